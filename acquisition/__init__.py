@@ -4,7 +4,3 @@
 sensor, `sample` is the record of one cycle and `schema` its layout in the file. Begin
 with `control_loop`; `ipc`, `recording` and `trial_file` carry its samples to the disk.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,7 +4,3 @@
 `study` fits and cross-validates them, `findings` computes what the report shows,
 `figures` and `report` draw and print it. Begin with `api`.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

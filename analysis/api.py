@@ -21,26 +21,19 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.breakaway import (
-    AvailableForce,
-    BreakAwayModel,
-    BreakAwayOptions,
-    BreakAwayRisk,
-)
-from analysis.breakaway import fit_break_away as fit_of_terrains
-from analysis.data import (
-    PreparedTrial,
-    PrepareOptions,
-    RecordedTrial,
-    SampleTable,
-    TractionSeries,
-    TrainingSet,
-    load_tables,
-    load_trial,
-    prepare_trial,
-    terrain_kind,
-)
-from analysis.study import (
+from analysis.breakaway.answers import AvailableForce, BreakAwayRisk
+from analysis.breakaway.fitting import fit_break_away as fit_of_terrains
+from analysis.breakaway.model import BreakAwayModel
+from analysis.breakaway.recorded import BreakAwayOptions
+from analysis.data.load import RecordedTrial, load_trial
+from analysis.data.prepare import PreparedTrial, PrepareOptions, prepare_trial
+from analysis.data.samples import SampleTable, TrainingSet
+from analysis.data.series import TractionSeries
+from analysis.data.tables import load_tables
+from analysis.data.terrain_kinds import terrain_kind
+from analysis.study.crossval import FoldResult, plan_folds, run_fold
+from analysis.study.jobs import run_tasks
+from analysis.study.models import (
     FITTERS,
     GP_NN,
     GP_NN_TUSTIN,
@@ -51,14 +44,12 @@ from analysis.study import (
     TUSTIN,
     FitOptions,
     FittedModel,
-    FoldResult,
     ModelFitter,
     TustinModel,
-    plan_folds,
-    run_fold,
-    run_tasks,
 )
-from analysis.terrains import SlipRisk, TerrainDatabase, load
+from analysis.terrains.database import load
+from analysis.terrains.known import TerrainDatabase
+from analysis.terrains.table import SlipRisk
 
 __all__ = [
     "FITTERS",

@@ -15,7 +15,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from acquisition import openblas_settings
+from acquisition.linear_algebra import openblas_settings
 from benchmarks.rows import BenchRow
 from benchmarks.surroundings import surroundings
 

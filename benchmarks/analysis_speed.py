@@ -15,16 +15,17 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from acquisition import keep_memory
-from analysis.data import PreparedTrial, PrepareOptions, load_trial, prepare_trial
-from analysis.findings import HeldTrial
-from analysis.study import run_fold
+from acquisition.linear_algebra import keep_memory
+from analysis.data.load import load_trial
+from analysis.data.prepare import PreparedTrial, PrepareOptions, prepare_trial
+from analysis.findings.held_trial import HeldTrial
+from analysis.study.crossval import run_fold
 from analysis.terrains.table import Table
 from benchmarks.fit import EVALUATION, chosen, load_rows, our_evaluation
 from benchmarks.rows import BenchRow
 from benchmarks.study_race import SLICE, folds_of
 from experiments.__main__ import main as traction
-from experiments.report import REPORTED
+from experiments.report.sessions import REPORTED
 
 _SECONDS = 30.0  # of a trial
 _HELD = 8  # trials that are held at once

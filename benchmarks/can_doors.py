@@ -22,18 +22,15 @@ from typing import Any
 
 from can.interfaces.socketcan import socketcan
 
-from acquisition import SystemClock
-from acquisition.control_loop import RealtimeRequest, request
+from acquisition.clock import SystemClock
+from acquisition.control_loop.realtime import RealtimeRequest, request
 from benchmarks.rows import BenchRow
-from wam.bus import (
-    MODERN,
+from wam.bus.datagrams import system_call
+from wam.bus.doors import PythonCanDoor
+from wam.bus.frames import (
     MOTOR_NODES,
     SENSOR_NODE,
-    CanLink,
-    Device,
-    Door,
     Group,
-    PythonCanDoor,
     encode_force,
     encode_get,
     encode_position,
@@ -41,10 +38,10 @@ from wam.bus import (
     encode_torques,
     group_id,
     position_reply_id,
-    property_number,
 )
-from wam.bus.datagrams import system_call
 from wam.bus.kernel_door import KernelDoor
+from wam.bus.link import CanLink, Door
+from wam.bus.properties import MODERN, Device, property_number
 
 GOAL_US = 45.0  # of the kernel's socket, per cycle
 _PERIOD_NS = 2_000_000

@@ -22,12 +22,14 @@ from typing import Any
 
 import numpy as np
 
-from analysis.data import PrepareOptions, load_tables, prepare_trial
-from analysis.study import FitOptions, Workers, run_fold, run_tasks
-from analysis.study.crossval import FoldPlan, plan_folds
+from analysis.data.prepare import PrepareOptions, prepare_trial
+from analysis.data.tables import load_tables
+from analysis.study.crossval import FoldPlan, plan_folds, run_fold
+from analysis.study.jobs import Workers, run_tasks
+from analysis.study.models import FitOptions
 from benchmarks.rows import BenchRow
 from benchmarks.study_race import SLICE
-from experiments.report import REPORTED
+from experiments.report.sessions import REPORTED
 
 FOLDS = 640  # 80 trials of each of 8 terrains
 LARGER = (8, 64)  # workers of the schedules

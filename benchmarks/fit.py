@@ -17,7 +17,7 @@ from scipy.optimize import least_squares
 from sklearn.gaussian_process import GaussianProcessRegressor
 from threadpoolctl import threadpool_limits
 
-from acquisition import keep_memory
+from acquisition.linear_algebra import keep_memory
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.samples import SampleTable
 from analysis.data.tables import load_tables

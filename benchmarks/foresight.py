@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition import PERIOD_NS
-from acquisition.trial_file import TrialReader
-from experiments.session import list_sessions
+from acquisition.clock import PERIOD_NS
+from acquisition.trial_file.reader import TrialReader
+from experiments.session.store import list_sessions
 
 _PERCENTILES = (50.0, 99.0, 99.9)
 _SETTINGS = (

@@ -20,19 +20,22 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.trial_file import TrialReader
+from acquisition.trial_file.reader import TrialReader
 from analysis.api import load_trial, prepare
-from analysis.data import RecordedTrial, Slip, find_slips
-from analysis.figures import new_figure, render, styled
+from analysis.data.events import Slip, find_slips
+from analysis.data.load import RecordedTrial
+from analysis.figures.style import new_figure, render, styled
 from benchmarks.friction_text import MEASURED, page_text
-from experiments.settings import load_settings
-from wam.calibration import (
+from experiments.settings.load import load_settings
+from wam.calibration.friction_file import friction_from_toml
+from wam.calibration.friction_reach import (
     FrictionReach,
-    friction_from_toml,
     friction_reach,
     remaining_friction,
 )
-from wam.model import ArmModel, Body, Tool
+from wam.model.arm_model import ArmModel
+from wam.model.constants import Body
+from wam.model.tool import Tool
 
 _REST_NS = 400_000_000  # in which the foot stands, before the hand pushes
 _PUSHED = 0.5  # N, horizontal, of a hand that begins to push

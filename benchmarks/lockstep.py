@@ -21,18 +21,18 @@ from typing import Any, ParamSpec, TypeVar
 from unittest.mock import patch
 
 from acquisition.control_loop.states import ArmState
-from acquisition.recording import Recorder
+from acquisition.recording.recorder import Recorder
 from acquisition.trial_file.writer import TrialHeader
 from benchmarks.rows import BenchRow
 from experiments.rig.rig import FakeOptions, Rig, build_rig
 from experiments.settings.load import load_settings
-from fakes.bus import FakeCanBus, InProcessDoor
-from fakes.plant import ArmPlant
-from fakes.sensor import FakeSerialPort
-from ft_sensor import LiveFoot
-from ft_sensor.serial_line import SerialSensor
-from wam.control import FootController
-from wam.driver import WamArm
+from fakes.bus.in_process import FakeCanBus, InProcessDoor
+from fakes.plant.plant import ArmPlant
+from fakes.sensor.port import FakeSerialPort
+from ft_sensor.payload import LiveFoot
+from ft_sensor.serial_line.sensor import SerialSensor
+from wam.control.controller import FootController
+from wam.driver.arm import WamArm
 
 GOAL = 15.0  # times real time, with recorder
 TERRAIN = "S0"

@@ -22,7 +22,7 @@ import pinocchio as pin
 from acquisition.clock import PERIOD_NS
 from fakes.ground.contact import Contact, Motion
 from fakes.ground.terrain import Terrain, make_terrain
-from fakes.kernels import COMPILED, PINOCCHIO, chosen_dynamics
+from fakes.kernels.choice import COMPILED, PINOCCHIO, chosen_dynamics
 from fakes.plant.model import PlantOptions
 from fakes.plant.plant import ArmPlant
 from fakes.plant.push import HandView, Pace, Push, Vector3
@@ -139,7 +139,7 @@ def _run(
     plant = _plant(model, dynamics)
     plant.terrain = _ground() if notes is None else _NotedGround(notes)
     if plant.is_compiled:
-        from fakes.ground.compiled import compiled_ground
+        from fakes.ground.compiled.grounds import compiled_ground
 
         plant.terrain = compiled_ground(plant.terrain)
     plant.set_braking(is_braked=False, is_powered=True)

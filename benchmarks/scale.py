@@ -22,7 +22,8 @@ from typing import Any
 
 import numpy as np
 
-from analysis.study import FitOptions, plan_folds
+from analysis.study.crossval import plan_folds
+from analysis.study.models import FitOptions
 from analysis.study.store import task_key
 from benchmarks.made_sessions import TERRAINS, make_sessions
 from benchmarks.rows import BenchRow
@@ -104,7 +105,7 @@ def shipped_bytes() -> int:
     """
     from distributed.protocol.pickle import dumps
 
-    from analysis.study import run_fold
+    from analysis.study.crossval import run_fold
 
     return len(dumps((run_fold, 799, "future")))
 

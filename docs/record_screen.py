@@ -22,7 +22,7 @@ import termios
 from collections.abc import Iterator
 from pathlib import Path
 
-from acquisition import NS_PER_S, SystemClock
+from acquisition.clock import NS_PER_S, SystemClock
 
 _CLOCK = SystemClock()
 COLUMNS, ROWS = 80, 24

@@ -13,7 +13,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from acquisition import NS_PER_S, SystemClock
+from acquisition.clock import NS_PER_S, SystemClock
 
 SIZES = ((80, 24), (60, 20))
 FAULT = ("--fault", "ft-stale@T2+2s")

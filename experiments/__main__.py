@@ -12,7 +12,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NoReturn
 
-from acquisition import TractionError, openblas_settings
+from acquisition.errors import TractionError
+from acquisition.linear_algebra import openblas_settings
 from experiments.arguments import (
     add_global_options,
     did_you_mean,
@@ -182,7 +183,7 @@ def _complete() -> None:
 
 def _report_disk(error: OSError) -> int:
     """Say that a disk refused what no command had expected it to."""
-    from acquisition import TrialFileError
+    from acquisition.errors import TrialFileError
 
     refusal = TrialFileError(
         Path(str(error.filename or "a file")),

@@ -138,7 +138,7 @@ def friction_share(args: Namespace) -> float:
         SettingsError: the number is none that is simulated, or the arm is the twin of
             one whose friction is known.
     """
-    from acquisition import SettingsError
+    from acquisition.errors import SettingsError
 
     if args.friction is None:
         return FRICTION

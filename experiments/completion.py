@@ -7,7 +7,7 @@ from pathlib import Path
 
 from argcomplete.completers import BaseCompleter, FilesCompleter
 
-from acquisition import TractionError
+from acquisition.errors import TractionError
 
 
 class NameCompleter(BaseCompleter):
@@ -51,21 +51,21 @@ def _names(place: str, dest: str, args: argparse.Namespace) -> Iterable[str] | N
 
 
 def _terrains(args: argparse.Namespace) -> list[str]:
-    from experiments.settings import load_settings
+    from experiments.settings.load import load_settings
 
     rows = load_settings(getattr(args, "config", None)).matrix.terrains
     return [row.name for row in rows]
 
 
 def _sessions(args: argparse.Namespace) -> list[str]:
-    from experiments.session import list_sessions
+    from experiments.session.store import list_sessions
 
     return [folder.id for folder in list_sessions(_data(args))]
 
 
 def _trials(args: argparse.Namespace) -> list[str]:
-    from acquisition.trial_file import list_folder
-    from experiments.session import find_session
+    from acquisition.trial_file.data_files import list_folder
+    from experiments.session.store import find_session
 
     folder = find_session(_data(args), str(args.session))
     kept = list_folder(folder.trials, "T??.mcap")
@@ -74,9 +74,9 @@ def _trials(args: argparse.Namespace) -> list[str]:
 
 def _faults(args: argparse.Namespace) -> list[str]:
     """Return what a simulated rig of these settings can be made to do."""
-    from experiments.fault_injection import COMPUTER_FAULTS
-    from experiments.rig import FakeOptions, build_rig
-    from experiments.settings import load_settings
+    from experiments.fault_injection.host_faults import COMPUTER_FAULTS
+    from experiments.rig.rig import FakeOptions, build_rig
+    from experiments.settings.load import load_settings
 
     settings = load_settings(getattr(args, "config", None))
     fake = FakeOptions(is_fast=True, seed=1, is_brief=True)

@@ -9,9 +9,16 @@ from importlib import resources
 from pathlib import Path
 from string import Formatter
 
-from acquisition import BusCondition, PreflightError, SafetyMode
-from acquisition.control_loop import CircuitCauses, Fault, GuardVerdict, ReplySilence
-from experiments.operator import AFTER_FAULT, Prompt
+from acquisition.control_loop.faults import (
+    CircuitCauses,
+    Fault,
+    GuardVerdict,
+    ReplySilence,
+)
+from acquisition.devices import BusCondition, SafetyMode
+from acquisition.errors import PreflightError
+from experiments.operator.keys import AFTER_FAULT
+from experiments.operator.prompts import Prompt
 
 RESUME = "traction resume"
 REPORT = "traction report"

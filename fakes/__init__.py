@@ -4,7 +4,3 @@
 bytes; `world` joins them, `serving` gives them to other processes. Begin with
 `world.rig`.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

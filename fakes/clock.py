@@ -2,7 +2,7 @@
 
 from typing import Protocol
 
-from acquisition import Readable
+from acquisition.clock import Readable
 
 START_NS = 1_000_000_000_000
 EPOCH_UTC_NS = 1_800_000_000_000_000_000  # 2027-01-15T08:00:00Z

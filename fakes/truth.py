@@ -4,9 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from acquisition import TRUTH, Record
-from ft_sensor import TerrainFrame
-from wam.model import Array
+from acquisition.sample import Record
+from acquisition.schema import TRUTH
+from ft_sensor.payload import TerrainFrame
+from wam.model.constants import Array
 
 MOST_ROWS = 60_000  # two minutes; a trial lasts half of one at most
 

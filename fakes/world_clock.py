@@ -1,6 +1,6 @@
 """The time of a simulated world that other processes see on the wall clock."""
 
-from acquisition import PERIOD_NS, Clock, Readable
+from acquisition.clock import PERIOD_NS, Clock, Readable
 
 TICK_NS = PERIOD_NS  # a served world goes on at least this often
 _LONGEST_STEP_NS = 10 * TICK_NS

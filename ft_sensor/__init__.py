@@ -4,7 +4,3 @@
 foot in the terrain's frame, `tare` is the reading without load. Makes live in
 `vendors`. Begin with `payload`.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -16,9 +16,12 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import ArmReading, Sample, WrenchSample
-from acquisition.control_loop import FootObserver
-from wam.model import GRAVITY, ArmModel, Array, Tool
+from acquisition.control_loop.law import FootObserver
+from acquisition.devices import ArmReading, WrenchSample
+from acquisition.sample import Sample
+from wam.model.arm_model import ArmModel
+from wam.model.constants import GRAVITY, Array
+from wam.model.tool import Tool
 
 Floats = NDArray[np.float64]
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from itertools import repeat
 from operator import mul
 
-from acquisition import are_within
+from acquisition.bounds import are_within
 
 Wrench = tuple[float, float, float, float, float, float]
 

@@ -4,8 +4,9 @@ from typing import Literal
 
 from pydantic import Field
 
-from acquisition import File, Mass, Number, SettingsSection, Whole
-from ft_sensor.serial_line import PortSettings, SerialDevice
+from acquisition.settings import File, Mass, Number, SettingsSection, Whole
+from ft_sensor.serial_line.link import PortSettings
+from ft_sensor.serial_line.sensor import SerialDevice
 
 
 class SensorSection(SettingsSection):

@@ -7,9 +7,11 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import NS_PER_S, RATE_HZ, TractionError, WrenchSample
+from acquisition.clock import NS_PER_S, RATE_HZ
+from acquisition.devices import WrenchSample
+from acquisition.errors import TractionError
 from ft_sensor.payload import Payload
-from wam.model import Array
+from wam.model.constants import Array
 
 Wrench = tuple[float, float, float, float, float, float]
 

@@ -11,7 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
-from acquisition import NS_PER_S, SystemClock
+from acquisition.clock import NS_PER_S, SystemClock
 from lab import initramfs, report, timer_rate
 from lab.follower import PANICKED, Follower
 from lab.guest.scenarios.registry import ALL, Scenario, chosen

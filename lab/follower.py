@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
-from acquisition import NS_PER_S, SystemClock
+from acquisition.clock import NS_PER_S, SystemClock
 from lab import report, timer_rate
 from lab.machine import SLOWNESS
 from lab.results import (

@@ -10,7 +10,7 @@ import threading
 from dataclasses import dataclass
 from pathlib import Path
 
-from acquisition import NS_PER_S, SystemClock
+from acquisition.clock import NS_PER_S, SystemClock
 from lab.calls import MEMORY_SIZE
 from lab.kernel import Kernel
 from lab.requirements import program

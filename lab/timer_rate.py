@@ -14,7 +14,7 @@ import socket
 import struct
 from pathlib import Path
 
-from acquisition import NS_PER_S, SystemClock
+from acquisition.clock import NS_PER_S, SystemClock
 from lab.requirements import LabError
 from lab.results import TimerAddresses
 

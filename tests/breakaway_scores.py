@@ -18,21 +18,14 @@ from pathlib import Path
 import numpy as np
 
 from analysis.api import GP_SE, FitOptions, fit_gp, prepare
-from analysis.breakaway import (
-    BreakAwayModel,
-    BreakAwayOptions,
-    FootPush,
-    find_pushes,
-    fit_break_away,
-    kaplan_meier,
-    pit_distance,
-)
-from analysis.data import (
-    PreparedTrial,
-    groups_of,
-    load_tables,
-    terrain_kind,
-)
+from analysis.breakaway.fitting import fit_break_away
+from analysis.breakaway.model import BreakAwayModel
+from analysis.breakaway.pushes import FootPush, find_pushes
+from analysis.breakaway.recorded import BreakAwayOptions
+from analysis.breakaway.survival import kaplan_meier, pit_distance
+from analysis.data.prepare import PreparedTrial
+from analysis.data.tables import load_tables
+from analysis.data.terrain_kinds import groups_of, terrain_kind
 
 REQUIRED = np.arange(2.0, 20.5, 1.0)  # N
 BINS = 10

@@ -31,7 +31,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def pytest_sessionstart(session: pytest.Session) -> None:
     """Compile the simulation once, before several workers do it at the same time."""
-    from fakes.kernels import is_compiled_first
+    from fakes.kernels.choice import is_compiled_first
     from tests.fakes.scenes import make_plant
 
     if not hasattr(session.config, "workerinput") and is_compiled_first():

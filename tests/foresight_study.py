@@ -19,29 +19,18 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.data import (
-    RecordedTrial,
-    load_tables,
-    load_trial,
-    parse_columns,
-    terrain_kind,
-)
-from analysis.foresight import (
-    Foresight,
-    ForesightModel,
-    ForesightRun,
-    RigIdentity,
-    WatchedTrial,
-    fit_foresight,
-    foresee,
-    ground_answers,
-    hold_out,
-    score_ground,
-    score_slips,
-    watch_all,
-    watch_series,
-)
-from experiments.rig import state_record
+from analysis.data.columns import parse_columns
+from analysis.data.load import RecordedTrial, load_trial
+from analysis.data.tables import load_tables
+from analysis.data.terrain_kinds import terrain_kind
+from analysis.foresight.engine import Foresight
+from analysis.foresight.held_out import foresee, hold_out
+from analysis.foresight.model import ForesightModel, RigIdentity
+from analysis.foresight.scores import ground_answers, score_ground, score_slips
+from analysis.foresight.ticks import ForesightRun
+from analysis.foresight.training import fit_foresight
+from analysis.foresight.watching import WatchedTrial, watch_all, watch_series
+from experiments.rig.foresight import state_record
 from tests.analysis.foresight.databases import BREAKS
 
 LEAST_RECALL, LEAST_OF_ONE, LEAST_LEAD = 0.80, 0.75, 0.1

@@ -19,8 +19,9 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.friction_text import with_calibrations
-from wam.calibration import joint_breakaway, speed_curve
-from wam.model import friction_of, load_constants
+from wam.calibration.joint_friction import joint_breakaway, speed_curve
+from wam.model.constants import load_constants
+from wam.model.friction import friction_of
 
 SHARES, SEEDS = (0.2, 0.4, 1.0), (1, 2, 3, 4, 5)
 COULOMB, ASYMMETRY, BREAKAWAY = 0.1, 0.2, 0.15

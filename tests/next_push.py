@@ -21,10 +21,12 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.data import PreparedTrial, PrepareOptions, prepare_trial
-from analysis.next_push import Knowledge, PushRecord, advise, push_record, stopping_of
+from analysis.data.prepare import PreparedTrial, PrepareOptions, prepare_trial
+from analysis.next_push.advice import advise
 from analysis.next_push.aims import AIMS
-from analysis.next_push.stopping import points_of, slip_information
+from analysis.next_push.knowledge import Knowledge
+from analysis.next_push.records import PushRecord, push_record
+from analysis.next_push.stopping import points_of, slip_information, stopping_of
 from fakes.plant.push import Pace
 from tests.fakes.point_foot import GROUNDS, PointFoot
 

@@ -17,18 +17,12 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.data import (
-    FLAT,
-    PooledSamples,
-    PrepareOptions,
-    SampleTable,
-    TractionSeries,
-    TrainingSet,
-    load_tables,
-    load_trial,
-    prepare_trial,
-    terrain_kind,
-)
+from analysis.data.load import load_trial
+from analysis.data.prepare import PrepareOptions, prepare_trial
+from analysis.data.samples import PooledSamples, SampleTable, TrainingSet
+from analysis.data.series import TractionSeries
+from analysis.data.tables import load_tables
+from analysis.data.terrain_kinds import FLAT, terrain_kind
 from analysis.gp.kernels import SquaredExponential
 from analysis.gp.likelihood import Likelihood
 from analysis.gp.search import climb_from, spread
@@ -38,7 +32,7 @@ from analysis.study.metrics import Score, score
 from analysis.study.models import GP_SE_NOISE, GP_SE_TRIAL, FitOptions, ModelFitter
 from analysis.study.new_trial import NORMAL, NewTrialFit, NewTrialModel
 from analysis.study.skew import warped
-from experiments.session import list_sessions
+from experiments.session.store import list_sessions
 
 BEFORE, EFFECT, NEW = "noise chosen", "trial effect alone", "new trial"
 MODELS = (BEFORE, EFFECT, NEW)

@@ -17,17 +17,14 @@ from multiprocessing import get_context
 from multiprocessing.pool import Pool
 from pathlib import Path
 
-from analysis.figures import render, styled
-from analysis.foresight import ForesightModel, RiskTable
-from analysis.report import draw_stances
-from analysis.stance import (
-    POLICIES,
-    StancePlan,
-    StanceRequest,
-    StanceTotals,
-    risk_tables,
-    totals,
-)
+from analysis.figures.style import render, styled
+from analysis.foresight.engine import RiskTable
+from analysis.foresight.model import ForesightModel
+from analysis.report.stance_page import draw_stances
+from analysis.stance.outcomes import StanceTotals, totals
+from analysis.stance.policies import POLICIES
+from analysis.stance.seam import StanceRequest, risk_tables
+from analysis.stance.sequence import StancePlan
 from tests.fakes.point_foot import GROUNDS
 from tests.fakes.stance_bench import (
     TRAVEL,

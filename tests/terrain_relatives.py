@@ -17,17 +17,16 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.data import PrepareOptions, TractionSeries, prepare_trial
-from analysis.study import (
-    GP_SE_TRIAL,
-    FitOptions,
+from analysis.data.prepare import PrepareOptions, prepare_trial
+from analysis.data.series import TractionSeries
+from analysis.study.crossval import plan_folds, run_fold
+from analysis.study.jobs import run_tasks
+from analysis.study.models import GP_SE_TRIAL, FitOptions
+from analysis.study.relatives import (
     RelativesOutcome,
     grounds_of,
-    plan_folds,
     plan_relatives,
-    run_fold,
     run_relatives,
-    run_tasks,
 )
 from tests.predictive_bands import load_study
 

@@ -9,9 +9,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from analysis.data import load_tables
-from analysis.study import GP_SE, FitOptions, StudyOptions, run_study
-from analysis.terrains import KEPT_PER_SECOND, Identification, identify_study
+from analysis.data.tables import load_tables
+from analysis.study.models import GP_SE, FitOptions
+from analysis.study.study import StudyOptions, run_study
+from analysis.terrains.identify import KEPT_PER_SECOND, Identification, identify_study
 
 LEAST_RIGHT = {50: 0.96, 100: 0.98, 200: 0.99}
 MOST_ERROR, MOST_FALSE = 0.05, 0.06

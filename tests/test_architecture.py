@@ -1,8 +1,132 @@
-import pytest
+"""The structure of the code: cycles, names, docstrings; `make contracts` has layers."""
 
-from tests.architecture import measures
+import ast
+import re
+from collections import defaultdict
+from collections.abc import Iterator
+from functools import cache
+from graphlib import TopologicalSorter
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = (
+    "acquisition",
+    "wam",
+    "ft_sensor",
+    "experiments",
+    "analysis",
+    "fakes",
+    "traction",
+)
+# Public by their documentation: os, namedtuple, python-can.
+DOCUMENTED = frozenset({"_exit", "_replace", "_asdict", "_recv_internal"})
 
 
-@pytest.mark.parametrize("measure", measures(), ids=lambda measure: measure.name)
-def test_the_structure_stays_within_its_limits(measure):
-    assert measure.is_met, "\n".join(measure.where)
+@cache
+def sources() -> dict[str, Path]:
+    """Return the file of every module; a package has the name of its folder."""
+    files = {}
+    for package in PACKAGES:
+        for path in sorted((ROOT / package).rglob("*.py")):
+            parts = path.relative_to(ROOT).with_suffix("").parts
+            files[".".join(parts).removesuffix(".__init__")] = path
+    return files
+
+
+@cache
+def tree_of(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(), str(path))
+
+
+def package_of(module: str) -> str:
+    is_package = sources()[module].name == "__init__.py"
+    return module if is_package else module.rpartition(".")[0]
+
+
+def imported(module: str) -> Iterator[str]:
+    """Yield the project's own modules that `module` imports."""
+    for node in ast.walk(tree_of(sources()[module])):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names if alias.name in sources())
+        elif isinstance(node, ast.ImportFrom) and node.module in sources():
+            for alias in node.names:
+                inner = f"{node.module}.{alias.name}"
+                yield inner if inner in sources() else str(node.module)
+
+
+def lines_about(node: ast.ClassDef | ast.FunctionDef) -> set[str]:
+    """Return the names that begin an entry of `Attributes:` or `Args:`."""
+    docstring = ast.get_docstring(node) or ""
+    sections = re.findall(
+        r"^(?:Attributes|Args):\n((?:    .*\n?|\n)*)", docstring, re.M
+    )
+    entries = re.findall(r"^    ([\w*, ]+):(?: |$)", "".join(sections), re.M)
+    return {name.strip(" *") for entry in entries for name in entry.split(",")}
+
+
+def defined_names(node: ast.ClassDef | ast.FunctionDef) -> set[str]:
+    """Return every attribute, method and parameter that `node` defines."""
+    inner = list(ast.walk(node))
+    return {
+        *(n.arg for n in inner if isinstance(n, ast.arg)),
+        *(n.id for n in inner if isinstance(n, ast.Name)),
+        *(n.attr for n in inner if isinstance(n, ast.Attribute)),
+        *(n.name for n in inner if isinstance(n, ast.FunctionDef)),
+    }
+
+
+def test_packages_import_each_other_without_cycles():
+    graph = defaultdict(set)
+    for module in sources():
+        for target in imported(module):
+            ours, theirs = package_of(module), package_of(target)
+            if ours != theirs and not ours.startswith(theirs + "."):
+                graph[ours].add(theirs)
+    TopologicalSorter(graph).prepare()  # raises CycleError, which names the cycle
+
+
+def test_a_class_name_means_one_class():
+    where = defaultdict(list)
+    for module, path in sources().items():
+        for node in ast.walk(tree_of(path)):
+            if isinstance(node, ast.ClassDef):
+                where[node.name].append(module)
+    assert {name: w for name, w in where.items() if len(w) > 1} == {}
+
+
+def test_tests_use_only_what_objects_offer():
+    found = []
+    for path in sorted((ROOT / "tests").rglob("*.py")):
+        for node in ast.walk(tree_of(path)):
+            if not isinstance(node, ast.Attribute) or not node.attr.startswith("_"):
+                continue
+            owner = node.value.id if isinstance(node.value, ast.Name) else ""
+            is_public = node.attr.startswith("__") or node.attr in DOCUMENTED
+            if owner not in {"self", "cls"} and not is_public:
+                found.append(f"{path.relative_to(ROOT)}:{node.lineno} {node.attr}")
+    assert found == []
+
+
+def test_every_package_says_what_it_is_for():
+    silent = [
+        name
+        for name, path in sources().items()
+        if path.name == "__init__.py"
+        and len((ast.get_docstring(tree_of(path)) or "").split("\n")) < 2
+    ]
+    assert silent == []
+
+
+def test_docstrings_describe_only_names_that_exist():
+    stale = [
+        f"{module}.{node.name}: {name}"
+        for module, path in sources().items()
+        for node in ast.walk(tree_of(path))
+        if isinstance(node, ast.ClassDef | ast.FunctionDef)
+        for name in sorted(lines_about(node) - defined_names(node))
+    ]
+    assert stale == []
+
+
+def test_packages_need_no_stubs_of_their_own():
+    assert [p for name in PACKAGES for p in (ROOT / name).rglob("*.pyi")] == []

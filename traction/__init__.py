@@ -16,13 +16,55 @@ ordinary slip, F_n in compression. `analysis.api` has the functions below these.
 Begin with `loading`, then `models`.
 """
 
-from typing import Any
-
-import lazy_loader
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from traction.installation import check_packages
 
-_load, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+if TYPE_CHECKING:
+    from traction.loading import load_session, load_tables, load_trial
+    from traction.models import (
+        Comparison,
+        Model,
+        ModelScore,
+        compare,
+        fit,
+        load_terrains,
+    )
+    from traction.trial_sets import TrialSet
+    from traction.trials import Trial
+
+    __version__: str
+
+# Loaded when first asked for: the program `traction` starts through this package.
+_MODULES = {
+    "Comparison": "models",
+    "Model": "models",
+    "ModelScore": "models",
+    "Trial": "trials",
+    "TrialSet": "trial_sets",
+    "compare": "models",
+    "fit": "models",
+    "load_session": "loading",
+    "load_tables": "loading",
+    "load_terrains": "models",
+    "load_trial": "loading",
+}
+
+__all__ = [
+    "Comparison",
+    "Model",
+    "ModelScore",
+    "Trial",
+    "TrialSet",
+    "check_packages",
+    "compare",
+    "fit",
+    "load_session",
+    "load_tables",
+    "load_terrains",
+    "load_trial",
+]
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401
@@ -31,4 +73,10 @@ def __getattr__(name: str) -> Any:  # noqa: ANN401
         from importlib.metadata import version
 
         return version("traction")
-    return _load(name)
+    if name not in _MODULES:
+        raise AttributeError(f"module 'traction' has no attribute '{name}'")
+    return getattr(import_module(f"traction.{_MODULES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from acquisition import MissingLibraryError
+from acquisition.errors import MissingLibraryError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

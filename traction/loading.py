@@ -3,9 +3,10 @@
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from acquisition import SessionError, SettingsError
+from acquisition.errors import SessionError, SettingsError
 from analysis import api
-from experiments.session import check_kept, find_session
+from experiments.session.kept_files import check_kept
+from experiments.session.store import find_session
 from traction.trial_sets import TrialSet
 from traction.trials import Trial, trial_of
 

@@ -10,10 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from acquisition import SettingsError
+from acquisition.errors import SettingsError
 from analysis import api
-from analysis.study import TITLES, Distribution, FoldResult, mean_of, standard_error
-from analysis.tustin import UNITS
+from analysis.study.crossval import FoldResult
+from analysis.study.distribution import Distribution
+from analysis.study.metrics import standard_error
+from analysis.study.models import TITLES
+from analysis.study.terrain_fit import mean_of
+from analysis.tustin.model import UNITS
 from traction.frames import data_frame
 from traction.trial_sets import by_terrain
 from traction.trials import Trial

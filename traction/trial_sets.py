@@ -8,15 +8,16 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
-from acquisition import SettingsError
+from acquisition.errors import SettingsError
 from analysis import api
-from analysis.data import terrain_kind
-from experiments.report import KEPT, columns_of
+from analysis.data.terrain_kinds import terrain_kind
+from experiments.report.quantities import KEPT
+from experiments.report.table_columns import columns_of
 from traction.frames import data_frame
 from traction.trials import SERIES_UNITS, Trial
 
 if TYPE_CHECKING:
-    from analysis.figures import Figure
+    from analysis.figures.style import Figure
     from traction.frames import DataFrame
 
 

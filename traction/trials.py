@@ -6,12 +6,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from analysis import api
-from analysis.data import Array, prepare_trial
-from experiments.report import KEPT, QUANTITIES, TableColumn, columns_of
+from analysis.data.prepare import prepare_trial
+from analysis.data.series import Array
+from experiments.report.quantities import KEPT, QUANTITIES
+from experiments.report.table_columns import TableColumn, columns_of
 from traction.frames import data_frame
 
 if TYPE_CHECKING:
-    from analysis.figures import Figure
+    from analysis.figures.style import Figure
     from traction.frames import DataFrame
 
 SERIES_UNITS = {"t": "s", "v_t": "m/s", "F_n": "N", "F_t": "N"}

@@ -4,7 +4,3 @@
 kinematics and gravity, `control` the torques, `calibration` what is measured of it.
 Begin with `driver.arm`.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,7 +4,3 @@
 limits and observations into verdicts, `states` says what the arm may be doing and what
 each event does to it. Begin with `cycle`; nothing here waits, logs or opens a file.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -5,7 +5,3 @@ of `rings`): the console sends `commands` through `loop_client`, `loop_server` o
 publishes. Between trials they call each other (`rpc`) over a socket pair; `child`
 spawns and watches them. Begin with `layout`.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from acquisition.control_loop import die_with_parent
+from acquisition.control_loop.realtime import die_with_parent
 from acquisition.errors import TractionError
 from acquisition.ipc.channel import Channel, ChannelClosedError
 from acquisition.ipc.layout import SharedLayout

@@ -6,13 +6,8 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Final
 
-from acquisition.control_loop import (
-    ArmState,
-    ControlStatus,
-    GuardVerdict,
-    from_plain,
-    to_plain,
-)
+from acquisition.control_loop.faults import GuardVerdict, from_plain, to_plain
+from acquisition.control_loop.states import ArmState, ControlStatus
 from acquisition.devices import BusCondition, SafetyMode
 from acquisition.ipc.rings import Ring, Slot
 

@@ -5,7 +5,8 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from acquisition.clock import NS_PER_S, PERIOD_NS, Clock
-from acquisition.control_loop import ArmState, ControlStatus, SoleGoal
+from acquisition.control_loop.law import SoleGoal
+from acquisition.control_loop.states import ArmState, ControlStatus
 from acquisition.ipc.commands import CommandKind, CommandQueue, LoopStatus, StatusSlot
 from acquisition.ipc.layout import ProcessRole, SharedLayout
 from acquisition.ipc.rings import RingReader

@@ -5,16 +5,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from acquisition.clock import RATE_HZ
-from acquisition.control_loop import (
-    ArmState,
-    Cycle,
-    Fault,
-    LoopStats,
-    SoleGoal,
-    Tick,
-    pack_timing,
-    verdict_for,
-)
+from acquisition.control_loop.cycle import Cycle
+from acquisition.control_loop.faults import Fault, verdict_for
+from acquisition.control_loop.law import SoleGoal
+from acquisition.control_loop.loop import LoopStats, Tick
+from acquisition.control_loop.states import ArmState
+from acquisition.control_loop.timing import pack_timing
 from acquisition.devices import Arm
 from acquisition.ipc.commands import (
     Command,

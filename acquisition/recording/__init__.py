@@ -3,7 +3,3 @@
 `recorder` drains the rings into a `TrialWriter`, ends a file, reads it back and gives
 it its final name; `recorder_process` is the same in a process of its own.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -11,18 +11,17 @@ import numpy as np
 
 from acquisition.clock import RATE_HZ, Clock
 from acquisition.errors import TrialFileError
-from acquisition.ipc import ProcessRole, SharedLayout
+from acquisition.ipc.layout import ProcessRole, SharedLayout
 from acquisition.sample import Record
-from acquisition.trial_file import (
+from acquisition.trial_file.data_files import claimed_folder
+from acquisition.trial_file.header import TrialHeader
+from acquisition.trial_file.verify import VerifiedFile, verify_file
+from acquisition.trial_file.writer import (
     FLIGHT_TOPICS,
     FORESIGHT_TOPICS,
     TRIAL_TOPICS,
-    TrialHeader,
     TrialWriter,
-    VerifiedFile,
-    claimed_folder,
     publish,
-    verify_file,
 )
 
 FLUSH_NS = 250_000_000

@@ -6,21 +6,16 @@ from pathlib import Path
 from typing import Any
 
 from acquisition.clock import SystemClock
-from acquisition.control_loop import RealtimeRequest, request
+from acquisition.control_loop.realtime import RealtimeRequest, request
 from acquisition.errors import TrialFileError
-from acquisition.ipc import (
-    ChannelClosedError,
-    Child,
-    ChildContext,
-    RpcServer,
-    SharedLayout,
-    bind,
-    give_back_heap,
-    make_proxy,
-    name_process,
-)
+from acquisition.ipc.channel import ChannelClosedError
+from acquisition.ipc.child import Child, ChildContext, name_process
+from acquisition.ipc.layout import SharedLayout
+from acquisition.ipc.rings import give_back_heap
+from acquisition.ipc.rpc import RpcServer, bind, make_proxy
 from acquisition.recording.recorder import Recorder, TrialRecording
-from acquisition.trial_file import TrialHeader, VerifiedFile
+from acquisition.trial_file.header import TrialHeader
+from acquisition.trial_file.verify import VerifiedFile
 
 DRAIN_S = 0.02
 NICE = 5

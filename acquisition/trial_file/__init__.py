@@ -4,7 +4,3 @@
 have been checked, `verify` reads a file back completely, `recover` saves what is sound
 in a damaged one. The only package that imports mcap. Begin with `writer`.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

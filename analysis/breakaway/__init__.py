@@ -3,7 +3,3 @@
 `pushes` cuts trials into pushes that slipped or held, `fitting` fits the model of their
 peak forces, `model` answers: the risk of a slip, the force available at a risk.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from acquisition import SettingsError
+from acquisition.errors import SettingsError
 
 
 @dataclass(frozen=True, slots=True)

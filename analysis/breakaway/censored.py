@@ -21,7 +21,7 @@ from functools import cache
 import numpy as np
 
 from analysis.breakaway.pushes import PushTable
-from analysis.data import Array
+from analysis.data.series import Array
 
 NODES = 15
 _LOG_SPREAD = (float(np.log(0.35)), 0.5)  # prior of log s: mean, sd

@@ -22,7 +22,9 @@ from analysis.breakaway.recorded import (
     plan_break_away,
 )
 from analysis.breakaway.survival import pit_distance
-from analysis.data import Array, PreparedTrial, groups_of
+from analysis.data.prepare import PreparedTrial
+from analysis.data.series import Array
+from analysis.data.terrain_kinds import groups_of
 
 ROCKY = "rocky"
 LEAST_TRIALS = 3

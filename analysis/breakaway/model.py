@@ -20,7 +20,7 @@ from analysis.breakaway.answers import (
 )
 from analysis.breakaway.censored import Family, nodes, share_below
 from analysis.breakaway.pushes import log_load
-from analysis.data import Array
+from analysis.data.series import Array
 
 BREAK_AWAY, SLIDING = "break-away", "sliding"
 INTERVAL = (0.05, 0.95)  # of the trial bootstraps: 90 %

@@ -18,7 +18,8 @@ from functools import cached_property
 
 import numpy as np
 
-from analysis.data import Array, Indices, PreparedTrial, Smoothed
+from analysis.data.prepare import PreparedTrial, Smoothed
+from analysis.data.series import Array, Indices
 
 V_SLIP = 0.06  # m/s
 _END_SPEED = 0.03  # m/s below which a slip has ended

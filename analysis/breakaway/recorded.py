@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from itertools import chain
 
 from analysis.breakaway.pushes import V_SLIP, FootPush, find_pushes
-from analysis.data import Array, PreparedTrial
+from analysis.data.prepare import PreparedTrial
+from analysis.data.series import Array
 
 _SLOW, _FAST = 0.005, 0.02  # m/s of sliding
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.data import Array
+from analysis.data.series import Array
 
 _KOLMOGOROV = 1.36  # 95 % point of sqrt(n) times the largest difference
 

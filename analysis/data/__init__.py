@@ -4,7 +4,3 @@
 `prepare` smooths, thins and windows it, `events` finds slips, `quality` grades
 coverage.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

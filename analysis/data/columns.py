@@ -10,7 +10,7 @@ from typing import TextIO
 
 import numpy as np
 
-from acquisition import SettingsError
+from acquisition.errors import SettingsError
 from analysis.data.series import Array
 
 COLUMNS = ("t", "v_t", "F_n", "F_t")

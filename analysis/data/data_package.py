@@ -16,7 +16,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from acquisition import SettingsError
+from acquisition.errors import SettingsError
 
 DESCRIPTOR = "datapackage.json"
 _LARGEST = 16_000_000  # bytes of a descriptor; a study of 80 trials has 2 million

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from acquisition import SettingsError
+from acquisition.errors import SettingsError
 from analysis.data.series import Array
 
 WINDOW = 0.03  # s that one parabola spans; faster changes are not seen

@@ -12,15 +12,19 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import Flag, Record, SettingsError, TrialFileError, parse_toml
-from acquisition.trial_file import TrialReader
+from acquisition.errors import SettingsError, TrialFileError
+from acquisition.sample import Flag, Record
+from acquisition.settings import parse_toml
+from acquisition.trial_file.reader import TrialReader
 from analysis.data.inertia import InertialForce, inertial_force
 from analysis.data.prepare import foot_velocity
 from analysis.data.series import TractionSeries
 from analysis.data.tare_bracket import TareBracket, read_bracket
-from ft_sensor import Payload, TerrainFrame, traction
-from ft_sensor.calibration import payload_from_toml, terrain_from_toml
-from wam.model import ArmConstants, ArmModel, Body, Tool, load_constants
+from ft_sensor.calibration.files import payload_from_toml, terrain_from_toml
+from ft_sensor.payload import Payload, TerrainFrame, traction
+from wam.model.arm_model import ArmModel
+from wam.model.constants import ArmConstants, Body, load_constants
+from wam.model.tool import Tool
 
 Array = NDArray[np.float64]
 Frame = Literal["terrain", "sole"]

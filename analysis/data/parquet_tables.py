@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from acquisition import MissingLibraryError, SettingsError
+from acquisition.errors import MissingLibraryError, SettingsError
 from analysis.data.data_package import TableOrigin
 from analysis.data.series import Array
 

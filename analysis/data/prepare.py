@@ -9,7 +9,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from acquisition import RATE_HZ, SettingsError
+from acquisition.clock import RATE_HZ
+from acquisition.errors import SettingsError
 from analysis.data.lag import ForceLag, force_lag
 from analysis.data.series import Array, Indices, TractionSeries
 

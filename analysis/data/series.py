@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import SettingsError
+from acquisition.errors import SettingsError
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from acquisition import SettingsError
+from acquisition.errors import SettingsError
 from analysis.data.columns import (
     COLUMNS,
     PREPARED,

@@ -8,7 +8,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from acquisition.trial_file import read_data
+from acquisition.trial_file.data_files import read_data
 from analysis.data.series import Array
 
 _AXES = 6

@@ -9,7 +9,7 @@ Any other terrain of unknown stones is a kind of its own, under its own name.
 from collections.abc import Iterable, Mapping
 from statistics import median
 
-from acquisition import SettingsError
+from acquisition.errors import SettingsError
 
 SMALL, BIG, FLAT = "small", "big", "flat"
 STONE_SIZES: Mapping[str, str] = {"small": SMALL, "big": BIG, "none": FLAT}

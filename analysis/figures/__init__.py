@@ -3,7 +3,3 @@
 `style` is the door to matplotlib, `selection` chooses what is drawn, every other module
 is one family of figures and ends with their list.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -10,7 +10,8 @@ from analysis.figures.style import (
     panel_grid,
     plain,
 )
-from analysis.findings import RISKS, StudyResults, TerrainBreakAway
+from analysis.findings.break_away import RISKS, TerrainBreakAway
+from analysis.findings.findings import StudyResults
 
 _CURVES = ("#0072B2", "#D55E00", "#009E73")
 _STYLES = ("-", "--", "-.")

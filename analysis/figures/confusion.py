@@ -13,8 +13,8 @@ from analysis.figures.style import (
     plain,
     shade_table,
 )
-from analysis.findings import StudyResults
-from analysis.terrains import KEPT_PER_SECOND, Confusion, Identification
+from analysis.findings.findings import StudyResults
+from analysis.terrains.identify import KEPT_PER_SECOND, Confusion, Identification
 
 _SIDE = 2.25  # inches of one matrix of terrains
 _SMALL_SIDE = 1.55  # of a matrix of two or three kinds

@@ -7,7 +7,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from analysis.data import Array, PrepareOptions, SampleTable
+from analysis.data.prepare import PrepareOptions
+from analysis.data.samples import SampleTable
+from analysis.data.series import Array
 from analysis.figures.sections import ReportSection
 from analysis.figures.selection import Panel, force_range, panels, representatives
 from analysis.figures.spec import FigureSpec
@@ -20,8 +22,9 @@ from analysis.figures.style import (
     panel_grid,
     plain,
 )
-from analysis.findings import StudyResults
-from analysis.study import GP_SE, GP_SE_TRIAL, TUSTIN, TerrainResult
+from analysis.findings.findings import StudyResults
+from analysis.study.models import GP_SE, GP_SE_TRIAL, TUSTIN
+from analysis.study.terrain_fit import TerrainResult
 
 
 def draw_tustin_model(results: StudyResults) -> Figure | None:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from analysis.data import FLAT
+from analysis.data.terrain_kinds import FLAT
 from analysis.figures.sections import ReportSection
 from analysis.figures.spec import FigureSpec
 from analysis.figures.style import (
@@ -19,8 +19,10 @@ from analysis.figures.style import (
     shade_table,
     terrain_colours,
 )
-from analysis.findings import StudyResults
-from analysis.study import FITTERS, GP_SE, TITLES, TUSTIN, Study, TerrainResult
+from analysis.findings.findings import StudyResults
+from analysis.study.models import FITTERS, GP_SE, TITLES, TUSTIN
+from analysis.study.study import Study
+from analysis.study.terrain_fit import TerrainResult
 
 _MOST_NARROW = 10  # terrains whose bars one column of a paper holds
 _MOST_BARS = 12  # terrains beyond which grouped bars cannot be told apart

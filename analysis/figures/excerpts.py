@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.data import PreparedTrial, find_slips
+from analysis.data.events import find_slips
+from analysis.data.prepare import PreparedTrial
 from analysis.figures.sections import ReportSection
 from analysis.figures.selection import TimeWindow, time_windows
 from analysis.figures.spec import FigureSpec
@@ -17,7 +18,7 @@ from analysis.figures.style import (
     plain,
     styled,
 )
-from analysis.findings import StudyResults
+from analysis.findings.findings import StudyResults
 
 
 def draw_excerpts(results: StudyResults) -> Figure | None:

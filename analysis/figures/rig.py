@@ -4,7 +4,8 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from analysis.data import JOINT7_WARNING, Array
+from analysis.data.quality import JOINT7_WARNING
+from analysis.data.series import Array
 from analysis.figures.sections import ReportSection
 from analysis.figures.spec import FigureSpec
 from analysis.figures.style import (
@@ -14,7 +15,8 @@ from analysis.figures.style import (
     new_figure,
     terrain_colours,
 )
-from analysis.findings import PERIOD_EDGES, SKEW_EDGES, RigTrial, StudyResults
+from analysis.findings.findings import StudyResults
+from analysis.findings.rig_health import PERIOD_EDGES, SKEW_EDGES, RigTrial
 
 
 def draw_timing(results: StudyResults) -> Figure | None:

@@ -5,8 +5,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.data import Array, SampleTable, Slip, Smoothed
-from analysis.study import Distribution, FittedModel, Study, TerrainResult
+from analysis.data.events import Slip
+from analysis.data.prepare import Smoothed
+from analysis.data.samples import SampleTable
+from analysis.data.series import Array
+from analysis.study.distribution import Distribution
+from analysis.study.models import FittedModel
+from analysis.study.study import Study
+from analysis.study.terrain_fit import TerrainResult
 
 WINDOW = 3.5  # s shown of a trial
 LOADS = (0.1, 0.5, 0.9)  # quantiles of F_n at which curves are drawn

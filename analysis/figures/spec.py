@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from analysis.figures.sections import ReportSection
 from analysis.figures.style import Figure
-from analysis.findings import StudyResults
+from analysis.findings.findings import StudyResults
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,7 +21,7 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from analysis.data import BIG, FLAT, SMALL
+from analysis.data.terrain_kinds import BIG, FLAT, SMALL
 from analysis.figures.pictures import Picture, png_of_few_colours
 
 __all__ = [

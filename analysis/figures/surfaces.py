@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.data import Array
+from analysis.data.series import Array
 from analysis.figures.sections import ReportSection
 from analysis.figures.selection import representatives
 from analysis.figures.spec import FigureSpec
@@ -21,7 +21,8 @@ from analysis.figures.style import (
     panel_grid,
     plain,
 )
-from analysis.findings import StudyResults, Surface, common_range
+from analysis.findings.findings import StudyResults
+from analysis.findings.surfaces import Surface, common_range
 
 _WIDE = 0.7  # decades from which a logarithmic scale has logarithmic ticks
 _MOST_DIGITS = 15

@@ -4,7 +4,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from analysis.data import Array, PreparedTrial, Smoothed, kind_title
+from analysis.data.prepare import PreparedTrial, Smoothed
+from analysis.data.series import Array
+from analysis.data.terrain_kinds import kind_title
 from analysis.figures.excerpts import shade_slip
 from analysis.figures.selection import representatives
 from analysis.figures.spec import FigureSpec
@@ -21,8 +23,9 @@ from analysis.figures.style import (
     styled,
     terrain_colours,
 )
-from analysis.findings import MEAN_FORCE, StudyResults, Trend
-from analysis.study import TerrainResult
+from analysis.findings.findings import StudyResults
+from analysis.findings.trends import MEAN_FORCE, Trend
+from analysis.study.terrain_fit import TerrainResult
 
 _MOST_TRIALS = 20  # side by side
 _MOST_POINTS = 400  # of a curve

@@ -14,8 +14,11 @@ from analysis.figures.style import (
     panel_grid,
     plain,
 )
-from analysis.findings import BINS, RESIDUAL_MODELS, StudyResults
-from analysis.study import GP_SE, TITLES, TerrainResult, mean_of, standard_error
+from analysis.findings.findings import RESIDUAL_MODELS, StudyResults
+from analysis.findings.new_trial_bands import BINS
+from analysis.study.metrics import standard_error
+from analysis.study.models import GP_SE, TITLES
+from analysis.study.terrain_fit import TerrainResult, mean_of
 
 BANDS = (("coverage50", 0.50), ("coverage90", 0.90), ("coverage95", 0.95))
 _FIRST, _SECOND = "#0072B2", "#D55E00"

@@ -3,7 +3,3 @@
 `findings` joins the results of a study with trends, residuals, surfaces and the health
 of the rig and writes them as plain values. Begin with `findings`.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -6,18 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from analysis.breakaway import (
-    BREAK_AWAY,
-    BreakAwayModel,
-    FootPush,
-    SurvivalCurve,
-    find_pushes,
-    kaplan_meier,
-    pit_limit,
-)
-from analysis.data import Array
-from analysis.study import GP_SE, Study, TerrainResult
-from analysis.terrains import break_away_of
+from analysis.breakaway.model import BREAK_AWAY, BreakAwayModel
+from analysis.breakaway.pushes import FootPush, find_pushes
+from analysis.breakaway.survival import SurvivalCurve, kaplan_meier, pit_limit
+from analysis.data.series import Array
+from analysis.study.models import GP_SE
+from analysis.study.study import Study
+from analysis.study.terrain_fit import TerrainResult
+from analysis.terrains.export import break_away_of
 
 RISKS = (0.05, 0.1, 0.5)  # at which forces are stated
 BREAK_AWAY_UNITS = {

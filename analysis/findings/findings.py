@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from analysis.breakaway import BreakAwayModel
-from analysis.data import LEVELS
+from analysis.breakaway.model import BreakAwayModel
+from analysis.data.terrain_kinds import LEVELS
 from analysis.findings.break_away import (
     BREAK_AWAY_UNITS,
     TerrainBreakAway,
@@ -39,8 +39,10 @@ from analysis.findings.trends import (
     residual_band,
     trends_of,
 )
-from analysis.study import GP_SE, TUSTIN, CsvRow, Study
-from analysis.terrains import Identification, identify_study
+from analysis.study.fits import CsvRow
+from analysis.study.models import GP_SE, TUSTIN
+from analysis.study.study import Study
+from analysis.terrains.identify import Identification, identify_study
 
 RESIDUAL_MODELS = (TUSTIN, GP_SE)
 

@@ -23,8 +23,9 @@ from typing import Protocol
 
 import numpy as np
 
-from analysis.data import Array, TareBracket
-from ft_sensor import Payload
+from analysis.data.series import Array
+from analysis.data.tare_bracket import TareBracket
+from ft_sensor.payload import Payload
 
 _MEAN_KEEPS = 1.0 / 3.0  # of the variance of a sample, in the mean of a trial
 _LINE_SAMPLE, _LINE_MEAN = 2.0 / 3.0, 1.0 / 2.0  # of a tare's variance, between two

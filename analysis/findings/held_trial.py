@@ -9,17 +9,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from analysis.data import (
-    Doubt,
-    RecordedTrial,
-    TareBracket,
-    TractionSeries,
-    doubts_of_record,
-    load_trial,
-)
+from analysis.data.load import RecordedTrial, load_trial
+from analysis.data.plausibility import Doubt, doubts_of_record
+from analysis.data.series import TractionSeries
+from analysis.data.tare_bracket import TareBracket
 from analysis.findings.rig_health import RigTrial, health_of
-from analysis.foresight import digest_of
-from ft_sensor import Payload, TerrainFrame
+from analysis.foresight.judged import digest_of
+from ft_sensor.payload import Payload, TerrainFrame
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.data import SENSOR_ERROR
+from analysis.data.quality import SENSOR_ERROR
 from analysis.findings.paper_measures import (
     ClaimResult,
     PaperEvidence,
@@ -15,19 +15,11 @@ from analysis.findings.paper_measures import (
     graded,
 )
 from analysis.findings.trends import explained_share, held_out_residual
-from analysis.study import (
-    FITTERS,
-    GP_NN,
-    GP_SE,
-    TUSTIN,
-    PairedComparison,
-    TerrainResult,
-    compare,
-    mean_of,
-    standard_error,
-)
-from analysis.terrains import KEPT_PER_SECOND
-from analysis.tustin import NO_STRIBECK, NOT_IDENTIFIABLE
+from analysis.study.metrics import PairedComparison, compare, standard_error
+from analysis.study.models import FITTERS, GP_NN, GP_SE, TUSTIN
+from analysis.study.terrain_fit import TerrainResult, mean_of
+from analysis.terrains.identify import KEPT_PER_SECOND
+from analysis.tustin.model import NO_STRIBECK, NOT_IDENTIFIABLE
 
 _SIMILAR = 0.15  # relative difference of errors that are called similar
 _BAND, _BAND_SLACK = 0.95, 0.05  # nominal coverage, and what it may be off by

@@ -14,8 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from analysis.data import Array
-from analysis.study import GP_SE_TRIAL, Study, TerrainResult
+from analysis.data.series import Array
+from analysis.study.models import GP_SE_TRIAL
+from analysis.study.study import Study
+from analysis.study.terrain_fit import TerrainResult
 
 BINS = 10  # of the shares
 ORACLE = (0.5, 0.8)  # bands that ten trials can show; 95 % would need nineteen

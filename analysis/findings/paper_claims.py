@@ -21,7 +21,7 @@ from analysis.findings.paper_measures import (
     signs_of_b,
     slips_of,
 )
-from analysis.study import mean_of
+from analysis.study.terrain_fit import mean_of
 
 _HOLDS = 0.95  # share from which a bound holds
 _NEAR_ZERO, _LOW = 0.25, 0.3  # of the peak before

@@ -11,23 +11,24 @@ from typing import NamedTuple
 
 import numpy as np
 
-from analysis.data import BIG, FLAT, SMALL, PreparedTrial, SampleTable, Slip
+from analysis.data.events import Slip
+from analysis.data.prepare import PreparedTrial
+from analysis.data.samples import SampleTable
+from analysis.data.terrain_kinds import BIG, FLAT, SMALL
 from analysis.findings.trends import NoiseSummary
-from analysis.study import (
-    GP_SE,
-    FoldResult,
-    GpModel,
+from analysis.study.crossval import FoldResult
+from analysis.study.fits import tustin_medians
+from analysis.study.metrics import (
     PairedComparison,
-    Study,
-    TerrainResult,
     adjusted_by_holm,
     compare,
-    mean_of,
     smallest_adjusted,
-    tustin_medians,
 )
-from analysis.terrains import Identification
-from analysis.tustin import bound
+from analysis.study.models import GP_SE, GpModel
+from analysis.study.study import Study
+from analysis.study.terrain_fit import TerrainResult, mean_of
+from analysis.terrains.identify import Identification
+from analysis.tustin.model import bound
 
 _MORE = 4  # times as many rows as the process was fitted to
 SIGNIFICANT = 0.05  # adjusted p below which a difference is one

@@ -7,8 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from acquisition import Flag, SettingsError
-from analysis.data import Array, RecordedTrial, moving_average
+from acquisition.errors import SettingsError
+from acquisition.sample import Flag
+from analysis.data.load import RecordedTrial
+from analysis.data.prepare import moving_average
+from analysis.data.series import Array
 from analysis.findings.force_uncertainty import (
     ForceUncertainty,
     TaredTrial,
@@ -16,14 +19,16 @@ from analysis.findings.force_uncertainty import (
     uncertainties_of,
     uncertainty_of,
 )
-from ft_sensor import largest_traction
-from wam.calibration import (
+from ft_sensor.reading import largest_traction
+from wam.calibration.friction_file import friction_from_toml
+from wam.calibration.friction_reach import (
     FrictionTorques,
-    friction_from_toml,
     friction_reach,
     remaining_friction,
 )
-from wam.model import GRAVITY, ArmModel, Body, Tool
+from wam.model.arm_model import ArmModel
+from wam.model.constants import GRAVITY, Body
+from wam.model.tool import Tool
 
 HEALTH_UNITS = {
     "period": "ms",

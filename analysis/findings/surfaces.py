@@ -5,8 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.data import Array, SampleTable
-from analysis.study import Study, TerrainResult
+from analysis.data.samples import SampleTable
+from analysis.data.series import Array
+from analysis.study.study import Study
+from analysis.study.terrain_fit import TerrainResult
 
 _POINTS = 41  # along each axis of a surface
 _CELLS = 20  # along each axis of a coverage map

@@ -5,19 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.data import Array, PreparedTrial, SampleTable
-from analysis.study import (
-    GP_SE,
-    GP_SE_NOISE,
-    NAMES,
-    GpModel,
-    PairedComparison,
-    Study,
-    TerrainResult,
-    compare,
-    mean_of,
-)
-from analysis.tustin import correlation_samples
+from analysis.data.prepare import PreparedTrial
+from analysis.data.samples import SampleTable
+from analysis.data.series import Array
+from analysis.study.metrics import PairedComparison, compare
+from analysis.study.models import GP_SE, GP_SE_NOISE, GpModel
+from analysis.study.noise_selection import NAMES
+from analysis.study.study import Study
+from analysis.study.terrain_fit import TerrainResult, mean_of
+from analysis.tustin.identifiability import correlation_samples
 
 MEAN_FORCE, TRACTION_RATIO, MEAN_LOAD = "F_t", "F_t/F_n", "F_n"
 TREND_UNITS = {MEAN_FORCE: "N", TRACTION_RATIO: "1", MEAN_LOAD: "N"}

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from analysis.data import Array, Indices
+from analysis.data.series import Array, Indices
 
 BINS = 10
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.data import Array
+from analysis.data.series import Array
 from analysis.foresight.calibration import BINS, equal_bins
 from analysis.foresight.engine import EVERY, ForesightFlag
 from analysis.foresight.signals import PERIOD

@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from analysis.breakaway import BreakAwayModel
+from analysis.breakaway.model import BreakAwayModel
 from analysis.foresight.ground import GroundRecogniser, log_speed
 from analysis.foresight.ground_window import FASTEST, SLOWEST
 from analysis.foresight.model import ForesightModel, RigIdentity

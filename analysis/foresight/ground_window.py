@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from analysis.data import Array, Indices
+from analysis.data.series import Array, Indices
 from analysis.foresight.signals import LEAST_LOAD
 
 WINDOWS: Final = (25, 50, 100)  # sliding ticks: 0.25, 0.5 and 1 s

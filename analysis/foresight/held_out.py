@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import overload
 
-from analysis.breakaway import BreakAwayModel
+from analysis.breakaway.model import BreakAwayModel
 from analysis.foresight.engine import Foresight
 from analysis.foresight.model import ForesightModel
 from analysis.foresight.scores import GroundAnswers, ground_answers

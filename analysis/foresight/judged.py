@@ -11,8 +11,9 @@ from typing import Protocol
 
 import numpy as np
 
-from analysis.breakaway import BreakAwayModel
-from analysis.data import RecordedTrial, groups_of
+from analysis.breakaway.model import BreakAwayModel
+from analysis.data.load import RecordedTrial
+from analysis.data.terrain_kinds import groups_of
 from analysis.foresight.curves import (
     ForesightCurves,
     ForesightExcerpt,

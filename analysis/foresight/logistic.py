@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from analysis.data import Array
+from analysis.data.series import Array
 
 _REACH = 5.0  # standard deviations beyond which a feature says no more
 _LARGEST_LOGIT = 30.0

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Any
 
-from acquisition import MOST_TERRAINS
+from acquisition.schema import MOST_TERRAINS
 from analysis.foresight.ground import SHARES, GroundLaw, GroundModel
 from analysis.foresight.ground_window import GROUND_FEATURES, WINDOWS
 from analysis.foresight.logistic import RidgeLogistic

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from math import exp, log, sqrt
 from typing import Final
 
-from acquisition import PERIOD_NS
+from acquisition.clock import PERIOD_NS
 
 PERIOD: Final = PERIOD_NS * 1e-9  # s
 EVERY: Final = 5  # cycles between two ticks: 10 ms

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from analysis.data import Array
+from analysis.data.series import Array
 from analysis.foresight.engine import EVERY, ForesightFlag, ForesightState
 from analysis.foresight.watching import HORIZON, WatchedTrial
 

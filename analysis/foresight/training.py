@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from analysis.data import Array
+from analysis.data.series import Array
 from analysis.foresight.ground import (
     JUDGED,
     SHARES,

@@ -12,19 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from acquisition import PERIOD_NS
-from analysis.data import (
-    Array,
-    Indices,
-    PrepareOptions,
-    RecordedTrial,
-    Smoothed,
-    TractionSeries,
-    find_slips,
-    groups_of,
-    load_trial,
-    smoothed,
-)
+from acquisition.clock import PERIOD_NS
+from analysis.data.events import find_slips
+from analysis.data.load import RecordedTrial, load_trial
+from analysis.data.prepare import PrepareOptions, Smoothed, smoothed
+from analysis.data.series import Array, Indices, TractionSeries
+from analysis.data.terrain_kinds import groups_of
 from analysis.foresight.ground_window import FASTEST, SLOWEST, windows_of
 from analysis.foresight.model import RigIdentity
 from analysis.foresight.signals import PERIOD, FootSample

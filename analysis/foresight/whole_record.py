@@ -11,8 +11,8 @@ from math import log
 
 import numpy as np
 
-from acquisition import Record
-from analysis.data import Array, Indices
+from acquisition.sample import Record
+from analysis.data.series import Array, Indices
 from analysis.foresight import signals as live
 from analysis.foresight.signals import EVERY, FEATURES, MEMORY, PERIOD, FootSample
 

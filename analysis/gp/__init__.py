@@ -4,7 +4,3 @@
 gradient, `search` chooses starts and optimises, `regression` predicts. Begin with
 `regression`.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -11,8 +11,8 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from acquisition import SettingsError
-from analysis.data import Array
+from acquisition.errors import SettingsError
+from analysis.data.series import Array
 from analysis.gp.kernels import Kernel
 from analysis.gp.likelihood import Likelihood, split
 from analysis.gp.low_rank import LowRankLikelihood, Near

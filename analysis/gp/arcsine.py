@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from analysis.data import Array
+from analysis.data.series import Array
 from analysis.gp.kernels import (
     Composable,
     Contraction,

@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from analysis.data import FLAT, Array, Indices
+from analysis.data.series import Array, Indices
+from analysis.data.terrain_kinds import FLAT
 from analysis.gp.trial_noise import TrialRows
 
 

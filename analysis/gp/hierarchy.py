@@ -20,8 +20,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from acquisition import SettingsError
-from analysis.data import Array
+from acquisition.errors import SettingsError
+from analysis.data.series import Array
 from analysis.gp.ground import Ground, GroundRows, Resemblance
 from analysis.gp.kernels import SquaredExponential
 from analysis.gp.likelihood import Factor, factorise

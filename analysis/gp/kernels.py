@@ -17,7 +17,7 @@ from typing import Protocol
 
 import numpy as np
 
-from analysis.data import Array
+from analysis.data.series import Array
 
 # W -> sum_ij W_ij dK_ij/dtheta_k, shape (p,); W may be overwritten
 Contraction = Callable[[Array], Array]

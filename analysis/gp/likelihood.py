@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from acquisition import SettingsError
-from analysis.data import Array
+from acquisition.errors import SettingsError
+from analysis.data.series import Array
 from analysis.gp.kernels import Contraction, Kernel
 from analysis.gp.noise import Noise
 from analysis.gp.trial_noise import SharedAt, TrialRows, shared_over

@@ -26,8 +26,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from acquisition import SettingsError
-from analysis.data import Array, Indices
+from acquisition.errors import SettingsError
+from analysis.data.series import Array, Indices
 from analysis.gp.kernels import Contraction, Kernel
 from analysis.gp.likelihood import Likelihood, lapack, split
 from analysis.gp.noise import Noise

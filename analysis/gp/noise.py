@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from analysis.data import Array
+from analysis.data.series import Array
 
 _START = 0.8  # sn / sd(y) that the search starts with
 _REACH = 2.0  # standard deviations beyond which the noise changes no more

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from acquisition import SettingsError
-from analysis.data import Array
+from acquisition.errors import SettingsError
+from analysis.data.series import Array
 from analysis.gp.likelihood import lapack
 
 # theta -> value and slope; may raise SettingsError

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.data import Array
+from analysis.data.series import Array
 from analysis.gp.approach import objective_of
 from analysis.gp.kernels import Kernel
 from analysis.gp.likelihood import Likelihood

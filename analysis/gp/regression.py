@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from acquisition import SettingsError
-from analysis.data import Array
+from acquisition.errors import SettingsError
+from analysis.data.series import Array
 from analysis.gp.ascent import Start
 from analysis.gp.kernels import Kernel, SquaredExponential
 from analysis.gp.likelihood import Factor, Likelihood, factorise, lapack, split

@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from acquisition import SettingsError
-from analysis.data import Array
+from acquisition.errors import SettingsError
+from analysis.data.series import Array
 from analysis.gp.approach import GOOD, objective_of
 from analysis.gp.ascent import Start, Top, climb, refined
 from analysis.gp.kernels import Kernel

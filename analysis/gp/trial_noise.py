@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from analysis.data import Array, Indices
+from analysis.data.series import Array, Indices
 from analysis.gp.noise import ConstantNoise, Noise
 
 _EFFECT, _DRIFT = 0.3, 0.5  # sc or sp, and so, over sd(y) that a search starts with

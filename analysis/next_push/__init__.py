@@ -5,7 +5,3 @@ what becomes of it, `knowledge` what the trials so far know
 about and would know after another, `stopping` when that is enough for a target,
 `advice` chooses among the pushes that a person can aim at. Begin with `advice`.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

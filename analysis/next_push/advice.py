@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition import TractionError
-from analysis.data import Array
+from acquisition.errors import TractionError
+from analysis.data.series import Array
 from analysis.next_push.aims import AIMS, LOADS, SPEEDS, expected_by_aim
 from analysis.next_push.knowledge import Knowledge
 from analysis.next_push.records import Aim, PushRecord

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from analysis.data import Array
+from analysis.data.series import Array
 from analysis.next_push.records import Aim, PushRecord
 
 LOADS = ((3.0, "lightly"), (4.0, "as usual"), (5.5, "firmly"))  # N

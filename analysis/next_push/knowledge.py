@@ -19,17 +19,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition import TractionError
-from analysis.data import FLAT, Array
-from analysis.gp import (
-    ConstantNoise,
-    Likelihood,
-    SquaredExponential,
-    TrialNoise,
-    TrialRows,
-    factorise,
-    prior_of,
-)
+from acquisition.errors import TractionError
+from analysis.data.series import Array
+from analysis.data.terrain_kinds import FLAT
+from analysis.gp.hierarchy import prior_of
+from analysis.gp.kernels import SquaredExponential
+from analysis.gp.likelihood import Likelihood, factorise
+from analysis.gp.noise import ConstantNoise
+from analysis.gp.trial_noise import TrialNoise, TrialRows
 from analysis.next_push.records import PushRecord
 
 MOST_TRIALS = 16  # the newest that are looked at: 400 rows

@@ -11,8 +11,9 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from analysis.breakaway import find_pushes
-from analysis.data import Array, PreparedTrial
+from analysis.breakaway.pushes import find_pushes
+from analysis.data.prepare import PreparedTrial
+from analysis.data.series import Array
 
 ROWS = 25  # of a trial
 _RUN, _APART = 5, 4  # neighbours together, kept samples from one to the next

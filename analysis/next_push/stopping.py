@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from acquisition import TractionError
-from analysis.data import Array
+from acquisition.errors import TractionError
+from analysis.data.series import Array
 from analysis.next_push.aims import expected_by_aim
 from analysis.next_push.knowledge import Knowledge
 from analysis.next_push.records import PushRecord

@@ -18,14 +18,16 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
-from acquisition import available_cores
-from analysis.figures import PAGE_ORDER, Picture, ReportSection
+from acquisition.worker_processes import available_cores
+from analysis.figures.pictures import Picture
+from analysis.figures.sections import PAGE_ORDER, ReportSection
 from analysis.report.foresight_page import FORESIGHT_KEY, foresight_figure
 from analysis.report.page_model import ReportFigure, ShownNumbers
-from analysis.study import Store, Study, run_tasks
+from analysis.study.jobs import Store, run_tasks
+from analysis.study.study import Study
 
 if TYPE_CHECKING:
-    from analysis.figures import FigureSpec
+    from analysis.figures.spec import FigureSpec
 
 _KEYS = (*PAGE_ORDER, FORESIGHT_KEY)
 _MOST_DRAWING = 4  # processes
@@ -97,7 +99,7 @@ def draw_figure(task: FigureTask) -> ReportFigure | None:
 
 
 def _draw(key: str, shown: ShownNumbers) -> ReportFigure | None:
-    from analysis.figures import render, styled
+    from analysis.figures.style import render, styled
 
     results, with_pdf = shown.results, shown.with_pdf
     is_simulated = results.study.simulated

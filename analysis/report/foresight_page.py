@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.figures import ReportSection
-from analysis.foresight import HORIZON, ForesightCurves, ForesightExcerpt
+from analysis.figures.sections import ReportSection
+from analysis.foresight.curves import ForesightCurves, ForesightExcerpt
+from analysis.foresight.watching import HORIZON
 from analysis.report.page_model import ReportFigure
 
 if TYPE_CHECKING:  # a page that is not drawn anew needs no matplotlib
-    from analysis.figures import Axes, Figure
+    from analysis.figures.style import Axes, Figure
 
 FORESIGHT_KEY = "foresight"
 
@@ -30,7 +31,7 @@ def foresight_figure(
         is_simulated: the trials were.
         with_pdf: it is wanted as PDF, too.
     """
-    from analysis.figures import render, styled
+    from analysis.figures.style import render, styled
 
     with styled():
         drawn = draw_foresight(curves)
@@ -77,7 +78,7 @@ def draw_foresight(curves: ForesightCurves) -> Figure | None:
 
     Panels without numbers are left out; None where there is none.
     """
-    from analysis.figures import new_figure
+    from analysis.figures.style import new_figure
 
     panels = [
         draw
@@ -101,7 +102,7 @@ def draw_foresight(curves: ForesightCurves) -> Figure | None:
 
 
 def _draw_excerpt(ax: Axes, excerpt: ForesightExcerpt) -> None:
-    from analysis.figures import SPEED_LABEL, plain
+    from analysis.figures.style import SPEED_LABEL, plain
 
     ax.plot(excerpt.t, excerpt.p, color=_RISK, lw=1.2, label="slip within 0.2 s")
     ax.axhline(excerpt.threshold, color=_RISK, lw=0.8, ls=":", label="alarm")
@@ -137,7 +138,7 @@ def _draw_reliability(ax: Axes, curves: ForesightCurves) -> None:
 
 
 def _draw_grounds(ax: Axes, curves: ForesightCurves) -> None:
-    from analysis.figures import MODEL_COLOURS, plain
+    from analysis.figures.style import MODEL_COLOURS, plain
 
     for k, (name, means) in enumerate(curves.grounds.items()):
         style = _STYLES[(k // len(MODEL_COLOURS) + k) % len(_STYLES)]

@@ -8,30 +8,29 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.data import Array
-from analysis.figures import (
-    Figure,
-    ReportSection,
-    new_figure,
-    render,
-    styled,
-)
+from analysis.data.series import Array
+from analysis.figures.sections import ReportSection
+from analysis.figures.style import Figure, new_figure, render, styled
 from analysis.report.page import ReportContext, html_page
 from analysis.report.page_model import PageSection, ReportFigure, ReportTable
-from ft_sensor import TerrainFrame
-from wam.calibration import (
-    FrictionCalibration,
-    FrictionFit,
+from ft_sensor.payload import TerrainFrame
+from wam.calibration.friction_file import FrictionCalibration
+from wam.calibration.friction_fit import FrictionFit
+from wam.calibration.friction_reach import (
     FrictionReach,
-    joint_asymmetry,
-    joint_breakaway,
-    joint_deviation,
     reaches_along,
     remaining_friction,
     rendered_masses,
+)
+from wam.calibration.joint_friction import (
+    joint_asymmetry,
+    joint_breakaway,
+    joint_deviation,
     speed_curve,
 )
-from wam.model import ArmConstants, ArmModel, MotorFriction, joint_coulomb
+from wam.model.arm_model import ArmModel
+from wam.model.constants import ArmConstants
+from wam.model.friction import MotorFriction, joint_coulomb
 
 _SIGMAS = 1.96
 _SHOWN = np.geomspace(0.004, 0.5, 60)  # rad/s, of the curves

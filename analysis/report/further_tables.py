@@ -3,22 +3,23 @@
 from collections.abc import Sequence
 from statistics import median
 
-from analysis.data import LATEST_MS
-from analysis.figures import ReportSection
-from analysis.findings import MEAN_FORCE, MEAN_LOAD, TRACTION_RATIO, StudyResults, Trend
+from analysis.data.plausibility import LATEST_MS
+from analysis.figures.sections import ReportSection
+from analysis.findings.findings import StudyResults
+from analysis.findings.trends import MEAN_FORCE, MEAN_LOAD, TRACTION_RATIO, Trend
 from analysis.report.new_trial_tables import new_trial_tables
 from analysis.report.page_model import ReportTable
 from analysis.report.paper_tables import with_error
 from analysis.report.terrain_tables import terrain_tables
-from analysis.study import (
-    TITLES,
+from analysis.study.metrics import (
     PairedComparison,
-    Study,
-    TerrainResult,
     adjusted_by_holm,
     compare,
     smallest_adjusted,
 )
+from analysis.study.models import TITLES
+from analysis.study.study import Study
+from analysis.study.terrain_fit import TerrainResult
 
 _SHOWN = ("rmse", "nlpd", "crps", "coverage50", "coverage90", "coverage95", "variance")
 _HEADS = (

@@ -4,23 +4,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from analysis.figures import ReportSection
-from analysis.findings import StudyResults
+from analysis.figures.sections import ReportSection
+from analysis.findings.findings import StudyResults
 from analysis.report.page_model import ReportTable
-from analysis.study import (
-    GP_SE_NOISE,
-    GP_SE_TRIAL,
-    Dissipation,
-    NewTrialModel,
-    RelativesOutcome,
-    Score,
-    Study,
-    TerrainResult,
-    TrialComponents,
-    compare,
-    family_counts,
-    mean_of,
-)
+from analysis.study.all_ground import Dissipation
+from analysis.study.metrics import Score, compare
+from analysis.study.models import GP_SE_NOISE, GP_SE_TRIAL
+from analysis.study.new_trial import NewTrialModel, family_counts
+from analysis.study.relatives import RelativesOutcome
+from analysis.study.study import Study
+from analysis.study.terrain_fit import TerrainResult, mean_of
+from analysis.study.trial_components import TrialComponents
 
 _ENOUGH = 10  # trials that the level is stated for
 _LEAST = (

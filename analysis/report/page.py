@@ -12,14 +12,14 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from analysis.figures import PAGE_ORDER, ReportSection
-from analysis.findings import (
+from analysis.figures.sections import PAGE_ORDER, ReportSection
+from analysis.findings.findings import (
     StudyResults,
     compute_results,
     findings_rows,
     plain_findings,
 )
-from analysis.foresight import ForesightModel
+from analysis.foresight.model import ForesightModel
 from analysis.report.drawing import kept_figures
 from analysis.report.foresight_page import FORESIGHT_KEY
 from analysis.report.further_tables import beyond_tables
@@ -41,16 +41,11 @@ from analysis.report.paper_tables import (
     verdicts,
 )
 from analysis.report.rig_tables import choices, rig_tables
-from analysis.study import (
-    GP_SE,
-    GP_SE_TRIAL,
-    Study,
-    to_csv,
-    to_fits,
-    to_plain,
-    write_atomic,
-)
-from analysis.terrains import database_of
+from analysis.study.fits import to_csv, to_fits, to_plain
+from analysis.study.models import GP_SE, GP_SE_TRIAL
+from analysis.study.store import write_atomic
+from analysis.study.study import Study
+from analysis.terrains.export import database_of
 
 __all__ = ["ReportContext", "ReportTable", "write_report"]
 

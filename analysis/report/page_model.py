@@ -5,10 +5,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from analysis.figures import Picture, ReportSection
-from analysis.findings import RigTrial, StudyResults
-from analysis.foresight import ForesightCurves, ForesightModel
-from analysis.study import Store
+from analysis.figures.pictures import Picture
+from analysis.figures.sections import ReportSection
+from analysis.findings.findings import StudyResults
+from analysis.findings.rig_health import RigTrial
+from analysis.foresight.curves import ForesightCurves
+from analysis.foresight.model import ForesightModel
+from analysis.study.jobs import Store
 
 
 @dataclass(frozen=True, slots=True)

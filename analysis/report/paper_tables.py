@@ -2,30 +2,25 @@
 
 from collections.abc import Iterator, Sequence
 
-from analysis.data import PULLED_WARNING, SENSOR_ERROR
-from analysis.figures import ReportSection
-from analysis.findings import PaperClaim, StudyResults, traction_ratio
+from analysis.data.quality import PULLED_WARNING, SENSOR_ERROR
+from analysis.figures.sections import ReportSection
+from analysis.findings.findings import StudyResults
+from analysis.findings.paper_claims import PaperClaim
+from analysis.findings.trends import traction_ratio
 from analysis.report.page_model import ReportTable
-from analysis.study import (
-    FITTERS,
-    TITLES,
-    TUSTIN,
-    PooledTustinFit,
-    Study,
-    TerrainResult,
-    flag_counts,
-    mean_of,
-    standard_error,
-    tustin_medians,
-)
-from analysis.tustin import (
+from analysis.study.fits import flag_counts, tustin_medians
+from analysis.study.metrics import standard_error
+from analysis.study.models import FITTERS, TITLES, TUSTIN
+from analysis.study.study import Study
+from analysis.study.terrain_fit import PooledTustinFit, TerrainResult, mean_of
+from analysis.tustin.identifiability import Interval
+from analysis.tustin.model import (
     MINIMUM_ROWS,
     NEGATIVE_B,
     NO_STRIBECK,
     NOT_IDENTIFIABLE,
     SYMBOLS,
     UNITS,
-    Interval,
     TustinBounds,
     TustinParameters,
 )

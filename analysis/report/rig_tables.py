@@ -4,12 +4,13 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from acquisition import RATE_HZ
-from analysis.figures import ReportSection
-from analysis.findings import RigTrial, StudyResults
+from acquisition.clock import RATE_HZ
+from analysis.figures.sections import ReportSection
+from analysis.findings.findings import StudyResults
+from analysis.findings.rig_health import RigTrial
 from analysis.report.page_model import ReportTable
-from analysis.study import Study
-from analysis.tustin import SYMBOLS
+from analysis.study.study import Study
+from analysis.tustin.model import SYMBOLS
 
 _SATURATED = 1e-9  # share of cycles
 

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.figures import (
+from analysis.figures.sections import ReportSection
+from analysis.figures.style import (
     MODEL_COLOURS,
     MODEL_HATCHES,
     Axes,
     Figure,
-    ReportSection,
     name_ticks,
     new_figure,
     render,
@@ -23,7 +23,8 @@ from analysis.report.page_model import (
     ReportFigure,
     ReportTable,
 )
-from analysis.stance import StanceOutcome, StanceRequest, StanceTotals, totals
+from analysis.stance.outcomes import StanceOutcome, StanceTotals, totals
+from analysis.stance.seam import StanceRequest
 
 HEADER = (
     "terrain",

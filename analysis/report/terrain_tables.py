@@ -1,11 +1,13 @@
 """Tables of what terrains give and of how they are told apart."""
 
-from analysis.breakaway import SLIDING
-from analysis.data import LEVELS
-from analysis.figures import ReportSection
-from analysis.findings import RISKS, StudyResults, TerrainBreakAway
+from analysis.breakaway.model import SLIDING
+from analysis.data.terrain_kinds import LEVELS
+from analysis.figures.sections import ReportSection
+from analysis.findings.break_away import RISKS, TerrainBreakAway
+from analysis.findings.findings import StudyResults
 from analysis.report.page_model import ReportTable
-from analysis.terrains import KEPT_PER_SECOND, Exclusion, Identification
+from analysis.terrains.evidence import Exclusion
+from analysis.terrains.identify import KEPT_PER_SECOND, Identification
 
 
 def terrain_tables(results: StudyResults) -> list[ReportTable]:

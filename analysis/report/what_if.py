@@ -6,17 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from acquisition import SettingsError
-from analysis.data import WINDOW, Frame, PrepareOptions, RecordedTrial, TractionSeries
-from analysis.study import (
-    FITTERS,
-    GP_NN,
-    GP_NN_TUSTIN,
-    GP_SE_TUSTIN,
-    TUSTIN,
-    StudyOptions,
-)
-from analysis.tustin import TustinForm
+from acquisition.errors import SettingsError
+from analysis.data.inertia import WINDOW
+from analysis.data.load import Frame, RecordedTrial
+from analysis.data.prepare import PrepareOptions
+from analysis.data.series import TractionSeries
+from analysis.study.models import FITTERS, GP_NN, GP_NN_TUSTIN, GP_SE_TUSTIN, TUSTIN
+from analysis.study.study import StudyOptions
+from analysis.tustin.model import TustinForm
 
 VALUES = {
     "smoothing": "an odd number of samples, e.g. smoothing=15",

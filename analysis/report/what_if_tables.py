@@ -2,11 +2,14 @@
 
 from typing import Any
 
-from analysis.figures import ReportSection
+from analysis.figures.sections import ReportSection
 from analysis.report.further_tables import paired_cell
 from analysis.report.page_model import ReportTable
 from analysis.report.what_if import StudyVariant
-from analysis.study import TITLES, PairedComparison, Study, compare, mean_of
+from analysis.study.metrics import PairedComparison, compare
+from analysis.study.models import TITLES
+from analysis.study.study import Study
+from analysis.study.terrain_fit import mean_of
 
 _MEASURES = (("mae", "N"), ("nlpd", "nat"))
 

@@ -4,7 +4,3 @@ Begin with `seam`: what a policy is given and what it answers. `policies` holds 
 that are compared, `sequence` sets the foot down and asks the policy, `outcomes` judges
 what came of it and adapts the risk.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

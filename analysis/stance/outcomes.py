@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass, field
 from math import exp, inf, isfinite, log, nan, sqrt
 from typing import Any
 
-from analysis.breakaway import FootPush
+from analysis.breakaway.pushes import FootPush
 from analysis.stance.seam import (
     ENOUGH,
     FAST,

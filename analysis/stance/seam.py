@@ -12,9 +12,9 @@ from functools import cached_property
 from math import nan
 from typing import Final, Protocol
 
-from acquisition import SettingsError
-from analysis.breakaway import BreakAwayModel
-from analysis.foresight import RiskTable
+from acquisition.errors import SettingsError
+from analysis.breakaway.model import BreakAwayModel
+from analysis.foresight.engine import RiskTable
 
 LEAST_F_N, MOST_F_N = 3.0, 20.0  # N that a policy may choose from
 LEAST_PEAK, MOST_PEAK = 4.0, 10.0  # N

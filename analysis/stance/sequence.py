@@ -11,8 +11,8 @@ from enum import Enum, auto
 from math import nan
 from typing import Final
 
-from acquisition.control_loop import SoleGoal
-from analysis.foresight import RiskTable
+from acquisition.control_loop.law import SoleGoal
+from analysis.foresight.engine import RiskTable
 from analysis.stance.outcomes import (
     StanceOutcome,
     StanceWatch,

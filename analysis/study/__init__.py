@@ -3,7 +3,3 @@
 `models` names the fitters, `crossval` is ten-fold cross-validation trial by trial,
 `jobs` runs tasks on processes or a cluster, `study` joins them. Begin with `study`.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -12,12 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from analysis.data import Array, SampleTable
-from analysis.gp import (
-    Ground,
+from analysis.data.samples import SampleTable
+from analysis.data.series import Array
+from analysis.gp.ground import Ground, GroundRows
+from analysis.gp.hierarchy import (
     GroundPosterior,
     GroundProcess,
-    GroundRows,
     PredictiveProcess,
     in_unit,
 )

@@ -13,14 +13,10 @@ from typing import TypeVar, overload
 
 import numpy as np
 
-from acquisition import TractionError
-from analysis.data import (
-    Indices,
-    PooledSamples,
-    PreparedTrial,
-    SampleTable,
-    TrainingSet,
-)
+from acquisition.errors import TractionError
+from analysis.data.prepare import PreparedTrial
+from analysis.data.samples import PooledSamples, SampleTable, TrainingSet
+from analysis.data.series import Indices
 from analysis.study.metrics import Score, mean_absolute_error, score
 from analysis.study.models import TITLES, FitOptions, FittedModel, ModelFitter
 

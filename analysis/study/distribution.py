@@ -19,7 +19,7 @@ from typing import Protocol
 
 import numpy as np
 
-from analysis.data import Array
+from analysis.data.series import Array
 from analysis.study.skew import ShapeMap, log_warp_slope, unwarped, warped
 
 SHARES = (0.01, 0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95, 0.99)

@@ -13,7 +13,7 @@ import numpy as np
 from analysis.study.metrics import Score, compare, standard_error
 from analysis.study.models import TUSTIN
 from analysis.study.study import Study, TerrainResult, mean_of
-from analysis.tustin import UNITS, TustinFit
+from analysis.tustin.model import UNITS, TustinFit
 
 SCHEMA = 1
 _OTHER_UNITS = {

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar, runtime_checkable
 from urllib.parse import urlsplit
 
-from acquisition import (
-    SettingsError,
+from acquisition.errors import SettingsError
+from acquisition.linear_algebra import keep_memory
+from acquisition.worker_processes import (
     WorkerLostError,
     available_cores,
-    keep_memory,
     prepare_workers,
     read_shared,
     run_calls,

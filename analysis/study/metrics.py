@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from analysis.data import Array
+from analysis.data.series import Array
 from analysis.study.distribution import Distribution
 
 _SMALLEST_SD = 1e-6  # N; a fit without any error is scored as if it had this one

@@ -10,22 +10,19 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from acquisition import SettingsError
-from analysis.data import Array, TrainingSet
-from analysis.gp import (
-    Arcsine,
-    GaussianProcess,
-    Kernel,
-    LogLinearNoise,
-    SquaredExponential,
-    fit_gp,
-    refit_gp,
-)
+from acquisition.errors import SettingsError
+from analysis.data.samples import TrainingSet
+from analysis.data.series import Array
+from analysis.gp.arcsine import Arcsine
+from analysis.gp.kernels import Kernel, SquaredExponential
+from analysis.gp.noise import LogLinearNoise
+from analysis.gp.refit import refit_gp
+from analysis.gp.regression import GaussianProcess, fit_gp
 from analysis.study.distribution import Distribution
 from analysis.study.metrics import Prediction
 from analysis.study.new_trial import EFFECTS, LEVEL, NewTrialModel, fit_new_trial
 from analysis.study.noise_selection import NoiseChoice, TailedNoise, choose_noise
-from analysis.tustin import TustinBounds, TustinFit, TustinForm, fit_tustin
+from analysis.tustin.model import TustinBounds, TustinFit, TustinForm, fit_tustin
 
 TUSTIN = "tustin"
 GP_SE = "gp_se"

@@ -15,18 +15,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from analysis.data import Array, Indices, TrainingSet
-from analysis.gp import (
-    ConstantNoise,
-    GaussianProcess,
-    Kernel,
-    LeaveOut,
-    LogLinearNoise,
-    TrialNoise,
-    TrialRows,
-    fit_gp,
-    refit_gp,
-)
+from analysis.data.samples import TrainingSet
+from analysis.data.series import Array, Indices
+from analysis.gp.kernels import Kernel
+from analysis.gp.noise import ConstantNoise, LogLinearNoise
+from analysis.gp.refit import refit_gp
+from analysis.gp.regression import GaussianProcess, LeaveOut, fit_gp
+from analysis.gp.trial_noise import TrialNoise, TrialRows
 from analysis.study.distribution import FEWEST, NewTrialPrediction
 from analysis.study.metrics import clearly_best
 from analysis.study.skew import (
@@ -37,7 +32,7 @@ from analysis.study.skew import (
     unwarped,
     warped,
 )
-from analysis.tustin import TustinFit
+from analysis.tustin.model import TustinFit
 
 NORMAL, LOGLINEAR, WARPED = "normal", "loglinear", "log warp"
 FAMILIES = (NORMAL, LOGLINEAR, WARPED)

@@ -10,8 +10,10 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from analysis.data import Array, Indices, SampleTable, TrainingSet
-from analysis.gp import GaussianProcess, refit_gp
+from analysis.data.samples import SampleTable, TrainingSet
+from analysis.data.series import Array, Indices
+from analysis.gp.refit import refit_gp
+from analysis.gp.regression import GaussianProcess
 from analysis.study.metrics import Prediction, clearly_best, log_density
 
 NoiseName = Literal["constant", "loglinear", "student"]

@@ -14,19 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from acquisition import TractionError
-from analysis.data import (
-    BIG,
-    FLAT,
-    SMALL,
-    PreparedTrial,
-    SampleTable,
-    TractionSeries,
-    TrainingSet,
-    terrain_incline,
-    terrain_kind,
-)
-from analysis.gp import Ground, SquaredExponential
+from acquisition.errors import TractionError
+from analysis.data.prepare import PreparedTrial
+from analysis.data.samples import SampleTable, TrainingSet
+from analysis.data.series import TractionSeries
+from analysis.data.terrain_kinds import BIG, FLAT, SMALL, terrain_incline, terrain_kind
+from analysis.gp.ground import Ground
+from analysis.gp.kernels import SquaredExponential
 from analysis.study.all_ground import (
     GIVEN,
     AllGroundModel,

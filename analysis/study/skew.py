@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from analysis.data import Array
+from analysis.data.series import Array
 
 _CLIPPED = 0.95  # c times this below zero, where the warp would lose its logarithm
 _STEEPEST = 50.0  # z / c beyond which an exponential is no force any more

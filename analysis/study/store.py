@@ -28,10 +28,14 @@ from typing import Any
 
 import numpy as np
 
-from acquisition import SettingsError
-from analysis.breakaway import BreakAwayModel, Family, PushLaw
-from analysis.data import SampleTable
-from analysis.gp import Arcsine, GaussianProcess, Start, kernels, noise, trial_noise
+from acquisition.errors import SettingsError
+from analysis.breakaway.censored import Family
+from analysis.breakaway.model import BreakAwayModel, PushLaw
+from analysis.data.samples import SampleTable
+from analysis.gp import kernels, noise, trial_noise
+from analysis.gp.arcsine import Arcsine
+from analysis.gp.ascent import Start
+from analysis.gp.regression import GaussianProcess
 from analysis.study.crossval import FoldResult, FoldTask, ModelFold
 from analysis.study.metrics import Score
 from analysis.study.models import FitOptions, GpModel, TustinModel
@@ -41,8 +45,8 @@ from analysis.study.relatives import STORED
 from analysis.study.skew import ShapeMap
 from analysis.study.terrain_fit import PooledTustinFit, TerrainTask
 from analysis.study.trial_components import ComponentsTask, TimedRows, TrialComponents
-from analysis.tustin import Interval, Profiles
 from analysis.tustin import model as tustin
+from analysis.tustin.identifiability import Interval, Profiles
 
 Types = Mapping[str, type]
 

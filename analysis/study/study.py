@@ -5,21 +5,19 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from acquisition import SettingsError
-from analysis.data import (
+from acquisition.errors import SettingsError
+from analysis.data.events import find_slips
+from analysis.data.plausibility import doubts_of, summed_up
+from analysis.data.prepare import (
     MINIMUM_KEPT,
-    PULLED_WARNING,
-    SENSOR_ERROR,
     PreparedTrial,
     PrepareOptions,
-    SampleTable,
-    TractionSeries,
-    doubts_of,
-    find_slips,
     prepare_trial,
-    summed_up,
-    terrain_kind,
 )
+from analysis.data.quality import PULLED_WARNING, SENSOR_ERROR
+from analysis.data.samples import SampleTable
+from analysis.data.series import TractionSeries
+from analysis.data.terrain_kinds import terrain_kind
 from analysis.study.crossval import FoldResult, Prepared, plan_folds, run_fold
 from analysis.study.jobs import Batch, Progress, Store, Workers, run_batches
 from analysis.study.metrics import standard_error

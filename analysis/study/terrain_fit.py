@@ -6,19 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition import TractionError
-from analysis.data import (
-    SENSOR_ERROR,
-    PreparedTrial,
-    SampleTable,
-    Slip,
-    kind_title,
-    share_below,
-)
+from acquisition.errors import TractionError
+from analysis.data.events import Slip
+from analysis.data.prepare import PreparedTrial
+from analysis.data.quality import SENSOR_ERROR, share_below
+from analysis.data.samples import SampleTable
+from analysis.data.terrain_kinds import kind_title
 from analysis.study.crossval import FoldResult, ModelFold
 from analysis.study.models import FitOptions
 from analysis.study.trial_components import TrialComponents
-from analysis.tustin import Interval, TustinFit, bootstrap_tustin, fit_tustin
+from analysis.tustin.bootstrap import bootstrap_tustin
+from analysis.tustin.identifiability import Interval
+from analysis.tustin.model import TustinFit, fit_tustin
 
 _STREAM = 1_000_000  # apart from the folds, which have the same kind of seed
 

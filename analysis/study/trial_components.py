@@ -16,11 +16,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition import TractionError
-from analysis.data import Array, Indices, PreparedTrial
-from analysis.gp import ConstantNoise, SquaredExponential, TrialNoise, TrialRows, fit_gp
+from acquisition.errors import TractionError
+from analysis.data.prepare import PreparedTrial
+from analysis.data.series import Array, Indices
+from analysis.gp.kernels import SquaredExponential
+from analysis.gp.noise import ConstantNoise
+from analysis.gp.regression import fit_gp
+from analysis.gp.trial_noise import TrialNoise, TrialRows
 from analysis.study.models import FitOptions
-from analysis.tustin import Interval
+from analysis.tustin.identifiability import Interval
 
 RUN = 5  # neighbours that are taken together
 APART = 4  # kept samples from one to the next: nearer ones share the moving average

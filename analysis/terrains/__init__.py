@@ -3,7 +3,3 @@
 `identify` tells terrains apart by the models of a study, `verdict` says which one a
 trial is from, `database` is what a locomotion controller queries.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

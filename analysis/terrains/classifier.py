@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from analysis.data import Array
+from analysis.data.series import Array
 from analysis.terrains.windows import FEATURES, WINDOWS
 
 FLAT_GROUND, ROCKY_GROUND = "flat", "rocky"

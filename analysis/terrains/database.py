@@ -26,9 +26,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from acquisition import SettingsError
-from analysis.data import Array
-from analysis.study import SHARES
+from acquisition.errors import SettingsError
+from analysis.data.series import Array
+from analysis.study.distribution import SHARES
 from analysis.terrains.known import KnownTerrain, TerrainDatabase
 from analysis.terrains.parts import checked_parts
 from analysis.terrains.table import Rows, Table, rows_of

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.data import Array, PreparedTrial
+from analysis.data.prepare import PreparedTrial
+from analysis.data.series import Array
 from analysis.terrains.classifier import (
     FLAT_GROUND,
     ROCKY_GROUND,

@@ -7,29 +7,18 @@ from typing import Any
 
 import numpy as np
 
-from acquisition import SettingsError, TractionError
-from analysis.breakaway import (
-    BreakAwayModel,
-    BreakAwayOptions,
-    fit_planned,
-    plan_break_away,
-)
-from analysis.data import Array, PreparedTrial, PrepareOptions, SampleTable, TrainingSet
-from analysis.foresight import ForesightModel
-from analysis.study import (
-    GP_SE,
-    GP_SE_TRIAL,
-    SHARES,
-    TITLES,
-    Batch,
-    FitOptions,
-    ModelFitter,
-    Store,
-    Study,
-    Workers,
-    run_batches,
-    run_tasks,
-)
+from acquisition.errors import SettingsError, TractionError
+from analysis.breakaway.fitting import fit_planned
+from analysis.breakaway.model import BreakAwayModel
+from analysis.breakaway.recorded import BreakAwayOptions, plan_break_away
+from analysis.data.prepare import PreparedTrial, PrepareOptions
+from analysis.data.samples import SampleTable, TrainingSet
+from analysis.data.series import Array
+from analysis.foresight.model import ForesightModel
+from analysis.study.distribution import SHARES
+from analysis.study.jobs import Batch, Store, Workers, run_batches, run_tasks
+from analysis.study.models import GP_SE, GP_SE_TRIAL, TITLES, FitOptions, ModelFitter
+from analysis.study.study import Study
 from analysis.terrains.database import to_text
 from analysis.terrains.identify import Identification
 from analysis.terrains.known import KnownTerrain, TerrainDatabase

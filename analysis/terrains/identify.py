@@ -11,14 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from analysis.data import LEVELS, PreparedTrial, groups_of
-from analysis.study import (
-    GP_SE,
-    Study,
-    TerrainResult,
-    run_tasks,
-    running_workers,
-)
+from analysis.data.prepare import PreparedTrial
+from analysis.data.terrain_kinds import LEVELS, groups_of
+from analysis.study.jobs import run_tasks, running_workers
+from analysis.study.models import GP_SE
+from analysis.study.study import Study
+from analysis.study.terrain_fit import TerrainResult
 from analysis.terrains.classifier import (
     ROCKY_GROUND,
     SurfaceClassifier,

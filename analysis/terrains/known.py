@@ -11,10 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from acquisition import SettingsError
-from analysis.breakaway import BreakAwayModel, BreakAwayRisk
-from analysis.data import Array
-from analysis.study import Prediction
+from acquisition.errors import SettingsError
+from analysis.breakaway.answers import BreakAwayRisk
+from analysis.breakaway.model import BreakAwayModel
+from analysis.data.series import Array
+from analysis.study.metrics import Prediction
 from analysis.terrains.parts import BREAK_AWAY_PART, Parts, break_away_in
 from analysis.terrains.table import SlipRisk, Table, TractionEstimate, TractionEstimates
 

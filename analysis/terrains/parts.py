@@ -12,9 +12,9 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from acquisition import SettingsError
-from analysis.breakaway import BreakAwayModel
-from analysis.foresight import ForesightModel
+from acquisition.errors import SettingsError
+from analysis.breakaway.model import BreakAwayModel
+from analysis.foresight.model import ForesightModel
 from analysis.terrains.classifier import SurfaceClassifier
 
 BREAK_AWAY_PART, ROUGHNESS_PART, SURFACES_PART = "break_away", "roughness", "surfaces"

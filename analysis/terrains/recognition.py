@@ -16,8 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.data import Array, PreparedTrial
-from analysis.study import Distribution
+from analysis.data.prepare import PreparedTrial
+from analysis.data.series import Array
+from analysis.study.distribution import Distribution
 from analysis.terrains.windows import windows_of
 
 TAU = 10.0  # samples that count as one

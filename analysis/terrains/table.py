@@ -13,8 +13,8 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.data import Array
-from analysis.study import SHARES
+from analysis.data.series import Array
+from analysis.study.distribution import SHARES
 
 Rows = tuple[tuple[float, ...], ...]
 

@@ -12,7 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.data import Array, PreparedTrial, groups_of
+from analysis.data.prepare import PreparedTrial
+from analysis.data.series import Array
+from analysis.data.terrain_kinds import groups_of
 from analysis.terrains.classifier import FLAT_GROUND, ROCKY_GROUND, LogisticModel
 from analysis.terrains.known import KnownTerrain, TerrainDatabase
 from analysis.terrains.parts import roughness_in, surfaces_in

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.data import Array, PreparedTrial
+from analysis.data.prepare import PreparedTrial
+from analysis.data.series import Array
 
 WINDOWS = (50, 100, 200)  # kept samples: 0.5, 1 and 2 s of motion
 FEATURES = (

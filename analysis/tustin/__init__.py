@@ -3,7 +3,3 @@
 `model` is equation (1) of the paper and its fit, `varpro` the search over its two
 nonlinear parameters. Begin with `model`.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

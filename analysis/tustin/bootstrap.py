@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from analysis.data import Array
+from analysis.data.series import Array
 from analysis.tustin.identifiability import Interval
 from analysis.tustin.model import TustinBounds, TustinFit, TustinForm
 from analysis.tustin.moments import Moments, solve_moments, zoom

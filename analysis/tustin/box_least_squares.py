@@ -13,7 +13,7 @@ from itertools import permutations
 
 import numpy as np
 
-from analysis.data import Array
+from analysis.data.series import Array
 
 # relative; keeps collinear columns solvable. The tiny part does that for zero ones
 _RIDGE = 1.0 + 1e-12 * np.eye(3)

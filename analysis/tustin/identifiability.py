@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from analysis.data import Array
+from analysis.data.series import Array
 from analysis.tustin.varpro import Point, Problem
 
 _SINGULAR = 1e8  # condition number of the scaled Gram matrix

@@ -11,8 +11,8 @@ from typing import Literal
 
 import numpy as np
 
-from acquisition import SettingsError
-from analysis.data import Array
+from acquisition.errors import SettingsError
+from analysis.data.series import Array
 from analysis.tustin.identifiability import Profiles, is_identifiable, is_straight
 from analysis.tustin.moments import (
     Loss,

@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from analysis.data import Array
+from analysis.data.series import Array
 from analysis.tustin.box_least_squares import solve_in_box
 from analysis.tustin.identifiability import Interval, Profiles, independent_samples
 from analysis.tustin.varpro import (

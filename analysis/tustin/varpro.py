@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from analysis.data import Array
+from analysis.data.series import Array
 from analysis.tustin.box_least_squares import solve_in_box
 
 _REACH = 0.5  # of q, the furthest first step

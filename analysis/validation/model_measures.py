@@ -4,8 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.data import FLAT, Array, PreparedTrial
-from analysis.study import GP_SE, TUSTIN, ModelFold, Study, TerrainResult, TustinModel
+from analysis.data.prepare import PreparedTrial
+from analysis.data.series import Array
+from analysis.data.terrain_kinds import FLAT
+from analysis.study.crossval import ModelFold
+from analysis.study.models import GP_SE, TUSTIN, TustinModel
+from analysis.study.study import Study
+from analysis.study.terrain_fit import TerrainResult
 
 _MODELS = (TUSTIN, GP_SE)
 _SIGNIFICANT = 0.05

@@ -5,7 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.data import Array, PreparedTrial, Slip, TractionSeries
+from analysis.data.events import Slip
+from analysis.data.prepare import PreparedTrial
+from analysis.data.series import Array, TractionSeries
 
 LOW_FLOOR = 0.3  # of the peak
 _REST_MARGIN = 0.1  # s before the first motion that no longer counts as rest

@@ -4,7 +4,3 @@
 file changes, `matrix_board` counts, `upcoming` says what to record next. Begin with
 `matrix_board`.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

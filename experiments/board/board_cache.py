@@ -19,7 +19,7 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from acquisition import SystemClock
+from acquisition.clock import SystemClock
 from experiments.board.session_summaries import (
     SessionSummary,
     glance,
@@ -28,8 +28,8 @@ from experiments.board.session_summaries import (
 )
 
 if TYPE_CHECKING:
-    from experiments.session import SessionFolder
-    from experiments.settings import TerrainRow
+    from experiments.session.store import SessionFolder
+    from experiments.settings.matrix import TerrainRow
 
 _FORMAT = 1
 _LARGEST = 16 * 2**20  # bytes; a thousand sessions take 0.3 MB

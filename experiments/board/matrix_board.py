@@ -6,15 +6,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
-from acquisition import SettingsError
+from acquisition.errors import SettingsError
 from experiments.board.session_summaries import SeenSession, facts_of
-from experiments.session import list_sessions
+from experiments.session.store import list_sessions
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from experiments.board.board_cache import BoardCache, BoardRow
-    from experiments.session import Deviation
+    from experiments.session.kept_files import Deviation
 
 KEYS = ("terrain", "stones", "incline_deg", "foot", "kind", "session", "operator")
 

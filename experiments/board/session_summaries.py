@@ -10,13 +10,14 @@ from functools import cache
 from hashlib import blake2b
 from typing import TYPE_CHECKING
 
-from acquisition import TrialFileError
-from experiments.session import list_sessions
+from acquisition.errors import TrialFileError
+from experiments.session.store import list_sessions
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from experiments.session import Deviation, SessionFolder
+    from experiments.session.kept_files import Deviation
+    from experiments.session.store import SessionFolder
 
 _FOLDERS = ("", "trials", "rejected", "faults")
 
@@ -74,7 +75,7 @@ class SeenSession:
 
 def summarise(folder: SessionFolder) -> SessionSummary:
     """Return what a session is; kept trials are held against their checksums."""
-    from experiments.session import sha256_of
+    from experiments.session.data_files import sha256_of
 
     return _summarise(folder, cache(sha256_of))
 
@@ -87,13 +88,10 @@ def glance(folder: SessionFolder) -> SessionSummary:
 def _summarise(
     folder: SessionFolder, digest: Callable[[Path], str] | None
 ) -> SessionSummary:
-    from experiments.session import (
-        compare_kept,
-        kept_pushes,
-        owner_of,
-        read_json,
-        unreadable,
-    )
+    from experiments.session.data_files import read_json
+    from experiments.session.kept_files import compare_kept, unreadable
+    from experiments.session.lock import owner_of
+    from experiments.session.trial_files import kept_pushes
 
     deviations = tuple(compare_kept(folder, digest)) if digest else ()
     try:
@@ -116,7 +114,8 @@ def _summarise(
 
 
 def _is_resumable(folder: SessionFolder) -> bool:
-    from experiments.session import is_unfinished, replay
+    from experiments.session.reducer import replay
+    from experiments.session.unfinished import is_unfinished
 
     return is_unfinished(replay(folder.events()))
 

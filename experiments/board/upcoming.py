@@ -10,10 +10,10 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from acquisition import TrialFileError
+from acquisition.errors import TrialFileError
 from experiments.arguments import data_option
 from experiments.board.matrix_board import counted_of, facts_of_row, is_of, matches
-from experiments.session import owner_of
+from experiments.session.lock import owner_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -62,7 +62,7 @@ def _opened(session: SeenSession) -> str:
 
 def _left(session: SeenSession) -> str:
     """Return what there is to be resumed of a session; empty for nothing."""
-    from experiments.session import inspect_session
+    from experiments.session.unfinished import inspect_session
 
     with suppress(OSError, TrialFileError):
         unfinished = inspect_session(session.folder)
@@ -95,7 +95,7 @@ def enough_lines(
 
 
 def _enough(own: Sequence[SeenSession], row: BoardRow) -> str:
-    from experiments.session import enough_of
+    from experiments.session.kept_files import enough_of
 
     return enough_of([s.folder for s in own], row)
 

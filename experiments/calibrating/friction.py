@@ -7,25 +7,21 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition import SettingsError, read_text
-from analysis.report import FRICTION_HEADER, FrictionPage, friction_rows
-from experiments.run import ConsoleLoop, PoseWalk, activate
-from experiments.session import iso_utc
-from wam.calibration import (
-    FreeSpace,
-    FrictionCalibration,
-    FrictionFit,
-    FrictionLeg,
-    LegUse,
-    MeasurementPose,
-    RecordedLeg,
-    check_friction,
-    fit_friction,
-    friction_from_toml,
-    plan_friction,
-    sliding_rows,
-)
-from wam.model import Array, MotorFriction
+from acquisition.errors import SettingsError
+from acquisition.settings import read_text
+from analysis.report.friction_page import FRICTION_HEADER, FrictionPage, friction_rows
+from experiments.run.console_loop import ConsoleLoop
+from experiments.run.pose_walk import PoseWalk
+from experiments.run.ready import activate
+from experiments.session.store import iso_utc
+from wam.calibration.excitation import FrictionLeg, LegUse, plan_friction
+from wam.calibration.free_space import FreeSpace
+from wam.calibration.friction_file import FrictionCalibration, friction_from_toml
+from wam.calibration.friction_fit import FrictionFit, check_friction, fit_friction
+from wam.calibration.poses import MeasurementPose
+from wam.calibration.sliding import RecordedLeg, sliding_rows
+from wam.model.constants import Array
+from wam.model.friction import MotorFriction
 
 # kg m to which first moments are known: calibrated ones, and those of drawings.
 _KNOWN, _DRAWN = 0.02, 0.1

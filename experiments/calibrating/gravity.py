@@ -5,17 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.run import ConsoleLoop, PoseWalk, activate
-from experiments.session import iso_utc
-from wam.calibration import (
-    FreeSpace,
-    GravityCalibration,
-    MeasurementPose,
-    choose_poses,
-    plan_halts,
-)
-from wam.model import (
-    Array,
+from experiments.run.console_loop import ConsoleLoop
+from experiments.run.pose_walk import PoseWalk
+from experiments.run.ready import activate
+from experiments.session.store import iso_utc
+from wam.calibration.free_space import FreeSpace
+from wam.calibration.gravity_file import GravityCalibration
+from wam.calibration.poses import MeasurementPose, choose_poses, plan_halts
+from wam.model.constants import Array
+from wam.model.moments import (
     MomentFit,
     ZeroErrors,
     check_fit,

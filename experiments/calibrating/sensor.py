@@ -4,23 +4,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from acquisition import PreflightError, Record
-from acquisition.ipc import WRENCH_SLOTS
-from experiments.run import ConsoleLoop, PoseWalk, activate
-from experiments.session import iso_utc
-from ft_sensor.calibration import (
-    SensorCalibration,
-    SensorFit,
-    check_residual,
-    fit_sensor,
-)
-from wam.calibration import (
-    FreeSpace,
-    MeasurementPose,
-    choose_orientations,
-    plan_halts,
-)
-from wam.model import Array
+from acquisition.errors import PreflightError
+from acquisition.ipc.layout import WRENCH_SLOTS
+from acquisition.sample import Record
+from experiments.run.console_loop import ConsoleLoop
+from experiments.run.pose_walk import PoseWalk
+from experiments.run.ready import activate
+from experiments.session.store import iso_utc
+from ft_sensor.calibration.fit import SensorFit, check_residual, fit_sensor
+from ft_sensor.calibration.sensor_file import SensorCalibration
+from wam.calibration.free_space import FreeSpace
+from wam.calibration.poses import MeasurementPose, choose_orientations, plan_halts
+from wam.model.constants import Array
 
 AVERAGE = 2.0  # s of readings that are averaged in each orientation
 _FEWEST = 100  # readings in an average

@@ -2,13 +2,14 @@
 
 import numpy as np
 
-from acquisition import PreflightError
-from acquisition.control_loop import ArmState
-from experiments.operator import Prompt
-from experiments.run import ConsoleLoop, activate
-from experiments.session import TrialName
-from ft_sensor.calibration import CORNERS, ContainerFit, check_terrain, fit_terrain
-from wam.model import Array
+from acquisition.control_loop.states import ArmState
+from acquisition.errors import PreflightError
+from experiments.operator.prompts import Prompt
+from experiments.run.console_loop import ConsoleLoop
+from experiments.run.ready import activate
+from experiments.session.sidecar import TrialName
+from ft_sensor.calibration.fit import CORNERS, ContainerFit, check_terrain, fit_terrain
+from wam.model.constants import Array
 
 AVERAGE = 0.3  # s of positions that are averaged
 STILL = 0.003  # m that the sole may move meanwhile

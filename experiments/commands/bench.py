@@ -6,8 +6,8 @@ import argparse
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from experiments.operator import Console
-    from experiments.tools import BenchReport
+    from experiments.operator.console import Console
+    from experiments.tools.bench import BenchReport
 
 EXAMPLES = """\
   traction bench --fake --seconds 60        the loop with simulated devices
@@ -31,12 +31,14 @@ def run(args: argparse.Namespace) -> int:
     import os
     from contextlib import closing
 
-    from acquisition import SettingsError
-    from experiments.operator import Console
-    from experiments.preflight import connect_rig, start_devices
-    from experiments.rig import FakeOptions, MultiProcessBackend
-    from experiments.settings import load_settings
-    from experiments.tools import run_bench
+    from acquisition.errors import SettingsError
+    from experiments.operator.console import Console
+    from experiments.preflight.connecting import connect_rig
+    from experiments.preflight.preflight import start_devices
+    from experiments.rig.processes import MultiProcessBackend
+    from experiments.rig.rig import FakeOptions
+    from experiments.settings.load import load_settings
+    from experiments.tools.bench import run_bench
 
     if not 1.0 <= args.seconds <= _LONGEST:
         raise SettingsError(

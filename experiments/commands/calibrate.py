@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 from experiments.arguments import add_simulated_arm, friction_share
 
 if TYPE_CHECKING:
-    from experiments.run import ConsoleLoop
-    from experiments.settings import Settings, TerrainRow
-    from wam.model import Array
+    from experiments.run.console_loop import ConsoleLoop
+    from experiments.settings.load import Settings
+    from experiments.settings.matrix import TerrainRow
+    from wam.model.constants import Array
 
 EXAMPLES = """\
   traction calibrate terrain --terrain S10  where the container of a terrain stands
@@ -63,11 +64,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Lead through one calibration and write its file; return the exit code."""
-    from experiments.operator import Console, choose_operator, keyboard
-    from experiments.preflight import connect_rig, run_preflight
-    from experiments.rig import FakeOptions, SimulatedHand, logging_bus
-    from experiments.run import ConsoleLoop, StopFlag, guided, handle_signals
-    from experiments.settings import load_settings
+    from experiments.operator.console import Console
+    from experiments.operator.scripted import choose_operator
+    from experiments.operator.terminal import keyboard
+    from experiments.preflight.connecting import connect_rig
+    from experiments.preflight.preflight import run_preflight
+    from experiments.rig.bus_log import logging_bus
+    from experiments.rig.rig import FakeOptions
+    from experiments.rig.simulation import SimulatedHand
+    from experiments.run.console_loop import ConsoleLoop
+    from experiments.run.pose_walk import guided
+    from experiments.run.stop import StopFlag, handle_signals
+    from experiments.settings.load import load_settings
 
     _check_arguments(args)
     friction = friction_share(args)
@@ -98,9 +106,9 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _gravity(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> None:
-    from experiments.calibrating import GravityGuide
-    from experiments.session import write_new_text
-    from wam.calibration import gravity_to_toml
+    from experiments.calibrating.gravity import GravityGuide
+    from experiments.session.data_files import write_new_text
+    from wam.calibration.gravity_file import gravity_to_toml
 
     guide = GravityGuide(console_loop)
     result = guide.run(args.poses, args.chosen, is_forced=args.force)
@@ -109,11 +117,12 @@ def _gravity(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> 
 
 
 def _friction(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> None:
-    from analysis.report import friction_html
-    from experiments.calibrating import FrictionGuide
-    from experiments.session import write_new_text
-    from wam.calibration import CENTRES, friction_to_toml, truth_to_toml
-    from wam.model import friction_of
+    from analysis.report.friction_page import friction_html
+    from experiments.calibrating.friction import FrictionGuide
+    from experiments.session.data_files import write_new_text
+    from wam.calibration.excitation import CENTRES
+    from wam.calibration.friction_file import friction_to_toml, truth_to_toml
+    from wam.model.friction import friction_of
 
     rig, console = console_loop.rig, console_loop.console
     console.say(f"Back and forth about {CENTRES} poses, each motor slow and fast.")
@@ -150,9 +159,9 @@ def _written(args: argparse.Namespace, out: Path) -> list[Path]:
 
 
 def _sensor(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> None:
-    from experiments.calibrating import SensorGuide
-    from experiments.session import write_new_text
-    from ft_sensor.calibration import sensor_to_toml
+    from experiments.calibrating.sensor import SensorGuide
+    from experiments.session.data_files import write_new_text
+    from ft_sensor.calibration.sensor_file import sensor_to_toml
 
     tool = console_loop.rig.model.tool
     assert tool is not None
@@ -168,9 +177,10 @@ def _sensor(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> N
 
 
 def _terrain(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> None:
-    from experiments.calibrating import TerrainGuide
-    from experiments.session import iso_utc, write_new_text
-    from ft_sensor.calibration import terrain_to_toml
+    from experiments.calibrating.terrain import TerrainGuide
+    from experiments.session.data_files import write_new_text
+    from experiments.session.store import iso_utc
+    from ft_sensor.calibration.files import terrain_to_toml
 
     rig = console_loop.rig
     fit, points = TerrainGuide(console_loop).run(is_forced=args.force)
@@ -220,7 +230,7 @@ def _without_old(
 
 def _place(what: str, settings: Settings, row: TerrainRow, *, is_fake: bool) -> Path:
     """Return where the file goes, beside rig.toml; what is simulated is marked."""
-    from experiments.rig import friction_path, gravity_path
+    from experiments.rig.law_calibrations import friction_path, gravity_path
 
     names = {
         "sensor": "ft_sensor.toml",
@@ -236,7 +246,7 @@ def _place(what: str, settings: Settings, row: TerrainRow, *, is_fake: bool) -> 
 
 
 def _check_arguments(args: argparse.Namespace) -> None:
-    from acquisition import SettingsError
+    from acquisition.errors import SettingsError
 
     nothing = "Nothing was started."
     if not args.fake and (args.fast or args.operator_script):
@@ -258,7 +268,7 @@ def _chosen_poses(
     """Return the poses of a person, checked before anything is started; [] = none."""
     if args.pose_file is None:
         return []
-    from experiments.run import read_poses
+    from experiments.run.surroundings import read_poses
 
     fewest = _FEWEST.get(args.what)
     counts = range(0) if fewest is None else range(fewest, _MOST + 1)
@@ -267,7 +277,7 @@ def _chosen_poses(
 
 def _check_out(out: Path) -> None:
     """Refuse before the arm moves what could not be written afterwards."""
-    from acquisition import SettingsError
+    from acquisition.errors import SettingsError
 
     if out.exists():
         raise SettingsError(

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 from experiments.arguments import did_you_mean, number_within
 
 if TYPE_CHECKING:
-    from experiments.operator import Console
-    from experiments.settings import Settings
-    from wam.bus import BusErrors
+    from experiments.operator.console import Console
+    from experiments.settings.load import Settings
+    from wam.bus.error_frames import BusErrors
 
 EXAMPLES = """\
   traction check --bus 10                   who says what on the bus; nothing is sent
@@ -58,10 +58,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the page and return the exit code."""
-    from acquisition import SettingsError
-    from experiments.operator import GOOD, Console
-    from experiments.rig import read_law_calibrations
-    from experiments.settings import load_settings, origin_lines
+    from acquisition.errors import SettingsError
+    from experiments.operator.console import GOOD, Console
+    from experiments.rig.law_calibrations import read_law_calibrations
+    from experiments.settings.load import load_settings
+    from experiments.settings.origins import origin_lines
 
     console = Console(color=not args.no_color)
     if args.json and (args.explain or args.config_only or args.bus is not None):
@@ -92,8 +93,10 @@ def _check(args: argparse.Namespace, settings: Settings, console: Console) -> No
     Raises:
         PreflightError: a check failed.
     """
-    from experiments.preflight import connect_rig, run_preflight
-    from experiments.rig import FakeOptions, logging_bus
+    from experiments.preflight.connecting import connect_rig
+    from experiments.preflight.preflight import run_preflight
+    from experiments.rig.bus_log import logging_bus
+    from experiments.rig.rig import FakeOptions
 
     first = settings.matrix.terrains[0].name
     row = settings.row(args.terrain or first)
@@ -113,9 +116,9 @@ def _as_json(args: argparse.Namespace, settings: Settings) -> int:
     """
     import json
 
-    from acquisition import TractionError
+    from acquisition.errors import TractionError
     from experiments import provenance
-    from experiments.operator import Console, PageRecorder
+    from experiments.operator.console import Console, PageRecorder
 
     page = PageRecorder()
     refusal: TractionError | None = None
@@ -146,8 +149,11 @@ def _listen(
         SettingsError: a simulated bus is inside its own process only.
         LinkError: the bus cannot be opened, or broke.
     """
-    from acquisition import SettingsError, SystemClock
-    from wam.bus import BusTraffic, CanLink, open_door
+    from acquisition.clock import SystemClock
+    from acquisition.errors import SettingsError
+    from wam.bus.doors import open_door
+    from wam.bus.link import CanLink
+    from wam.bus.log import BusTraffic
 
     if is_fake:
         raise SettingsError(
@@ -179,8 +185,8 @@ def _say_traffic(
     counts: Mapping[int, int], seconds: float, load: float, console: Console
 ) -> None:
     """Say how often each identifier was heard."""
-    from experiments.operator import GOOD
-    from wam.bus import describe_id
+    from experiments.operator.console import GOOD
+    from wam.bus.decoder import describe_id
 
     if not counts:
         console.check(GOOD, "traffic", "silent, as an arm is while no host polls it")
@@ -193,9 +199,9 @@ def _say_traffic(
 
 def _say_trouble(foreign: Collection[int], errors: BusErrors, console: Console) -> None:
     """Say who else is master, and what the controller reports."""
-    from acquisition import BusCondition
+    from acquisition.devices import BusCondition
     from experiments.messages import BUS_WORDS
-    from experiments.operator import BAD, GOOD, WARNING
+    from experiments.operator.console import BAD, GOOD, WARNING
 
     names = ", ".join(f"{can_id:03X}" for can_id in sorted(foreign))
     console.check(
@@ -209,10 +215,10 @@ def _say_trouble(foreign: Collection[int], errors: BusErrors, console: Console) 
 
 
 def _explain(name: str, console: Console) -> int:
-    from acquisition import SettingsError
-    from acquisition.control_loop import transition_lines
+    from acquisition.control_loop.states import transition_lines
+    from acquisition.errors import SettingsError
     from experiments.messages import CATALOGUE, catalogue_table, explanation
-    from experiments.session import table_lines
+    from experiments.session.states import table_lines
 
     pages = {
         "states": lambda: [*table_lines(), *transition_lines()],

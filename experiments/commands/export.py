@@ -37,16 +37,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the tables and return the exit code."""
-    from acquisition import SettingsError
-    from experiments.operator import Console
-    from experiments.report import (
-        ReportRequest,
-        choose_sessions,
-        export_sessions,
-        export_terrains,
-        tell_missing,
-    )
-    from experiments.settings import load_settings
+    from acquisition.errors import SettingsError
+    from experiments.operator.console import Console
+    from experiments.report.choices import choose_sessions, tell_missing
+    from experiments.report.export import export_sessions
+    from experiments.report.sessions import ReportRequest, export_terrains
+    from experiments.settings.load import load_settings
 
     if (args.to is None) == (args.terrain_db is None):
         raise SettingsError(
@@ -108,17 +104,12 @@ def _add_publish_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _publish(args: argparse.Namespace) -> int:
     """Write the publication and return the exit code."""
-    from experiments.operator import Console
-    from experiments.report import (
-        LICENCES,
-        PublishRequest,
-        ReportRequest,
-        choose_sessions,
-        parse_author,
-        publish_sessions,
-        tell_missing,
-    )
-    from experiments.settings import load_settings
+    from experiments.operator.console import Console
+    from experiments.report.choices import choose_sessions, tell_missing
+    from experiments.report.credits import LICENCES, parse_author
+    from experiments.report.publication import PublishRequest, publish_sessions
+    from experiments.report.sessions import ReportRequest
+    from experiments.settings.load import load_settings
 
     authors = [parse_author(text) for text in args.author]
     request = PublishRequest(

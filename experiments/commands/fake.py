@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from experiments.operator import Console
-    from experiments.rig import ServedArm
-    from experiments.settings import Settings
-    from experiments.tools import Press, Pressable
+    from experiments.operator.console import Console
+    from experiments.rig.fake import ServedArm
+    from experiments.settings.load import Settings
+    from experiments.tools.pendant import Press, Pressable
 
 EXAMPLES = """\
   traction fake --can traction-fake:/tmp/wam.sock --idle-first
@@ -89,12 +89,13 @@ def _add_arm(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serve until a signal ends it and return the exit code."""
-    from acquisition import SystemClock
-    from experiments.operator import Console
-    from experiments.rig import build_server, open_bus_log
-    from experiments.run import StopFlag, handle_signals
-    from experiments.settings import load_settings
-    from experiments.tools import PRESSES, Lines, Pendant, read_script
+    from acquisition.clock import SystemClock
+    from experiments.operator.console import Console
+    from experiments.rig.bus_log import open_bus_log
+    from experiments.rig.fake import build_server
+    from experiments.run.stop import StopFlag, handle_signals
+    from experiments.settings.load import load_settings
+    from experiments.tools.pendant import PRESSES, Lines, Pendant, read_script
 
     served = _served(args)
     script = None if args.script is None else read_script(args.script)
@@ -125,7 +126,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _served(args: argparse.Namespace) -> ServedArm | None:
     """Return the arm that is to be served; None = none."""
-    from experiments.rig import ServedArm
+    from experiments.rig.fake import ServedArm
 
     if not args.can:
         return None
@@ -166,9 +167,9 @@ def _serve_sensor(
     settings: Settings, args: argparse.Namespace, console: Console
 ) -> int:
     """Serve a sensor without an arm until a signal ends it."""
-    from acquisition import SettingsError
-    from experiments.rig import build_sensor_server
-    from experiments.run import StopFlag, handle_signals
+    from acquisition.errors import SettingsError
+    from experiments.rig.fake import build_sensor_server
+    from experiments.run.stop import StopFlag, handle_signals
 
     line = _line(args)
     if line is None:
@@ -198,7 +199,7 @@ def _press(server: Pressable, presses: list[Press]) -> bool:
 
 
 def _split(text: str) -> tuple[str, str]:
-    from acquisition import SettingsError
+    from acquisition.errors import SettingsError
 
     interface, colon, channel = text.partition(":")
     if not (interface and colon and channel):

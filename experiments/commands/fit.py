@@ -17,7 +17,7 @@ from experiments.arguments import (
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from analysis.data import TractionSeries
+    from analysis.data.series import TractionSeries
 
 EXAMPLES = """\
   traction fit trials.npz --to fit
@@ -66,18 +66,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Fit tables and write the report."""
-    from acquisition import SystemClock
-    from analysis.report import ReportContext, plain_choice, side_by_side, write_report
-    from analysis.study import FitOptions, StudyOptions, run_study
-    from experiments.operator import Console
-    from experiments.report import (
-        REPORTED,
-        analysis_choices,
-        fitting,
-        repeat_study,
-        require_samples,
-    )
-    from experiments.session import iso_utc
+    from acquisition.clock import SystemClock
+    from analysis.report.page import ReportContext, write_report
+    from analysis.report.what_if_tables import plain_choice, side_by_side
+    from analysis.study.models import FitOptions
+    from analysis.study.study import StudyOptions, run_study
+    from experiments.operator.console import Console
+    from experiments.report.choices import analysis_choices, repeat_study
+    from experiments.report.progress import fitting
+    from experiments.report.sessions import REPORTED, require_samples
+    from experiments.session.store import iso_utc
 
     console = Console(color=not args.no_color)
     choices = analysis_choices(args)
@@ -116,7 +114,9 @@ def run(args: argparse.Namespace) -> int:
 
 def _load(args: argparse.Namespace) -> dict[str, list[TractionSeries]]:
     """Return the trials by terrain; raises SettingsError."""
-    from analysis.data import load_tables, parse_columns, parse_stones, parse_units
+    from analysis.data.columns import parse_columns, parse_units
+    from analysis.data.tables import load_tables
+    from analysis.data.terrain_kinds import parse_stones
 
     columns = parse_columns(args.columns) if args.columns else None
     stones = parse_stones(args.stones) if args.stones else None
@@ -126,7 +126,7 @@ def _load(args: argparse.Namespace) -> dict[str, list[TractionSeries]]:
 
 def _is_simulated(trials: Mapping[str, Sequence[TractionSeries]]) -> bool:
     """Return whether the trials are simulated ones; a mixture is refused."""
-    from acquisition import SettingsError
+    from acquisition.errors import SettingsError
 
     kinds = {trial.is_simulated for series in trials.values() for trial in series}
     if len(kinds) > 1:

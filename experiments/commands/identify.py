@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from analysis.data import TractionSeries
-    from analysis.terrains import Recognition, WindowEvidence
-    from experiments.operator import Console
+    from analysis.data.series import TractionSeries
+    from analysis.terrains.verdict import Recognition, WindowEvidence
+    from experiments.operator.console import Console
 
 EXAMPLES = """\
   traction identify data/sessions/*/trials/T01.mcap --terrain-db terrains.json
@@ -50,9 +50,10 @@ def run(args: argparse.Namespace) -> int:
     import json
     from dataclasses import asdict
 
-    from analysis.data import PrepareOptions, prepare_trial
-    from analysis.terrains import load, recognise
-    from experiments.operator import Console
+    from analysis.data.prepare import PrepareOptions, prepare_trial
+    from analysis.terrains.database import load
+    from analysis.terrains.verdict import recognise
+    from experiments.operator.console import Console
 
     console = Console(color=not args.no_color)
     database = load(args.terrain_db)
@@ -73,7 +74,9 @@ def run(args: argparse.Namespace) -> int:
 
 def _series(args: argparse.Namespace) -> list[TractionSeries]:
     """Return the trials of all files, recorded ones and tables."""
-    from analysis.data import load_tables, load_trial, parse_columns
+    from analysis.data.columns import parse_columns
+    from analysis.data.load import load_trial
+    from analysis.data.tables import load_tables
 
     recorded = [path for path in args.files if path.suffix == ".mcap"]
     tables = [path for path in args.files if path.suffix != ".mcap"]

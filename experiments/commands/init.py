@@ -21,9 +21,9 @@ def run(args: argparse.Namespace) -> int:
     """Write both files, or neither where one is there already."""
     from importlib import resources
 
-    from acquisition import SettingsError
-    from experiments.operator import Console
-    from experiments.session import write_new_text
+    from acquisition.errors import SettingsError
+    from experiments.operator.console import Console
+    from experiments.session.data_files import write_new_text
 
     folder: Path = args.folder
     there = [str(folder / name) for name in _FILES if (folder / name).exists()]

@@ -23,8 +23,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the remark into the journal, and beside the trial."""
-    from experiments.operator import Console
-    from experiments.session import add_note, find_session, looks_like_trial
+    from experiments.operator.console import Console
+    from experiments.session.annotations import add_note, looks_like_trial
+    from experiments.session.store import find_session
 
     folder = find_session(args.data, args.session)
     words: list[str] = args.words

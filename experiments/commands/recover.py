@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from acquisition.trial_file import Recovery
-    from experiments.operator import Console
+    from acquisition.trial_file.recover import Recovery
+    from experiments.operator.console import Console
 
 EXAMPLES = """\
   traction recover data/sessions/2027-03-14_S012_S10   every .partial below a folder
@@ -34,9 +34,9 @@ def run(args: argparse.Namespace) -> int:
     """Recover every file and return the exit code."""
     import json
 
-    from acquisition import TrialFileError
-    from acquisition.trial_file import recover_file
-    from experiments.operator import Console, PageRecorder
+    from acquisition.errors import TrialFileError
+    from acquisition.trial_file.recover import recover_file
+    from experiments.operator.console import Console, PageRecorder
 
     console = PageRecorder() if args.json else Console(color=not args.no_color)
     sources = find_sources(args.files)
@@ -87,7 +87,7 @@ def find_sources(names: list[str]) -> list[Path]:
     Raises:
         SettingsError: a name means no file.
     """
-    from acquisition import SettingsError
+    from acquisition.errors import SettingsError
 
     paths: dict[Path, None] = {}
     for name in names:
@@ -116,7 +116,7 @@ def _matching(pattern: Path) -> list[Path]:
 
 
 def _tell(recovery: Recovery, console: Console) -> None:
-    from experiments.operator import GOOD, WARNING
+    from experiments.operator.console import GOOD, WARNING
 
     source, verified = recovery.source, recovery.verified
     held = f"{verified.cycles} cycles, {recovery.messages} messages"
@@ -138,7 +138,7 @@ def missing_text(recovery: Recovery) -> str:
 
     A copy that was cut off does not show by itself how much is missing.
     """
-    from experiments.session import read_json
+    from experiments.session.data_files import read_json
 
     source, verified = recovery.source, recovery.verified
     stem = source.name.removesuffix(".partial").removesuffix(".mcap")
@@ -147,7 +147,7 @@ def missing_text(recovery: Recovery) -> str:
     if type(cycles) is not int or not verified.cycles < cycles <= _MOST_CYCLES:
         return ""
     missing = cycles - verified.cycles
-    from acquisition import RATE_HZ
+    from acquisition.clock import RATE_HZ
 
     return (
         f"Its sidecar {stem}.json states {cycles} cycles: at least {missing} are "
@@ -159,7 +159,7 @@ def lost_text(recovery: Recovery) -> str:
     """Return what was lost in words, for the operator."""
     if not recovery.bytes_dropped:
         return "Lost: nothing that was on the disk. The source is kept."
-    from acquisition import RATE_HZ
+    from acquisition.clock import RATE_HZ
 
     lost = f"Lost: {recovery.bytes_dropped} bytes at the end"
     if recovery.seconds_dropped > 0.0:

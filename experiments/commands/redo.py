@@ -21,9 +21,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Record the trial and return the exit code."""
-    from acquisition import SessionError
-    from experiments.run import redo, resume_request
-    from experiments.session import clean_text, find_session, parse_trial
+    from acquisition.errors import SessionError
+    from experiments.run.resume import redo, resume_request
+    from experiments.session.annotations import clean_text, parse_trial
+    from experiments.session.store import find_session
 
     folder = find_session(args.data, args.session)
     number, attempt = parse_trial(args.trial)

@@ -11,9 +11,9 @@ from experiments.arguments import add_simulated_arm, friction_share
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from analysis.validation import BandResult
-    from experiments.operator import Console
-    from experiments.tools import AcceptancePlan
+    from analysis.validation.bands import BandResult
+    from experiments.operator.console import Console
+    from experiments.tools.acceptance import AcceptancePlan
 
 EXAMPLES = """\
   traction rehearse --seed 2                all terrains, ten trials each, 43 bands
@@ -43,11 +43,11 @@ def run(args: argparse.Namespace) -> int:
     """Record, analyse and judge; return 6 if a band is not met."""
     import json
 
-    from experiments.operator import Console
-    from experiments.rig import twin_words
-    from experiments.session import write_text
-    from experiments.settings import load_settings
-    from experiments.tools import (
+    from experiments.operator.console import Console
+    from experiments.rig.law_calibrations import twin_words
+    from experiments.session.data_files import write_text
+    from experiments.settings.load import load_settings
+    from experiments.tools.acceptance import (
         AcceptancePlan,
         analyse,
         as_plain,
@@ -92,8 +92,8 @@ def run(args: argparse.Namespace) -> int:
 def _print(
     plan: AcceptancePlan, results: Sequence[BandResult], folder: Path, console: Console
 ) -> int:
-    from experiments.operator import BAD, GOOD
-    from experiments.tools import gated
+    from experiments.operator.console import BAD, GOOD
+    from experiments.tools.acceptance import gated
 
     rows = [
         [
@@ -128,7 +128,7 @@ def _free_folder(data: Path, seed: int) -> Path:
 
 
 def _check_arguments(args: argparse.Namespace) -> None:
-    from acquisition import SettingsError
+    from acquisition.errors import SettingsError
 
     if args.twin is not None and args.config is not None:
         raise SettingsError(

@@ -14,9 +14,9 @@ from experiments.arguments import JoinedCommand, add_allow_missing, number_withi
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from experiments.operator import Console
-    from experiments.run import StopFlag
-    from wam.bus import BusSummary, DecodedLine
+    from experiments.operator.console import Console
+    from experiments.run.stop import StopFlag
+    from wam.bus.log import BusSummary, DecodedLine
 
 EXAMPLES = """\
   traction replay S012 T04 --speed 2        a trial, twice as fast as it was
@@ -75,7 +75,7 @@ def _add_port(parser: argparse.ArgumentParser, when: str) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Show a trial or a bus log and return the exit code."""
-    from acquisition import SettingsError
+    from acquisition.errors import SettingsError
 
     is_trial = args.session is not None and args.trial is not None
     if args.foresight is not None and not is_trial:
@@ -97,15 +97,12 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _show_trial(args: argparse.Namespace) -> int:
-    from acquisition import SystemClock
-    from experiments.operator import Console
-    from experiments.report import play
-    from experiments.session import (
-        compare_trial,
-        find_session,
-        kept_data_error,
-        trial_path,
-    )
+    from acquisition.clock import SystemClock
+    from experiments.operator.console import Console
+    from experiments.report.playback import play
+    from experiments.session.annotations import trial_path
+    from experiments.session.kept_files import compare_trial, kept_data_error
+    from experiments.session.store import find_session
 
     console = Console(color=not args.no_color)
     folder = find_session(args.data, args.session)
@@ -122,9 +119,9 @@ def _show_trial(args: argparse.Namespace) -> int:
 
 
 def _serve_trial(args: argparse.Namespace, path: Path, console: Console) -> int:
-    from acquisition import SystemClock
-    from experiments.report import serve
-    from experiments.run import StopFlag, handle_signals
+    from acquisition.clock import SystemClock
+    from experiments.report.playback import serve
+    from experiments.run.stop import StopFlag, handle_signals
 
     stop = StopFlag()
     with handle_signals(stop):
@@ -147,10 +144,10 @@ def _add_watch_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _watch(args: argparse.Namespace) -> int:
     """Serve what is recorded until Ctrl-C and return the exit code."""
-    from acquisition import SystemClock
-    from experiments.live import watch
-    from experiments.operator import Console
-    from experiments.run import StopFlag, handle_signals
+    from acquisition.clock import SystemClock
+    from experiments.live.watching import watch
+    from experiments.operator.console import Console
+    from experiments.run.stop import StopFlag, handle_signals
 
     console, stop = Console(color=not args.no_color), StopFlag()
     with handle_signals(stop):
@@ -165,8 +162,8 @@ WATCH = JoinedCommand(WATCH_EXAMPLES, _add_watch_arguments, _watch)
 
 def _prove_foresight(path: Path, database: Path, console: Console) -> int:
     """Say whether the record gives what was foreseen; 0 if bit for bit, 1 if not."""
-    from experiments.report import replay_foresight
-    from experiments.rig import read_foresight
+    from experiments.report.foresight import replay_foresight
+    from experiments.rig.foresight import read_foresight
 
     replay = replay_foresight(path, read_foresight(database))
     console.say(
@@ -186,9 +183,10 @@ def _prove_foresight(path: Path, database: Path, console: Console) -> int:
 
 
 def _show_log(args: argparse.Namespace) -> int:
-    from acquisition import SettingsError
-    from experiments.operator import Console
-    from wam.bus import LONGEST_LINE, BusReader, parse_log
+    from acquisition.errors import SettingsError
+    from experiments.operator.console import Console
+    from wam.bus.decoder import BusReader
+    from wam.bus.log import LONGEST_LINE, parse_log
 
     console = Console(color=not args.no_color)
     reader = BusReader()

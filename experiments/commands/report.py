@@ -17,7 +17,7 @@ from experiments.arguments import (
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from experiments.session import SessionFolder
+    from experiments.session.store import SessionFolder
 
 EXAMPLES = """\
   traction report S012                             one session, in its own folder
@@ -49,19 +49,18 @@ def run(args: argparse.Namespace) -> int:
     import json
 
     if not args.scheduler and not _is_kept(Path(args.data)):
-        from acquisition import available_cores, prepare_workers
+        from acquisition.worker_processes import available_cores, prepare_workers
 
         if available_cores() > 1:
             prepare_workers(_WORK)  # first, as it imports while this process does
-    from experiments.operator import Console, PageRecorder
-    from experiments.report import (
-        ReportRequest,
+    from experiments.operator.console import Console, PageRecorder
+    from experiments.report.choices import (
         analysis_choices,
         choose_sessions,
-        report_sessions,
         tell_missing,
     )
-    from experiments.settings import load_settings
+    from experiments.report.sessions import ReportRequest, report_sessions
+    from experiments.settings.load import load_settings
 
     choices = analysis_choices(args)
     console = PageRecorder() if args.json else Console(color=not args.no_color)
@@ -90,7 +89,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _is_kept(data: Path) -> bool:
     """Whether results have been kept since the last trial was recorded."""
-    from experiments.session import FOLDS
+    from experiments.session.store import FOLDS
 
     results, trials = [data / FOLDS], data.glob("sessions/*/trials")
     kept, recorded = (
@@ -130,8 +129,8 @@ def _stance_sessions(data: Path, names: Sequence[str]) -> list[SessionFolder]:
     Raises:
         SessionError: there is no such session, or both kinds are named.
     """
-    from acquisition import SessionError
-    from experiments.session import find_session
+    from acquisition.errors import SessionError
+    from experiments.session.store import find_session
 
     sessions = [find_session(data, name) for name in dict.fromkeys(names)]
     standing = [session for session in sessions if session.is_of_stances]
@@ -151,14 +150,13 @@ def _report_stances(sessions: Sequence[SessionFolder], data: Path) -> Path:
     Raises:
         SessionError: no session has a kept stance, or a file is not what it was.
     """
-    from acquisition import SessionError, SystemClock
-    from analysis.report import ReportContext, StanceGroup, stance_html
-    from experiments.session import (
-        iso_utc,
-        read_stance_task,
-        stance_outcomes,
-        write_text,
-    )
+    from acquisition.clock import SystemClock
+    from acquisition.errors import SessionError
+    from analysis.report.page import ReportContext
+    from analysis.report.stance_page import StanceGroup, stance_html
+    from experiments.session.data_files import write_text
+    from experiments.session.stance_task import read_stance_task, stance_outcomes
+    from experiments.session.store import iso_utc
 
     groups: list[StanceGroup] = []
     for session in sessions:

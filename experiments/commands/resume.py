@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from experiments.arguments import add_reopening
 
 if TYPE_CHECKING:
-    from experiments.session import SessionFolder
+    from experiments.session.store import SessionFolder
 
 EXAMPLES = """\
   traction resume                           the only unfinished session
@@ -24,8 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Record what is missing and return the exit code."""
-    from experiments.run import resume_request, resume_session
-    from experiments.session import find_session
+    from experiments.run.resume import resume_request, resume_session
+    from experiments.session.store import find_session
 
     if args.session is None:
         folder = _only_one(args.data, is_fake=args.fake)
@@ -40,13 +40,10 @@ def _only_one(data: Path, *, is_fake: bool) -> "SessionFolder":
     Raises:
         SessionError: there is none, or more than one, or it is open elsewhere.
     """
-    from acquisition import SessionError
-    from experiments.session import (
-        find_unfinished,
-        list_sessions,
-        locked_error,
-        owner_of,
-    )
+    from acquisition.errors import SessionError
+    from experiments.session.lock import locked_error, owner_of
+    from experiments.session.store import list_sessions
+    from experiments.session.unfinished import find_unfinished
 
     sessions = [
         session

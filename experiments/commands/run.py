@@ -16,8 +16,10 @@ from experiments.arguments import (
 )
 
 if TYPE_CHECKING:
-    from experiments.run import ResumeRequest, SessionRequest
-    from experiments.session import StanceTask, UnfinishedSession
+    from experiments.run.resume import ResumeRequest
+    from experiments.run.session import SessionRequest
+    from experiments.session.stance_task import StanceTask
+    from experiments.session.unfinished import UnfinishedSession
 
 EXAMPLES = """\
   traction run S0 --fake --fast             a simulated session, ten trials
@@ -83,11 +85,13 @@ def run(args: argparse.Namespace) -> int:
 
 def _run(args: argparse.Namespace, stance: StanceTask | None) -> int:
     """Run one session of pushes, or of stances; return the exit code."""
-    from experiments.operator import Console, choose_operator
-    from experiments.rig import FakeOptions
-    from experiments.run import OpenMode, SessionRequest, resume_session, run_session
-    from experiments.session import Event
-    from experiments.settings import load_settings
+    from experiments.operator.console import Console
+    from experiments.operator.scripted import choose_operator
+    from experiments.rig.rig import FakeOptions
+    from experiments.run.resume import resume_session
+    from experiments.run.session import OpenMode, SessionRequest, run_session
+    from experiments.session.states import Event
+    from experiments.settings.load import load_settings
 
     _check_arguments(args)
     friction = friction_share(args)
@@ -121,8 +125,8 @@ def _run(args: argparse.Namespace, stance: StanceTask | None) -> int:
 
 def _make_room(request: SessionRequest, *, is_new: bool) -> UnfinishedSession | None:
     """Return the session to be resumed instead, None when none is in the way."""
-    from experiments.run import ResumeChoice, choose_resume, close
-    from experiments.session import find_unfinished
+    from experiments.run.resume import ResumeChoice, choose_resume, close
+    from experiments.session.unfinished import find_unfinished
 
     is_fake, terrain = request.fake is not None, request.row.name
     sessions = [
@@ -145,7 +149,7 @@ def _make_room(request: SessionRequest, *, is_new: bool) -> UnfinishedSession | 
 
 
 def _as_reopening(args: argparse.Namespace, request: SessionRequest) -> ResumeRequest:
-    from experiments.run import ResumeRequest
+    from experiments.run.resume import ResumeRequest
 
     return ResumeRequest(
         data=request.data,
@@ -162,7 +166,7 @@ def _as_reopening(args: argparse.Namespace, request: SessionRequest) -> ResumeRe
 
 
 def _check_arguments(args: argparse.Namespace) -> None:
-    from acquisition import SettingsError
+    from acquisition.errors import SettingsError
 
     nothing = "Nothing was started."
     simulated = (args.fast, args.twin, args.fault, args.operator_script)
@@ -222,9 +226,9 @@ def _add_stance_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _stance(args: argparse.Namespace) -> int:
     """Let the foot stand by itself, in the simulation only."""
-    from acquisition import PreflightError
-    from experiments.run import LIVE_STANCE
-    from experiments.session import StanceTask
+    from acquisition.errors import PreflightError
+    from experiments.run.stances import LIVE_STANCE
+    from experiments.session.stance_task import StanceTask
 
     task = StanceTask(args.policy, args.risk, args.peak, args.stances)
     if not args.fake:

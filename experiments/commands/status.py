@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence
 
-    from experiments.board import MatrixRow
-    from experiments.operator import Console
-    from experiments.session import Deviation, SessionFolder
-    from experiments.settings import TerrainRow
+    from experiments.board.matrix_board import MatrixRow
+    from experiments.operator.console import Console
+    from experiments.session.kept_files import Deviation
+    from experiments.session.store import SessionFolder
+    from experiments.settings.matrix import TerrainRow
 
 EXAMPLES = """\
   traction status                           the board, and what comes next
@@ -51,17 +52,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the board, counted from files whose checksum is right."""
-    from experiments.board import (
-        BoardCache,
-        cache_path,
+    from experiments.board.board_cache import BoardCache, cache_path
+    from experiments.board.matrix_board import (
         compare_board,
         count_board,
-        enough_lines,
-        next_steps,
         parse_where,
         see_sessions,
     )
-    from experiments.operator import Console
+    from experiments.board.upcoming import enough_lines, next_steps
+    from experiments.operator.console import Console
 
     cache = BoardCache(None if args.fresh else cache_path(args.data))
     rows = cache.rows(_settings_texts(args.config), lambda: _terrains(args.config))
@@ -103,7 +102,7 @@ class Board:
 
     def plain(self) -> list[str]:
         """Return the board as lines of text."""
-        from experiments.operator import aligned
+        from experiments.operator.console import aligned
 
         table = aligned([_HEADER, *map(_row, self.lines)])
         return [*table, *self.notes, *self.steps]
@@ -125,8 +124,8 @@ def board_notes(
         where: the conditions that the board was counted with.
         board: its rows.
     """
-    from acquisition.trial_file import list_folder
-    from experiments.session import JOURNAL_FILE
+    from acquisition.trial_file.data_files import list_folder
+    from experiments.session.store import JOURNAL_FILE
 
     sessions = data / "sessions"
     if not data.is_dir():
@@ -155,7 +154,7 @@ def board_notes(
 
 def _show(board: Board, console: Console, *, is_json: bool) -> int:
     """Print what was seen; return the exit code."""
-    from experiments.operator import BAD
+    from experiments.operator.console import BAD
 
     for note in board.notes:  # not in the way of a program that reads the board
         console.problem(note)
@@ -187,7 +186,7 @@ def _settings_texts(config: Path | None) -> list[bytes] | None:
 
 
 def _terrains(config: Path | None) -> Sequence[TerrainRow]:
-    from experiments.settings import load_settings
+    from experiments.settings.load import load_settings
 
     return load_settings(config).matrix.terrains
 
@@ -205,7 +204,7 @@ def _row(line: MatrixRow) -> tuple[str, ...]:
 
 def _follow(look: Callable[[], list[str]], console: Console) -> int:
     """Show what `look` returns whenever it has changed, until Ctrl-C."""
-    from acquisition import SystemClock
+    from acquisition.clock import SystemClock
 
     clock = SystemClock()
     shown: list[str] = []

@@ -20,8 +20,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Change the verdict; files and journal follow, the history is kept."""
-    from experiments.operator import Console
-    from experiments.session import change_verdict, find_session
+    from experiments.operator.console import Console
+    from experiments.session.annotations import change_verdict
+    from experiments.session.store import find_session
 
     folder = find_session(args.data, args.session)
     reason = " ".join(args.reason)

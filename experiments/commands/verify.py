@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from experiments.operator import Console
+    from experiments.operator.console import Console
 
 EXAMPLES = """\
   traction verify S012                      the kept trials of one session
@@ -39,10 +39,11 @@ def run(args: argparse.Namespace) -> int:
     import json
     from dataclasses import asdict
 
-    from acquisition import SessionError
-    from experiments.operator import BAD, GOOD, Console
-    from experiments.report import is_publication
-    from experiments.session import compare_kept, find_session, list_sessions
+    from acquisition.errors import SessionError
+    from experiments.operator.console import BAD, GOOD, Console
+    from experiments.report.crate import is_publication
+    from experiments.session.kept_files import compare_kept
+    from experiments.session.store import find_session, list_sessions
 
     if bool(args.sessions) == args.all:
         raise SessionError(
@@ -73,9 +74,9 @@ def _verify_published(folders: list[Path], args: argparse.Namespace) -> int:
     import json
     from dataclasses import asdict
 
-    from acquisition import SessionError
-    from experiments.operator import BAD, GOOD, Console
-    from experiments.report import changed_files
+    from acquisition.errors import SessionError
+    from experiments.operator.console import BAD, GOOD, Console
+    from experiments.report.checksums import changed_files
 
     if len(folders) != 1 or len(args.sessions) != 1:
         raise SessionError(
@@ -96,8 +97,8 @@ def _verify_published(folders: list[Path], args: argparse.Namespace) -> int:
 
 
 def _rebuild(folder: Path, console: Console) -> int:
-    from experiments.operator import BAD, GOOD
-    from experiments.report import TOLERANCE, rebuild
+    from experiments.operator.console import BAD, GOOD
+    from experiments.report.rebuilding import TOLERANCE, rebuild
 
     result = rebuild(folder, console)
     for text in result.different[:_SHOWN]:

@@ -7,9 +7,9 @@ import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from experiments.operator import Console
-    from experiments.rig import Rig
-    from wam.driver import ArmInfo
+    from experiments.operator.console import Console
+    from experiments.rig.rig import Rig
+    from wam.driver.startup import ArmInfo
 
 EXAMPLES = """\
   traction zero                             asks, then defines the home position
@@ -28,10 +28,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Define the home position after confirmation and return the exit code."""
-    from experiments.operator import GOOD, WARNING, Console
-    from experiments.preflight import connect_rig
-    from experiments.rig import FakeOptions
-    from experiments.settings import load_settings
+    from experiments.operator.console import GOOD, WARNING, Console
+    from experiments.preflight.connecting import connect_rig
+    from experiments.rig.rig import FakeOptions
+    from experiments.settings.load import load_settings
 
     console = Console(color=not args.no_color)
     settings = load_settings(args.config)
@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _start(rig: Rig) -> ArmInfo:
     """Ask the arm who it is; raise PreflightError when it is not fit."""
-    from acquisition import PreflightError, TractionError
+    from acquisition.errors import PreflightError, TractionError
 
     try:
         return rig.backend.start_arm()
@@ -74,8 +74,8 @@ def _check_encoders(rig: Rig, info: ArmInfo, console: Console) -> None:
     Raises:
         PreflightError: the arm is not where home was.
     """
-    from experiments.operator import GOOD, WARNING
-    from wam.driver import check_home, home_error
+    from experiments.operator.console import GOOD, WARNING
+    from wam.driver.home import check_home, home_error
 
     before = rig.settings.rig.arm.mech_at_home
     mech = [puck.mech for puck in info.pucks if puck.mech is not None]
@@ -97,7 +97,7 @@ def _check_encoders(rig: Rig, info: ArmInfo, console: Console) -> None:
 
 def _is_confirmed(console: Console) -> bool:
     """Ask for the word itself: a stray Enter must not move the arm's zero."""
-    from acquisition import SettingsError
+    from acquisition.errors import SettingsError
 
     if not sys.stdin.isatty():
         raise SettingsError(

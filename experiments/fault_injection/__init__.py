@@ -3,7 +3,3 @@
 `plan` reads `--fault NAME@Tn+SECONDSs`, `host_faults` spoils disk, lock and program;
 faults of the devices are injected by the simulated rig.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -9,9 +9,10 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from experiments.preflight import free_bytes
-from experiments.rig import Rig
-from experiments.session import LOCK_FILE, SessionFolder, sign
+from experiments.preflight.host_checks import free_bytes
+from experiments.rig.rig import Rig
+from experiments.session.lock import LOCK_FILE, sign
+from experiments.session.store import SessionFolder
 
 COMPUTER_FAULTS = ("bug", "crash", "disk-full", "locked", "write-failed")
 _ALMOST_NOTHING = 2_100_000_000  # bytes free, less than any session is allowed

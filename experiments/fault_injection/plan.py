@@ -5,7 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
-from acquisition import SettingsError, SimulationControl
+from acquisition.errors import SettingsError
+from acquisition.simulation import SimulationControl
 from experiments.arguments import did_you_mean
 from experiments.fault_injection.host_faults import COMPUTER_FAULTS, HostFaults
 

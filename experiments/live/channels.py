@@ -8,8 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import FORESIGHT, NS_PER_S, CdrWriter, encode_string, parse_toml
-from acquisition.trial_file import TRIAL_TOPICS, VIEW_TOPICS, encode_views
+from acquisition.cdr import CdrWriter, encode_string
+from acquisition.clock import NS_PER_S
+from acquisition.schema import FORESIGHT
+from acquisition.settings import parse_toml
+from acquisition.trial_file.views import VIEW_TOPICS, encode_views
+from acquisition.trial_file.writer import TRIAL_TOPICS
 
 TF_TOPIC, FORESIGHT_TOPIC = "/tf", "/foresight"
 DESCRIPTION_TOPIC, EVENTS_TOPIC = "/robot_description", "/events"

@@ -8,7 +8,8 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from acquisition import MissingLibraryError, SettingsError, schema_text
+from acquisition.errors import MissingLibraryError, SettingsError
+from acquisition.schema import schema_text
 
 if TYPE_CHECKING:
     from foxglove import Channel, Context

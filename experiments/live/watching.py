@@ -9,9 +9,12 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from acquisition import Clock, SessionError, encode_log, read_text, utc_offset_ns
-from acquisition.control_loop import RealtimeRequest, choose_cores, request
-from acquisition.ipc import SharedLayout
+from acquisition.cdr import encode_log
+from acquisition.clock import Clock, utc_offset_ns
+from acquisition.control_loop.realtime import RealtimeRequest, choose_cores, request
+from acquisition.errors import SessionError
+from acquisition.ipc.layout import SharedLayout
+from acquisition.settings import read_text
 from experiments.live.channels import (
     DESCRIPTION_TOPIC,
     EVENTS_TOPIC,
@@ -21,9 +24,11 @@ from experiments.live.channels import (
     stamped_foresight,
 )
 from experiments.live.server import HOST, LiveServer, layout_path
-from experiments.operator import Console
-from experiments.session import SessionFolder, list_sessions, owner_of
-from wam.model import load_constants, urdf
+from experiments.operator.console import Console
+from experiments.session.lock import owner_of
+from experiments.session.store import SessionFolder, list_sessions
+from wam.model.arm_model import urdf
+from wam.model.constants import load_constants
 
 PERIOD_NS = 20_000_000  # 50 Hz
 NICE = 10

@@ -3,7 +3,3 @@
 `prompts` says what can be asked and which keys answer it, `terminal` and `scripted`
 give the answers, `console` is the door to rich, `screens` is what is shown.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

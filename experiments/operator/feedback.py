@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from experiments.operator.console import Console
-from experiments.settings import OperatorSection
+from experiments.settings.rig import OperatorSection
 
 
 class FeedbackSignal(Enum):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.data import PrepareOptions
+from analysis.data.prepare import PrepareOptions
 
 _BARS = "▁▂▃▄▅▆▇█"
 _ABSURD = 1e9  # nothing a sensor or an encoder can mean

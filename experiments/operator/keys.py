@@ -7,7 +7,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.ipc import LoopClient
+from acquisition.ipc.loop_client import LoopClient
 from experiments.operator.prompts import Prompt
 
 REJECT_REASONS = {

@@ -3,7 +3,8 @@
 import sys
 from pathlib import Path
 
-from acquisition import SettingsError, read_text
+from acquisition.errors import SettingsError
+from acquisition.settings import read_text
 from experiments.messages import CATALOGUE
 from experiments.operator.keys import REJECT_REASONS, Operand, script_keys
 from experiments.operator.prompts import (

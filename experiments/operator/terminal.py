@@ -11,7 +11,7 @@ import tty
 from types import TracebackType
 from typing import Self
 
-from acquisition import SystemClock
+from acquisition.clock import SystemClock
 from experiments.operator.keys import (
     REJECT_REASONS,
     KeyAction,

@@ -8,22 +8,20 @@ from typing import Any
 
 from pydantic import BaseModel, TypeAdapter
 
-from acquisition import SessionError
+from acquisition.errors import SessionError
 from experiments.messages import CATALOGUE
-from experiments.operator import (
-    GOOD,
-    WARNING,
-    Console,
-    KeyAction,
-    OperatorInput,
-    Prompt,
-    wait_for_key,
-)
+from experiments.operator.console import GOOD, WARNING, Console
+from experiments.operator.keys import KeyAction
+from experiments.operator.prompts import OperatorInput, Prompt
+from experiments.operator.terminal import wait_for_key
 from experiments.preflight.page import CheckResult
-from experiments.rig import Rig
-from experiments.session import SessionFolder, list_sessions, read_json, write_json
-from experiments.settings import RigSettings, TerrainRow, flatten
-from ft_sensor.vendors import SECTIONS
+from experiments.rig.rig import Rig
+from experiments.session.data_files import read_json, write_json
+from experiments.session.store import SessionFolder, list_sessions
+from experiments.settings.matrix import TerrainRow
+from experiments.settings.origins import flatten
+from experiments.settings.rig import RigSettings
+from ft_sensor.vendors.registry import SECTIONS
 
 FILE = "conditions.json"
 VERSION = 2  # of the file; 1 had no number

@@ -1,6 +1,6 @@
 """Connects the rig, and says why an arm cannot be reached."""
 
-from acquisition import (
+from acquisition.errors import (
     LinkError,
     LinkFullError,
     LinkTimeoutError,
@@ -8,9 +8,12 @@ from acquisition import (
     TractionError,
 )
 from experiments.messages import preflight_error
-from experiments.operator import Console
-from experiments.rig import FakeOptions, Rig, build_rig, compiling_words
-from experiments.settings import RigSettings, Settings, TerrainRow
+from experiments.operator.console import Console
+from experiments.rig.fake import compiling_words
+from experiments.rig.rig import FakeOptions, Rig, build_rig
+from experiments.settings.load import Settings
+from experiments.settings.matrix import TerrainRow
+from experiments.settings.rig import RigSettings
 
 
 def connect_rig(

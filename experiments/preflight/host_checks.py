@@ -6,21 +6,22 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition import Record, SettingsError
+from acquisition.errors import SettingsError
+from acquisition.sample import Record
 from experiments.messages import preflight_error
-from experiments.operator import BAD, GOOD, WARNING
+from experiments.operator.console import BAD, GOOD, WARNING
 from experiments.preflight.page import Add, CheckResult
-from experiments.rig import Rig
-from ft_sensor import axis_names, largest_traction
-from ft_sensor.serial_line import BURSTY
-from wam.bus import LONGEST_QUEUE, interface_state
-from wam.calibration import (
-    friction_from_toml,
+from experiments.rig.rig import Rig
+from ft_sensor.reading import axis_names, largest_traction
+from ft_sensor.serial_line.sensor import BURSTY
+from wam.bus.kernel_door import LONGEST_QUEUE, interface_state
+from wam.calibration.friction_file import friction_from_toml
+from wam.calibration.friction_reach import (
     reaches_along,
     remaining_friction,
     rendered_masses,
 )
-from wam.model import MAX_VIRTUAL_MASS
+from wam.model.gravity import MAX_VIRTUAL_MASS
 
 CPUS = Path("/sys/devices/system/cpu")
 FAST = "performance"

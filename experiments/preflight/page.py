@@ -4,8 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeVar
 
-from acquisition import PreflightError
-from experiments.operator import Console
+from acquisition.errors import PreflightError
+from experiments.operator.console import Console
 
 Add = Callable[[str, str, str], None]  # mark, name and text of a line
 _T = TypeVar("_T")

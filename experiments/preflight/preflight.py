@@ -5,14 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition import (
-    SafetyMode,
-    TractionError,
-)
-from acquisition.control_loop import SLOW_EXCHANGE_NS, loop_report
+from acquisition.control_loop.timing import SLOW_EXCHANGE_NS, loop_report
+from acquisition.devices import SafetyMode
+from acquisition.errors import TractionError
 from experiments import provenance
 from experiments.messages import preflight_error
-from experiments.operator import BAD, GOOD, WARNING, Console
+from experiments.operator.console import BAD, GOOD, WARNING, Console
 from experiments.preflight.connecting import as_preflight, not_reached
 from experiments.preflight.host_checks import (
     DiskProbe,
@@ -27,19 +25,12 @@ from experiments.preflight.host_checks import (
     reach_words,
 )
 from experiments.preflight.page import Add, CheckResult, ChecksPage
-from experiments.rig import (
-    EXCHANGE_CYCLES,
-    Rig,
-    law_words,
-)
-from wam.driver import (
-    HOME_LIMIT,
-    ArmInfo,
-    check_zero,
-    complaints,
-    temperature_range,
-    zero_error,
-)
+from experiments.rig.backend import EXCHANGE_CYCLES
+from experiments.rig.law_calibrations import law_words
+from experiments.rig.rig import Rig
+from wam.driver.health import complaints, temperature_range
+from wam.driver.home import HOME_LIMIT, check_zero, zero_error
+from wam.driver.startup import ArmInfo
 
 STEPPED_TEST = 0.3  # s
 

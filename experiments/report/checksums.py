@@ -7,8 +7,8 @@ import stat
 from dataclasses import dataclass
 from pathlib import Path
 
-from acquisition import TrialFileError
-from experiments.session import write_new
+from acquisition.errors import TrialFileError
+from experiments.session.data_files import write_new
 
 SUMS = "SHA256SUMS"
 _LINE = re.compile(r"(?P<digest>[0-9a-f]{64})  (?P<path>[^\0\n]{1,1000})")

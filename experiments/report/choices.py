@@ -6,21 +6,20 @@ from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
 
-from acquisition import SessionError, SettingsError
-from analysis.data import PrepareOptions, RecordedTrial, TractionSeries
-from analysis.report import StudyVariant, parse_choice, parse_window
-from analysis.study import ResultStore, Study, run_study
-from analysis.tustin import TustinBounds
+from acquisition.errors import SessionError, SettingsError
+from analysis.data.load import RecordedTrial
+from analysis.data.prepare import PrepareOptions
+from analysis.data.series import TractionSeries
+from analysis.report.what_if import StudyVariant, parse_choice, parse_window
+from analysis.study.store import ResultStore
+from analysis.study.study import Study, run_study
+from analysis.tustin.model import TustinBounds
 from experiments.messages import CATALOGUE
-from experiments.operator import WARNING, Console
+from experiments.operator.console import WARNING, Console
 from experiments.report.progress import fitting
-from experiments.session import (
-    SessionFolder,
-    check_kept,
-    find_session,
-    list_sessions,
-    replay,
-)
+from experiments.session.kept_files import check_kept
+from experiments.session.reducer import replay
+from experiments.session.store import SessionFolder, find_session, list_sessions
 
 
 @dataclass(frozen=True, slots=True)

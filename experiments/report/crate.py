@@ -14,7 +14,7 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from acquisition import MissingLibraryError
+from acquisition.errors import MissingLibraryError
 from experiments.report.checksums import SUMS, digest_of
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from acquisition import SettingsError
+from acquisition.errors import SettingsError
 
 _ORCID = re.compile(r"(\d{4}-){3}\d{3}[\dX]")
 _AUTHOR = re.compile(r"(?P<name>[^<>]+?)\s*(<(?P<orcid>[^<>]+)>)?")

@@ -4,21 +4,20 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from acquisition import SessionError, SystemClock, TrialFileError
-from analysis.data import (
+from acquisition.clock import SystemClock
+from acquisition.errors import SessionError, TrialFileError
+from analysis.data.data_package import (
     DESCRIPTOR,
     DataPackage,
     PackageField,
     PackageFile,
-    PrepareOptions,
-    RecordedTrial,
     TableOrigin,
     TableSchema,
-    load_trial,
-    prepare_trial,
-    to_parquet,
 )
-from experiments.operator import WARNING, Console
+from analysis.data.load import RecordedTrial, load_trial
+from analysis.data.parquet_tables import to_parquet
+from analysis.data.prepare import PrepareOptions, prepare_trial
+from experiments.operator.console import WARNING, Console
 from experiments.report.checksums import SUMS, digest_of, write_sums
 from experiments.report.quantities import KEPT, QUANTITIES, kept_rule
 from experiments.report.table_columns import (
@@ -27,7 +26,8 @@ from experiments.report.table_columns import (
     csv_of,
     csv_of_rows,
 )
-from experiments.session import SessionFolder, iso_utc, write_new
+from experiments.session.data_files import write_new
+from experiments.session.store import SessionFolder, iso_utc
 
 DICTIONARY, INDEX = "data_dictionary.csv", "trials.csv"
 FORMATS = ("csv", "parquet")

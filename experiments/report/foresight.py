@@ -8,27 +8,23 @@ from typing import Any
 
 import numpy as np
 
-from acquisition import FORESIGHT, Record, SettingsError
-from acquisition.trial_file import TrialReader
-from analysis.breakaway import BreakAwayModel
-from analysis.data import groups_of, load_trial
-from analysis.findings import HeldTrial
-from analysis.foresight import (
-    ForesightCurves,
-    ForesightModel,
-    JudgedForesight,
-    JudgedTask,
-    RigIdentity,
-    WatchedTrial,
-    WatchTask,
-    judge,
-    plan_judged,
-    watch_file,
-)
-from analysis.report import ReportTable
-from analysis.study import Store, Study, run_tasks
+from acquisition.errors import SettingsError
+from acquisition.sample import Record
+from acquisition.schema import FORESIGHT
+from acquisition.trial_file.reader import TrialReader
+from analysis.breakaway.model import BreakAwayModel
+from analysis.data.load import load_trial
+from analysis.data.terrain_kinds import groups_of
+from analysis.findings.held_trial import HeldTrial
+from analysis.foresight.curves import ForesightCurves
+from analysis.foresight.judged import JudgedForesight, JudgedTask, judge, plan_judged
+from analysis.foresight.model import ForesightModel, RigIdentity
+from analysis.foresight.watching import WatchedTrial, WatchTask, watch_file
+from analysis.report.page_model import ReportTable
+from analysis.study.jobs import Store, run_tasks
+from analysis.study.study import Study
 from experiments.report.tables import foresight_tables
-from experiments.rig import ForesightSource, state_record, states_of
+from experiments.rig.foresight import ForesightSource, state_record, states_of
 
 OPEN_END = 25  # last states that a process may not have come to at the end
 

@@ -9,21 +9,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import MOTOR_FRESH_SHIFT, NS_PER_S, RATE_HZ, Clock, Flag, parse_toml
-from acquisition.trial_file import TopicRows, TrialReader
-from analysis.data import RecordedTrial, load_trial
-from experiments.live import (
+from acquisition.clock import NS_PER_S, RATE_HZ, Clock
+from acquisition.sample import MOTOR_FRESH_SHIFT, Flag
+from acquisition.settings import parse_toml
+from acquisition.trial_file.reader import TopicRows, TrialReader
+from analysis.data.load import RecordedTrial, load_trial
+from experiments.live.channels import (
     DESCRIPTION_TOPIC,
     FORESIGHT_TOPIC,
-    HOST,
     LIVE_TOPICS,
     LiveEncoder,
-    LiveServer,
-    PlaybackWish,
-    layout_path,
     stamped_foresight,
 )
-from experiments.operator import Console, LiveScales, RecordingView, recording_lines
+from experiments.live.server import HOST, LiveServer, PlaybackWish, layout_path
+from experiments.operator.console import Console
+from experiments.operator.graphs import LiveScales
+from experiments.operator.screens import RecordingView, recording_lines
 
 _PICTURES = 8  # per second of the person's time
 _LINES = 1.0  # seconds of the trial between two lines without a terminal

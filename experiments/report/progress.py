@@ -3,8 +3,8 @@
 from collections.abc import Generator
 from contextlib import contextmanager
 
-from acquisition import NS_PER_S, Clock, SystemClock
-from experiments.operator import Console
+from acquisition.clock import NS_PER_S, Clock, SystemClock
+from experiments.operator.console import Console
 
 _STEP = 0.1  # of the whole between two plain lines
 _BAR = 30  # characters

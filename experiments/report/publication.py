@@ -11,11 +11,12 @@ from dataclasses import dataclass, replace
 from importlib import metadata
 from pathlib import Path
 
-from acquisition import SystemClock, TrialFileError
-from acquisition.trial_file import list_folder, open_data
-from analysis.data import RecordedTrial, load_trial
+from acquisition.clock import SystemClock
+from acquisition.errors import TrialFileError
+from acquisition.trial_file.data_files import list_folder, open_data
+from analysis.data.load import RecordedTrial, load_trial
 from experiments import provenance
-from experiments.operator import WARNING, Console
+from experiments.operator.console import WARNING, Console
 from experiments.report.checksums import SUMS, write_sums
 from experiments.report.crate import (
     METADATA,
@@ -36,13 +37,9 @@ from experiments.report.credits import (
 )
 from experiments.report.export import export_sessions, make_empty
 from experiments.report.sessions import ReportRequest, report_sessions
-from experiments.session import (
-    PhotoError,
-    SessionFolder,
-    iso_utc,
-    kept_photo,
-    write_new,
-)
+from experiments.session.data_files import write_new
+from experiments.session.photos import PhotoError, kept_photo
+from experiments.session.store import SessionFolder, iso_utc
 
 SESSIONS, TABLES, RESULTS = "sessions", "tables", "results"
 ANALYSIS = f"{RESULTS}/analysis.json"  # the choices that a rebuild needs

@@ -7,13 +7,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from acquisition import MOTOR_FRESH_SHIFT, Flag, SafetyMode
-from analysis.data import (
+from acquisition.devices import SafetyMode
+from acquisition.sample import MOTOR_FRESH_SHIFT, Flag
+from analysis.data.load import RecordedTrial
+from analysis.data.prepare import (
     MINIMUM_KEPT,
     MINIMUM_TRAVEL_SHARE,
     PreparedTrial,
     PrepareOptions,
-    RecordedTrial,
 )
 from experiments.report.table_columns import Quantity, Values
 

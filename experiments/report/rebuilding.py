@@ -9,13 +9,16 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import cast
 
-from acquisition import SettingsError, TrialFileError
-from analysis.findings import compute_results, findings_rows, with_tares
-from analysis.study import FitOptions, to_csv
-from experiments.operator import Console
+from acquisition.errors import SettingsError, TrialFileError
+from analysis.findings.findings import compute_results, findings_rows
+from analysis.findings.rig_health import with_tares
+from analysis.study.fits import to_csv
+from analysis.study.models import FitOptions
+from experiments.operator.console import Console
 from experiments.report.publication import ANALYSIS, TABLE
 from experiments.report.sessions import REPORTED, ReportRequest, study_sessions
-from experiments.session import list_sessions, read_json
+from experiments.session.data_files import read_json
+from experiments.session.store import list_sessions
 
 TOLERANCE = 1e-9  # relative
 _ABSOLUTE = 1e-12  # of values that are nothing but rounding

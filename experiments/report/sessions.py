@@ -5,40 +5,29 @@ from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from pathlib import Path
 
-from acquisition import SessionError, SettingsError, SystemClock, TrialFileError
-from analysis.data import load_trial, summed_up, terrain_kind
-from analysis.findings import HeldTrial, TrialFiles, compute_results, with_tares
-from analysis.foresight import JUDGED_TYPES, fit_foresight
-from analysis.report import (
-    DRAWN_TYPES,
-    BedPhoto,
-    ReportContext,
-    StudyVariant,
-    plain_choice,
-    side_by_side,
-    write_report,
-)
-from analysis.study import (
-    FITTERS,
-    GP_SE,
-    GP_SE_NOISE,
-    GP_SE_TRIAL,
-    TYPES,
-    Batch,
-    FitOptions,
-    Prepared,
-    ResultStore,
-    Study,
-    StudyOptions,
-    run_study,
-)
-from analysis.terrains import (
-    break_away_batch,
-    break_away_of,
-    database_of,
-    identify_study,
-)
-from experiments.operator import Console
+from acquisition.clock import SystemClock
+from acquisition.errors import SessionError, SettingsError, TrialFileError
+from analysis.data.load import load_trial
+from analysis.data.plausibility import summed_up
+from analysis.data.terrain_kinds import terrain_kind
+from analysis.findings.findings import compute_results
+from analysis.findings.held_trial import HeldTrial, TrialFiles
+from analysis.findings.rig_health import with_tares
+from analysis.foresight.judged import JUDGED_TYPES
+from analysis.foresight.training import fit_foresight
+from analysis.report.drawing import DRAWN_TYPES
+from analysis.report.page import ReportContext, write_report
+from analysis.report.page_model import BedPhoto
+from analysis.report.what_if import StudyVariant
+from analysis.report.what_if_tables import plain_choice, side_by_side
+from analysis.study.crossval import Prepared
+from analysis.study.jobs import Batch
+from analysis.study.models import FITTERS, GP_SE, GP_SE_NOISE, GP_SE_TRIAL, FitOptions
+from analysis.study.store import TYPES, ResultStore
+from analysis.study.study import Study, StudyOptions, run_study
+from analysis.terrains.export import break_away_batch, break_away_of, database_of
+from analysis.terrains.identify import identify_study
+from experiments.operator.console import Console
 from experiments.report.choices import AnalysisChoices, repeat_study
 from experiments.report.foresight import (
     StudyForesight,
@@ -52,13 +41,9 @@ from experiments.report.truth_errors import (
     compare_with_truth,
     truth_tables,
 )
-from experiments.session import (
-    FOLDS,
-    SessionFolder,
-    iso_utc,
-    photos_of,
-    write_new_text,
-)
+from experiments.session.data_files import write_new_text
+from experiments.session.photos import photos_of
+from experiments.session.store import FOLDS, SessionFolder, iso_utc
 
 REPORTED = (*FITTERS, GP_SE_NOISE, GP_SE_TRIAL)  # Fig. 9, and those beyond the paper
 EXPORTED = (*FITTERS, GP_SE_TRIAL)

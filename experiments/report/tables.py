@@ -6,13 +6,17 @@ from typing import Any, cast
 
 import numpy as np
 
-from acquisition.trial_file import list_folder
-from analysis.figures import ReportSection
-from analysis.findings import HeldTrial, traction_ratio
-from analysis.foresight import SLID, GroundScore, SlipScore
-from analysis.report import ReportTable
-from analysis.study import GP_SE, TUSTIN, Study
-from experiments.session import SessionFolder, read_json
+from acquisition.trial_file.data_files import list_folder
+from analysis.figures.sections import ReportSection
+from analysis.findings.held_trial import HeldTrial
+from analysis.findings.trends import traction_ratio
+from analysis.foresight.judged import SLID
+from analysis.foresight.scores import GroundScore, SlipScore
+from analysis.report.page_model import ReportTable
+from analysis.study.models import GP_SE, TUSTIN
+from analysis.study.study import Study
+from experiments.session.data_files import read_json
+from experiments.session.store import SessionFolder
 
 _SLIP_HEADER = (
     *("terrain", "slips", "recall", "lead [ms]", "0.1 s ahead", "needless time"),

@@ -7,18 +7,20 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import TrialFileError
-from acquisition.trial_file import TrialReader
-from analysis.data import RecordedTrial, moving_average
-from analysis.figures import ReportSection
-from analysis.findings import (
-    HeldTrial,
+from acquisition.errors import TrialFileError
+from acquisition.trial_file.reader import TrialReader
+from analysis.data.load import RecordedTrial
+from analysis.data.prepare import moving_average
+from analysis.figures.sections import ReportSection
+from analysis.findings.force_uncertainty import (
     TaredTrial,
     uncertainties_of,
     uncertainty_of,
 )
-from analysis.report import ReportTable
-from analysis.study import Study, TerrainResult
+from analysis.findings.held_trial import HeldTrial
+from analysis.report.page_model import ReportTable
+from analysis.study.study import Study
+from analysis.study.terrain_fit import TerrainResult
 
 _FEWEST = 50  # cycles, or a truth file is none of this trial
 _WIDTH = 11  # of the moving average, as the models see the trial

@@ -4,7 +4,3 @@
 time) or in processes of their own; `fake` alone knows the simulated devices. Begin with
 `rig`.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

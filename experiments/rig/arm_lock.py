@@ -21,7 +21,8 @@ from pathlib import Path
 from typing import cast
 from urllib.parse import quote
 
-from acquisition import NS_PER_S, PreflightError, SystemClock
+from acquisition.clock import NS_PER_S, SystemClock
+from acquisition.errors import PreflightError
 from experiments.messages import preflight_error
 
 FOLDERS = (Path("/run/lock"), Path("/var/lock"), Path("/var/tmp"), Path("/tmp"))

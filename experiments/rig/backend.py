@@ -6,16 +6,20 @@ from typing import Protocol
 
 import numpy as np
 
-from acquisition import PERIOD_NS, Clock, SafetyMode, WrenchSensor
-from acquisition.control_loop import Grant, Loop
-from acquisition.ipc import LoopClient, SharedLayout
-from acquisition.recording import Recorder, TrialRecording
-from analysis.foresight import RigIdentity
+from acquisition.clock import PERIOD_NS, Clock
+from acquisition.control_loop.loop import Loop
+from acquisition.control_loop.realtime import Grant
+from acquisition.devices import SafetyMode, WrenchSensor
+from acquisition.ipc.layout import SharedLayout
+from acquisition.ipc.loop_client import LoopClient
+from acquisition.recording.recorder import Recorder, TrialRecording
+from analysis.foresight.model import RigIdentity
 from experiments.rig.build import LoopConfig, build_loop_server
 from experiments.rig.claim import release
 from experiments.rig.foresight import ForesightSource, ForesightWorker
-from wam.bus import CanLink
-from wam.driver import ArmInfo, WamArm
+from wam.bus.link import CanLink
+from wam.driver.arm import WamArm
+from wam.driver.startup import ArmInfo
 
 EXCHANGE_CYCLES = 100
 

@@ -7,39 +7,36 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition import (
-    PERIOD_NS,
-    Clock,
-    Flag,
-    SettingsError,
-    WrenchSample,
-    WrenchSensor,
-)
-from acquisition.control_loop import Cycle, CycleOutputs, GuardLimits
-from acquisition.ipc import (
-    FrameTape,
-    LoopHooks,
-    LoopServer,
-    SharedLayout,
-    SharedSensor,
-    no_bell,
-    publish,
-)
-from experiments.settings import FootSection, RigSettings, TerrainRow, build_device
-from ft_sensor import LiveFoot, TerrainFrame, payload_of
-from ft_sensor.serial_line import SerialLink, SerialPort, SerialSensor
-from ft_sensor.vendors import BarrettSensor
-from wam.bus import CanLink, Door
-from wam.control import (
-    FootController,
-    FrictionCompensation,
-    LockGains,
-    SoftWalls,
-    SoleImpedance,
-    Walls,
-)
-from wam.driver import WARNING_SHARE, ArmSettings, SafetyLimits, WamArm, health_metadata
-from wam.model import ArmConstants, ArmModel, Body, Tool, sensor_body
+from acquisition.clock import PERIOD_NS, Clock
+from acquisition.control_loop.cycle import Cycle, CycleOutputs
+from acquisition.control_loop.limits import GuardLimits
+from acquisition.devices import WrenchSample, WrenchSensor
+from acquisition.errors import SettingsError
+from acquisition.ipc.frame_tape import FrameTape
+from acquisition.ipc.layout import SharedLayout
+from acquisition.ipc.loop_server import LoopHooks, LoopServer, no_bell
+from acquisition.ipc.shared_sensor import SharedSensor, publish
+from acquisition.sample import Flag
+from experiments.settings.matrix import TerrainRow
+from experiments.settings.rig import FootSection, RigSettings
+from experiments.settings.sensor import build_device
+from ft_sensor.payload import LiveFoot, TerrainFrame, payload_of
+from ft_sensor.serial_line.link import SerialLink, SerialPort
+from ft_sensor.serial_line.sensor import SerialSensor
+from ft_sensor.vendors.barrett import BarrettSensor
+from wam.bus.link import CanLink, Door
+from wam.control.controller import FootController
+from wam.control.friction_compensation import FrictionCompensation
+from wam.control.joint_lock import LockGains
+from wam.control.soft_walls import SoftWalls, Walls
+from wam.control.sole_impedance import SoleImpedance
+from wam.driver.arm import WamArm
+from wam.driver.health import health_metadata
+from wam.driver.safety_module import WARNING_SHARE, SafetyLimits
+from wam.driver.settings import ArmSettings
+from wam.model.arm_model import ArmModel
+from wam.model.constants import ArmConstants, Body
+from wam.model.tool import Tool, sensor_body
 
 
 def terrain_frame(row: TerrainRow) -> TerrainFrame:

@@ -7,9 +7,10 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from acquisition import Clock, SettingsError
-from experiments.operator import WARNING, Console
-from wam.bus import CanLog
+from acquisition.clock import Clock
+from acquisition.errors import SettingsError
+from experiments.operator.console import WARNING, Console
+from wam.bus.log import CanLog
 
 if TYPE_CHECKING:
     from experiments.rig.rig import Rig

@@ -3,10 +3,12 @@
 And at the end: an arm that never got a torque is left as it is.
 """
 
-from acquisition import Clock, LinkTimeoutError, SafetyMode
+from acquisition.clock import Clock
+from acquisition.devices import SafetyMode
+from acquisition.errors import LinkTimeoutError
 from experiments.messages import preflight_error
-from wam.bus import CanLink
-from wam.driver import WamArm
+from wam.bus.link import CanLink
+from wam.driver.arm import WamArm
 
 LISTEN_NS = 50_000_000  # 25 cycles of another master at 500 Hz
 _QUESTIONS = 3  # a lost answer must not let the start-up write to an active arm

@@ -8,14 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from acquisition import (
-    Clock,
-    SettingsError,
-    SimulationControl,
-    SystemClock,
-    WrenchSensor,
-)
-from acquisition.ipc import SharedLayout
+from acquisition.clock import Clock, SystemClock
+from acquisition.devices import WrenchSensor
+from acquisition.errors import SettingsError
+from acquisition.ipc.layout import SharedLayout
+from acquisition.simulation import SimulationControl
 from experiments.rig.backend import InProcessBackend, RigBackend
 from experiments.rig.build import (
     LawParts,
@@ -29,25 +26,22 @@ from experiments.rig.build import (
     tool_with,
 )
 from experiments.rig.law_calibrations import LawCalibrations, twin_gravity
-from experiments.settings import RigSettings, Settings, TerrainRow, read_foot
-from ft_sensor.serial_line import SerialPort, SerialSensor
-from ft_sensor.vendors import AnySensor
-from wam.calibration import (
-    FrictionCalibration,
-    friction_from_toml,
-    gravity_from_toml,
-)
-from wam.model import (
-    ArmConstants,
-    Tool,
-    load_constants,
-    moments_of_links,
-    tool_metadata,
-    weighed_arm,
-)
+from experiments.settings.load import Settings, read_foot
+from experiments.settings.matrix import TerrainRow
+from experiments.settings.rig import RigSettings
+from ft_sensor.serial_line.link import SerialPort
+from ft_sensor.serial_line.sensor import SerialSensor
+from ft_sensor.vendors.registry import AnySensor
+from wam.calibration.friction_file import FrictionCalibration, friction_from_toml
+from wam.calibration.gravity_file import gravity_from_toml
+from wam.model.constants import ArmConstants, load_constants
+from wam.model.gravity import weighed_arm
+from wam.model.moments import moments_of_links
+from wam.model.tool import Tool, tool_metadata
 
 if TYPE_CHECKING:
-    from fakes.serving import PuckServer, SensorLine, SensorServer
+    from fakes.serving.puck_server import PuckServer
+    from fakes.serving.sensor_server import SensorLine, SensorServer
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +128,7 @@ def sensor_metadata(section: AnySensor) -> dict[str, Any]:
 
 def compiling_words() -> str:
     """Return what to say before a stepped simulation that is compiled first, or ""."""
-    from fakes.kernels import is_compiled_first
+    from fakes.kernels.choice import is_compiled_first
 
     return "Compiling the simulation, once: about 15 s." if is_compiled_first() else ""
 
@@ -147,9 +141,9 @@ def stepped(
     shared: SharedLayout,
 ) -> tuple[Clock, RigBackend, SimulationControl]:
     """Return (clock, crew, handle) of a simulation in this thread, under `law`."""
-    from fakes import SteppedClock
-    from fakes.bus import InProcessDoor
-    from fakes.world import simulated_rig
+    from fakes.bus.in_process import InProcessDoor
+    from fakes.clock import SteppedClock
+    from fakes.world.plain_world import simulated_rig
 
     clock = SteppedClock()
     constants = law.model.constants
@@ -188,8 +182,8 @@ def _opened_sensor(rig: RigSettings, port: SerialPort, clock: Clock) -> SerialSe
 
 def _sensor_line(settings: Settings, path: Path, kind: str) -> SensorLine:
     """Return a serial sensor of `kind` at `path`, as rig.toml has it if it fits."""
-    from fakes.sensor import SensorChoice
-    from fakes.serving import SensorLine
+    from fakes.sensor.kinds import SensorChoice
+    from fakes.serving.sensor_server import SensorLine
 
     section = settings.rig.ft_sensor
     fields: dict[str, Any] = {"kind": kind}
@@ -250,7 +244,7 @@ def build_sensor_server(
     Raises:
         SettingsError: the path is in use or cannot be one, or there is no tool.
     """
-    from fakes.serving import SensorServer, hanging_load
+    from fakes.serving.sensor_server import SensorServer, hanging_load
 
     hanging = _with_sensor(_served_tool(settings, tool))
     served = _sensor_line(settings, *line)
@@ -276,7 +270,8 @@ def build_server(settings: Settings, served: ServedArm) -> PuckServer:
             wrong.
         LinkError: the bus cannot be opened.
     """
-    from fakes.serving import HomePose, build_home_server, open_can_port
+    from fakes.serving.home_arm import HomePose, build_home_server
+    from fakes.serving.puck_server import open_can_port
 
     tool, line = _served_tool(settings, served.tool), None
     if served.line is not None:

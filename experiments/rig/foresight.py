@@ -18,24 +18,19 @@ from typing import Any, Final
 
 import numpy as np
 
-from acquisition import FORESIGHT, MOST_TERRAINS, Record, SettingsError
-from acquisition.control_loop import RealtimeRequest, request
-from acquisition.ipc import (
-    ChildContext,
-    SharedLayout,
-    name_process,
-)
-from analysis.breakaway import BreakAwayModel
-from analysis.foresight import (
-    FootRecord,
-    Foresight,
-    ForesightFlag,
-    ForesightModel,
-    ForesightState,
-    RigIdentity,
-)
-from analysis.terrains import foresight_in, load
-from experiments.operator import OTHER_RIG_TEXT, ForesightView
+from acquisition.control_loop.realtime import RealtimeRequest, request
+from acquisition.errors import SettingsError
+from acquisition.ipc.child import ChildContext, name_process
+from acquisition.ipc.layout import SharedLayout
+from acquisition.sample import Record
+from acquisition.schema import FORESIGHT, MOST_TERRAINS
+from analysis.breakaway.model import BreakAwayModel
+from analysis.foresight.engine import Foresight, ForesightFlag, ForesightState
+from analysis.foresight.model import ForesightModel, RigIdentity
+from analysis.foresight.whole_record import FootRecord
+from analysis.terrains.database import load
+from analysis.terrains.parts import foresight_in
+from experiments.operator.screens import OTHER_RIG_TEXT, ForesightView
 
 NICE = 10
 STUDY_DATABASE = Path("study") / "terrains.json"  # below the data: of its report

@@ -4,31 +4,28 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from acquisition import SettingsError, read_text
+from acquisition.errors import SettingsError
+from acquisition.settings import read_text
 from experiments.rig.build import LawParts, build_tool
-from experiments.settings import (
+from experiments.settings.calibrations import (
     NOTHING,
-    RigSettings,
-    Settings,
     check_kind,
     read_calibration,
     with_calibrations,
 )
-from wam.calibration import (
+from experiments.settings.load import Settings
+from experiments.settings.rig import RigSettings
+from wam.calibration.friction_file import friction_from_toml
+from wam.calibration.gravity_file import (
     GravityCalibration,
     fits_tool,
-    friction_from_toml,
     gravity_from_toml,
 )
-from wam.control import FrictionCompensation, known_friction
-from wam.model import (
-    ArmConstants,
-    ArmModel,
-    MotorFriction,
-    gravity_model,
-    joint_coulomb,
-    load_constants,
-)
+from wam.control.friction_compensation import FrictionCompensation, known_friction
+from wam.model.arm_model import ArmModel
+from wam.model.constants import ArmConstants, load_constants
+from wam.model.friction import MotorFriction, joint_coulomb
+from wam.model.gravity import gravity_model
 
 _INSTEAD = 'set [gravity] model = "cad" in rig.toml'
 _WITHOUT = 'set [friction] model = "none" in rig.toml'

@@ -4,30 +4,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from acquisition import (
-    PERIOD_NS,
-    Clock,
-    DeviceServer,
-    LinkError,
-    PreflightError,
-    SafetyMode,
-    TractionError,
-)
-from acquisition.control_loop import ArmState, Grant, choose_cores
-from acquisition.ipc import (
-    Child,
-    LoopClient,
-    ProcessLostError,
-    SharedLayout,
-    make_proxy,
-    require_ordered_stores,
-)
-from acquisition.recording import RemoteRecorder
-from analysis.foresight import RigIdentity
+from acquisition.clock import PERIOD_NS, Clock
+from acquisition.control_loop.realtime import Grant, choose_cores
+from acquisition.control_loop.states import ArmState
+from acquisition.devices import SafetyMode
+from acquisition.errors import LinkError, PreflightError, TractionError
+from acquisition.ipc.child import Child, ProcessLostError
+from acquisition.ipc.layout import SharedLayout
+from acquisition.ipc.loop_client import LoopClient
+from acquisition.ipc.rings import require_ordered_stores
+from acquisition.ipc.rpc import make_proxy
+from acquisition.recording.recorder_process import RemoteRecorder
+from acquisition.simulation import DeviceServer
+from analysis.foresight.model import RigIdentity
 from experiments.rig.arm_lock import ArmLock
 from experiments.rig.foresight import ForesightSource
 from experiments.rig.services import ArmService, SensorService
-from wam.driver import ArmInfo
+from wam.driver.startup import ArmInfo
 
 _CONTROL, _READER = "control", "sensor reader"  # names of processes
 _FORESIGHT = "foresight"

@@ -6,9 +6,10 @@ import os
 from dataclasses import dataclass
 from typing import Any
 
-from acquisition import Clock, SimulationControl, SystemClock
-from acquisition.ipc import SharedLayout
-from analysis.foresight import RigIdentity
+from acquisition.clock import Clock, SystemClock
+from acquisition.ipc.layout import SharedLayout
+from acquisition.simulation import SimulationControl
+from analysis.foresight.model import RigIdentity
 from experiments.arguments import FRICTION
 from experiments.rig.arm_lock import ArmLock
 from experiments.rig.backend import RigBackend
@@ -22,9 +23,11 @@ from experiments.rig.law_calibrations import (
 )
 from experiments.rig.processes import MultiProcessBackend, WorkerConfigs
 from experiments.rig.simulation import connect_simulation
-from experiments.settings import Settings, TerrainRow, with_calibrations
-from ft_sensor import Payload, TerrainFrame, payload_of
-from wam.model import ArmModel
+from experiments.settings.calibrations import with_calibrations
+from experiments.settings.load import Settings
+from experiments.settings.matrix import TerrainRow
+from ft_sensor.payload import Payload, TerrainFrame, payload_of
+from wam.model.arm_model import ArmModel
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from typing import Protocol
 
-from acquisition import SafetyMode
-from acquisition.control_loop import Grant
-from wam.driver import ArmInfo
+from acquisition.control_loop.realtime import Grant
+from acquisition.devices import SafetyMode
+from wam.driver.startup import ArmInfo
 
 
 class ArmService(Protocol):

@@ -2,9 +2,11 @@
 
 import numpy as np
 
-from acquisition import Record, SimulationControl, TruthSource
-from acquisition.ipc import Child, make_proxy
-from experiments.operator import Prompt, PromptState
+from acquisition.ipc.child import Child
+from acquisition.ipc.rpc import make_proxy
+from acquisition.sample import Record
+from acquisition.simulation import SimulationControl, TruthSource
+from experiments.operator.prompts import Prompt, PromptState
 
 
 def connect_simulation(child: Child) -> SimulationControl:

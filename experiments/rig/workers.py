@@ -9,19 +9,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from acquisition import SafetyMode, SystemClock, TractionError, WrenchSensor
-from acquisition.control_loop import Grant, Loop, RealtimeRequest, request
-from acquisition.ipc import (
-    ChannelClosedError,
-    ChildContext,
-    LoopServer,
-    ProcessRole,
-    RpcServer,
-    SharedSensor,
-    bind,
-    name_process,
-    publish,
-)
+from acquisition.clock import SystemClock
+from acquisition.control_loop.loop import Loop
+from acquisition.control_loop.realtime import Grant, RealtimeRequest, request
+from acquisition.devices import SafetyMode, WrenchSensor
+from acquisition.errors import TractionError
+from acquisition.ipc.channel import ChannelClosedError
+from acquisition.ipc.child import ChildContext, name_process
+from acquisition.ipc.layout import ProcessRole
+from acquisition.ipc.loop_server import LoopServer
+from acquisition.ipc.rpc import RpcServer, bind
+from acquisition.ipc.shared_sensor import SharedSensor, publish
 from experiments.rig.backend import measure_exchange
 from experiments.rig.build import (
     LoopConfig,
@@ -34,15 +32,15 @@ from experiments.rig.build import (
 from experiments.rig.claim import check_alone, check_inactive, release
 from experiments.rig.law_calibrations import LawCalibrations, build_law
 from experiments.rig.services import ArmService, SensorService
-from experiments.settings import RigSettings, TerrainRow
-from ft_sensor.serial_line import (
-    ReconnectingSensor,
-    SerialSensor,
-    open_port,
-    stream_metadata,
-)
-from wam.bus import CanLink, open_door
-from wam.driver import ArmInfo, WamArm
+from experiments.settings.matrix import TerrainRow
+from experiments.settings.rig import RigSettings
+from ft_sensor.serial_line.link import open_port
+from ft_sensor.serial_line.reconnect import ReconnectingSensor, stream_metadata
+from ft_sensor.serial_line.sensor import SerialSensor
+from wam.bus.doors import open_door
+from wam.bus.link import CanLink
+from wam.driver.arm import WamArm
+from wam.driver.startup import ArmInfo
 
 CONTROL_PRIORITY = 80
 READER_PRIORITY = 60

@@ -4,7 +4,3 @@
 `console_loop` lets time pass, `resume` continues, `pose_walk` moves the arm by itself.
 Begin with `runner`.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

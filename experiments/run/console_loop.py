@@ -5,25 +5,22 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import TypeVar
 
-from acquisition.control_loop import ArmState, GuardVerdict
-from acquisition.ipc import LoopClient
-from experiments.fault_injection import FaultTrigger, PlannedFaults
-from experiments.operator import (
-    Console,
-    KeyAction,
-    OperatorInput,
-    Prompt,
-    PromptState,
-    key_action,
-)
-from experiments.rig import Rig, SimulatedHand
+from acquisition.control_loop.faults import GuardVerdict
+from acquisition.control_loop.states import ArmState
+from acquisition.ipc.loop_client import LoopClient
+from experiments.fault_injection.plan import FaultTrigger, PlannedFaults
+from experiments.operator.console import Console
+from experiments.operator.keys import KeyAction, key_action
+from experiments.operator.prompts import OperatorInput, Prompt, PromptState
+from experiments.rig.rig import Rig
+from experiments.rig.simulation import SimulatedHand
 from experiments.run.stop import (
     ArmFaultError,
     StopFlag,
     StopRequestedError,
     UndoRequestedError,
 )
-from experiments.session import TrialName
+from experiments.session.sidecar import TrialName
 
 TICK = 0.02  # period of the console [s]
 REFRESH_NS = 125_000_000  # between two pictures of the live screen

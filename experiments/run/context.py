@@ -3,34 +3,27 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
-from acquisition import TractionError
-from acquisition.control_loop import ArmState, GuardVerdict
-from acquisition.ipc import LoopClient
-from analysis.next_push import Aim
+from acquisition.control_loop.faults import GuardVerdict
+from acquisition.control_loop.states import ArmState
+from acquisition.errors import TractionError
+from acquisition.ipc.loop_client import LoopClient
+from analysis.next_push.records import Aim
 from experiments.messages import REPORT, ComputerLoad, FaultContext, fault_text
-from experiments.operator import (
-    Console,
-    FootKeys,
-    OperatorFeedback,
-    OperatorInput,
-    Prompt,
-    build_feedback,
-    packed,
-    screen_keys,
-)
-from experiments.rig import Rig
+from experiments.operator.console import Console
+from experiments.operator.feedback import OperatorFeedback, build_feedback
+from experiments.operator.graphs import packed
+from experiments.operator.keys import FootKeys, screen_keys
+from experiments.operator.prompts import OperatorInput, Prompt
+from experiments.rig.rig import Rig
 from experiments.run.console_loop import ConsoleLoop
 from experiments.run.stop import ArmFaultError, StopFlag
-from experiments.session import (
-    KEEP,
-    REJECT,
-    Camera,
-    Event,
-    Journal,
-    StanceTask,
-    TrialName,
-)
-from experiments.trial import SessionMetadata, TrialArchive
+from experiments.session.journal import Journal
+from experiments.session.photos import Camera
+from experiments.session.reducer import KEEP, REJECT
+from experiments.session.sidecar import TrialName
+from experiments.session.stance_task import StanceTask
+from experiments.session.states import Event
+from experiments.trial.files import SessionMetadata, TrialArchive
 
 UNDO_NS = 10_000_000_000  # a verdict can be taken back for so long [ns]
 

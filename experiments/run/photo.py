@@ -2,10 +2,12 @@
 
 from collections.abc import Callable
 
-from acquisition import SystemClock, TractionError
-from experiments.operator import WARNING
+from acquisition.clock import SystemClock
+from acquisition.errors import TractionError
+from experiments.operator.console import WARNING
 from experiments.run.context import RunContext
-from experiments.session import PhotoError, TrialName, add_photo, has_photo
+from experiments.session.photos import PhotoError, add_photo, has_photo
+from experiments.session.sidecar import TrialName
 
 _Photo = tuple[bytes, int]  # content, UTC [ns]
 

@@ -4,21 +4,17 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from acquisition import PreflightError, TractionError
-from acquisition.ipc import unpack_wrenches
+from acquisition.errors import PreflightError, TractionError
+from acquisition.ipc.layout import unpack_wrenches
 from experiments.messages import FaultContext, fault_text, rest_text
-from experiments.operator import Prompt
+from experiments.operator.prompts import Prompt
 from experiments.run.console_loop import TICK, ConsoleLoop
 from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.run.surroundings import free_space
-from wam.calibration import (
-    APPROACH_SPEED,
-    FreeSpace,
-    MeasurementPose,
-    way_seconds,
-)
-from wam.control import JointMove, move_reference
-from wam.model import Array
+from wam.calibration.free_space import FreeSpace
+from wam.calibration.poses import APPROACH_SPEED, MeasurementPose, way_seconds
+from wam.control.position_control import JointMove, move_reference
+from wam.model.constants import Array
 
 INTERRUPTED = 130
 _NOTHING = "Nothing was written."

@@ -3,24 +3,22 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from acquisition import MOTOR_FRESH_SHIFT, BusCondition, SafetyMode
-from acquisition.control_loop import ArmState
-from acquisition.trial_file import list_folder
+from acquisition.control_loop.states import ArmState
+from acquisition.devices import BusCondition, SafetyMode
+from acquisition.sample import MOTOR_FRESH_SHIFT
+from acquisition.trial_file.data_files import list_folder
 from experiments.messages import BUS_WORDS, preflight_error, pucks_have
-from experiments.operator import (
-    KeyAction,
-    Prompt,
-    ReadyView,
-    key_action,
-    ready_lines,
-    screen_keys,
-)
+from experiments.operator.keys import KeyAction, key_action, screen_keys
+from experiments.operator.prompts import Prompt
+from experiments.operator.screens import ReadyView, ready_lines
 from experiments.run.console_loop import ConsoleLoop
 from experiments.run.context import RunContext
 from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.run.verdicts import take_note
-from experiments.session import Event, TrialName
-from experiments.trial import kept_rows, next_push, review_trial
+from experiments.session.sidecar import TrialName
+from experiments.session.states import Event
+from experiments.trial.quality import next_push, review_trial
+from experiments.trial.running import kept_rows
 
 PATIENCE = 120.0  # how long a person may take to activate the arm [s]
 _READY_SECONDS = 0.1  # from the request for hold to its first torques

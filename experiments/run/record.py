@@ -5,44 +5,38 @@ from dataclasses import replace
 
 import numpy as np
 
-from acquisition import (
-    MOTOR_FRESH_SHIFT,
-    RATE_HZ,
-    Flag,
-    SystemClock,
-    TractionError,
-    TrialFileError,
-)
-from acquisition.control_loop import Action, ArmState
-from acquisition.ipc import ProcessLostError
-from acquisition.trial_file import TrialHeader
-from experiments.fault_injection import FaultTrigger
+from acquisition.clock import RATE_HZ, SystemClock
+from acquisition.control_loop.faults import Action
+from acquisition.control_loop.states import ArmState
+from acquisition.errors import TractionError, TrialFileError
+from acquisition.ipc.child import ProcessLostError
+from acquisition.sample import MOTOR_FRESH_SHIFT, Flag
+from acquisition.trial_file.header import TrialHeader
+from experiments.fault_injection.plan import FaultTrigger
 from experiments.messages import CATALOGUE, FaultContext
-from experiments.operator import (
-    WARNING,
-    FeedbackSignal,
+from experiments.operator.console import WARNING
+from experiments.operator.feedback import FeedbackSignal
+from experiments.operator.graphs import LiveScales
+from experiments.operator.prompts import Prompt
+from experiments.operator.screens import (
     ForesightView,
-    LiveScales,
-    Prompt,
     RecordingView,
     live_line,
     recording_lines,
 )
-from experiments.rig import Rig, foresight_view
+from experiments.rig.foresight import foresight_view
+from experiments.rig.rig import Rig
 from experiments.run.console_loop import TICK
 from experiments.run.context import RunContext
 from experiments.run.photo import take_photo
 from experiments.run.stances import follow_stances, stance_lines
 from experiments.run.stop import ArmFaultError, StopRequestedError
-from experiments.session import Event, TrialName, TrialOutcome
-from experiments.trial import (
-    EndDetector,
-    PaceMonitor,
-    kept_traces,
-    review_trial,
-    trial_header,
-)
-from wam.control import SWUNG_MOTOR
+from experiments.session.sidecar import TrialName, TrialOutcome
+from experiments.session.states import Event
+from experiments.trial.files import EndDetector, PaceMonitor, trial_header
+from experiments.trial.quality import review_trial
+from experiments.trial.running import kept_traces
+from wam.control.friction_compensation import SWUNG_MOTOR
 
 HISTORY = 5.0  # s of traction in the sparklines
 FORESEEN = 500  # states in the bar of slip probabilities, 5 s

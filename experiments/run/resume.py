@@ -9,36 +9,27 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from acquisition import SessionError, SettingsError, SystemClock
+from acquisition.clock import SystemClock
+from acquisition.errors import SessionError, SettingsError
 from experiments.arguments import PACES
 from experiments.messages import CATALOGUE
-from experiments.operator import (
-    NO_PERSONS,
-    WARNING,
-    Console,
-    KeyAction,
-    OperatorInput,
-    Prompt,
-    TerminalInput,
-    choose_operator,
-    wait_for_key,
-)
-from experiments.rig import FakeOptions
+from experiments.operator.console import WARNING, Console
+from experiments.operator.keys import KeyAction
+from experiments.operator.prompts import OperatorInput, Prompt
+from experiments.operator.scripted import NO_PERSONS, choose_operator
+from experiments.operator.terminal import TerminalInput, wait_for_key
+from experiments.rig.rig import FakeOptions
 from experiments.run.session import OpenMode, SessionRequest, run_session
-from experiments.session import (
-    Event,
-    Journal,
-    SessionFolder,
-    SessionPhase,
-    UnfinishedSession,
-    check_kept,
-    open_journal,
-    read_stance_task,
-    recover_session,
-    refusal,
-    session_lock,
-)
-from experiments.settings import load_settings
+from experiments.session.crash_recovery import recover_session
+from experiments.session.journal import Journal, open_journal
+from experiments.session.kept_files import check_kept
+from experiments.session.lock import session_lock
+from experiments.session.reducer import refusal
+from experiments.session.stance_task import read_stance_task
+from experiments.session.states import Event, SessionPhase
+from experiments.session.store import SessionFolder
+from experiments.session.unfinished import UnfinishedSession
+from experiments.settings.load import load_settings
 
 
 class ResumeChoice(Enum):

@@ -4,12 +4,9 @@ import traceback
 from collections.abc import Callable
 from dataclasses import replace
 
-from acquisition import TractionError
+from acquisition.errors import TractionError
 from experiments.messages import CATALOGUE, FaultContext, rest_text
-from experiments.operator import (
-    EndView,
-    end_lines,
-)
+from experiments.operator.screens import EndView, end_lines
 from experiments.run.console_loop import ConsoleLoop
 from experiments.run.context import open_context
 from experiments.run.ready import activate, wait_ready
@@ -18,14 +15,12 @@ from experiments.run.stances import StuckFootError
 from experiments.run.stop import ArmFaultError, StopRequestedError, UndoRequestedError
 from experiments.run.tare import prove_mounting, take_end_tare, take_tare
 from experiments.run.verdicts import ask_verdict, await_undo, judge_again
-from experiments.session import (
-    Event,
-    Journal,
-    StanceTask,
-    TrialName,
-    write_text,
-)
-from experiments.trial import SessionMetadata
+from experiments.session.data_files import write_text
+from experiments.session.journal import Journal
+from experiments.session.sidecar import TrialName
+from experiments.session.stance_task import StanceTask
+from experiments.session.states import Event
+from experiments.trial.files import SessionMetadata
 
 FAULTS_IN_A_ROW = 5  # end the session: recording again does not help
 

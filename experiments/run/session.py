@@ -5,50 +5,46 @@ from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
-from acquisition import PreflightError, TractionError
-from acquisition.trial_file import is_there
+from acquisition.errors import PreflightError, TractionError
+from acquisition.trial_file.data_files import is_there
 from experiments.arguments import data_option
-from experiments.board import glance_sessions, next_steps, row_of
-from experiments.fault_injection import HostFaults, plan_faults
+from experiments.board.board_cache import row_of
+from experiments.board.session_summaries import glance_sessions
+from experiments.board.upcoming import next_steps
+from experiments.fault_injection.host_faults import HostFaults
+from experiments.fault_injection.plan import plan_faults
 from experiments.messages import blames_hardware
-from experiments.operator import WARNING, Console, OperatorInput, keyboard
-from experiments.preflight import (
-    Preflight,
+from experiments.operator.console import WARNING, Console
+from experiments.operator.prompts import OperatorInput
+from experiments.operator.terminal import keyboard
+from experiments.preflight.conditions import (
     check_conditions,
     confirm_foot,
-    connect_rig,
     last_foot,
     rig_conditions,
-    run_preflight,
     sensor_conditions,
     write_conditions,
 )
-from experiments.rig import (
-    STUDY_DATABASE,
-    FakeOptions,
-    ForesightSource,
-    Rig,
-    SimulatedHand,
-    logging_bus,
-    read_foresight,
-)
+from experiments.preflight.connecting import connect_rig
+from experiments.preflight.preflight import Preflight, run_preflight
+from experiments.rig.bus_log import logging_bus
+from experiments.rig.foresight import STUDY_DATABASE, ForesightSource, read_foresight
+from experiments.rig.rig import FakeOptions, Rig
+from experiments.rig.simulation import SimulatedHand
 from experiments.run.console_loop import ConsoleLoop
 from experiments.run.context import busy_load
 from experiments.run.runner import SessionRunner
 from experiments.run.stances import check_stances
 from experiments.run.stop import StopFlag, handle_signals
-from experiments.session import (
-    Event,
-    Journal,
-    StanceTask,
-    create_session,
-    session_lock,
-    session_utc_ns,
-    write_json,
-    write_text,
-)
-from experiments.settings import Settings, TerrainRow
-from experiments.trial import SessionMetadata, collect_metadata
+from experiments.session.data_files import write_json, write_text
+from experiments.session.journal import Journal
+from experiments.session.lock import session_lock
+from experiments.session.stance_task import StanceTask
+from experiments.session.states import Event
+from experiments.session.store import create_session, session_utc_ns
+from experiments.settings.load import Settings
+from experiments.settings.matrix import TerrainRow
+from experiments.trial.files import SessionMetadata, collect_metadata
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,35 +7,26 @@ do by itself it does in hold, with joint 7 locked. Only a simulated arm takes it
 from collections.abc import Mapping
 from pathlib import Path
 
-from acquisition import PreflightError, SettingsError, TractionError
-from acquisition.control_loop import ArmState
-from analysis.breakaway import BreakAwayModel, BreakAwayOptions, fit_pushes
-from analysis.foresight import ForesightFlag
-from analysis.stance import (
-    FRESH_SCALE,
-    POLICIES,
-    SoleView,
-    StanceOutcome,
-    StancePlan,
-    StanceSequence,
-    risk_tables,
-    totals,
-)
-from experiments.fault_injection import FaultTrigger
+from acquisition.control_loop.states import ArmState
+from acquisition.errors import PreflightError, SettingsError, TractionError
+from analysis.breakaway.fitting import fit_pushes
+from analysis.breakaway.model import BreakAwayModel
+from analysis.breakaway.recorded import BreakAwayOptions
+from analysis.foresight.engine import ForesightFlag
+from analysis.stance.outcomes import FRESH_SCALE, StanceOutcome, totals
+from analysis.stance.policies import POLICIES
+from analysis.stance.seam import risk_tables
+from analysis.stance.sequence import SoleView, StancePlan, StanceSequence
+from experiments.fault_injection.plan import FaultTrigger
 from experiments.messages import FaultContext
-from experiments.operator import GOOD, WARNING, Prompt
-from experiments.rig import Rig
+from experiments.operator.console import GOOD, WARNING
+from experiments.operator.prompts import Prompt
+from experiments.rig.rig import Rig
 from experiments.run.console_loop import TICK
 from experiments.run.context import RunContext
-from experiments.session import (
-    STANCES,
-    SessionFolder,
-    StanceTask,
-    TrialName,
-    TrialOutcome,
-    adapted_scale,
-    stance_pushes,
-)
+from experiments.session.sidecar import STANCES, TrialName, TrialOutcome
+from experiments.session.stance_task import StanceTask, adapted_scale, stance_pushes
+from experiments.session.store import SessionFolder
 
 LIVE_STANCE = (
     "Stances are not available on a real arm: impedance and policies "

@@ -5,8 +5,8 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
-from acquisition import NS_PER_S, Clock, SystemClock
-from acquisition.control_loop import GuardVerdict
+from acquisition.clock import NS_PER_S, Clock, SystemClock
+from acquisition.control_loop.faults import GuardVerdict
 
 URGENT_NS = 3 * NS_PER_S  # two requests closer than this: stop now
 

@@ -6,19 +6,16 @@ from typing import cast
 import numpy as np
 from pydantic import ValidationError
 
-from acquisition import Near, SettingsError, SettingsSection, parse_toml, read_text
-from experiments.rig import build_tool, terrain_frame
-from experiments.settings import Settings, TerrainRow
-from ft_sensor import TerrainFrame
-from wam.calibration import FreeSpace, check_poses
-from wam.model import (
-    BASE_HEIGHT,
-    ArmClearance,
-    ArmModel,
-    Array,
-    ObstacleBox,
-    load_constants,
-)
+from acquisition.errors import SettingsError
+from acquisition.settings import Near, SettingsSection, parse_toml, read_text
+from experiments.rig.build import build_tool, terrain_frame
+from experiments.settings.load import Settings
+from experiments.settings.matrix import TerrainRow
+from ft_sensor.payload import TerrainFrame
+from wam.calibration.free_space import FreeSpace, check_poses
+from wam.model.arm_model import ArmModel
+from wam.model.clearance import BASE_HEIGHT, ArmClearance, ObstacleBox
+from wam.model.constants import Array, load_constants
 
 ABOVE = 0.10  # m that sole, plate and elbow stay above the highest container
 RIM = 0.03  # of a container above its plane [m]

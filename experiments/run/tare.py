@@ -8,22 +8,28 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from acquisition import PreflightError, TractionError, WrenchSample
-from acquisition.control_loop import ArmState
-from acquisition.ipc import unpack_wrenches
-from experiments.fault_injection import FaultTrigger
+from acquisition.control_loop.states import ArmState
+from acquisition.devices import WrenchSample
+from acquisition.errors import PreflightError, TractionError
+from acquisition.ipc.layout import unpack_wrenches
+from experiments.fault_injection.plan import FaultTrigger
 from experiments.messages import CATALOGUE, preflight_error
-from experiments.operator import GOOD, Prompt
-from experiments.rig import Rig
+from experiments.operator.console import GOOD
+from experiments.operator.prompts import Prompt
+from experiments.rig.rig import Rig
 from experiments.run.console_loop import TICK
 from experiments.run.context import RunContext
 from experiments.run.pose_walk import PoseWalk
 from experiments.run.stop import ArmFaultError, StopRequestedError
-from experiments.session import Event, TrialName, write_next_tare
-from ft_sensor import Payload, TareError, TareResult, take_mean, weight_change
-from ft_sensor.calibration import SensorCalibration, sensor_from_toml
-from wam.calibration import FreeSpace, MeasurementPose, plan_halts, tilted_pair
-from wam.model import Array
+from experiments.session.sidecar import TrialName
+from experiments.session.states import Event
+from experiments.session.trial_files import write_next_tare
+from ft_sensor.calibration.sensor_file import SensorCalibration, sensor_from_toml
+from ft_sensor.payload import Payload
+from ft_sensor.tare import TareError, TareResult, take_mean, weight_change
+from wam.calibration.free_space import FreeSpace
+from wam.calibration.poses import MeasurementPose, plan_halts, tilted_pair
+from wam.model.constants import Array
 
 TARE_SECONDS = 1.0
 STILL_SECONDS = 0.3

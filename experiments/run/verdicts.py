@@ -1,31 +1,21 @@
 """What the operator says of a trial: remarks, its verdict, and another one later."""
 
-from acquisition import SessionError, TractionError
-from acquisition.control_loop import ArmState
-from analysis.data import MINIMUM_TRAVEL_SHARE
+from acquisition.control_loop.states import ArmState
+from acquisition.errors import SessionError, TractionError
+from analysis.data.prepare import MINIMUM_TRAVEL_SHARE
 from experiments.arguments import data_option
 from experiments.messages import FaultContext
-from experiments.operator import (
-    NO_PERSONS,
-    NOTE_KEYS,
-    REJECT_REASONS,
-    WARNING,
-    KeyAction,
-    Prompt,
-    key_action,
-)
+from experiments.operator.console import WARNING
+from experiments.operator.keys import NOTE_KEYS, REJECT_REASONS, KeyAction, key_action
+from experiments.operator.prompts import Prompt
+from experiments.operator.scripted import NO_PERSONS
 from experiments.run.context import RunContext
 from experiments.run.photo import collect_photo
 from experiments.run.stop import ArmFaultError, StopRequestedError
-from experiments.session import (
-    LONGEST_TEXT,
-    STANCES,
-    Event,
-    TrialName,
-    TrialOutcome,
-    add_remark,
-    clean_text,
-)
+from experiments.session.annotations import LONGEST_TEXT, clean_text
+from experiments.session.sidecar import STANCES, TrialName, TrialOutcome
+from experiments.session.states import Event
+from experiments.session.trial_files import add_remark
 
 _ENDED = "session ended at the review"
 _NO_VERDICT = (

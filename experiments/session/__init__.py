@@ -4,7 +4,3 @@
 `trial_files` follow the journal, `crash_recovery` finishes what a kill cut short. Begin
 with `states`.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

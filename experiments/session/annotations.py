@@ -3,9 +3,11 @@
 import re
 from pathlib import Path
 
-from acquisition import SessionError, SystemClock
-from acquisition.trial_file import is_there, list_folder
-from experiments.operator import WARNING, login_name
+from acquisition.clock import SystemClock
+from acquisition.errors import SessionError
+from acquisition.trial_file.data_files import is_there, list_folder
+from experiments.operator.console import WARNING
+from experiments.operator.terminal import login_name
 from experiments.session.crash_recovery import recover_session
 from experiments.session.data_files import sha256_of
 from experiments.session.journal import Journal, open_journal

@@ -2,17 +2,12 @@
 
 from pathlib import Path
 
-from acquisition import SessionError, SystemClock, TrialFileError, remove_abandoned
-from acquisition.trial_file import (
-    ROOM,
-    VerifiedFile,
-    is_claimed,
-    is_there,
-    list_folder,
-    recover_file,
-    recovered_path,
-    verify_file,
-)
+from acquisition.clock import SystemClock
+from acquisition.errors import SessionError, TrialFileError
+from acquisition.temporary_folders import remove_abandoned
+from acquisition.trial_file.data_files import is_claimed, is_there, list_folder
+from acquisition.trial_file.recover import ROOM, recover_file, recovered_path
+from acquisition.trial_file.verify import VerifiedFile, verify_file
 from experiments.session.data_files import move_file, read_json, remove_file, write_json
 from experiments.session.journal import Journal
 from experiments.session.sidecar import TrialName, TrialOutcome, sidecar_of

@@ -11,8 +11,13 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, cast
 
-from acquisition import TrialFileError
-from acquisition.trial_file import check_absent, open_data, open_folder, read_data
+from acquisition.errors import TrialFileError
+from acquisition.trial_file.data_files import (
+    check_absent,
+    open_data,
+    open_folder,
+    read_data,
+)
 
 _NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL
 

@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass, field
 
-from acquisition import Clock, SessionError
+from acquisition.clock import Clock
+from acquisition.errors import SessionError
 from experiments.session.data_files import read_json, write_json
 from experiments.session.reducer import KEEP, SessionState, apply, refusal, replay
 from experiments.session.store import SessionFolder, iso_utc

@@ -9,8 +9,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from acquisition import SessionError, TrialFileError
-from acquisition.trial_file import is_there, list_folder
+from acquisition.errors import SessionError, TrialFileError
+from acquisition.trial_file.data_files import is_there, list_folder
 from experiments.session.data_files import damaged_lines, read_json, sha256_of
 from experiments.session.reducer import KEEP, replay
 from experiments.session.sidecar import TrialName
@@ -18,7 +18,7 @@ from experiments.session.store import SessionFolder
 from experiments.session.trial_files import decision_of, find_sidecar, kept_pushes
 
 if TYPE_CHECKING:
-    from analysis.next_push import Stopping
+    from analysis.next_push.stopping import Stopping
 
 _NAMED = 6  # deviations in one message
 _Facts = Mapping[str, Any]
@@ -223,7 +223,8 @@ def enough_of(sessions: Sequence[SessionFolder], row: WantedRow) -> str:
 
 @lru_cache(maxsize=64)
 def _stopping(texts: tuple[str, ...], kind: str, target: str) -> Stopping | None:
-    from analysis.next_push import PushRecord, stopping_of
+    from analysis.next_push.records import PushRecord
+    from analysis.next_push.stopping import stopping_of
 
     records = [PushRecord.from_plain(json.loads(text)) for text in texts]
     known = [record for record in records if record is not None]

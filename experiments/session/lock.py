@@ -8,8 +8,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from acquisition import SessionError, SystemClock
-from acquisition.trial_file import check_absent, check_folders, open_data
+from acquisition.clock import SystemClock
+from acquisition.errors import SessionError
+from acquisition.trial_file.data_files import check_absent, check_folders, open_data
 from experiments.session.data_files import read_json
 from experiments.session.store import SessionFolder, iso_utc
 

@@ -18,8 +18,9 @@ from pathlib import Path
 from tempfile import gettempdir
 from typing import Any, cast
 
-from acquisition import TrialFileError, temporary_folder
-from acquisition.trial_file import list_folder, open_data
+from acquisition.errors import TrialFileError
+from acquisition.temporary_folders import temporary_folder
+from acquisition.trial_file.data_files import list_folder, open_data
 from experiments.session.data_files import read_json, write_json, write_new
 from experiments.session.sidecar import TrialName
 from experiments.session.store import SessionFolder, iso_utc

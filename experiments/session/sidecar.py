@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from acquisition.trial_file import VerifiedFile
+    from acquisition.trial_file.verify import VerifiedFile
 
 STANCES = "stances"  # all of them were made
 COMPLETE = frozenset({"travel", "key", "time-limit", STANCES})

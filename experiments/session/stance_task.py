@@ -9,15 +9,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from acquisition import SessionError, SettingsError
-from analysis.breakaway import FootPush
-from analysis.stance import (
-    LEAST_TRAVEL,
-    POLICIES,
-    StanceOutcome,
-    StanceRequest,
-    adapted,
-)
+from acquisition.errors import SessionError, SettingsError
+from analysis.breakaway.pushes import FootPush
+from analysis.stance.outcomes import StanceOutcome, adapted
+from analysis.stance.policies import POLICIES
+from analysis.stance.seam import StanceRequest
+from analysis.stance.sequence import LEAST_TRAVEL
 from experiments.arguments import did_you_mean
 from experiments.session.data_files import read_json, write_json
 from experiments.session.store import STANCE_FILE, SessionFolder, list_sessions

@@ -11,17 +11,17 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from acquisition import SessionError, SettingsError, SystemClock, TrialFileError
-from acquisition.trial_file import (
+from acquisition.clock import SystemClock
+from acquisition.errors import SessionError, SettingsError, TrialFileError
+from acquisition.trial_file.data_files import (
     check_absent,
     check_folders,
     is_there,
     list_folder,
-    make_directories,
     open_data,
     read_data,
-    sync_directory,
 )
+from acquisition.trial_file.publishing import make_directories, sync_directory
 from experiments.session.data_files import (
     journal_line,
     parse_line,

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from acquisition import TrialFileError
-from acquisition.trial_file import is_there, list_folder
+from acquisition.errors import TrialFileError
+from acquisition.trial_file.data_files import is_there, list_folder
 from experiments.session.data_files import (
     move_file,
     read_json,
@@ -22,7 +22,7 @@ from experiments.session.states import Event
 from experiments.session.store import SessionFolder
 
 if TYPE_CHECKING:
-    from analysis.next_push import PushRecord
+    from analysis.next_push.records import PushRecord
 
 PHOTO_SUFFIXES = (".photo.jpg", ".photo.png")
 _SUFFIXES = (".mcap", ".truth.mcap", *PHOTO_SUFFIXES)
@@ -148,7 +148,7 @@ def kept_pushes(folder: SessionFolder) -> list[PushRecord]:
 
     None at all where one of them has no such record: a trial of an older version.
     """
-    from analysis.next_push import PushRecord
+    from analysis.next_push.records import PushRecord
 
     records = [PushRecord.from_plain(s.get("push")) for s in kept_sidecars(folder)]
     known = [record for record in records if record is not None]

@@ -4,8 +4,10 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from acquisition import TrialFileError
-from acquisition.trial_file import is_there, read_file, recorded_seconds
+from acquisition.errors import TrialFileError
+from acquisition.trial_file.chunks import read_file
+from acquisition.trial_file.data_files import is_there
+from acquisition.trial_file.salvage import recorded_seconds
 from experiments.messages import CATALOGUE
 from experiments.session.lock import owner_of
 from experiments.session.reducer import SessionState, replay

@@ -8,16 +8,13 @@ from typing import TypeVar
 import numpy as np
 from pydantic import ValidationError
 
-from acquisition import SettingsError, read_text
+from acquisition.errors import SettingsError
+from acquisition.settings import read_text
 from experiments.settings.load import Settings
 from experiments.settings.matrix import TerrainRow
 from experiments.settings.rig import RigSettings
-from ft_sensor.calibration import (
-    SensorCalibration,
-    sensor_from_toml,
-    terrain_from_toml,
-    terrain_metadata,
-)
+from ft_sensor.calibration.files import terrain_from_toml, terrain_metadata
+from ft_sensor.calibration.sensor_file import SensorCalibration, sensor_from_toml
 
 NOTHING = "Nothing was started."
 

@@ -8,7 +8,8 @@ from typing import TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from acquisition import SettingsError, parse_toml, read_text
+from acquisition.errors import SettingsError
+from acquisition.settings import parse_toml, read_text
 from experiments.arguments import did_you_mean
 from experiments.settings.explaining import explain
 from experiments.settings.matrix import MatrixSettings, TerrainRow

@@ -4,8 +4,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from acquisition import File, Near, Number, SettingsSection, Vector3, Whole
-from analysis.data import FLAT
+from acquisition.settings import File, Near, Number, SettingsSection, Vector3, Whole
+from analysis.data.terrain_kinds import FLAT
 
 _Angles = tuple[Near, Near, Near, Near, Near, Near, Near]
 _Task = Annotated[str, Field(min_length=1, max_length=60, pattern=r"^[^\x00-\x1f]+$")]

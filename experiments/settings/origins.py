@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
-from acquisition import parse_toml
+from acquisition.settings import parse_toml
 from experiments.settings.explaining import line_of
 from experiments.settings.load import Settings
 

@@ -5,8 +5,9 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from acquisition import (
-    RATE_HZ,
+from acquisition.clock import RATE_HZ
+from acquisition.control_loop.limits import GuardLimits
+from acquisition.settings import (
     File,
     Mass,
     Number,
@@ -15,8 +16,7 @@ from acquisition import (
     Vector3,
     Whole,
 )
-from acquisition.control_loop import GuardLimits
-from ft_sensor.vendors import AnySensor
+from ft_sensor.vendors.registry import AnySensor
 
 _Turn = Annotated[Whole, Field(ge=0, lt=65536)]  # counts of one motor turn
 _SevenPositive = tuple[

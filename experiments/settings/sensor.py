@@ -1,8 +1,9 @@
 """The wrist sensor of rig.toml as a device."""
 
-from acquisition import SettingsError
-from ft_sensor import SensorSection
-from ft_sensor.serial_line import PortSettings, SerialDevice
+from acquisition.errors import SettingsError
+from ft_sensor.section import SensorSection
+from ft_sensor.serial_line.link import PortSettings
+from ft_sensor.serial_line.sensor import SerialDevice
 
 _SIMULATED_CHECK = 0.5  # s; a simulated rate is what it says
 

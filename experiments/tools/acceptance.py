@@ -12,27 +12,19 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition import SessionError
-from analysis.data import (
-    FLAT,
-    PrepareOptions,
-    RecordedTrial,
-    doubts_of,
-    doubts_of_record,
-    load_trial,
-)
-from analysis.study import GP_SE, TUSTIN, FitOptions, Study, StudyOptions, run_study
-from analysis.validation import (
-    Band,
-    BandResult,
-    GroundTrials,
-    hold_against_bands,
-    measure_models,
-    measure_slips,
-)
+from acquisition.errors import SessionError
+from analysis.data.load import RecordedTrial, load_trial
+from analysis.data.plausibility import doubts_of, doubts_of_record
+from analysis.data.prepare import PrepareOptions
+from analysis.data.terrain_kinds import FLAT
+from analysis.study.models import GP_SE, TUSTIN, FitOptions
+from analysis.study.study import Study, StudyOptions, run_study
+from analysis.validation.bands import Band, BandResult, hold_against_bands
+from analysis.validation.model_measures import measure_models
+from analysis.validation.slip_measures import GroundTrials, measure_slips
 from experiments.arguments import FRICTION
-from experiments.report import compare_with_truth, z_scores
-from experiments.session import list_sessions
+from experiments.report.truth_errors import compare_with_truth, z_scores
+from experiments.session.store import list_sessions
 
 WHOLE = 10  # trials per terrain from which every band applies
 _OF_FEW = ("D", "E", "F", "T")  # groups that apply to fewer

@@ -10,14 +10,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from acquisition import NS_PER_S, PreflightError, Record, SafetyMode
-from acquisition.control_loop import ArmState, LoopReport, loop_report
-from acquisition.ipc import TIMING_DTYPE
-from acquisition.trial_file import TrialHeader, TrialReader
-from experiments.trial import TIME_LIMIT
+from acquisition.clock import NS_PER_S
+from acquisition.control_loop.states import ArmState
+from acquisition.control_loop.timing import LoopReport, loop_report
+from acquisition.devices import SafetyMode
+from acquisition.errors import PreflightError
+from acquisition.ipc.layout import TIMING_DTYPE
+from acquisition.sample import Record
+from acquisition.trial_file.header import TrialHeader
+from acquisition.trial_file.reader import TrialReader
+from experiments.trial.files import TIME_LIMIT
 
 if TYPE_CHECKING:
-    from experiments.rig import Rig
+    from experiments.rig.rig import Rig
 
 SETTLE = 1.0  # s before anything is measured
 WARM = 180.0  # s, or half of the time, after which memory has to stay as it is

@@ -10,7 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, Protocol
 
-from acquisition import NS_PER_S, SettingsError, read_text
+from acquisition.clock import NS_PER_S
+from acquisition.errors import SettingsError
+from acquisition.settings import read_text
 
 Press = Literal["activate", "idle", "estop", "quit"]
 PendantButton = Literal["activate", "idle", "estop"]

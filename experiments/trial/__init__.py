@@ -3,7 +3,3 @@
 `files` writes what is known before the first cycle and keeps what was recorded,
 `quality` is the gate at the review.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

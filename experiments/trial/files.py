@@ -5,30 +5,22 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from acquisition import TrialFileError, utc_offset_ns
-from acquisition.ipc import last_frames
-from acquisition.recording import seal
-from acquisition.trial_file import (
-    FLIGHT_TOPICS,
-    TRUTH_TOPICS,
-    TrialHeader,
-    TrialWriter,
-    VerifiedFile,
-)
+from acquisition.clock import utc_offset_ns
+from acquisition.errors import TrialFileError
+from acquisition.ipc.frame_tape import last_frames
+from acquisition.recording.recorder import seal
+from acquisition.trial_file.header import TrialHeader
+from acquisition.trial_file.verify import VerifiedFile
+from acquisition.trial_file.writer import FLIGHT_TOPICS, TRUTH_TOPICS, TrialWriter
 from experiments import provenance
-from experiments.rig import Rig
-from experiments.session import (
-    SessionFolder,
-    TrialName,
-    TrialOutcome,
-    iso_utc,
-    kept_sidecars,
-    sidecar_of,
-    write_json,
-)
+from experiments.rig.rig import Rig
+from experiments.session.data_files import write_json
+from experiments.session.sidecar import TrialName, TrialOutcome, sidecar_of
+from experiments.session.store import SessionFolder, iso_utc
+from experiments.session.trial_files import kept_sidecars
 from experiments.trial.quality import Review
-from ft_sensor.calibration import payload_to_toml, terrain_to_toml
-from wam.model import urdf
+from ft_sensor.calibration.files import payload_to_toml, terrain_to_toml
+from wam.model.arm_model import urdf
 
 TIME_LIMIT = 30.0  # s
 AFTER_TRAVEL = 0.4  # a trial goes on this long after the foot has crossed [s]

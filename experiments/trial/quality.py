@@ -10,28 +10,31 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import Flag
-from analysis.data import (
-    JOINT7_WARNING,
+from acquisition.sample import Flag
+from analysis.data.events import find_slips
+from analysis.data.lag import ForceLag
+from analysis.data.load import load_trial
+from analysis.data.plausibility import Doubt, doubts_of, doubts_of_record
+from analysis.data.prepare import (
     MINIMUM_KEPT,
-    CoverageGrid,
-    Doubt,
-    ForceLag,
     PreparedTrial,
     PrepareOptions,
-    coverage,
-    doubts_of,
-    doubts_of_record,
-    find_slips,
-    load_trial,
     prepare_trial,
+)
+from analysis.data.quality import (
+    JOINT7_WARNING,
+    CoverageGrid,
+    coverage,
     quick_ratio,
     suggest,
 )
-from analysis.next_push import Aim, PushRecord, advise, push_record
-from experiments.operator import BAD, GOOD, WARNING, WayTrace, trace_lines
-from experiments.session import SessionFolder, kept_pushes, kept_sidecars
-from experiments.settings import TerrainRow
+from analysis.next_push.advice import advise
+from analysis.next_push.records import Aim, PushRecord, push_record
+from experiments.operator.console import BAD, GOOD, WARNING
+from experiments.operator.graphs import WayTrace, trace_lines
+from experiments.session.store import SessionFolder
+from experiments.session.trial_files import kept_pushes, kept_sidecars
+from experiments.settings.matrix import TerrainRow
 from experiments.trial.running import plain_trace, traces_of
 
 STALE_SHARE = 0.01  # of the cycles

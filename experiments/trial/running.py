@@ -6,9 +6,10 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.data import RecordedTrial
-from experiments.operator import KeptRow, WayTrace
-from experiments.session import SessionFolder, kept_sidecars
+from analysis.data.load import RecordedTrial
+from experiments.operator.graphs import KeptRow, WayTrace
+from experiments.session.store import SessionFolder
+from experiments.session.trial_files import kept_sidecars
 
 TRACE_CELLS = 72  # shares of the way in a trace
 

@@ -3,7 +3,3 @@
 `in_process` is a `can.BusABC` on stepped time and a door to it, `hub` and `client` the
 two ends of a socket, `adapter` any other bus.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -10,7 +10,7 @@ import struct
 
 import can
 
-from acquisition import NS_PER_S, Clock, SystemClock
+from acquisition.clock import NS_PER_S, Clock, SystemClock
 
 _FRAME = struct.Struct("=IB3x8s")
 FRAME_SIZE = _FRAME.size

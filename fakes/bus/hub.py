@@ -5,9 +5,10 @@ import select
 import socket
 from pathlib import Path
 
-from acquisition import LinkError, SettingsError, SystemClock
+from acquisition.clock import SystemClock
+from acquisition.errors import LinkError, SettingsError
 from fakes.bus.client import FRAME_SIZE, open_socket, pack_frame, unpack_frame
-from wam.bus import open_door
+from wam.bus.doors import open_door
 
 CLIENTS = 32
 _PACKETS_AT_A_TIME = 64  # of one client, before the next one is heard

@@ -6,10 +6,13 @@ from typing import NoReturn
 
 import can
 
-from acquisition import NS_PER_S, Clock
-from fakes.pucks import OutFrame, PuckNetwork, lay_wire
-from wam.bus import DRAIN_AT_MOST, PythonCanDoor, as_frame
-from wam.bus import Frame as DoorFrame
+from acquisition.clock import NS_PER_S, Clock
+from fakes.pucks.event_queue import OutFrame
+from fakes.pucks.network import PuckNetwork
+from fakes.pucks.wire import lay_wire
+from wam.bus.doors import PythonCanDoor
+from wam.bus.link import DRAIN_AT_MOST, as_frame
+from wam.bus.link import Frame as DoorFrame
 
 _PATIENCE_NS = NS_PER_S
 _QUEUE = 11  # frames: txqueuelen 10, and one in the driver

@@ -4,7 +4,3 @@
 Without numba, or without a folder to keep the machine code in, the simulation runs in
 Python and Pinocchio. Begin with `choice`.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

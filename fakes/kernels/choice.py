@@ -7,7 +7,7 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 
-from acquisition import SettingsError
+from acquisition.errors import SettingsError
 
 COMPILED, PINOCCHIO = "compiled", "pinocchio"
 ENVIRONMENT = "TRACTION_DYNAMICS"  # chooses one of them; unset = compiled if possible

@@ -3,7 +3,3 @@
 `plant` integrates the dynamics, `joints` is friction and stops, `gauges` what the
 sensor feels, `hand` and `push` what a person does. Begin with `plant`.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

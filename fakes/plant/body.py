@@ -19,12 +19,13 @@ from typing import NamedTuple, Protocol
 import numpy as np
 import pinocchio as pin
 
-from fakes.ground import NO_CONTACT, Terrain
-from fakes.kernels import PINOCCHIO
+from fakes.ground.contact import NO_CONTACT
+from fakes.ground.terrain import Terrain
+from fakes.kernels.choice import PINOCCHIO
 from fakes.plant.joints import JointDrives, JointLoads, JointState
 from fakes.plant.model import ArmAndHand
 from fakes.plant.push import HandView, Vector3
-from wam.model import Array
+from wam.model.constants import Array
 
 GRIP = (40.0, 1.0)  # the hand keeps the forearm's turn: N m/rad, N m s/rad
 NO_GRIP = (0.0, 0.0)

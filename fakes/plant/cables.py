@@ -16,7 +16,8 @@ import numpy as np
 
 from fakes.plant.friction import ASSUMED, FrictionParameter
 from fakes.plant.joints import JointDrives
-from wam.model import ArmConstants, Array, MotorFriction
+from wam.model.constants import ArmConstants, Array
+from wam.model.friction import MotorFriction
 
 CABLES = FrictionParameter("cables", "Hz, motors held", np.inf, 8.0, 25.0, ASSUMED)
 _STIFFEST = 40.0  # Hz, that steps of 0.5 ms follow

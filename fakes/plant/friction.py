@@ -10,12 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition import PERIOD_NS
+from acquisition.clock import PERIOD_NS
 from fakes.randomness import friction_generator
-from wam.model import (
+from wam.model.constants import ArmConstants, Array
+from wam.model.friction import (
     ELASTIC,
-    ArmConstants,
-    Array,
     MotorFriction,
     motor_shares,
     motor_turns,

@@ -6,8 +6,9 @@ from struct import Struct
 import numpy as np
 
 from fakes.plant.push import Vector3
-from ft_sensor import payload_of
-from wam.model import GRAVITY, Array, Tool
+from ft_sensor.payload import payload_of
+from wam.model.constants import GRAVITY, Array
+from wam.model.tool import Tool
 
 Wrench = tuple[float, float, float, float, float, float]
 _FELT = Struct("15d")  # ground's wrench, change of the foot's rates, its turning rate

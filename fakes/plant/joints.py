@@ -6,9 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from acquisition import PERIOD_NS
+from acquisition.clock import PERIOD_NS
 from fakes.plant.friction import MotorBristles
-from wam.model import ArmConstants, Array, MotorFriction, drive_inertia_matrix
+from wam.model.arm_model import drive_inertia_matrix
+from wam.model.constants import ArmConstants, Array
+from wam.model.friction import MotorFriction
 
 STOP_K, STOP_B = 2000.0, 20.0  # N m/rad, N m s/rad
 NEAR = 0.05  # of a stop: no joint goes further in 2 ms [rad]

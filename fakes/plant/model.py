@@ -6,16 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from ft_sensor import TerrainFrame
-from wam.model import (
-    ArmConstants,
-    Array,
-    MotorFriction,
-    Tool,
-    add_point,
-    build_pinocchio,
-    drive_inertia_matrix,
-)
+from ft_sensor.payload import TerrainFrame
+from wam.model.arm_model import add_point, build_pinocchio, drive_inertia_matrix
+from wam.model.constants import ArmConstants, Array
+from wam.model.friction import MotorFriction
+from wam.model.tool import Tool
 
 # The model of the arm with the hand on it, and its frames: sole and hand.
 ArmAndHand = tuple["pin.Model", int, int]

@@ -11,9 +11,9 @@ from math import floor
 
 import numpy as np
 
-from acquisition import PERIOD_NS
-from fakes.ground import Terrain
-from fakes.kernels import COMPILED, chosen_dynamics
+from acquisition.clock import PERIOD_NS
+from fakes.ground.terrain import Terrain
+from fakes.kernels.choice import COMPILED, chosen_dynamics
 from fakes.plant.body import GRIP, NO_GRIP, ArmBody, HandLoad, PinocchioBody
 from fakes.plant.cables import CableDrives
 from fakes.plant.friction import draw_friction
@@ -30,8 +30,10 @@ from fakes.plant.model import (
     motor_weights,
 )
 from fakes.truth import Truth
-from ft_sensor import TerrainFrame
-from wam.model import GRAVITY, ArmConstants, Array, MotorFriction, Tool
+from ft_sensor.payload import TerrainFrame
+from wam.model.constants import GRAVITY, ArmConstants, Array
+from wam.model.friction import MotorFriction
+from wam.model.tool import Tool
 
 _NO_TORQUE = (0.0,) * 7
 
@@ -94,7 +96,7 @@ class ArmPlant:
     def _build_gauges(self, tool: Tool, up: Array) -> WristGauges:
         if not self.is_compiled:
             return WristGauges(tool, up, PERIOD_NS * 1e-9)
-        from fakes.plant.compiled import CompiledGauges
+        from fakes.plant.compiled.gauges import CompiledGauges
 
         return CompiledGauges(tool, up, PERIOD_NS * 1e-9)
 
@@ -235,7 +237,7 @@ def _build_body(
     inertia = motor_inertia(model, constants, q)
     chosen = options.dynamics or chosen_dynamics()
     if chosen == COMPILED and options.cables is None:
-        from fakes.plant.compiled import CompiledBody
+        from fakes.plant.compiled.body import CompiledBody
 
         return CompiledBody(parts, constants, (friction, inertia), q, times)
     drives = JointDrives(constants, friction, inertia, times[0])

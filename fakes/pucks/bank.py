@@ -5,13 +5,19 @@ from functools import partial
 from operator import attrgetter
 from typing import Protocol
 
-from acquisition import SafetyMode
+from acquisition.devices import SafetyMode
 from fakes.pucks.event_queue import EventQueue
 from fakes.pucks.motor_puck import READ_ONLY, MotorPuck
 from fakes.pucks.options import NetworkOptions
 from fakes.pucks.power import AWAKE, Power, PuckPower, power_after, power_at_start
 from fakes.pucks.safety_module import puck_mode_in
-from wam.bus import MOTOR_NODES, Group, Property, encode_positions, wrap_positions
+from wam.bus.frames import (
+    MOTOR_NODES,
+    Group,
+    Property,
+    encode_positions,
+    wrap_positions,
+)
 
 _node, _position_id = attrgetter("node"), attrgetter("position_id")
 _torque = attrgetter("torque")

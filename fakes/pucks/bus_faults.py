@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition import PERIOD_NS
+from acquisition.clock import PERIOD_NS
 from fakes.pucks.event_queue import FRAME_NS, EventQueue
-from wam.bus import (
+from wam.bus.frames import (
     Group,
     compose_id,
     decode_position,

@@ -13,13 +13,13 @@ from struct import Struct
 
 import numpy as np
 
-from fakes.kernels import inline, kernel
+from fakes.kernels.compiler import inline, kernel
 from fakes.pucks.bank import LOWER
 from fakes.pucks.event_queue import FRAME_NS, NEVER, OutFrame
 from fakes.pucks.network import PuckNetwork
 from fakes.pucks.speed_monitor import HISTORY, SpeedMonitor
 from fakes.pucks.wire import WiredNetwork
-from wam.bus import (
+from wam.bus.frames import (
     MOTOR_NODES,
     POSITION_MODULUS,
     TORQUE_SIGNS,
@@ -27,7 +27,7 @@ from wam.bus import (
     group_id,
     position_reply_id,
 )
-from wam.driver import COUNTS_PER_SPEED
+from wam.driver.safety_module import COUNTS_PER_SPEED
 
 _SEVEN, _MONITORED = (7,), 4  # motors, and those that tell the speed of the arm
 _ROOM = HISTORY + 1

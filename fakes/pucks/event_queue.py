@@ -3,7 +3,8 @@
 from collections.abc import Callable, Sequence
 from heapq import heappop, heappush
 
-from wam.bus import encode_reply, is_wide, property_reply_id
+from wam.bus.frames import encode_reply, property_reply_id
+from wam.bus.properties import is_wide
 
 OutFrame = tuple[int, int, bytes]  # ready for the wire at [ns], identifier, data
 

@@ -9,24 +9,21 @@ effect, and the accelerometer feels a sensor at rest.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from acquisition import SafetyMode
+from acquisition.devices import SafetyMode
 from fakes.pucks.event_queue import EventQueue
 from fakes.pucks.options import NetworkOptions
 from fakes.pucks.power import Power, PuckPower, power_after, power_at_start
-from fakes.sensor import FORCE_ERRORS, TORQUE_ERRORS, SensorErrors
-from wam.bus import (
+from fakes.sensor.errors import FORCE_ERRORS, TORQUE_ERRORS, SensorErrors
+from wam.bus.frames import (
     SENSOR_NODE,
-    Device,
     Group,
     Property,
-    PuckRole,
-    PuckStatus,
     encode_acceleration,
     encode_force,
     encode_torque,
     group_id,
-    names,
 )
+from wam.bus.properties import Device, PuckRole, PuckStatus, names
 
 # Data sheet: steps and ranges of fx fy fz tx ty tz [N, N m]
 STEPS = (0.05, 0.05, 0.08, 0.0015, 0.0015, 0.0015)

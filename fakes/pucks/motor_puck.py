@@ -4,16 +4,15 @@ from collections.abc import MutableSequence
 
 from fakes.pucks.options import NetworkOptions
 from fakes.pucks.power import AWAKE, Power, PuckPower
-from wam.bus import (
+from wam.bus.frames import MOTOR_NODES, position_reply_id
+from wam.bus.properties import (
     MAGNETIC_ENCODER,
-    MOTOR_NODES,
     Device,
     PuckMode,
     PuckRole,
     PuckStatus,
     names,
     nearest_documented,
-    position_reply_id,
     property_number,
 )
 

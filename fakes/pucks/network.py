@@ -6,7 +6,7 @@ as far as hosts have described them.
 
 from typing import NamedTuple
 
-from acquisition import SafetyMode
+from acquisition.devices import SafetyMode
 from fakes.pucks.bank import MotorSide, PuckBank
 from fakes.pucks.bus_faults import BusFaults, OtherMaster
 from fakes.pucks.event_queue import NEVER, EventQueue, OutFrame
@@ -18,7 +18,7 @@ from fakes.pucks.safety_module import (
     PendantAction,
     Strainable,
 )
-from wam.bus import (
+from wam.bus.frames import (
     GROUP_BIT,
     MOTOR_NODES,
     SAFETY_NODE,
@@ -29,7 +29,7 @@ from wam.bus import (
     decode_request,
     decode_torques,
 )
-from wam.driver import PendantWord
+from wam.driver.pendant import PendantWord
 
 
 class NetworkParts(NamedTuple):

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from acquisition import SafetyMode
+from acquisition.devices import SafetyMode
 
 
 @dataclass(frozen=True, slots=True)

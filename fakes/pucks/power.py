@@ -3,10 +3,10 @@
 from collections.abc import Callable
 from enum import Enum
 
-from acquisition import SafetyMode
+from acquisition.devices import SafetyMode
 from fakes.pucks.event_queue import EventQueue
 from fakes.pucks.options import NetworkOptions
-from wam.bus import PuckStatus
+from wam.bus.properties import PuckStatus
 
 # Of the answers of neighbours; all come within the 75 to 150 us that are known.
 _APART_NS = 10_000

@@ -7,31 +7,27 @@ the one is an option, the other the mode that the pucks go to.
 from collections.abc import Callable, Mapping, MutableSequence, Sequence
 from typing import Literal
 
-from acquisition import SafetyMode
+from acquisition.devices import SafetyMode
 from fakes.pucks.event_queue import NEVER, EventQueue
 from fakes.pucks.options import NetworkOptions
 from fakes.pucks.speed_monitor import SpeedMonitor
-from wam.bus import (
-    SAFETY_NODE,
+from wam.bus.frames import SAFETY_NODE, Group, Property, compose_id, encode_reply
+from wam.bus.properties import (
     Device,
-    Group,
-    Property,
     PuckMode,
     PuckRole,
     PuckStatus,
-    compose_id,
-    encode_reply,
     names,
     nearest_documented,
 )
-from wam.driver import (
-    COUNTS_PER_SPEED,
+from wam.driver.pendant import (
     MONITORS,
     PendantButton,
     PendantWord,
     SafetyLevel,
     encode_pendant,
 )
+from wam.driver.safety_module import COUNTS_PER_SPEED
 
 PendantAction = Literal["activate", "idle", "estop"]
 Strainable = Literal["velocity", "torque", "heartbeat"]

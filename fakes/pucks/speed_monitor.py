@@ -10,7 +10,7 @@ from math import hypot, pi, sin
 
 import numpy as np
 
-from wam.model import load_constants
+from wam.model.constants import load_constants
 
 ELBOW = 0.55  # from shoulder to elbow [m]
 FOREARM = 0.35  # from the elbow to the point on the forearm [m]

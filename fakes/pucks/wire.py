@@ -4,7 +4,7 @@ from heapq import heappop, heappush
 
 from fakes.pucks.event_queue import FRAME_NS, NEVER, OutFrame
 from fakes.pucks.network import PuckNetwork
-from wam.bus import Payload
+from wam.bus.frames import Payload
 
 # A frame that wants onto the wire: identifier, order of arrival, data, is of a host.
 # The lowest identifier goes first.

@@ -7,7 +7,8 @@ from enum import Enum, auto
 from fakes.sensor.errors import SensorErrors
 from fakes.sensor.firmware import Measurement, SampleSchedule, Saying
 from fakes.sensor.stream import SensorStream, Source
-from ft_sensor.vendors import Acknowledgement, BootText, BotaFrame, bota
+from ft_sensor.vendors import bota
+from ft_sensor.vendors.bota import Acknowledgement, BootText, BotaFrame
 
 _BOOT_NS = 400_000_000  # silence until the port's opening has settled
 _LINE_PAUSE_NS = 100_000_000

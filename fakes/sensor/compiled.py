@@ -12,7 +12,7 @@ from struct import Struct
 
 import numpy as np
 
-from fakes.kernels import inline, kernel
+from fakes.kernels.compiler import inline, kernel
 from fakes.randomness import NormalArray
 from fakes.sensor.bota import BotaFirmware
 from fakes.sensor.errors import (
@@ -24,7 +24,7 @@ from fakes.sensor.errors import (
     SensorErrors,
 )
 from fakes.sensor.stream import ROOM, SensorStream, Source
-from ft_sensor import Wrench
+from ft_sensor.reading import Wrench
 from ft_sensor.vendors import bota
 
 _SIX = (6,)

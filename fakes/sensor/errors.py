@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from fakes.randomness import NormalStream, exact_step
-from ft_sensor import Wrench
+from ft_sensor.reading import Wrench
 
 
 @dataclass(frozen=True, slots=True)

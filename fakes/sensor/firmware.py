@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
-from ft_sensor import Wrench
+from ft_sensor.reading import Wrench
 
 Saying = tuple[int, bytes]  # time of sending [ns], bytes
 FULL_COUNT = 32767  # of a sensor that sends 16-bit counts

@@ -15,7 +15,7 @@ from fakes.sensor.optoforce import (
 )
 from fakes.sensor.robotous import RobotousOptions, robotous_stream
 from fakes.sensor.stream import SensorStream, Source
-from ft_sensor import Wrench
+from ft_sensor.reading import Wrench
 
 DRIFT_PPM = 20.0  # of the device's clock; two crystals are never alike
 

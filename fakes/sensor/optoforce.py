@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from fakes.sensor.errors import SensorErrors
 from fakes.sensor.firmware import Measurement, SampleSchedule, Saying, count_of
 from fakes.sensor.stream import SensorStream, Source
-from ft_sensor import Wrench
-from ft_sensor.vendors import OptoForceFrame, optoforce
+from ft_sensor.reading import Wrench
+from ft_sensor.vendors import optoforce
+from ft_sensor.vendors.optoforce import OptoForceFrame
 
 SERIAL_NUMBER = "HEX00042"
 SENSITIVITY: Wrench = (18.28, 18.41, 2.12, 278.72, 259.55, 448.47)

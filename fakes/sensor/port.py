@@ -3,7 +3,7 @@
 import io
 from typing import Protocol
 
-from acquisition import Clock
+from acquisition.clock import Clock
 
 _KERNEL_BUFFER = 4096  # what a terminal keeps for a reader that does not come
 

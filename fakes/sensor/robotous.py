@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from fakes.sensor.errors import SensorErrors
 from fakes.sensor.firmware import Measurement, SampleSchedule, Saying, count_of
 from fakes.sensor.stream import SensorStream, Source
-from ft_sensor import Wrench
-from ft_sensor.vendors import MODELS, RobotousFrame, robotous
+from ft_sensor.reading import Wrench
+from ft_sensor.vendors import robotous
+from ft_sensor.vendors.robotous import MODELS, RobotousFrame
 
 _REPLY_NS = 1_000_000
 _OVERLOAD = 1.2  # times rated load

@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 from fakes.sensor.errors import PER_DEGREE, SensorErrors
 from fakes.sensor.firmware import Firmware, Measurement, SampleSchedule, Saying
 from fakes.sensor.stream_faults import ByteFault, StreamFaults, damage
-from ft_sensor import ALL_AXES, Wrench
-from ft_sensor.serial_line import wire_time_ns
+from ft_sensor.reading import ALL_AXES, Wrench
+from ft_sensor.serial_line.framing import wire_time_ns
 
 Source = Callable[[int], Sequence[float]]
 

@@ -3,7 +3,7 @@
 import math
 from enum import Enum, auto
 
-from ft_sensor import Wrench
+from ft_sensor.reading import Wrench
 
 _GARBLED = 9  # byte of a frame that is inverted: in the middle of a force
 _NOT_A_NUMBER: Wrench = (math.nan, math.inf, 0.0, 0.0, 0.0, 0.0)

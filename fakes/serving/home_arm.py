@@ -5,24 +5,23 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from acquisition import PERIOD_NS, Clock, SafetyMode
-from fakes.kernels import PINOCCHIO
-from fakes.plant import ArmPlant, PlantOptions
-from fakes.pucks import (
-    SENSOR_FORCE_ERRORS,
-    SENSOR_TORQUE_ERRORS,
-    Load,
-    MotorSide,
-    NetworkOptions,
-    PuckNetwork,
-)
+from acquisition.clock import PERIOD_NS, Clock
+from acquisition.devices import SafetyMode
+from fakes.kernels.choice import PINOCCHIO
+from fakes.plant.model import PlantOptions
+from fakes.plant.plant import ArmPlant
+from fakes.pucks.bank import MotorSide
+from fakes.pucks.ft_puck import SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS, Load
+from fakes.pucks.network import PuckNetwork
+from fakes.pucks.options import NetworkOptions
 from fakes.randomness import trial_generator
-from fakes.sensor import SensorErrors
+from fakes.sensor.errors import SensorErrors
 from fakes.serving.puck_server import Port, PuckServer
 from fakes.serving.sensor_server import SensorLine, SensorServer
-from ft_sensor import TerrainFrame
-from wam.bus import MOTOR_NODES
-from wam.model import ArmConstants, Body, Tool, load_constants
+from ft_sensor.payload import TerrainFrame
+from wam.bus.frames import MOTOR_NODES
+from wam.model.constants import ArmConstants, Body, load_constants
+from wam.model.tool import Tool
 
 _SEED = 1  # of the sensor's errors
 # An arm that is served at once waits for no compiler.

@@ -4,9 +4,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
-from acquisition import Clock
-from fakes.bus import CanPort, Frame, SocketHub
-from fakes.pucks import MotorSide, PendantAction, PuckNetwork, WiredNetwork
+from acquisition.clock import Clock
+from fakes.bus.hub import CanPort, Frame, SocketHub
+from fakes.pucks.bank import MotorSide
+from fakes.pucks.network import PuckNetwork
+from fakes.pucks.safety_module import PendantAction
+from fakes.pucks.wire import WiredNetwork
 from fakes.serving.sensor_server import SensorServer
 from fakes.world_clock import TICK_NS, WorldClock
 

@@ -5,31 +5,27 @@ import signal
 import tempfile
 from pathlib import Path
 
-from acquisition import (
+from acquisition.clock import SystemClock
+from acquisition.control_loop.realtime import RealtimeRequest, request
+from acquisition.ipc.channel import Channel, ChannelClosedError
+from acquisition.ipc.child import ChildContext, name_process
+from acquisition.ipc.rpc import RpcServer, bind
+from acquisition.sample import Record
+from acquisition.simulation import (
     DeviceServer,
-    Record,
     ServedDevices,
     SimulationControl,
-    SystemClock,
     TruthSource,
-    temporary_folder,
 )
-from acquisition.control_loop import RealtimeRequest, request
-from acquisition.ipc import (
-    Channel,
-    ChannelClosedError,
-    ChildContext,
-    RpcServer,
-    bind,
-    name_process,
-)
-from fakes.bus import SocketHub
-from fakes.pucks import WiredNetwork
-from fakes.sensor import SerialPty
+from acquisition.temporary_folders import temporary_folder
+from fakes.bus.hub import SocketHub
+from fakes.pucks.wire import WiredNetwork
+from fakes.sensor.pty import SerialPty
 from fakes.truth import Truth, truth_records
-from fakes.world import FakeRig, LocalSimulation, simulated_rig
+from fakes.world.plain_world import simulated_rig
+from fakes.world.rig import FakeRig, LocalSimulation
 from fakes.world_clock import TICK_NS, WorldClock
-from wam.model import load_constants
+from wam.model.constants import load_constants
 
 PRIORITY = 70
 TRUTH_ROWS = 50  # in one answer; the bus waits meanwhile

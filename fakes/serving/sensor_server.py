@@ -5,11 +5,16 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition import Clock, SettingsError
+from acquisition.clock import Clock
+from acquisition.errors import SettingsError
 from fakes.randomness import trial_generator
-from fakes.sensor import SensorChoice, SensorErrors, SerialPty, Source, make_stream
+from fakes.sensor.errors import SensorErrors
+from fakes.sensor.kinds import SensorChoice, make_stream
+from fakes.sensor.pty import SerialPty
+from fakes.sensor.stream import Source
 from fakes.world_clock import TICK_NS, WorldClock
-from wam.model import GRAVITY, Tool
+from wam.model.constants import GRAVITY
+from wam.model.tool import Tool
 
 _SEED = 2  # of the sensor's errors
 

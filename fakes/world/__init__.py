@@ -3,7 +3,3 @@
 `rig` joins plant, pucks and sensor; `LocalSimulation` is all that only a simulation can
 be asked; `faults` does what a fault name says. Begin with `rig`.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

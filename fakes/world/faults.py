@@ -3,11 +3,15 @@
 from collections.abc import Callable
 from typing import Protocol
 
-from acquisition import PERIOD_NS
-from fakes.plant import ArmPlant
-from fakes.pucks import FRAME_NS, NOMINAL_VOLTAGE, BusFaults, PuckNetwork
-from fakes.sensor import NO_SHIFT, SensorStream
-from wam.bus import MOTOR_NODES, SAFETY_NODE, SENSOR_NODE, position_reply_id
+from acquisition.clock import PERIOD_NS
+from fakes.plant.plant import ArmPlant
+from fakes.pucks.bus_faults import BusFaults
+from fakes.pucks.event_queue import FRAME_NS
+from fakes.pucks.network import PuckNetwork
+from fakes.pucks.safety_module import NOMINAL_VOLTAGE
+from fakes.sensor.errors import NO_SHIFT
+from fakes.sensor.stream import SensorStream
+from wam.bus.frames import MOTOR_NODES, SAFETY_NODE, SENSOR_NODE, position_reply_id
 
 PUCK = 3  # of those that fail alone: its joint carries little, the arm stays up
 FOREIGN_LOAD = 0.6  # of the bus, half of it before the arm's frames and half after

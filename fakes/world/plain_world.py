@@ -6,13 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from acquisition import Clock
-from fakes.kernels import PINOCCHIO
-from fakes.plant import PACES, PlantOptions
-from fakes.sensor import SensorChoice
+from acquisition.clock import Clock
+from fakes.kernels.choice import PINOCCHIO
+from fakes.plant.model import PlantOptions
+from fakes.plant.push import PACES
+from fakes.sensor.kinds import SensorChoice
 from fakes.world.rig import FakeRig, LocalSimulation, SimulatedScene
-from ft_sensor import TerrainFrame
-from wam.model import ArmConstants, MotorFriction, friction_of, tool_of
+from ft_sensor.payload import TerrainFrame
+from wam.model.constants import ArmConstants
+from wam.model.friction import MotorFriction, friction_of
+from wam.model.tool import tool_of
 
 
 def _scene_of(fields: Mapping[str, Any]) -> SimulatedScene:

@@ -5,22 +5,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from acquisition import PERIOD_NS, Clock, Record, SettingsError
-from fakes.bus import FakeCanBus
+from acquisition.clock import PERIOD_NS, Clock
+from acquisition.errors import SettingsError
+from acquisition.sample import Record
+from fakes.bus.in_process import FakeCanBus
 from fakes.clock import SteppedClock
-from fakes.ground import Container, Terrain, make_terrain
-from fakes.kernels import mark_ready
-from fakes.plant import ArmPlant, Pace, PlantOptions, touched_place
-from fakes.pucks import (
-    SENSOR_FORCE_ERRORS,
-    SENSOR_TORQUE_ERRORS,
-    Load,
-    NetworkOptions,
-    PendantAction,
-    PuckNetwork,
-)
+from fakes.ground.terrain import Container, Terrain, make_terrain
+from fakes.kernels.choice import mark_ready
+from fakes.plant.hand import touched_place
+from fakes.plant.model import PlantOptions
+from fakes.plant.plant import ArmPlant
+from fakes.plant.push import Pace
+from fakes.pucks.ft_puck import SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS, Load
+from fakes.pucks.network import PuckNetwork
+from fakes.pucks.options import NetworkOptions
+from fakes.pucks.safety_module import PendantAction
 from fakes.randomness import TrialGenerators, trial_generators
-from fakes.sensor import FakeSerialPort, SensorChoice, draw_errors, make_stream
+from fakes.sensor.kinds import SensorChoice, draw_errors, make_stream
+from fakes.sensor.port import FakeSerialPort
 from fakes.truth import truth_records
 from fakes.world.faults import (
     BodyFaults,
@@ -31,8 +33,10 @@ from fakes.world.faults import (
     network_faults,
     stream_faults,
 )
-from ft_sensor import TerrainFrame
-from wam.model import ArmConstants, ArmModel, Array, Tool
+from ft_sensor.payload import TerrainFrame
+from wam.model.arm_model import ArmModel
+from wam.model.constants import ArmConstants, Array
+from wam.model.tool import Tool
 
 _START_HEIGHT = 0.05  # the foot waits this far above the far end [m]
 LAG_NS = 600_000  # more than a cycle may be late
@@ -204,7 +208,7 @@ class FakeRig:
         drawn = make_terrain(scene.stones, scene.foot, incline, random.ground)
         self.ground: Terrain = Container(drawn)
         if self.plant.is_compiled:
-            from fakes.ground.compiled import compiled_ground
+            from fakes.ground.compiled.grounds import compiled_ground
 
             self.ground = compiled_ground(self.ground)
         self.plant.terrain = self.ground

@@ -6,9 +6,10 @@ from typing import Any, cast
 
 import numpy as np
 
-from acquisition import SettingsError, parse_toml
+from acquisition.errors import SettingsError
+from acquisition.settings import parse_toml
 from ft_sensor.payload import Payload, TerrainFrame
-from wam.model import Array
+from wam.model.constants import Array
 
 
 def payload_to_toml(payload: Payload, sole: Array) -> str:

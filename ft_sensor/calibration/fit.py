@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import SettingsError
+from acquisition.errors import SettingsError
 from ft_sensor.payload import TerrainFrame, cross_matrix
-from wam.model import GRAVITY, Array
+from wam.model.constants import GRAVITY, Array
 
 FEWEST = 6  # orientations
 LARGEST_RESIDUAL = 0.3  # N rms; a sound sensor drifts by 0.2 between two poses

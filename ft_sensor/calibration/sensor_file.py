@@ -4,9 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition import SettingsError, parse_toml
+from acquisition.errors import SettingsError
+from acquisition.settings import parse_toml
 from ft_sensor.calibration.fit import Floats, SensorFit
-from wam.model import Array
+from wam.model.constants import Array
 
 _HEAVIEST = 5.0  # kg; what a wrist sensor carries
 _MOST = 200  # orientations

@@ -4,7 +4,3 @@
 dates samples by the sensor's own counter, `sensor` is a `WrenchSensor` of any make and
 `reconnect` opens it again after it was unplugged. Begin with `sensor`.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -7,7 +7,8 @@ from typing import Protocol
 
 import serial
 
-from acquisition import NS_PER_S, LinkError, SettingsError
+from acquisition.clock import NS_PER_S
+from acquisition.errors import LinkError, SettingsError
 from ft_sensor.serial_line.framing import wire_time_ns
 
 

@@ -2,7 +2,9 @@
 
 from collections.abc import Callable
 
-from acquisition import NS_PER_S, Clock, DeviceFaultError, TractionError, WrenchSample
+from acquisition.clock import NS_PER_S, Clock
+from acquisition.devices import WrenchSample
+from acquisition.errors import DeviceFaultError, TractionError
 from ft_sensor.serial_line.sensor import SerialSensor
 
 LOST_NS = 250_000_000  # without one sample that can be trusted

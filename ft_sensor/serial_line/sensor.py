@@ -4,7 +4,9 @@ import contextlib
 from dataclasses import asdict, dataclass
 from typing import Protocol
 
-from acquisition import NS_PER_S, Clock, TractionError, WrenchSample
+from acquisition.clock import NS_PER_S, Clock
+from acquisition.devices import WrenchSample
+from acquisition.errors import TractionError
 from ft_sensor.reading import Reading, StreamTiming, Wrench, is_measurable
 from ft_sensor.serial_line.framing import FrameScanner, ScanCounters
 from ft_sensor.serial_line.link import PortSettings, SerialLink

@@ -3,14 +3,8 @@
 from collections.abc import Callable
 from typing import TypeVar
 
-from acquisition import (
-    NS_PER_S,
-    RATE_HZ,
-    Clock,
-    DeviceFaultError,
-    LinkError,
-    LinkTimeoutError,
-)
+from acquisition.clock import NS_PER_S, RATE_HZ, Clock
+from acquisition.errors import DeviceFaultError, LinkError, LinkTimeoutError
 from ft_sensor.reading import Reading, StreamTiming
 from ft_sensor.serial_line.framing import FrameScanner
 from ft_sensor.serial_line.link import SerialLink

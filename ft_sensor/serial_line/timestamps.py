@@ -2,7 +2,7 @@
 
 import math
 
-from acquisition import WrenchSample
+from acquisition.devices import WrenchSample
 from ft_sensor.reading import Reading, StreamTiming, Wrench
 from ft_sensor.serial_line.clock_fit import WINDOW_NS, ClockFit
 

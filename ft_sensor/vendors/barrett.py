@@ -5,26 +5,22 @@ from typing import Literal
 
 from pydantic import Field
 
-from acquisition import Clock, DeviceFaultError, LinkTimeoutError, Whole, WrenchSample
+from acquisition.clock import Clock
+from acquisition.devices import WrenchSample
+from acquisition.errors import DeviceFaultError, LinkTimeoutError
+from acquisition.settings import Whole
 from ft_sensor.section import SensorSection
-from ft_sensor.serial_line import PortSettings
+from ft_sensor.serial_line.link import PortSettings
 from ft_sensor.vendors.barrett_frames import (
     RANGES,
     BarrettCounters,
     WrenchPairing,
     status_words,
 )
-from wam.bus import (
-    SENSOR_NODE,
-    Device,
-    Link,
-    Payload,
-    PropertyClient,
-    PuckRole,
-    PuckStatus,
-    encode_get,
-    property_number,
-)
+from wam.bus.frames import SENSOR_NODE, Payload, encode_get
+from wam.bus.link import Link
+from wam.bus.properties import Device, PuckRole, PuckStatus, property_number
+from wam.bus.property_client import PropertyClient
 
 _FT = property_number(Device.SENSOR, "FT")
 _GET_FT = encode_get(_FT)

@@ -6,9 +6,9 @@ that says whether they can be believed comes with the torque.
 
 from dataclasses import dataclass
 
-from acquisition import WrenchSample
+from acquisition.devices import WrenchSample
 from ft_sensor.reading import ALL_AXES, axes_beyond
-from wam.bus import (
+from wam.bus.frames import (
     SENSOR_NODE,
     FrameError,
     Group,

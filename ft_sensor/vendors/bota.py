@@ -15,7 +15,7 @@ from functools import partial
 from typing import NamedTuple
 
 from ft_sensor.reading import ALL_AXES, Reading, Wrench, axes_beyond
-from ft_sensor.serial_line import FrameScanner
+from ft_sensor.serial_line.framing import FrameScanner
 
 HEADER = 0xAA
 FRAME_SIZE = 37

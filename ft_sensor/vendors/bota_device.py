@@ -5,23 +5,14 @@ from typing import Literal
 
 from pydantic import Field
 
-from acquisition import (
-    NS_PER_S,
-    DeviceFaultError,
-    LinkTimeoutError,
-    Positive,
-    SettingsError,
-    Whole,
-)
+from acquisition.clock import NS_PER_S
+from acquisition.errors import DeviceFaultError, LinkTimeoutError, SettingsError
+from acquisition.settings import Positive, Whole
 from ft_sensor.reading import Reading, StreamTiming, Wrench
 from ft_sensor.section import SensorSection
-from ft_sensor.serial_line import (
-    FIRST_READINGS,
-    FrameScanner,
-    PortSettings,
-    SerialDialog,
-    wire_time_ns,
-)
+from ft_sensor.serial_line.framing import FrameScanner, wire_time_ns
+from ft_sensor.serial_line.link import PortSettings
+from ft_sensor.serial_line.startup import FIRST_READINGS, SerialDialog
 from ft_sensor.vendors import bota
 from ft_sensor.vendors.bota import BootText, BotaStatus
 

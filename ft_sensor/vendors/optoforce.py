@@ -9,7 +9,7 @@ import struct
 from dataclasses import dataclass
 
 from ft_sensor.reading import Reading, Wrench, axis_names
-from ft_sensor.serial_line import FrameScanner
+from ft_sensor.serial_line.framing import FrameScanner
 
 HEADER = bytes((0xAA, 0x07, 0x08, 0x10))
 FRAME_SIZE = 22

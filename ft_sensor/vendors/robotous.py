@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ft_sensor.reading import Reading, Wrench, axis_names
-from ft_sensor.serial_line import FrameScanner
+from ft_sensor.serial_line.framing import FrameScanner
 
 FRAME_SIZE = 19
 COMMAND_SIZE = 11

@@ -10,8 +10,8 @@ import traceback
 from collections.abc import Sequence
 from pathlib import Path
 
-from acquisition import Readable
-from experiments.settings import Settings, load_settings
+from acquisition.clock import Readable
+from experiments.settings.load import Settings, load_settings
 from lab.calls import DONE, MEMORY_SIZE, Call, Exchange
 from lab.far.line_sensor import LineSensor, Served
 from lab.far.proxy_device import ProxyDevice

@@ -4,12 +4,14 @@ from typing import Protocol
 
 import numpy as np
 
-from acquisition import Clock
-from experiments.rig import build_tool
+from acquisition.clock import Clock
+from experiments.rig.build import build_tool
 from experiments.rig.fake import sensor_metadata
-from experiments.settings import Settings
-from fakes.sensor import SensorChoice, SensorErrors, SensorStream, make_stream
-from fakes.serving import hanging_load
+from experiments.settings.load import Settings
+from fakes.sensor.errors import SensorErrors
+from fakes.sensor.kinds import SensorChoice, make_stream
+from fakes.sensor.stream import SensorStream
+from fakes.serving.sensor_server import hanging_load
 from fakes.world_clock import TICK_NS, WorldClock
 from lab.calls import Frame
 

@@ -7,15 +7,15 @@ sensor_on.
 
 from collections.abc import Callable
 
-from acquisition import Clock
+from acquisition.clock import Clock
 from experiments.rig.fake import SimulatedRig
-from experiments.settings import Settings
-from fakes.pucks import WiredNetwork
-from fakes.world import simulated_rig
+from experiments.settings.load import Settings
+from fakes.pucks.wire import WiredNetwork
+from fakes.world.plain_world import simulated_rig
 from fakes.world_clock import TICK_NS, WorldClock
 from lab.calls import Frame
 from lab.far.line_sensor import FarEnd, Turn
-from wam.model import load_constants
+from wam.model.constants import load_constants
 
 # What the arm says within this time leaves together, as through an adapter that
 # collects frames: seven positions, the last of which starts 0.53 ms after the question.

@@ -10,7 +10,7 @@ import termios
 from collections.abc import Sequence
 from pathlib import Path
 
-from acquisition import NS_PER_S, SystemClock
+from acquisition.clock import NS_PER_S, SystemClock
 from lab.guest.warm_start import Run, in_place_of
 
 CLOCK = SystemClock()

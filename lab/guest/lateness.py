@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.ipc import SharedLayout
+from acquisition.ipc.layout import SharedLayout
 from lab.guest.commands import require, wait
 
 WINDOW = 2.0  # s

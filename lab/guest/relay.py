@@ -14,8 +14,8 @@ import select
 import sys
 from pathlib import Path
 
-from acquisition import NS_PER_S, SystemClock
-from experiments.tools import Lines
+from acquisition.clock import NS_PER_S, SystemClock
+from experiments.tools.pendant import Lines
 from lab.calls import (
     DONE,
     MEMORY_SIZE,

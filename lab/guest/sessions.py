@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
-from acquisition import PERIOD_NS
-from acquisition.trial_file import TrialReader
+from acquisition.clock import PERIOD_NS
+from acquisition.trial_file.reader import TrialReader
 from lab.guest.commands import Program, ScenarioError, require
 from lab.guest.machine_room import MachineRoom
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.trial_file import TrialReader
+from acquisition.trial_file.reader import TrialReader
 
 Way = NDArray[np.float64]  # joint positions [rad], (cycles, 7)
 _MOVED = 2e-3  # rad: the push has begun

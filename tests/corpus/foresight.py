@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from acquisition.sample import Record
-from acquisition.trial_file import TrialReader
+from acquisition.trial_file.reader import TrialReader
 from analysis.foresight.engine import ForesightState
 from experiments.rig.foresight import read_foresight, state_record, states_of
 from tests.acquisition.trials import make_cycles

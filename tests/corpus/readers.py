@@ -10,10 +10,12 @@ from pathlib import Path
 
 from acquisition.clock import SystemClock
 from acquisition.errors import TractionError, TrialFileError
-from acquisition.trial_file import TrialReader, recover_file
+from acquisition.trial_file.reader import TrialReader
+from acquisition.trial_file.recover import recover_file
 from analysis.data.tables import load_tables
 from analysis.terrains import database as terrain_db
-from experiments.board import BoardCache, count_board, row_of, see_sessions
+from experiments.board.board_cache import BoardCache, row_of
+from experiments.board.matrix_board import count_board, see_sessions
 from experiments.operator.scripted import ScriptedOperator
 from experiments.report.checksums import SUMS, changed_files
 from experiments.report.rebuilding import compare_tables

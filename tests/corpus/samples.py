@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from acquisition.schema import FORESIGHT
-from acquisition.trial_file import publish
+from acquisition.trial_file.writer import publish
 from analysis.breakaway.censored import Family
 from analysis.breakaway.model import BREAK_AWAY, BreakAwayModel, PushLaw
 from analysis.data.data_package import TableOrigin

@@ -8,8 +8,8 @@ from functools import cache
 from pathlib import Path
 
 from acquisition.clock import SystemClock
-from acquisition.trial_file import publish
 from acquisition.trial_file.verify import verify_file
+from acquisition.trial_file.writer import publish
 from experiments.__main__ import main
 from experiments.session.data_files import write_json
 from experiments.session.journal import Journal

@@ -16,9 +16,10 @@ from analysis.data.prepare import prepare_trial
 from analysis.data.quality import quick_ratio
 from analysis.data.series import Array
 from analysis.data.tables import load_tables
-from analysis.study import FitOptions, StudyOptions, run_study
+from analysis.study.models import FitOptions
+from analysis.study.study import StudyOptions, run_study
 from experiments.operator.console import GOOD
-from experiments.report import require_samples
+from experiments.report.sessions import require_samples
 from experiments.trial.quality import review_trial
 from ft_sensor.calibration.files import payload_to_toml, terrain_to_toml
 from tests.disturbances.rewriting import rewrite

@@ -8,7 +8,7 @@ import numpy as np
 
 from acquisition.sample import Flag, Record
 from analysis.data.series import Array
-from ft_sensor import Payload, TerrainFrame
+from ft_sensor.payload import Payload, TerrainFrame
 
 T, V, N, F = range(4)  # columns of a table
 

@@ -15,7 +15,7 @@ import pytest
 from mcap.reader import make_reader
 from threadpoolctl import threadpool_info
 
-from fakes.kernels import COMPILED, ENVIRONMENT, PINOCCHIO
+from fakes.kernels.choice import COMPILED, ENVIRONMENT, PINOCCHIO
 from tests.experiments.program import only_session, traction, write_config
 
 KEPT = Path(__file__).parents[1] / "data" / "recorded" / "cycles.json"

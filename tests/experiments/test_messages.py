@@ -3,7 +3,6 @@ from pathlib import Path
 
 import pytest
 
-from acquisition import PreflightError
 from acquisition.control_loop.details import ReplySilence
 from acquisition.control_loop.faults import (
     FAULTS,
@@ -12,6 +11,7 @@ from acquisition.control_loop.faults import (
     Fault,
     verdict_for,
 )
+from acquisition.errors import PreflightError
 from experiments.messages import (
     CATALOGUE,
     ComputerLoad,

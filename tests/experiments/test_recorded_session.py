@@ -13,7 +13,7 @@ import pytest
 from acquisition.linear_algebra import openblas_settings
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.recover import recover_file
-from fakes.kernels import COMPILED, PINOCCHIO
+from fakes.kernels.choice import COMPILED, PINOCCHIO
 from tests.experiments.cycle_digest import KEPT
 from tests.experiments.program import journal, only_session, traction
 

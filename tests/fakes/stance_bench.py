@@ -11,32 +11,27 @@ from math import exp, log, nan, radians
 
 import numpy as np
 
-from acquisition.control_loop import SoleGoal
-from analysis.breakaway import BreakAwayModel, BreakAwayOptions, FootPush, fit_pushes
+from acquisition.control_loop.law import SoleGoal
+from analysis.breakaway.fitting import fit_pushes
+from analysis.breakaway.model import BreakAwayModel
+from analysis.breakaway.pushes import FootPush
+from analysis.breakaway.recorded import BreakAwayOptions
 from analysis.data.series import TractionSeries
-from analysis.foresight import (
-    FootSample,
-    Foresight,
-    ForesightFlag,
-    ForesightModel,
-    Provenance,
-    RigIdentity,
-    WatchedTrial,
-    fit_ground,
-    watch_series,
-)
-from analysis.stance import (
-    SoleView,
+from analysis.foresight.engine import Foresight, ForesightFlag
+from analysis.foresight.model import ForesightModel, Provenance, RigIdentity
+from analysis.foresight.signals import FootSample
+from analysis.foresight.training import fit_ground
+from analysis.foresight.watching import WatchedTrial, watch_series
+from analysis.stance.outcomes import StanceOutcome
+from analysis.stance.policies import avoid_slip
+from analysis.stance.seam import (
     StanceCommand,
     StanceForesight,
-    StanceOutcome,
     StancePhase,
-    StancePlan,
     StanceRequest,
     StanceSample,
-    StanceSequence,
-    avoid_slip,
 )
+from analysis.stance.sequence import SoleView, StancePlan, StanceSequence
 from fakes.ground.terrain import make_terrain
 from fakes.randomness import trial_generators
 from tests.fakes.point_foot import (
@@ -49,7 +44,7 @@ from tests.fakes.point_foot import (
     SUBSTEPS,
     VISCOUS,
 )
-from wam.control import SoleAxes
+from wam.control.sole_impedance import SoleAxes
 
 TRAVEL = 0.45  # m
 TICK_CYCLES = 10

@@ -2,7 +2,7 @@
 
 import pytest
 
-from experiments.settings import load_settings
+from experiments.settings.load import load_settings
 from lab.guest.commands import ScenarioError
 from lab.guest.machine_room import TRAVEL, MachineRoom
 from lab.guest.scenarios.serial_line import MAKES, write_make

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from acquisition import PERIOD_NS
+from acquisition.clock import PERIOD_NS
 from lab.calls import (
     DONE,
     FRAME,
@@ -17,7 +17,8 @@ from lab.calls import (
 )
 from lab.far.__main__ import FarSide
 from lab.guest.machine_room import MachineRoom
-from wam.bus import Device, Group, encode_get, group_id, property_number
+from wam.bus.frames import Group, encode_get, group_id
+from wam.bus.properties import Device, property_number
 
 _ASKED_NS = 60_000  # into a cycle
 _START_NS = PERIOD_NS * 1000

@@ -8,8 +8,11 @@ from pathlib import Path
 import pytest
 
 from acquisition.control_loop.faults import Fault
-from acquisition.trial_file import TrialReader, verify_file
-from experiments.session import find_unfinished, list_sessions, read_json
+from acquisition.trial_file.reader import TrialReader
+from acquisition.trial_file.verify import verify_file
+from experiments.session.data_files import read_json
+from experiments.session.store import list_sessions
+from experiments.session.unfinished import find_unfinished
 from tests.experiments.program import traction
 from tests.processes.watching import (
     is_running,

@@ -4,7 +4,3 @@
 `property_client` the table of settings of a puck, `log` and `decoder` a bus log in
 words.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

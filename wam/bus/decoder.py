@@ -7,7 +7,7 @@ a question asked again after the answer's time limit replaces the one before.
 
 from enum import Enum
 
-from acquisition import SafetyMode
+from acquisition.devices import SafetyMode
 from wam.bus.error_frames import ERROR_FLAG, EXTENDED_FLAG, error_names
 from wam.bus.frames import (
     HOST,

@@ -9,7 +9,8 @@ from typing import Final
 
 import can
 
-from acquisition import NS_PER_S, Clock, LinkError
+from acquisition.clock import NS_PER_S, Clock
+from acquisition.errors import LinkError
 from wam.bus.datagrams import system_call
 from wam.bus.error_frames import ERROR_FLAG, EXTENDED_FLAG, REMOTE_FLAG
 from wam.bus.kernel_door import (

@@ -7,7 +7,7 @@ the detail stands in the eight bytes.
 from collections import Counter
 from enum import IntFlag
 
-from acquisition import BusCondition
+from acquisition.devices import BusCondition
 from wam.bus.frames import Payload
 
 ERROR_MASK = 0x1FFFFFFF  # all classes, for the socket's filter

@@ -12,7 +12,7 @@ from enum import IntEnum
 from math import floor
 from typing import NamedTuple
 
-from acquisition import DeviceFaultError
+from acquisition.errors import DeviceFaultError
 
 HOST = 0
 SAFETY_NODE = 10

@@ -12,7 +12,7 @@ import struct
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from acquisition import NS_PER_S, Clock
+from acquisition.clock import NS_PER_S, Clock
 from wam.bus.datagrams import AT_ONCE, DatagramBatch, ReceiveMany
 from wam.bus.error_frames import ERROR_MASK
 from wam.bus.link import DRAIN_AT_MOST, Frame, as_frame, broken_link, plausible_times

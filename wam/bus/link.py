@@ -6,7 +6,8 @@ from functools import partial
 from operator import itemgetter
 from typing import NamedTuple, Protocol
 
-from acquisition import NS_PER_S, LinkError, LinkFullError
+from acquisition.clock import NS_PER_S
+from acquisition.errors import LinkError, LinkFullError
 from wam.bus.error_frames import ERROR_FLAG, BusErrors
 from wam.bus.frames import SAFETY_NODE, SENDER_MASK, Group, compose_id
 

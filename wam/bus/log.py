@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from heapq import heapify, heappop, heappushpop
 
-from acquisition import NS_PER_S, Clock, TractionError, utc_offset_ns
+from acquisition.clock import NS_PER_S, Clock, utc_offset_ns
+from acquisition.errors import TractionError
 
 LONGEST_LINE = 120  # characters
 _LINE = re.compile(

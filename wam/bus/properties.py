@@ -8,7 +8,7 @@ dash means that the property does not exist from that version on.
 from enum import Enum, IntEnum
 from functools import cache
 
-from acquisition import SettingsError
+from acquisition.errors import SettingsError
 
 WIDE = frozenset(
     "P DP E OT CT M MECH CTS IOFF HALLH EN JP JOFST PEN".split()  # noqa: SIM905

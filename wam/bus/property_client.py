@@ -1,6 +1,8 @@
 """Properties of the devices on the bus, read and set outside the loop."""
 
-from acquisition import BusCondition, Clock, LinkTimeoutError
+from acquisition.clock import Clock
+from acquisition.devices import BusCondition
+from acquisition.errors import LinkTimeoutError
 from wam.bus.frames import (
     HOST,
     FrameError,

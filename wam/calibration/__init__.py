@@ -5,7 +5,3 @@ that a calibration writes and the control law reads. For friction `excitation` p
 way, `sliding` reduces what was recorded, `friction_fit` identifies, `friction_file`
 keeps, `friction_reach` says which loads on the ground it leaves. Begin with `poses`.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

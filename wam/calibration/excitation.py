@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from acquisition import SettingsError
+from acquisition.errors import SettingsError
 from wam.calibration.free_space import UPRIGHT, FreeSpace, check_rise
 from wam.calibration.poses import (
     MARGIN,
@@ -15,7 +15,8 @@ from wam.calibration.poses import (
     choose_poses,
     leg_speed,
 )
-from wam.model import ArmModel, Array
+from wam.model.arm_model import ArmModel
+from wam.model.constants import Array
 
 CENTRES = 3  # around which the joints go to and fro, with gravity from elsewhere
 _CANDIDATES = 12

@@ -6,15 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import SettingsError
-from wam.model import (
-    CLEARANCE_MARGIN,
-    ArmClearance,
-    ArmConstants,
-    ArmModel,
-    Array,
-    straight_way,
-)
+from acquisition.errors import SettingsError
+from wam.model.arm_model import ArmModel
+from wam.model.clearance import CLEARANCE_MARGIN, ArmClearance, straight_way
+from wam.model.constants import ArmConstants, Array
 
 OFFSET = 0.03  # rad; a pose is approached from this far on both sides
 UPRIGHT = (0.0, -0.4, 0.0, 1.8, 0.0, -0.4, 0.0)  # rad; elbow and foot are high

@@ -5,14 +5,16 @@ from typing import Any
 
 import numpy as np
 
-from acquisition import SettingsError, parse_toml
+from acquisition.errors import SettingsError
+from acquisition.settings import parse_toml
 from wam.calibration.friction_fit import FrictionFit
 from wam.calibration.joint_friction import (
     joint_asymmetry,
     joint_breakaway,
     joint_deviation,
 )
-from wam.model import ArmConstants, Array, MotorFriction, friction_of, joint_coulomb
+from wam.model.constants import ArmConstants, Array
+from wam.model.friction import MotorFriction, friction_of, joint_coulomb
 
 _LARGEST_MOMENT = 10.0  # kg m
 _LARGEST = 1e4  # of any number in the file

@@ -17,14 +17,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import SettingsError
+from acquisition.errors import SettingsError
 from wam.calibration.sliding import SlidingRows, check_enough
-from wam.model import (
-    ArmConstants,
-    Array,
-    MotorFriction,
-    motor_turns,
-)
+from wam.model.constants import ArmConstants, Array
+from wam.model.friction import MotorFriction, motor_turns
 
 LARGEST_RESIDUAL = 0.2  # of Coulomb friction, rms on the held-out way
 LEAST_BOUND = 0.7  # of the estimate: its lower bound

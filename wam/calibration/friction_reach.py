@@ -17,7 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from wam.calibration.friction_fit import FrictionFit
-from wam.model import GRAVITY, ArmModel, Array
+from wam.model.arm_model import ArmModel
+from wam.model.constants import GRAVITY, Array
 
 _SIGMAS = 1.96
 _STEP = 0.01  # m between poses along the ground

@@ -5,8 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from acquisition import SettingsError, parse_toml
-from wam.model import Array, Body, Tool, tool_metadata, tool_of
+from acquisition.errors import SettingsError
+from acquisition.settings import parse_toml
+from wam.model.constants import Array, Body
+from wam.model.tool import Tool, tool_metadata, tool_of
 
 _SAME = 1e-9  # kg and m: the tool of a calibration and of a session
 _LARGEST_MOMENT = 10.0  # kg m; a Barrett arm's largest is 3

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from wam.model import ArmConstants, Array, MotorFriction, joint_coulomb
+from wam.model.constants import ArmConstants, Array
+from wam.model.friction import MotorFriction, joint_coulomb
 
 
 def joint_deviation(constants: ArmConstants, deviation: Array) -> Array:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition import SettingsError
+from acquisition.errors import SettingsError
 from wam.calibration.free_space import (
     OFFSET,
     STEP,
@@ -15,8 +15,11 @@ from wam.calibration.free_space import (
     elbow_of,
     lowest,
 )
-from wam.control import TOP_SPEED, JointMove
-from wam.model import ArmModel, Array, regressor, straight_way
+from wam.control.position_control import TOP_SPEED, JointMove
+from wam.model.arm_model import ArmModel
+from wam.model.clearance import straight_way
+from wam.model.constants import Array
+from wam.model.moments import regressor
 
 APPROACH_SPEED = 0.05  # rad/s, on the last bit
 POINT_SPEED = 0.3  # m/s of sole and elbow; the safety module warns at 0.5

@@ -6,8 +6,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import PERIOD_NS, SettingsError
-from wam.model import ELASTIC, ArmModel, Array, motor_turns, regressor
+from acquisition.clock import PERIOD_NS
+from acquisition.errors import SettingsError
+from wam.model.arm_model import ArmModel
+from wam.model.constants import Array
+from wam.model.friction import ELASTIC, motor_turns
+from wam.model.moments import regressor
 
 HALF = 10  # samples on each side of the centre of a line fit: 42 ms in all
 # Joint 7 turns at its own pace and breaks away within 20 ms, which HALF would flatten.

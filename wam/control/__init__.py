@@ -4,7 +4,3 @@
 (`joint_lock`), soft walls before the stops (`soft_walls`), and what holds the arm or
 moves it in joint space (`position_control`). Begin with `controller`.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

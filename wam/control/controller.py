@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from acquisition import ArmReading, Vector
-from acquisition.control_loop import ArmState, ControlLaw, SoleGoal
+from acquisition.control_loop.law import ControlLaw, SoleGoal
+from acquisition.control_loop.states import ArmState
+from acquisition.devices import ArmReading, Vector
 from wam.control.friction_compensation import FrictionCompensation
 from wam.control.joint_lock import LOCKED_JOINT, JointLock, LockGains
 from wam.control.position_control import (
@@ -16,7 +17,8 @@ from wam.control.position_control import (
 )
 from wam.control.soft_walls import SoftWalls
 from wam.control.sole_impedance import SoleImpedance
-from wam.model import ArmModel, VirtualMass, compensation
+from wam.model.arm_model import ArmModel
+from wam.model.gravity import VirtualMass, compensation
 
 TORQUE_SHARE = 0.9  # of the torque limits that a move or a hold may use, with gravity
 _STANDING = frozenset({ArmState.HOLD, ArmState.DAMP, ArmState.GUIDE})

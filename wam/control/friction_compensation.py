@@ -16,15 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition import ArmReading
-from wam.model import (
-    ELASTIC,
-    ArmConstants,
-    Array,
-    MotorFriction,
-    motor_turns,
-    plastic_share,
-)
+from acquisition.devices import ArmReading
+from wam.model.constants import ArmConstants, Array
+from wam.model.friction import ELASTIC, MotorFriction, motor_turns, plastic_share
 
 LARGEST_SHARE = 0.8
 SWUNG_MOTOR = "friction:swung_motor"  # in the recording

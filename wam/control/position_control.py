@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition import ArmReading
+from acquisition.devices import ArmReading
 from wam.control.joint_lock import RAMP
-from wam.model import ArmConstants, Array
+from wam.model.constants import ArmConstants, Array
 
 # Shares of the vendor's gains of joint PD, which are made to follow moves: softer, and
 # damped the more the heavier the joint is. In no pose a swing of the arm is damped by

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition import ArmReading, Vector, are_between
+from acquisition.bounds import are_between
+from acquisition.devices import ArmReading, Vector
 
 DEPTH = 0.1  # rad
 _REACH = 0.2  # rad in which the spring would reach the torque limit

@@ -14,9 +14,10 @@ from math import isnan, nan
 
 import numpy as np
 
-from acquisition import ArmReading
-from acquisition.control_loop import SoleGoal
-from wam.model import ArmModel, Array
+from acquisition.control_loop.law import SoleGoal
+from acquisition.devices import ArmReading
+from wam.model.arm_model import ArmModel
+from wam.model.constants import Array
 
 # N that may be asked for. At 12 N of traction the wrist is at its torque limit, and
 # beyond it the foot would tip over.

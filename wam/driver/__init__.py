@@ -4,7 +4,3 @@
 asks positions and sends torques, `transmission` turns counts into joint angles,
 `safety_module` and `status_poller` watch in the free bus time. Begin with `arm`.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -3,18 +3,17 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from acquisition import (
-    ArmReading,
-    BusCondition,
-    Clock,
+from acquisition.clock import Clock
+from acquisition.devices import ArmReading, BusCondition, SafetyMode, Vector
+from acquisition.errors import (
     DeviceFaultError,
     LinkError,
     LinkTimeoutError,
     PreflightError,
-    SafetyMode,
-    Vector,
 )
-from wam.bus import MOTOR_NODES, Link, PropertyClient
+from wam.bus.frames import MOTOR_NODES
+from wam.bus.link import Link
+from wam.bus.property_client import PropertyClient
 from wam.driver.cyclic_io import BusDevice, CycleTraffic
 from wam.driver.discovery import pucks_verb
 from wam.driver.health import PuckHealth

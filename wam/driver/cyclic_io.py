@@ -6,28 +6,21 @@ Time-outs follow the measured budget of one 2 ms cycle on a 1 Mbit/s bus.
 from dataclasses import dataclass, field
 from typing import Final, Protocol
 
-from acquisition import (
-    BusCondition,
-    Clock,
-    DeviceFaultError,
-    LinkError,
-    LinkFullError,
-)
-from wam.bus import (
-    MODERN,
+from acquisition.clock import Clock
+from acquisition.devices import BusCondition
+from acquisition.errors import DeviceFaultError, LinkError, LinkFullError
+from wam.bus.frames import (
     MOTOR_NODES,
-    Device,
     Group,
-    Link,
     Payload,
     decode_position,
     encode_get,
     encode_torques,
     group_id,
-    nearest_documented,
     position_reply_id,
-    property_number,
 )
+from wam.bus.link import Link
+from wam.bus.properties import MODERN, Device, nearest_documented, property_number
 from wam.driver.settings import ArmSettings
 from wam.driver.status_poller import StatusPoller
 from wam.driver.transmission import MOTORS

@@ -2,15 +2,12 @@
 
 from collections.abc import Iterable, Sequence
 
-from acquisition import (
-    BusCondition,
-    Clock,
-    DeviceFaultError,
-    LinkFullError,
-    PreflightError,
-    SafetyMode,
-)
-from wam.bus import MOTOR_NODES, SAFETY_NODE, PropertyClient, PuckStatus
+from acquisition.clock import Clock
+from acquisition.devices import BusCondition, SafetyMode
+from acquisition.errors import DeviceFaultError, LinkFullError, PreflightError
+from wam.bus.frames import MOTOR_NODES, SAFETY_NODE
+from wam.bus.properties import PuckStatus
+from wam.bus.property_client import PropertyClient
 from wam.driver.safety_module import SafetyModule
 
 _STAT = 5  # the same in every firmware

@@ -5,15 +5,9 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Final
 
-from acquisition import NS_PER_S
-from wam.bus import (
-    MODERN,
-    MOTOR_NODES,
-    Device,
-    Property,
-    nearest_documented,
-    property_number,
-)
+from acquisition.clock import NS_PER_S
+from wam.bus.frames import MOTOR_NODES, Property
+from wam.bus.properties import MODERN, Device, nearest_documented, property_number
 
 # The loop asks each puck something every 0.7 s; four questions without an answer and
 # older reports are no longer news.

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from acquisition import PreflightError
-from wam.model import ArmConstants, Array
+from acquisition.errors import PreflightError
+from wam.model.constants import ArmConstants, Array
 
 HOME_LIMIT = 0.03  # rad; by eye an arm is put against its stops to about a degree
 

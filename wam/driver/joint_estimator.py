@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from acquisition import PositionJump, Vector
+from acquisition.devices import PositionJump, Vector
 from wam.driver.settings import ArmSettings
 from wam.driver.transmission import MOTORS, Transmission
 

@@ -4,7 +4,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from enum import IntEnum
 
-from acquisition import DeviceFaultError
+from acquisition.errors import DeviceFaultError
 
 
 class SafetyLevel(IntEnum):

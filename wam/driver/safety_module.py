@@ -6,14 +6,12 @@ The host may only ask it to go down; up is the pendant's business.
 from collections.abc import Collection
 from dataclasses import dataclass
 
-from acquisition import Clock, DeviceFaultError, LinkError, SafetyMode
-from wam.bus import (
-    SAFETY_NODE,
-    Device,
-    PropertyClient,
-    nearest_documented,
-    property_number,
-)
+from acquisition.clock import Clock
+from acquisition.devices import SafetyMode
+from acquisition.errors import DeviceFaultError, LinkError
+from wam.bus.frames import SAFETY_NODE
+from wam.bus.properties import Device, nearest_documented, property_number
+from wam.bus.property_client import PropertyClient
 from wam.driver.pendant import MONITORS, NO_PENDANT, PendantWord, decode_pendant
 
 COUNTS_PER_SPEED = 4096  # VL1 and VL2 are Q4.12: 1 m/s is 4096

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 from wam.driver.safety_module import SafetyLimits
 from wam.driver.transmission import HOST_TORQUE_LIMITS, Matrix
-from wam.model import load_constants
+from wam.model.constants import load_constants
 
 _MS = 1_000_000
 

@@ -2,24 +2,17 @@
 
 from dataclasses import dataclass
 
-from acquisition import (
-    Clock,
-    DeviceFaultError,
-    PreflightError,
-    SafetyMode,
-    SettingsError,
-)
-from wam.bus import (
+from acquisition.clock import Clock
+from acquisition.devices import SafetyMode
+from acquisition.errors import DeviceFaultError, PreflightError, SettingsError
+from wam.bus.frames import MOTOR_NODES, SAFETY_NODE, Group
+from wam.bus.properties import (
     FIRST_RELEASED,
     MAGNETIC_ENCODER,
-    MOTOR_NODES,
     NEWEST_DOCUMENTED,
     POLES_OF_GIMBALS,
     POLES_OF_WRIST,
-    SAFETY_NODE,
     Device,
-    Group,
-    PropertyClient,
     PuckMode,
     PuckStatus,
     device_of,
@@ -27,6 +20,7 @@ from wam.bus import (
     nearest_documented,
     property_number,
 )
+from wam.bus.property_client import PropertyClient
 from wam.driver.discovery import discover_pucks, pucks_verb
 from wam.driver.health import PuckHealth, ask_health
 from wam.driver.pendant import PendantWord

@@ -6,21 +6,18 @@ Half a millisecond of a 2 ms cycle is free on the bus; a question and its answer
 
 from typing import Final
 
-from acquisition import SafetyMode
-from wam.bus import (
-    MODERN,
+from acquisition.devices import SafetyMode
+from wam.bus.frames import (
     MOTOR_NODES,
     SAFETY_NODE,
-    Device,
-    Link,
     Payload,
     decode_reply,
     encode_get,
     encode_set,
-    nearest_documented,
-    property_number,
     property_reply_id,
 )
+from wam.bus.link import Link
+from wam.bus.properties import MODERN, Device, nearest_documented, property_number
 from wam.driver.health import HealthTable
 from wam.driver.pendant import PendantWord, decode_pendant
 from wam.driver.safety_module import decode_mode

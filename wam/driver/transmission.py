@@ -13,7 +13,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import DeviceFaultError, SettingsError, Vector, are_within
+from acquisition.bounds import are_within
+from acquisition.devices import Vector
+from acquisition.errors import DeviceFaultError, SettingsError
 
 MOTORS = 7
 # The smaller of the cable's limit (MT) and nine tenths of the safety module's warning.

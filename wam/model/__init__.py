@@ -3,7 +3,3 @@
 `arm_model` is the door to Pinocchio, `constants` reads the table of the arm, `tool` the
 sensor and foot, `gravity` and `moments` what the arm weighs. Begin with `arm_model`.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -14,7 +14,8 @@ from pydantic import (
     model_validator,
 )
 
-from acquisition import SettingsError, SettingsSection, parse_toml
+from acquisition.errors import SettingsError
+from acquisition.settings import SettingsSection, parse_toml
 
 GRAVITY = 9.81  # m/s^2
 Array = NDArray[np.float64]

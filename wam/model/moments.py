@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import SettingsError
+from acquisition.errors import SettingsError
 from wam.model.constants import GRAVITY, ArmConstants, Array, Body
 
 OBSERVABLE = 12  # numbers of the 21 that show in the torques

@@ -27,7 +27,7 @@ from fakes.ground.contact import Contact, Motion
 from fakes.ground.jams import JamSequence
 from fakes.ground.stones import StoneBed
 from fakes.ground.terrain import Container, Plate, Terrain
-from fakes.kernels import kernel
+from fakes.kernels.compiler import kernel
 
 
 @kernel

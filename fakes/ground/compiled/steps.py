@@ -32,7 +32,7 @@ from fakes.ground.jams import A_C, LAM0, LAM1, LITTLE, MU_R, Q0, TAU, TOUCH, V_C
 from fakes.ground.profile import locate
 from fakes.ground.stones import FIRM, L_S, LIFTED, MU_LATERAL, STEEPEST_SLOPE
 from fakes.ground.terrain import BOARD_B, BOARD_K, BOARD_MU, FREE, RIM
-from fakes.kernels import inline
+from fakes.kernels.compiler import inline
 
 _locate = inline(locate)
 

@@ -3,7 +3,3 @@
 `motion` is links and dynamics, `drives` friction and stops, `substeps` puts them
 together, `body` and `gauges` are what the plant sees. Begin with `body`.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -6,9 +6,10 @@ from struct import Struct
 
 import numpy as np
 
-from fakes.ground import Terrain
-from fakes.ground.compiled import DONE, GIVEN, GROUND, CompiledGround
-from fakes.kernels import COMPILED
+from fakes.ground.compiled.grounds import CompiledGround
+from fakes.ground.compiled.layout import DONE, GIVEN, GROUND
+from fakes.ground.terrain import Terrain
+from fakes.kernels.choice import COMPILED
 from fakes.plant.body import HandLoad
 from fakes.plant.compiled.drives import take_drives
 from fakes.plant.compiled.motion import take_links
@@ -16,7 +17,8 @@ from fakes.plant.compiled.substeps import BODY, begin_cycle, go_on
 from fakes.plant.joints import BEARING_NS
 from fakes.plant.model import ArmAndHand
 from fakes.plant.push import HandView
-from wam.model import ArmConstants, Array, MotorFriction
+from wam.model.constants import ArmConstants, Array
+from wam.model.friction import MotorFriction
 
 _OFFSETS = {name: place[1] for name, place in (BODY.fields or {}).items()}
 # Packed in half the time in which numpy looks through a list.

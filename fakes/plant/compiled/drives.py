@@ -11,10 +11,12 @@ import math
 
 import numpy as np
 
-from fakes.kernels import inline
+from fakes.kernels.compiler import inline
 from fakes.plant.friction import bristle_columns, lively_speeds, plastic_share
 from fakes.plant.joints import NEAR, STOP_B, STOP_K
-from wam.model import ELASTIC, ArmConstants, Array, MotorFriction, drive_inertia_matrix
+from wam.model.arm_model import drive_inertia_matrix
+from wam.model.constants import ArmConstants, Array
+from wam.model.friction import ELASTIC, MotorFriction
 
 _FIXED = [
     ("dt", float),

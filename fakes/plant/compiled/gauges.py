@@ -6,9 +6,10 @@ from struct import Struct
 
 import numpy as np
 
-from fakes.kernels import inline, kernel
+from fakes.kernels.compiler import inline, kernel
 from fakes.plant.gauges import Wrench, WristGauges
-from wam.model import GRAVITY, Array, Tool
+from wam.model.constants import GRAVITY, Array
+from wam.model.tool import Tool
 
 _TAKEN = Struct("12d")
 # Force and moment of the ground, rates of the foot now and before, what is up; in the

@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from fakes.kernels import inline
+from fakes.kernels.compiler import inline
 from fakes.plant.model import ArmAndHand
 
 _FIXED = [

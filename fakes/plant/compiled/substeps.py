@@ -7,8 +7,9 @@ shape (3, 7).
 
 import numpy as np
 
-from fakes.ground.compiled import DONE, ground_step
-from fakes.kernels import inline, kernel
+from fakes.ground.compiled.layout import DONE
+from fakes.ground.compiled.steps import ground_step
+from fakes.kernels.compiler import inline, kernel
 from fakes.plant.compiled.drives import (
     DRIVES,
     begin_drives,

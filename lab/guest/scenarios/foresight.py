@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.trial_file import TrialReader
+from acquisition.trial_file.reader import TrialReader
 from lab.guest.commands import require, wait
 from lab.guest.lateness import Lateness, lateness, memory_of, require_on_time
 from lab.guest.machine_room import MachineRoom

@@ -6,9 +6,11 @@ import struct
 from dataclasses import dataclass
 from pathlib import Path
 
-from acquisition import TractionError
-from experiments.settings import build_device, load_settings
-from ft_sensor.serial_line import SerialLink, SerialSensor, open_port
+from acquisition.errors import TractionError
+from experiments.settings.load import load_settings
+from experiments.settings.sensor import build_device
+from ft_sensor.serial_line.link import SerialLink, open_port
+from ft_sensor.serial_line.sensor import SerialSensor
 from lab.guest.commands import CLOCK, ScenarioError, read_text, require, seconds, wait
 from lab.guest.machine_room import MachineRoom, line_port
 from lab.guest.monitor import ADAPTER, Monitor

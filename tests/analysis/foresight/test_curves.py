@@ -9,7 +9,7 @@ from analysis.foresight.engine import ForesightFlag
 from analysis.foresight.held_out import hold_out
 from analysis.foresight.scores import score_slips
 from analysis.foresight.ticks import ticks_of
-from analysis.report import foresight_figure
+from analysis.report.foresight_page import foresight_figure
 from tests.analysis.foresight.made import trials
 
 

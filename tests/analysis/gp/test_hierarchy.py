@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from acquisition import SettingsError
+from acquisition.errors import SettingsError
 from analysis.gp.ground import Ground, GroundRows, Resemblance
 from analysis.gp.hierarchy import NAMES, GroundLikelihood, GroundPosterior, prior_of
 

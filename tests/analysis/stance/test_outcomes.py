@@ -5,14 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.stance import (
-    StanceOutcome,
-    StanceRequest,
-    StanceWatch,
-    adapted,
-    totals,
-    wilson,
-)
+from analysis.stance.outcomes import StanceOutcome, StanceWatch, adapted, totals, wilson
+from analysis.stance.seam import StanceRequest
 
 REQUEST = StanceRequest(6.0, 0.1)
 TICK = 0.02

@@ -6,21 +6,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from acquisition import SettingsError
-from analysis.breakaway import BREAK_AWAY, BreakAwayModel, Family, PushLaw
-from analysis.stance import (
-    BEGIN,
+from acquisition.errors import SettingsError
+from analysis.breakaway.censored import Family
+from analysis.breakaway.model import BREAK_AWAY, BreakAwayModel, PushLaw
+from analysis.stance.policies import (
     POLICIES,
-    StanceCommand,
-    StanceForesight,
-    StancePhase,
-    StanceRequest,
-    StanceSample,
     avoid_slip,
     constant_mu,
     no_policy,
     oracle,
     planned,
+)
+from analysis.stance.seam import (
+    BEGIN,
+    StanceCommand,
+    StanceForesight,
+    StancePhase,
+    StanceRequest,
+    StanceSample,
     risk_tables,
 )
 

@@ -4,15 +4,10 @@ from itertools import pairwise
 
 import pytest
 
-from analysis.stance import (
-    POLICIES,
-    SoleView,
-    StancePlan,
-    StanceRequest,
-    StanceSequence,
-    risk_tables,
-    totals,
-)
+from analysis.stance.outcomes import totals
+from analysis.stance.policies import POLICIES
+from analysis.stance.seam import StanceRequest, risk_tables
+from analysis.stance.sequence import SoleView, StancePlan, StanceSequence
 from tests.fakes.stance_bench import (
     TRAVEL,
     StanceBench,

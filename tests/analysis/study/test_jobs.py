@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition import TrialFileError
+from acquisition.errors import TrialFileError
 from analysis.study.jobs import (
     Batch,
     WorkerLostError,

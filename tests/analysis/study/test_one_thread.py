@@ -37,7 +37,7 @@ def test_the_first_task_of_a_process_has_one_thread_too():
 
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="another C library")
 def test_memory_of_a_matrix_is_kept_for_the_next():
-    from acquisition import keep_memory
+    from acquisition.linear_algebra import keep_memory
 
     assert keep_memory()
     np.ones(_MATRIX // 8)

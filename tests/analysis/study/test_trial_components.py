@@ -10,7 +10,7 @@ from analysis.study.trial_components import (
     TrialComponents,
     fit_components,
 )
-from analysis.tustin import Interval
+from analysis.tustin.identifiability import Interval
 
 STEP, SAMPLES = 0.01, 800  # s, kept samples of a trial
 

@@ -8,17 +8,12 @@ import sys
 import pytest
 
 from benchmarks.made_sessions import make_sessions
-from experiments.board import (
-    BoardCache,
-    cache_path,
-    compare_board,
-    count_board,
-    row_of,
-    see_sessions,
-    summarise,
-)
-from experiments.session import compare_kept, find_session, list_sessions
-from experiments.settings import load_settings
+from experiments.board.board_cache import BoardCache, cache_path, row_of
+from experiments.board.matrix_board import compare_board, count_board, see_sessions
+from experiments.board.session_summaries import summarise
+from experiments.session.kept_files import compare_kept
+from experiments.session.store import find_session, list_sessions
+from experiments.settings.load import load_settings
 from tests.experiments.program import traction
 
 LATER_NS = 10**12

@@ -10,7 +10,7 @@ import pytest
 
 from acquisition.errors import SessionError
 from acquisition.trial_file.reader import TrialReader
-from analysis.validation import Band, BandResult
+from analysis.validation.bands import Band, BandResult
 from experiments.arguments import FRICTION
 from experiments.session.store import list_sessions
 from experiments.settings.load import load_settings

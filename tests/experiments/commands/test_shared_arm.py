@@ -11,7 +11,7 @@ import threading
 import pytest
 
 from acquisition.clock import SystemClock
-from acquisition.control_loop import RealtimeRequest, request
+from acquisition.control_loop.realtime import RealtimeRequest, request
 from acquisition.devices import SafetyMode
 from experiments.rig.arm_lock import ArmLock
 from fakes.bus.client import SocketBus

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from analysis.data import load_trial
+from analysis.data.load import load_trial
 from experiments.session.store import list_sessions
 from experiments.settings.load import load_settings
 from tests.experiments.program import traction, write_config

@@ -16,7 +16,8 @@ from experiments.live.channels import (
 from experiments.live.server import layout_path
 from tests.acquisition.ros import decode
 from tests.acquisition.test_schema import filled, numbers_of
-from wam.model import ArmModel, load_constants, urdf
+from wam.model.arm_model import ArmModel, urdf
+from wam.model.constants import load_constants
 
 URDF = urdf(load_constants())
 CONFIG = "[ft_sensor]\nheight = 0.012\nangle_deg = 90.0\n"

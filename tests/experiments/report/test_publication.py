@@ -21,7 +21,9 @@ from experiments.report.crate import (
 )
 from experiments.report.credits import LICENCES, Author, Credits
 from experiments.report.rebuilding import compare_tables
-from experiments.session import TrialName, add_photo, find_session
+from experiments.session.photos import add_photo
+from experiments.session.sidecar import TrialName
+from experiments.session.store import find_session
 from tests.experiments.program import digest, only_session, traction
 
 ROOT = Path(__file__).parents[3]

@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from acquisition import DeviceFaultError
 from acquisition.control_loop.faults import Action, Fault, GuardVerdict
+from acquisition.errors import DeviceFaultError
 from experiments.operator.keys import REJECT_REASONS
 from experiments.operator.prompts import AutoOperator, Prompt
 from experiments.run.console_loop import TICK

@@ -2,10 +2,10 @@
 
 import pytest
 
-from acquisition import LinkError
-from fakes.bus import InProcessDoor
+from acquisition.errors import LinkError
+from fakes.bus.in_process import InProcessDoor
 from tests.fakes.stepped import Rig
-from wam.bus import PythonCanDoor
+from wam.bus.doors import PythonCanDoor
 
 MS = 1_000_000
 POSITIONS, VERS, PUCK = 0x404, b"\x00", 1

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from fakes.ground.terrain import FREE, RIM, Container, make_terrain
-from fakes.kernels import COMPILED, chosen_dynamics
+from fakes.kernels.choice import COMPILED, chosen_dynamics
 
 if chosen_dynamics() != COMPILED:
     pytest.skip("nothing is compiled here", allow_module_level=True)
-from fakes.ground.compiled import CompiledGround, compiled_ground
+from fakes.ground.compiled.grounds import CompiledGround, compiled_ground
 
 DT = 0.0005
 GROUNDS = [("small", "tread"), ("big", "tread"), ("none", "tread"), ("none", "bare")]

@@ -13,7 +13,7 @@ import pinocchio as pin  # noqa: TID253 - the arm is compared with it
 import pytest
 
 from fakes.ground.terrain import Container, make_terrain
-from fakes.kernels import COMPILED, PINOCCHIO, chosen_dynamics
+from fakes.kernels.choice import COMPILED, PINOCCHIO, chosen_dynamics
 from fakes.plant.gauges import WristGauges
 from fakes.plant.model import PlantOptions, arm_and_hand
 from fakes.plant.plant import ArmPlant
@@ -34,7 +34,7 @@ from wam.model.gravity import compensation
 
 if chosen_dynamics() != COMPILED:
     pytest.skip("nothing is compiled here", allow_module_level=True)
-from fakes.ground.compiled import compiled_ground
+from fakes.ground.compiled.grounds import compiled_ground
 from fakes.plant.compiled.gauges import CompiledGauges
 from fakes.plant.compiled.motion import accelerate, take_links
 from fakes.plant.compiled.substeps import BODY

@@ -4,7 +4,7 @@ import numpy as np
 import pinocchio as pin  # noqa: TID253 - the arm cannot be simulated without it
 import pytest
 
-from fakes.kernels import COMPILED, ENVIRONMENT, PINOCCHIO
+from fakes.kernels.choice import COMPILED, ENVIRONMENT, PINOCCHIO
 from fakes.plant.joints import JointLoads, JointState, JointStops
 from tests.fakes.scenes import (
     CONSTANTS,

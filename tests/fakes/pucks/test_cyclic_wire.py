@@ -11,8 +11,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from acquisition import PERIOD_NS, SafetyMode
-from fakes.kernels import COMPILED, chosen_dynamics
+from acquisition.clock import PERIOD_NS
+from acquisition.devices import SafetyMode
+from fakes.kernels.choice import COMPILED, chosen_dynamics
 from fakes.pucks.network import PuckNetwork
 from fakes.pucks.options import NetworkOptions
 from fakes.pucks.wire import WiredNetwork, lay_wire

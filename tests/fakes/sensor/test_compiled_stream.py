@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from fakes.kernels import COMPILED, chosen_dynamics
-from fakes.pucks import SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS
+from fakes.kernels.choice import COMPILED, chosen_dynamics
+from fakes.pucks.ft_puck import SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS
 from fakes.randomness import NormalArray, NormalStream
-from fakes.sensor import FORCE_ERRORS, TORQUE_ERRORS, SensorErrors
 from fakes.sensor.bota import BotaOptions, bota_stream
+from fakes.sensor.errors import FORCE_ERRORS, TORQUE_ERRORS, SensorErrors
 from fakes.sensor.stream_faults import ByteFault
 
 if chosen_dynamics() != COMPILED:

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from acquisition.control_loop import SoleGoal
+from acquisition.control_loop.law import SoleGoal
 from tests.wam.control.test_controller import DOWN, reading
-from wam.control import LARGEST_F_N, LARGEST_F_T, SoleAxes, SoleImpedance
+from wam.control.sole_impedance import LARGEST_F_N, LARGEST_F_T, SoleAxes, SoleImpedance
 
 DT, TICK_NS = 0.002, 2_000_000
 NAN = math.nan

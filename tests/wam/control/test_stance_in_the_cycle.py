@@ -6,14 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from acquisition import PositionJump
-from acquisition.control_loop import SoleGoal
 from acquisition.control_loop.faults import Fault, verdict_for
+from acquisition.control_loop.law import SoleGoal
 from acquisition.control_loop.states import ArmState
+from acquisition.devices import PositionJump
 from tests.acquisition.control_loop.test_cycle import Bench, Law
 from tests.wam.control.test_controller import DOWN, reading
-from wam.control import FootController, SoftWalls, SoleImpedance, Walls
-from wam.model import ArmModel
+from wam.control.controller import FootController
+from wam.control.soft_walls import SoftWalls, Walls
+from wam.control.sole_impedance import SoleImpedance
+from wam.model.arm_model import ArmModel
 
 PRESS = SoleGoal(2.0, 10.0, 0.0, 0.0, 0.0)
 LIMITS = (50.0, 60.0, 30.0, 30.0, 8.0, 8.0, 1.3)  # N m

@@ -1,4 +1,0 @@
-from .body import CompiledBody
-from .gauges import CompiledGauges
-
-__all__ = ["CompiledBody", "CompiledGauges"]

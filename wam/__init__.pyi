@@ -1,9 +1,0 @@
-from . import bus, calibration, control, driver, model
-
-__all__ = [
-    "bus",
-    "calibration",
-    "control",
-    "driver",
-    "model",
-]
