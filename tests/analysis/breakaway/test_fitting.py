@@ -6,8 +6,7 @@ from analysis.breakaway.fitting import BreakAwayOptions, fit_break_away
 from analysis.breakaway.model import BREAK_AWAY, SLIDING
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.series import TractionSeries
-from tests.analysis.breakaway.pushed import Law, pushed_trials
-from tests.breakaway_scores import (
+from studies.breakaway_scores import (
     Predicted,
     calibration_error,
     censoring_weights,
@@ -15,6 +14,7 @@ from tests.breakaway_scores import (
     main,
     score,
 )
+from tests.analysis.breakaway.pushed import Law, pushed_trials
 
 KINDS = {"S0": "small", "B0": "big", "TF": "flat"}
 STRONG = Law(level=2.5)

@@ -8,6 +8,7 @@ from analysis.stance.outcomes import totals
 from analysis.stance.policies import POLICIES
 from analysis.stance.seam import StanceRequest, risk_tables
 from analysis.stance.sequence import SoleView, StancePlan, StanceSequence
+from studies.stances import KNOWN, StanceCase, claims
 from tests.fakes.stance_bench import (
     TRAVEL,
     StanceBench,
@@ -18,7 +19,6 @@ from tests.fakes.stance_bench import (
     stances,
     taught,
 )
-from tests.stance_study import KNOWN, StanceCase, claims
 
 REQUEST = StanceRequest(6.0, 0.1)
 

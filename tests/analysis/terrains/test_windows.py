@@ -34,7 +34,7 @@ from analysis.terrains.windows import (
     window_features,
     windows_of,
 )
-from tests.terrain_scores import main
+from studies.terrain_scores import main
 
 
 def record(rough=0.3, seed=0, rows=4000):

@@ -11,8 +11,8 @@ from acquisition.devices import SafetyMode
 from experiments.operator.prompts import AutoOperator, Prompt
 from fakes.plant.model import PlantOptions
 from fakes.world import plain_world
+from studies.friction_calibrations import SEEDS, SHARES, errors_of, verdicts
 from tests.experiments.program import traction
-from tests.friction_calibrations import SEEDS, SHARES, errors_of, verdicts
 from wam.calibration import excitation
 from wam.model.friction import friction_of
 

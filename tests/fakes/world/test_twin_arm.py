@@ -1,6 +1,6 @@
 """A twin built from calibrations against the simulated arm that was calibrated.
 
-tests/data/twin holds what `python -m tests.twin_arm --keep tests/data/twin` wrote
+tests/data/twin holds what `python -m studies.twin_arm --keep tests/data/twin` wrote
 (friction 0.4, seed 3).
 """
 
@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from studies.twin_arm import MOST_TORQUE, MOST_WAY, compare
 from tests.experiments.program import write_config
-from tests.twin_arm import MOST_TORQUE, MOST_WAY, compare
 
 pytestmark = pytest.mark.slow
 

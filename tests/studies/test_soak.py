@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from tests.soak import page, recorder, soaked, summary
+from studies.soak import page, recorder, soaked, summary
 
 MINUTE = 1 / 60  # h, simulated
 

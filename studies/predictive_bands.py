@@ -1,7 +1,7 @@
 """Do predictive bands hold for trials that no model has seen? Takes minutes.
 
-python -m tests.predictive_bands STUDY... [--jobs 2] [--starts 20] [--terrains S0,TF]
-python -m tests.predictive_bands STUDY... --many
+python -m studies.predictive_bands STUDY... [--jobs 2] [--starts 20] [--terrains S0,TF]
+python -m studies.predictive_bands STUDY... --many
 
 A study is a table of trials (npz) or a folder of recorded sessions. Every trial is left
 out once. Printed are, for stones and plates, NLPD of the noise chosen by earlier

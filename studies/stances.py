@@ -1,6 +1,6 @@
 """What the policies of a stance are worth, on the simulated ground alone.
 
-    python -m tests.stance_study --peak 6 --seed 1 --jobs 2 --out DIR
+    python -m studies.stances --peak 6 --seed 1 --jobs 2 --out DIR
 
 Prints the table of docs/foresight.md and draws its figure (DIR/stances.png); finished
 cells are kept there, so that a study resumes. --terrain and --policy, each any number
@@ -193,7 +193,7 @@ def draw(results: dict[StanceCase, StanceTotals], path: Path) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the study; return 1 if a claim is not met."""
-    parser = argparse.ArgumentParser(prog="tests.stance_study")
+    parser = argparse.ArgumentParser(prog="studies.stances")
     parser.add_argument("--peak", type=float, default=6.0, help="N asked for (6)")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=1)

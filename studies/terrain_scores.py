@@ -1,4 +1,4 @@
-"""How well terrains are told apart, held out: `python -m tests.terrain_scores FILE`.
+"""How well terrains are told apart, held out: `python -m studies.terrain_scores FILE`.
 
 Flat or rocky by the classifier of trials of other numbers, and windows of ground that
 is not known, against the figures they have to meet.

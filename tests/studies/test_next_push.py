@@ -5,7 +5,7 @@ import pytest
 
 from analysis.next_push.aims import AIMS
 from analysis.next_push.records import ROWS, Aim, PushRecord
-from tests.next_push import (
+from studies.next_push import (
     FIRST,
     PoolTrial,
     Session,
@@ -111,7 +111,7 @@ def test_worse_scores_and_a_dear_stop_are_missed(every):
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_a_pool_comes_back_from_the_disk(tmp_path, monkeypatch):
-    monkeypatch.setattr("tests.next_push.AIMS", AIMS[:2])
+    monkeypatch.setattr("studies.next_push.AIMS", AIMS[:2])
     new, again = (make_pool(tmp_path, "TF", 1) for _ in range(2))
     assert [len(of) for of in new] == [1, 1]
     for a, b in zip(new, again, strict=True):

@@ -1,6 +1,6 @@
 """Calibrations of friction held against the truth of simulated arms.
 
-python -m tests.friction_calibrations [--shares 0.2 0.4 1] [--seeds 1 2 3 4 5]
+python -m studies.friction_calibrations [--shares 0.2 0.4 1] [--seeds 1 2 3 4 5]
     [--keep FOLDER] [--write docs/friction.md]
 
 Every seed draws another arm. About two minutes each on an idle core; what is in FOLDER
@@ -139,7 +139,7 @@ def page_part(seeds: Sequence[int], rows: Sequence[str]) -> str:
     head = ["friction", "error [%]", *(f"joint {j}" for j in range(1, 8)), "bound"]
     lines = [f"| {' | '.join(head)} |", "|" + "---|" * len(head), *rows]
     return (
-        "`python -m tests.friction_calibrations --write docs/friction.md`: "
+        "`python -m studies.friction_calibrations --write docs/friction.md`: "
         f"{len(seeds)} arms drawn at each share (seeds "
         f"{', '.join(map(str, seeds))}), each calibrated through the whole program.\n\n"
         + "\n".join(lines)

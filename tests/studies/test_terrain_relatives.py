@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.data.tables import load_tables
-from tests.terrain_relatives import (
+from studies.terrain_relatives import (
     MOST_BEHIND_OWN,
     Figures,
     compare,

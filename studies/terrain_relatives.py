@@ -1,6 +1,6 @@
 """What do other terrains tell about one? Takes minutes.
 
-python -m tests.terrain_relatives STUDY... [--draws 3] [--jobs 2] [--terrains S0,TF]
+python -m studies.terrain_relatives STUDY... [--draws 3] [--jobs 2] [--terrains S0,TF]
 
 A study is a table of trials (npz) or a folder of recorded sessions. Of every terrain
 three trials are known, in so many draws; its other trials are predicted from them and
@@ -28,7 +28,7 @@ from analysis.study.relatives import (
     plan_relatives,
     run_relatives,
 )
-from tests.predictive_bands import load_study
+from studies.predictive_bands import load_study
 
 OPTIONS = FitOptions(models=(GP_SE_TRIAL,), draws=0)
 MOST_BEHIND_OWN = 0.05  # nat, the nine-trial fit before the joint one

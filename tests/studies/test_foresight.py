@@ -5,8 +5,7 @@ from pathlib import Path
 import pytest
 
 from analysis.foresight.held_out import foresee
-from tests.analysis.foresight.made import STONES, model, trial, trials
-from tests.foresight_study import (
+from studies.foresight import (
     THEIR_RIG,
     Judge,
     contour_alarms,
@@ -14,6 +13,7 @@ from tests.foresight_study import (
     report,
     report_ground,
 )
+from tests.analysis.foresight.made import STONES, model, trial, trials
 
 
 def test_a_limit_that_is_missed_is_named_and_one_that_is_met_is_not():

@@ -1,6 +1,6 @@
 """Does the advised push teach more than a random one? Takes a quarter of an hour.
 
-python -m tests.next_push POOL [--terrains S0,TF] [--seeds 10]
+python -m studies.next_push POOL [--terrains S0,TF] [--seeds 10]
 
 POOL is a folder of simulated trials, made where it is missing: on every terrain a point
 foot is pushed seven times at each of nine aims, three speeds of the hand by three

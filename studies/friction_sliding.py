@@ -1,8 +1,8 @@
 """F_n of a foot that a hand slides at a constant speed, by how much friction is left.
 
-python -m tests.friction_sliding FOLDER [FOLDER ...] [--write docs/friction.md]
+python -m studies.friction_sliding FOLDER [FOLDER ...] [--write docs/friction.md]
 
-Each FOLDER is one of `python -m tests.friction_calibrations --keep` or of
+Each FOLDER is one of `python -m studies.friction_calibrations --keep` or of
 `python -m benchmarks.friction --keep`: it has what a calibration found of a simulated
 arm, and what the arm really has. The foot is put down on a plate at the far end and
 slid from there. Exits with 1 where the compensated load is off by more than 1 N.
@@ -115,7 +115,7 @@ def page_part(folders: Sequence[Path], found: dict[float, list[SlidLoad]]) -> st
         lines.append(f"| {share:g} | {' | '.join(cells)} |")
     arms = "one arm" if len(folders) == 1 else f"{len(folders)} arms"
     return (
-        "`python -m tests.friction_sliding FOLDER... --write docs/friction.md`: "
+        "`python -m studies.friction_sliding FOLDER... --write docs/friction.md`: "
         f"{arms} with the whole friction, put down on a plate and slid. F_n less the "
         f"{_WEIGHT:.2f} N that were set [N]: mean (largest of the arms, without sign)."
         "\n\n" + "\n".join(lines) + f"\n\nThe goal while sliding is {MOST:g} N.\n"

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from analysis.data.tables import load_tables
-from tests.predictive_bands import (
+from studies.predictive_bands import (
     BANDS,
     LEAST_HITS,
     NEW,
@@ -20,7 +20,7 @@ from tests.predictive_bands import (
 
 @pytest.fixture(scope="module")
 def slice_outcomes():
-    path = Path(__file__).parent / "data" / "rehearsal_slice.npz"
+    path = Path(__file__).parents[1] / "data" / "rehearsal_slice.npz"
     trials = {name: list(of) for name, of in load_tables([path]).items()}
     return trials, evaluate(trials, 1, 3)
 

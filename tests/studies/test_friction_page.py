@@ -12,14 +12,14 @@ from benchmarks.friction_text import (
     page_text,
     with_calibrations,
 )
-from tests.friction_calibrations import (
+from studies.friction_calibrations import (
     CalibrationErrors,
     page_part,
     rows_of,
     verdicts,
 )
 
-PAGE = Path(__file__).parents[1] / "docs" / "friction.md"
+PAGE = Path(__file__).parents[2] / "docs" / "friction.md"
 ROW = "| 1 | none | 10 |"
 
 

@@ -1,4 +1,4 @@
-"""Break-away models on trials left out: `python -m tests.breakaway_scores FILE`.
+"""Break-away models on trials left out: `python -m studies.breakaway_scores FILE`.
 
 Trial k of every terrain is left out at a time, the family is chosen inside the other
 trials, and the pushes of the trials left out are held against what was predicted. A

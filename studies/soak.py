@@ -1,7 +1,7 @@
 """Simulated hours of sessions with random faults; what has to hold is checked.
 
-python tests/soak.py --hours 1 --seed 1 [--record FILE]
-python tests/soak.py --write docs/soak.md FILE ...
+python -m studies.soak --hours 1 --seed 1 [--record FILE]
+python -m studies.soak --write docs/soak.md FILE ...
 
 A run that is stopped counts for as long as it ran: its record is written after every
 session. Every session is run, and resumed until it is complete, as a person would.
@@ -16,7 +16,6 @@ import json
 import os
 import re
 import resource
-import sys
 import tempfile
 from collections import Counter
 from collections.abc import Callable
@@ -28,8 +27,6 @@ from subprocess import run
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from acquisition.clock import NS_PER_S, SystemClock
 from acquisition.devices import SafetyMode
@@ -312,8 +309,8 @@ processes:
 |{lines}|
 {rows}
 
-Measured by `python tests/soak.py --seed N --hours H --record FILE` for each row; this
-page by `python tests/soak.py --write docs/soak.md tests/data/soak/*.json`. Descriptors
+Measured by `python -m studies.soak --seed N --hours H --record FILE` for each row; this
+page by `python -m studies.soak --write docs/soak.md tests/data/soak/*.json`. Descriptors
 and memory (MB): after the first sessions, and at the end.
 """
 TITLES = ("seed", "commit", "date", "hours", "sessions", "trials", "with a fault")

@@ -1,6 +1,6 @@
 """What foresight is worth, each session foreseen by what the others taught. Minutes.
 
-python -m tests.foresight_study POOL... [--trials 5] [--contour FOLDER]
+python -m studies.foresight POOL... [--trials 5] [--contour FOLDER]
 
 A pool is a folder of recorded sessions (a rehearsal, one seed). With two pools or more
 every pool is foreseen by models of all other pools; one pool alone by folds of trials.

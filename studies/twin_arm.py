@@ -1,6 +1,6 @@
 """The twin of a simulated arm held against the arm itself, on a way of its own.
 
-python -m tests.twin_arm [--share 0.4] [--seed 3] [--seconds 20] [--keep FOLDER]
+python -m studies.twin_arm [--share 0.4] [--seed 3] [--seconds 20] [--keep FOLDER]
 
 Calibrates gravity and friction of a simulated arm whose friction was drawn, builds the
 twin from the files, and lets both follow a way that no calibration went. Prints, by
