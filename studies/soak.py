@@ -309,8 +309,8 @@ processes:
 |{lines}|
 {rows}
 
-Measured by `python -m studies.soak --seed N --hours H --record FILE` for each row; this
-page by `python -m studies.soak --write docs/soak.md tests/data/soak/*.json`. Descriptors
+Measured by `python -m studies.soak --seed N --hours H --record FILE` for each row;
+this page by `python -m studies.soak --write docs/soak.md tests/data/soak/*.json`. Descriptors
 and memory (MB): after the first sessions, and at the end.
 """
 TITLES = ("seed", "commit", "date", "hours", "sessions", "trials", "with a fault")
