@@ -310,8 +310,8 @@ processes:
 {rows}
 
 Measured by `python -m studies.soak --seed N --hours H --record FILE` for each row;
-this page by `python -m studies.soak --write docs/soak.md tests/data/soak/*.json`. Descriptors
-and memory (MB): after the first sessions, and at the end.
+this page by `python -m studies.soak --write docs/soak.md tests/data/soak/*.json`.
+Descriptors and memory (MB): after the first sessions, and at the end.
 """
 TITLES = ("seed", "commit", "date", "hours", "sessions", "trials", "with a fault")
 TITLES += ("resumes", "descriptors", "memory")
