@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from analysis.study.crossval import plan_folds
+from analysis.study.crossval import plan_folds, run_fold
 from analysis.study.models import FitOptions
 from analysis.study.store import task_key
 from benchmarks.made_sessions import TERRAINS, make_sessions
@@ -52,12 +52,12 @@ def folds_of(count: int) -> dict[str, float]:
         start = time.process_time()
         plan, _ = plan_folds(trials, FitOptions())
         for k in range(len(plan)):
-            task_key(plan.outline(k))
+            task_key(run_fold, plan.outline(k))
         times.append(time.process_time() - start)
     tracemalloc.start()
     plan, _ = plan_folds(trials, FitOptions())
     for k in range(len(plan)):
-        task_key(plan.outline(k))
+        task_key(run_fold, plan.outline(k))
     for k in range(0, len(plan), max(1, len(plan) // 10)):
         _ = plan[k].training
     peak = tracemalloc.get_traced_memory()[1]

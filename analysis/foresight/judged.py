@@ -34,7 +34,6 @@ from analysis.foresight.ticks import ForesightRun
 from analysis.foresight.training import fit_foresight
 from analysis.foresight.watching import WatchedTrial
 
-JUDGED_VERSION = 1  # higher whenever the same trials give another outcome
 LEAST_TRIALS = 5  # of a study: as many as there are folds
 SLID = (25, 50, 100, 200)  # ticks of sliding after which the ground is asked
 
@@ -109,12 +108,10 @@ class JudgedTask:
     Attributes:
         trials: in the order of the study.
         break_away: models by terrain.
-        version: of the outcome.
     """
 
     trials: tuple[WatchedSource, ...]
     break_away: Mapping[str, BreakAwayModel]
-    version: int = JUDGED_VERSION
 
 
 class DigestedTrial(Protocol):

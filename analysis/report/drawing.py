@@ -1,22 +1,15 @@
 """The figures of a report, drawn once for the same numbers and the same code.
 
 Drawing takes longer than all else of a report whose fits are kept, so its figures may
-be kept, too. They are known by a digest of all that they show and of the code that
-draws them: whatever is changed in the analysis, they are drawn anew.
+be kept, too. They are known by all that they show and by the code that draws them.
 """
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
-from enum import Enum
-from functools import cache, lru_cache
-from importlib.metadata import version
-from pathlib import Path
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING, Any, overload
-
-import numpy as np
 
 from acquisition.worker_processes import available_cores
 from analysis.figures.pictures import Picture
@@ -32,20 +25,23 @@ if TYPE_CHECKING:
 _KEYS = (*PAGE_ORDER, FORESIGHT_KEY)
 _MOST_DRAWING = 4  # processes
 _MANY_TERRAINS = 2  # from which on they pay: the workers are there, of the fits
-_PLAIN = (type(None), bool, int, float, str, bytes, Enum)
-_DRAWN_BY = ("matplotlib", "numpy", "pillow")  # besides the analysis
 DRAWN_TYPES: Mapping[str, type] = {
     kind.__name__: kind for kind in (Picture, ReportFigure, ReportSection)
 }
 
 
-def report_figures(shown: ShownNumbers, n_jobs: int = 1) -> list[ReportFigure]:
+def report_figures(
+    shown: ShownNumbers, n_jobs: int | None = None
+) -> list[ReportFigure]:
     """Return every figure that there are numbers for, in the order of the page.
 
     Args:
         shown: what they show.
         n_jobs: processes that draw; they share no figure, so pictures are the same.
+            By default as many as pay.
     """
+    if n_jobs is None:
+        n_jobs = _processes(shown.results.study)
     drawn = {
         figure.picture.key: figure
         for figure in run_tasks(draw_figure, FigureTasks(shown), n_jobs)
@@ -142,23 +138,6 @@ def figure_specs() -> Mapping[str, FigureSpec]:
     return {spec.key: spec for family in families for spec in family.FIGURES}
 
 
-@dataclass(frozen=True, slots=True)
-class DrawingTask:
-    """What figures follow from.
-
-    Attributes:
-        shown: digest of the numbers.
-        code: digest of the code that draws.
-        is_simulated: the numbers were.
-        with_pdf: figures are wanted as PDF, too.
-    """
-
-    shown: str
-    code: str
-    is_simulated: bool
-    with_pdf: bool
-
-
 def kept_figures(shown: ShownNumbers, store: Store | None = None) -> list[ReportFigure]:
     """Return every figure that there are numbers for, in the order of the page.
 
@@ -166,95 +145,23 @@ def kept_figures(shown: ShownNumbers, store: Store | None = None) -> list[Report
         shown: what they show.
         store: figures of earlier reports.
     """
-    study = shown.results.study
-
-    def draw() -> list[ReportFigure]:
-        return report_figures(shown, _processes(study))
-
-    return drawn_once(
-        shown, draw, store, is_simulated=study.simulated, with_pdf=shown.with_pdf
-    )
+    return drawn_once(report_figures, shown, store)
 
 
 def drawn_once(
+    draw: Callable[[Any], list[ReportFigure]],
     shown: Any,  # noqa: ANN401
-    draw: Callable[[], Sequence[ReportFigure]],
     store: Store | None,
-    *,
-    is_simulated: bool,
-    with_pdf: bool,
 ) -> list[ReportFigure]:
-    """Return figures from the store, or draw and keep them.
-
-    Args:
-        shown: all that they show: dataclasses, arrays, mappings, plain values.
-        draw: draws them.
-        store: figures of earlier reports.
-        is_simulated: the numbers were.
-        with_pdf: figures are wanted as PDF, too.
-    """
+    """Return what `draw` makes of `shown`: from the store, or drawn and kept."""
     if store is None:
-        return list(draw())
-    task = DrawingTask(shown_digest(shown), code_digest(), is_simulated, with_pdf)
-    kept = store.get(task)
+        return draw(shown)
+    kept = store.get(draw, shown)
     if isinstance(kept, tuple) and all(isinstance(k, ReportFigure) for k in kept):
         return list(kept)
-    drawn = list(draw())
-    store.put(task, drawn)
+    drawn = draw(shown)
+    store.put(draw, shown, drawn)
     return drawn
-
-
-def shown_digest(shown: Any) -> str:  # noqa: ANN401
-    """Return the SHA-256 of a value.
-
-    Raises:
-        TypeError: a value of a kind whose content is not known.
-    """
-    digest = hashlib.sha256()
-    for part in _parts(shown):
-        digest.update(len(part).to_bytes(8, "little"))
-        digest.update(part)
-    return digest.hexdigest()
-
-
-def _parts(value: Any) -> Iterator[bytes]:  # noqa: ANN401
-    """Give the bytes of a value, each with its kind and the count of what is inside."""
-    if isinstance(value, np.generic):  # the store gives it back as a plain value
-        value = value.item()
-    kind = type(value).__name__
-    if isinstance(value, np.ndarray):
-        yield f"{kind} {value.dtype.str} {value.shape}".encode()
-        yield value.tobytes()
-    elif isinstance(value, _PLAIN):
-        yield f"{kind} {value!r}".encode()
-    elif isinstance(value, Mapping) or is_dataclass(value):
-        inside = value if isinstance(value, Mapping) else _fields_of(value)
-        yield f"{kind} {len(inside)}".encode()
-        for key, item in inside.items():
-            yield from _parts(key)
-            yield from _parts(item)
-    elif isinstance(value, list | tuple):
-        yield f"{kind} {len(value)}".encode()
-        for item in value:
-            yield from _parts(item)
-    else:
-        raise TypeError(f"{kind} has no digest")
-
-
-def _fields_of(value: Any) -> dict[str, Any]:  # noqa: ANN401
-    return {item.name: getattr(value, item.name) for item in fields(value)}
-
-
-@lru_cache
-def code_digest() -> str:
-    """Return the SHA-256 of the analysis and of the libraries' versions."""
-    folder = Path(__file__).parents[1]
-    digest = hashlib.sha256(" ".join(map(version, _DRAWN_BY)).encode())
-    for path in sorted(folder.rglob("*.py")):
-        content = path.read_bytes()
-        digest.update(f"{path.relative_to(folder)} {len(content)} ".encode())
-        digest.update(content)
-    return digest.hexdigest()
 
 
 def _processes(study: Study) -> int:

@@ -83,12 +83,12 @@ Place = tuple[int, int]  # of a task: number of its batch, and in it
 class Store(Protocol):
     """Keeps results, so that an interrupted study resumes."""
 
-    def get(self, task: Any) -> Any | None:  # noqa: ANN401
-        """Return the result of a task done before, None if there is none."""
+    def get(self, function: Callable[..., Any], task: Any) -> Any | None:  # noqa: ANN401
+        """Return what the function made of a task before, None if nothing is kept."""
         ...
 
-    def put(self, task: Any, result: Any) -> None:  # noqa: ANN401
-        """Keep a result."""
+    def put(self, function: Callable[..., Any], task: Any, result: Any) -> None:  # noqa: ANN401
+        """Keep what the function made of a task."""
         ...
 
 
@@ -144,7 +144,7 @@ def run_batches(
     for (k, n), result in _stream(batches, left, where):
         results[k, n] = result
         if store is not None:
-            store.put(_key(batches[k].tasks, n), result)
+            store.put(batches[k].function, _key(batches[k].tasks, n), result)
         if progress is not None:
             progress(len(results), len(places))
     return [
@@ -161,8 +161,12 @@ def _key(tasks: Sequence[Any], number: int) -> object:
 def _stored(
     store: Store, batches: Sequence[Batch], places: Sequence[Place]
 ) -> dict[Place, Any]:
-    results = (((k, n), store.get(_key(batches[k].tasks, n))) for k, n in places)
-    return {place: result for place, result in results if result is not None}
+    results: dict[Place, Any] = {}
+    for k, n in places:
+        result = store.get(batches[k].function, _key(batches[k].tasks, n))
+        if result is not None:
+            results[k, n] = result
+    return results
 
 
 def _stream(

@@ -1,8 +1,9 @@
 """Results of a study on disk, by the hash of what they were made from.
 
 An interrupted study resumes where it stopped, and a study repeated with one choice
-changed repeats only what that choice touches. A file that is damaged, foreign or of
-another version counts as not there. Files are written whole or not at all.
+changed repeats only what that choice touches. A result is known by its task and by the
+code that computes it, so a corrected formula never shows an old number. A file that is
+damaged or foreign counts as not there. Files are written whole or not at all.
 
 Values become JSON and come back exactly: dataclasses, named tuples, enumerations,
 arrays, numbers. Nothing is ever unpickled: a type is found by name in a table of the
@@ -20,7 +21,7 @@ import math
 import os
 import stat
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from pathlib import Path
@@ -37,6 +38,7 @@ from analysis.gp.arcsine import Arcsine
 from analysis.gp.ascent import Start
 from analysis.gp.regression import GaussianProcess
 from analysis.study.crossval import FoldResult, FoldTask, ModelFold
+from analysis.study.digests import code_digest, value_digest
 from analysis.study.metrics import Score
 from analysis.study.models import FitOptions, GpModel, TustinModel
 from analysis.study.new_trial import FamilyChoice, NewTrialModel
@@ -49,12 +51,12 @@ from analysis.tustin import model as tustin
 from analysis.tustin.identifiability import Interval, Profiles
 
 Types = Mapping[str, type]
+Function = Callable[..., Any]
 
 _DTYPES = {"float64": "<f8", "int64": "<i8", "bool": "|b1"}
 MOST_BYTES = 256 * 1024**2  # of all results; a fold of a study has about 60 kB
 LARGEST = 16 * 1024**2  # bytes of one result; a larger file is none
 _KEPT = 0.9  # share of the size that is left when results go
-VERSION = 9  # of the numbers: higher whenever the same task gives another result
 
 TYPES = {
     kind.__name__: kind
@@ -100,9 +102,9 @@ class ResultStore:
         self._types = types
         self._bytes: int | None = None  # of the folder, as far as it is known
 
-    def get(self, task: Any) -> Any | None:  # noqa: ANN401
+    def get(self, function: Function, task: Any) -> Any | None:  # noqa: ANN401
         """Return the result of a task done before, None if there is none."""
-        path = self._path(task)
+        path = self._path(function, task)
         try:
             content = json.loads(_read(path))
             is_whole = content["digest"] == _digest(content["result"])
@@ -113,15 +115,18 @@ class ResultStore:
             os.utime(path)
         return result
 
-    def put(self, task: Any, result: Any) -> None:  # noqa: ANN401
+    def put(self, function: Function, task: Any, result: Any) -> None:  # noqa: ANN401
         """Keep a result.
 
         Raises:
             SettingsError: the folder cannot be written.
+            TypeError: a type in it is not in the table, so it could never be read.
         """
         plain = encode(result)
+        if unknown := sorted(_type_names(plain) - set(self._types)):
+            raise TypeError(f"results with {', '.join(unknown)} cannot be read again")
         content = {"digest": _digest(plain), "result": plain}
-        path, data = self._path(task), json.dumps(content).encode()
+        path, data = self._path(function, task), json.dumps(content).encode()
         if path.is_dir():  # nobody's result; it is made again every time
             return
         write_atomic(path, data)
@@ -130,8 +135,8 @@ class ResultStore:
         if self._bytes is None or self._bytes > self._most:
             self._bytes = remove_oldest(self._folder, self._most)
 
-    def _path(self, task: Any) -> Path:  # noqa: ANN401
-        return self._folder / f"{task_key(task)}.json"
+    def _path(self, function: Function, task: Any) -> Path:  # noqa: ANN401
+        return self._folder / f"{task_key(function, task)}.json"
 
 
 def _read(path: Path) -> bytes:
@@ -171,9 +176,20 @@ def remove_oldest(folder: Path, most: int) -> int:
     return total
 
 
-def task_key(task: Any) -> str:  # noqa: ANN401
-    """Return the hash of a task: its data, its options, the version of the numbers."""
-    return _digest({"version": VERSION, "task": encode(task)})
+def task_key(function: Function, task: Any) -> str:  # noqa: ANN401
+    """Return the hash of a task: its data, its options, and the code it is done by."""
+    name, code = function.__qualname__, code_digest(function.__module__)
+    return _digest({"function": name, "code": code, "task": value_digest(task)})
+
+
+def _type_names(plain: Any) -> set[str]:  # noqa: ANN401
+    """Return the names of all types in what `encode` made."""
+    if isinstance(plain, list):
+        return set().union(*map(_type_names, plain))
+    if not isinstance(plain, dict):
+        return set()
+    inside = set().union(*map(_type_names, plain.values()))
+    return inside | ({plain["type"]} if "type" in plain and len(plain) > 1 else set())
 
 
 def _digest(plain: Any) -> str:  # noqa: ANN401

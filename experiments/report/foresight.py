@@ -109,7 +109,7 @@ def judged_foresight(
         n_jobs: processes; one per core where it is None.
         meanwhile: called here, once or more, while other processes learn.
     """
-    kept = None if store is None else store.get(task)
+    kept = None if store is None else store.get(judge, task)
     if isinstance(kept, JudgedForesight):
         return kept
 
@@ -119,7 +119,7 @@ def judged_foresight(
     run = partial(run_tasks, workers=n_jobs, progress=learning)
     outcome = judge(watched(), task.break_away, run)
     if store is not None:
-        store.put(task, outcome)
+        store.put(judge, task, outcome)
     return outcome
 
 

@@ -187,12 +187,14 @@ def test_a_plan_grows_with_the_trials_not_with_their_square():
 
 def test_a_fold_is_another_one_where_any_of_its_samples_is(trials):
     before, _ = plan_folds(trials, SMALL_FIT)
-    keys = [task_key(before.outline(k)) for k in range(len(before))]
+    keys = [task_key(run_fold, before.outline(k)) for k in range(len(before))]
     assert len(set(keys)) == len(keys)
     changed = replace(trials["B0"][1], F_t=trials["B0"][1].F_t + 1e-12)
     trials["B0"][1] = changed
     after, _ = plan_folds(trials, SMALL_FIT)
-    is_same = [task_key(after.outline(k)) == key for k, key in enumerate(keys)]
+    is_same = [
+        task_key(run_fold, after.outline(k)) == key for k, key in enumerate(keys)
+    ]
     touched = [
         any(
             np.array_equal(rows.F_t, changed.F_t)
@@ -204,7 +206,7 @@ def test_a_fold_is_another_one_where_any_of_its_samples_is(trials):
     assert is_same == [not is_touched for is_touched in touched]
     assert any(is_same)
     other, _ = plan_folds(trials, replace(SMALL_FIT, seed=9))
-    assert task_key(other.outline(0)) != task_key(after.outline(0))
+    assert task_key(run_fold, other.outline(0)) != task_key(run_fold, after.outline(0))
 
 
 def test_folds_of_other_targets_have_other_outlines(trials):
@@ -220,4 +222,4 @@ def test_a_plan_that_was_sent_gives_the_same_folds(trials):
     plan.outline(0)
     sent = copy.deepcopy(plan)  # as pickle does it
     for one, other in zip(plan[:], sent[:], strict=True):
-        assert task_key(one) == task_key(other)
+        assert task_key(run_fold, one) == task_key(run_fold, other)

@@ -100,10 +100,10 @@ class Memory:
     def __init__(self):
         self.results = {}
 
-    def get(self, key):
+    def get(self, function, key):
         return self.results.get(key)
 
-    def put(self, key, result):
+    def put(self, function, key, result):
         self.results[key] = result
 
 

@@ -92,8 +92,8 @@ def test_what_has_no_plain_form_is_not_written():
 
 def test_a_fold_comes_back_from_disk_as_it_was(tmp_path, task, result):
     store = ResultStore(tmp_path)
-    store.put(task, result)
-    found = store.get(task)
+    store.put(run_fold, task, result)
+    found = store.get(run_fold, task)
     assert encode(found) == encode(result)
     own = task.own
     for name, fold in result.models.items():
@@ -103,29 +103,40 @@ def test_a_fold_comes_back_from_disk_as_it_was(tmp_path, task, result):
         np.testing.assert_array_equal(again.sd, before.sd)
 
 
+@dataclass(frozen=True)
+class Unlisted:
+    value: int
+
+
+def test_a_result_that_could_not_be_read_again_is_refused(tmp_path, task):
+    with pytest.raises(TypeError, match="Unlisted cannot be read again"):
+        ResultStore(tmp_path).put(run_fold, task, {"a": [Unlisted(1)]})
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_changed_option_or_sample_is_another_task(task):
     options = replace(task.options, seed=1)
     rows = replace(task.own, F_t=task.own.F_t + 1e-12)
-    keys = {task_key(t) for t in (task, replace(task, options=options))}
-    assert len(keys | {task_key(replace(task, own=rows))}) == 3
-    assert task_key(replace(task)) in keys
+    keys = {task_key(run_fold, t) for t in (task, replace(task, options=options))}
+    assert len(keys | {task_key(run_fold, replace(task, own=rows))}) == 3
+    assert task_key(run_fold, replace(task)) in keys
 
 
 @pytest.mark.parametrize("damage", [b"", b"{}", b"[1", b'{"digest": 1, "result": 2}'])
 def test_a_damaged_file_counts_as_not_there(tmp_path, task, result, damage):
     store = ResultStore(tmp_path)
-    store.put(task, result)
+    store.put(run_fold, task, result)
     (path,) = tmp_path.iterdir()
     path.write_bytes(damage)
-    assert store.get(task) is None
+    assert store.get(run_fold, task) is None
 
 
 def test_a_flipped_digit_is_noticed(tmp_path, task, result):
     store = ResultStore(tmp_path)
-    store.put(task, result)
+    store.put(run_fold, task, result)
     (path,) = tmp_path.iterdir()
     path.write_text(path.read_text().replace('"fold": 0', '"fold": 1'))
-    assert store.get(task) is None
+    assert store.get(run_fold, task) is None
 
 
 def filled(folder, results, size=1000):
@@ -157,23 +168,25 @@ def test_a_store_never_grows_beyond_its_size(tmp_path, task, result):
     tasks = [
         replace(task, options=replace(task.options, seed=seed)) for seed in range(6)
     ]
-    ResultStore(tmp_path).put(tasks[0], result)
+    ResultStore(tmp_path).put(run_fold, tasks[0], result)
     size = sum(path.stat().st_size for path in tmp_path.iterdir())
     store = ResultStore(tmp_path, most=int(3.5 * size))
     for number, one in enumerate(tasks):
-        store.put(one, result)
+        store.put(run_fold, one, result)
         assert sum(p.stat().st_size for p in tmp_path.iterdir()) <= 3.5 * size
-        os.utime(next(tmp_path.glob(f"{task_key(one)}*")), (number, number))
-    assert [store.get(one) is not None for one in tasks] == [False] * 3 + [True] * 3
+        os.utime(next(tmp_path.glob(f"{task_key(run_fold, one)}*")), (number, number))
+    assert [store.get(run_fold, one) is not None for one in tasks] == [False] * 3 + [
+        True
+    ] * 3
 
 
 def test_a_result_that_was_read_counts_as_used(tmp_path, task, result):
     store = ResultStore(tmp_path)
-    store.put(task, result)
+    store.put(run_fold, task, result)
     (path,) = tmp_path.iterdir()
     os.utime(path, (1, 1))
     newer = filled(tmp_path, 2, size=path.stat().st_size)
-    assert store.get(task) is not None
+    assert store.get(run_fold, task) is not None
     remove_oldest(tmp_path, 2 * path.stat().st_size)
     assert path.exists()
     assert not newer[0].exists()
@@ -195,7 +208,7 @@ def test_what_is_no_result_is_left_alone(tmp_path):
 @pytest.mark.parametrize("what", ["folder", "link", "pipe", "huge", "unreadable"])
 def test_a_name_that_holds_no_result_is_no_error(tmp_path, task, result, what):
     store, folder = ResultStore(tmp_path / "folds"), tmp_path / "folds"
-    store.put(task, result)
+    store.put(run_fold, task, result)
     (path,) = folder.iterdir()
     whole = path.read_bytes()
     path.unlink()
@@ -209,9 +222,9 @@ def test_a_name_that_holds_no_result_is_no_error(tmp_path, task, result, what):
         "unreadable": lambda: path.write_bytes(b"[" * 100_000),
     }
     make[what]()
-    assert store.get(task) is None
-    store.put(task, result)
-    assert (store.get(task) is None) is (what == "folder")
+    assert store.get(run_fold, task) is None
+    store.put(run_fold, task, result)
+    assert (store.get(run_fold, task) is None) is (what == "folder")
     assert elsewhere.read_bytes() == whole
 
 
@@ -219,11 +232,11 @@ def test_a_name_that_holds_no_result_is_no_error(tmp_path, task, result, what):
 class Memory:
     kept: dict
 
-    def get(self, task):
-        return self.kept.get(task)
+    def get(self, function, task):
+        return self.kept.get((function, task))
 
-    def put(self, task, result):
-        self.kept[task] = result
+    def put(self, function, task, result):
+        self.kept[function, task] = result
 
 
 def stop_at_three(number):
@@ -236,9 +249,9 @@ def test_an_interrupted_run_resumes_where_it_stopped():
     memory, seen = Memory({}), []
     with pytest.raises(KeyboardInterrupt):
         run_tasks(stop_at_three, [1, 2, 3, 4], 1, store=memory)
-    assert memory.kept == {1: 11, 2: 12}
+    assert memory.kept == {(stop_at_three, 1): 11, (stop_at_three, 2): 12}
 
-    memory.kept[3] = 13
+    memory.put(stop_at_three, 3, 13)
     found = run_tasks(
         stop_at_three, [1, 2, 3, 4], 1, lambda *done: seen.append(done), memory
     )

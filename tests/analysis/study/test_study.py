@@ -112,7 +112,8 @@ def names(trials):
 def test_what_is_done_beside_the_fits_is_in_the_store(slice_trials):
     kept = {}
     store = SimpleNamespace(
-        get=lambda _: None, put=lambda task, result: kept.update({repr(task): result})
+        get=lambda function, task: None,
+        put=lambda function, task, result: kept.update({repr(task): result}),
     )
     run_study(
         {"TF": slice_trials["TF"]},

@@ -25,7 +25,7 @@ def refused():
 
 
 def test_a_kept_outcome_comes_back_bit_for_bit_and_nothing_is_computed(store, outcome):
-    store.put(TASK, outcome)
+    store.put(judge, TASK, outcome)
     kept = judged_foresight(TASK, refused, store)
     assert encode(kept) == encode(outcome)
 
@@ -42,14 +42,14 @@ def test_a_first_outcome_is_kept(store, outcome, monkeypatch):
 def test_a_damaged_outcome_is_computed_anew(
     tmp_path, store, outcome, monkeypatch, content
 ):
-    store.put(TASK, outcome)
+    monkeypatch.setattr(foresight, "judge", lambda *_: outcome)
+    store.put(foresight.judge, TASK, outcome)
     (path,) = tmp_path.iterdir()
     path.write_bytes(content)
-    monkeypatch.setattr(foresight, "judge", lambda *_: outcome)
     assert judged_foresight(TASK, lambda: WATCHED, store) is outcome
 
 
 def test_what_is_no_outcome_is_computed_anew(store, outcome, monkeypatch):
-    store.put(TASK, {"model": None})
     monkeypatch.setattr(foresight, "judge", lambda *_: outcome)
+    store.put(foresight.judge, TASK, {"model": None})
     assert judged_foresight(TASK, lambda: WATCHED, store) is outcome

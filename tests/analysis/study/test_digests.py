@@ -1,0 +1,66 @@
+"""A corrected formula never shows an old number: results are keyed by their code."""
+
+import shutil
+
+import pytest
+
+from analysis.breakaway.fitting import fit_planned
+from analysis.foresight.judged import judge
+from analysis.report.drawing import report_figures
+from analysis.study.crossval import run_fold
+from analysis.study.digests import ROOT, code_digest, source_files
+from analysis.study.relatives import run_relatives
+from analysis.study.terrain_fit import fit_terrain
+from analysis.study.trial_components import fit_components
+from analysis.terrains.export import tabulate
+
+FOLDS = "analysis.study.crossval"
+
+
+@pytest.fixture
+def copy(tmp_path):
+    """The sources, copied to where they may be changed."""
+    for package in ("acquisition", "analysis", "wam", "ft_sensor"):
+        ignored = shutil.ignore_patterns("__pycache__")
+        shutil.copytree(ROOT / package, tmp_path / package, ignore=ignored)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    "formula",
+    ["gp/kernels.py", "gp/likelihood.py", "tustin/model.py", "data/prepare.py"],
+)
+def test_a_changed_formula_is_in_the_digest_of_the_folds(copy, formula):
+    before = code_digest(FOLDS)
+    path = copy / "analysis" / formula
+    path.write_text(path.read_text() + "\n")
+    assert code_digest(FOLDS, copy) != before
+
+
+def test_equal_sources_elsewhere_have_an_equal_digest(copy):
+    assert code_digest(FOLDS, copy) == code_digest(FOLDS)
+
+
+def test_what_a_fold_does_not_use_leaves_its_digest(copy):
+    for name in ("figures/style.py", "report/page.py", "stance/policies.py"):
+        path = copy / "analysis" / name
+        path.write_text(path.read_text() + "\n")
+    assert code_digest(FOLDS, copy) == code_digest(FOLDS)
+
+
+@pytest.mark.parametrize(
+    ("function", "used"),
+    [
+        (run_fold, "analysis.gp.regression"),
+        (fit_terrain, "analysis.tustin.model"),
+        (fit_components, "analysis.data.series"),
+        (run_relatives, "analysis.gp.hierarchy"),
+        (fit_planned, "analysis.breakaway.censored"),
+        (tabulate, "analysis.study.models"),
+        (judge, "analysis.foresight.signals"),
+        (report_figures, "analysis.figures.curves"),  # imported when drawn
+        (report_figures, "ft_sensor.payload"),  # through other modules
+    ],
+)
+def test_imports_are_followed_to_their_end(function, used):
+    assert {function.__module__, used} <= set(source_files(function.__module__))
