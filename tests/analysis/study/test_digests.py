@@ -1,6 +1,9 @@
 """A corrected formula never shows an old number: results are keyed by their code."""
 
 import shutil
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 
@@ -64,3 +67,50 @@ def test_what_a_fold_does_not_use_leaves_its_digest(copy):
 )
 def test_imports_are_followed_to_their_end(function, used):
     assert {function.__module__, used} <= set(source_files(function.__module__))
+
+
+PROGRAM = """
+import sys
+from pathlib import Path
+
+from analysis.data.prepare import PrepareOptions, prepare_trial
+from analysis.data.tables import load_tables
+from analysis.study.crossval import plan_folds, run_fold
+from analysis.study.jobs import run_tasks
+from analysis.study.models import FitOptions
+from analysis.study.store import ResultStore
+
+path, folder = map(Path, sys.argv[1:])
+series = load_tables([path])["TF"]
+trials = {"TF": [prepare_trial(one, PrepareOptions()) for one in series]}
+plan, _ = plan_folds(trials, FitOptions(models=("tustin",)))
+made = []
+store = ResultStore(folder)
+folds = run_tasks(
+    run_fold, plan, 1, lambda done, of: made.append(done), store
+)
+print(len(made), *(fold.models["tustin"].score.mae for fold in folds))
+"""
+
+
+def test_a_corrected_formula_is_fitted_anew(copy, tmp_path):
+    table = Path(__file__).parents[2] / "data" / "rehearsal_slice.npz"
+
+    def fitted():
+        command = [sys.executable, "-c", PROGRAM, str(table), str(tmp_path / "kept")]
+        done = subprocess.run(
+            command, cwd=copy, capture_output=True, text=True, check=True
+        )
+        made, *errors = done.stdout.split()
+        return int(made), errors
+
+    first, errors = fitted()
+    assert first == len(errors) > 1
+    assert fitted() == (1, errors)  # one word of progress: all of them are kept
+    path = copy / "analysis" / "tustin" / "model.py"
+    formula, right = path.read_text(), "stribeck_power(np.abs(v_t), p.v_s,"
+    assert right in formula
+    path.write_text(formula.replace(right, "stribeck_power(np.abs(v_t), 2 * p.v_s,"))
+    again, others = fitted()
+    assert again == first
+    assert others != errors
