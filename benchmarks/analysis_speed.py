@@ -20,12 +20,12 @@ from analysis.data.load import load_trial
 from analysis.data.prepare import PreparedTrial, PrepareOptions, prepare_trial
 from analysis.findings.held_trial import HeldTrial
 from analysis.study.crossval import run_fold
+from analysis.study.models import REPORTED
 from analysis.terrains.table import Table
 from benchmarks.fit import EVALUATION, chosen, load_rows, our_evaluation
 from benchmarks.rows import BenchRow
 from benchmarks.study_race import SLICE, folds_of
 from experiments.__main__ import main as traction
-from experiments.report.sessions import REPORTED
 
 _SECONDS = 30.0  # of a trial
 _HELD = 8  # trials that are held at once

@@ -26,10 +26,9 @@ from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.tables import load_tables
 from analysis.study.crossval import FoldPlan, plan_folds, run_fold
 from analysis.study.jobs import Workers, run_tasks
-from analysis.study.models import FitOptions
+from analysis.study.models import REPORTED, FitOptions
 from benchmarks.rows import BenchRow
 from benchmarks.study_race import SLICE
-from experiments.report.sessions import REPORTED
 
 FOLDS = 640  # 80 trials of each of 8 terrains
 LARGER = (8, 64)  # workers of the schedules

@@ -21,9 +21,9 @@ from pathlib import Path
 import numpy as np
 
 from acquisition.trial_file.reader import TrialReader
-from analysis.api import load_trial, prepare
 from analysis.data.events import Slip, find_slips
-from analysis.data.load import RecordedTrial
+from analysis.data.load import RecordedTrial, load_trial
+from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.figures.style import new_figure, render, styled
 from benchmarks.friction_text import MEASURED, page_text
 from experiments.settings.load import load_settings
@@ -144,7 +144,7 @@ def figures_of(folder: Path, share: float, compensated: str) -> SessionFigures:
     for path in paths:
         trial = load_trial(path)
         series = trial.series()
-        found = find_slips(prepare(series).smooth)
+        found = find_slips(prepare_trial(series, PrepareOptions()).smooth)
         slips += len(found)
         bounces += [bounce_of(trial, slip) for slip in found if slip.has_bounce]
         truth = TrialReader(path.with_name(f"{path.stem}.truth.mcap")).truth().data
@@ -161,7 +161,7 @@ def figures_of(folder: Path, share: float, compensated: str) -> SessionFigures:
 
 def bounce_of(trial: RecordedTrial, slip: Slip) -> Bounce:
     """Return how far the foot went back after a slip, and by which joint."""
-    v_t = prepare(trial.series()).smooth.v_t
+    v_t = prepare_trial(trial.series(), PrepareOptions()).smooth.v_t
     after = np.flatnonzero((trial.t >= slip.end) & (trial.t <= slip.end + _BOUNCE))
     lowest = int(after[np.argmin(v_t[after])])
     first = last = lowest

@@ -20,7 +20,7 @@ from analysis.gp.noise import ConstantNoise
 from analysis.gp.search import posterior_search
 from analysis.study.crossval import FoldTask
 from analysis.study.jobs import run_tasks
-from analysis.study.models import FITTERS, TUSTIN
+from analysis.study.models import PAPER_MODELS, TUSTIN
 from benchmarks.beside_sklearn import KERNELS
 from benchmarks.fit import SLICE, many_starts
 from benchmarks.study_race import FITS, folds_of, given
@@ -98,7 +98,9 @@ def climb(likelihood: Likelihood, start: Array, box: Array) -> float:
 def summary(found: Sequence[RawRecord]) -> list[str]:
     """Return what to print: shares, then every fit that missed the optimum."""
     processes = [one for one in found if one.model != TUSTIN]
-    groups = {name: [one for one in found if one.model == name] for name in FITTERS}
+    groups = {
+        name: [one for one in found if one.model == name] for name in PAPER_MODELS
+    }
     lines = [
         f"{name}: {sum(one.is_as_good for one in group)} of {len(group)} fits at the "
         f"best of {_STARTS} starts, {sum(one.evaluations for one in group)} evaluations"

@@ -18,7 +18,6 @@ html_title = "Traction"
 exclude_patterns = ["_build", "licences.md"]
 autodoc2_packages = [
     {"path": "../traction", "module": "traction"},
-    {"path": "../analysis/api.py", "module": "analysis.api"},
     {
         "path": "../analysis/terrains/database.py",
         "module": "analysis.terrains.database",

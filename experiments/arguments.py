@@ -195,6 +195,12 @@ def add_analysis(parser: ArgumentParser) -> None:
         help="bounds of the Tustin fit: mu, F_s, v_s, delta_s, b",
     )
     group.add_argument(
+        "--models",
+        metavar="NAME,..",
+        help="models to fit, with commas between: tustin, gp_se, gp_nn, gp_se_tustin, "
+        "gp_nn_tustin, gp_se_noise, gp_se_trial (all of these), gp_nn_trial, ...",
+    )
+    group.add_argument(
         "--what-if",
         action="append",
         default=[],

@@ -17,15 +17,16 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.api import GP_SE, FitOptions, fit_gp, prepare
 from analysis.breakaway.fitting import fit_break_away
 from analysis.breakaway.model import BreakAwayModel
 from analysis.breakaway.pushes import FootPush, find_pushes
 from analysis.breakaway.recorded import BreakAwayOptions
 from analysis.breakaway.survival import kaplan_meier, pit_distance
-from analysis.data.prepare import PreparedTrial
+from analysis.data.prepare import PreparedTrial, PrepareOptions, prepare_trial
+from analysis.data.samples import TrainingSet
 from analysis.data.tables import load_tables
 from analysis.data.terrain_kinds import groups_of, terrain_kind
+from analysis.study.models import GP_SE, FitOptions, ModelFitter
 
 REQUIRED = np.arange(2.0, 20.5, 1.0)  # N
 BINS = 10
@@ -89,7 +90,7 @@ def in_motion(trials: Trials, points: int) -> list[Predicted]:
         for name, of in without(trials, k).items():
             if k >= len(trials[name]):
                 continue
-            model = fit_gp(of, GP_SE, FitOptions(gp_points=points, seed=k))
+            model = ModelFitter(TrainingSet.of(of, points, k), FitOptions()).fit(GP_SE)
 
             def risk(required: np.ndarray, F_n: np.ndarray, gp=model) -> np.ndarray:
                 answer = gp.predict(F_n, np.full(F_n.size, SLOWEST))
@@ -159,7 +160,10 @@ def calibration_error(
 
 def load(path: Path) -> dict[str, list[PreparedTrial]]:
     tables = load_tables([path])
-    return {name: [prepare(series) for series in of] for name, of in tables.items()}
+    return {
+        name: [prepare_trial(s, PrepareOptions()) for s in of]
+        for name, of in tables.items()
+    }
 
 
 def kinds_of(trials: Trials) -> dict[str, str]:

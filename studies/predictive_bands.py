@@ -35,7 +35,7 @@ from analysis.study.skew import warped
 from experiments.session.store import list_sessions
 
 BEFORE, EFFECT, NEW = "noise chosen", "trial effect alone", "new trial"
-MODELS = (BEFORE, EFFECT, NEW)
+TITLES = (BEFORE, EFFECT, NEW)
 BANDS = (("coverage50", 0.50), ("coverage90", 0.90), ("coverage95", 0.95))
 MANY_ROWS = 900  # of a fit to the trials of other studies
 SAME_TOP = 1e-3  # of the log likelihood
@@ -213,7 +213,7 @@ def coverages(outcomes: Sequence[Outcome], model: str) -> str:
 def table(name: str, outcomes: Sequence[Outcome]) -> list[str]:
     """Return the lines of one group of folds."""
     lines = [f"{name}: {len(outcomes)} trials"]
-    for model in MODELS:
+    for model in TITLES:
         values = [
             f"{mean(outcomes, model, key):.3f}" for key in ("nlpd", "crps", "mae")
         ]
@@ -229,7 +229,7 @@ def table(name: str, outcomes: Sequence[Outcome]) -> list[str]:
     for terrain in dict.fromkeys(o.terrain for o in outcomes):
         own = [o for o in outcomes if o.terrain == terrain]
         errors = [mean(own, NEW, key) - nominal for key, nominal in BANDS]
-        nlpds = ", ".join(f"{mean(own, model, 'nlpd'):.3f}" for model in MODELS)
+        nlpds = ", ".join(f"{mean(own, model, 'nlpd'):.3f}" for model in TITLES)
         lines.append(
             f"  {terrain:4} NLPD {nlpds}  new trial off by "
             f"{'/'.join(f'{e:+.3f}' for e in errors)}"

@@ -9,11 +9,11 @@
     frame = session.to_pandas()             # units in frame.attrs["units"]
     model = tr.fit(session, "tustin")       # or a Gaussian process
     scores = tr.compare(session)            # one whole trial left out at a time
+    rest = tr.fit_break_away(tables)        # before a foot at rest slips
     known = tr.load_terrains("terrains.json")
 
 SI units throughout: forces in N, velocities in m/s; v_t and F_t are positive in
-ordinary slip, F_n in compression. `analysis.api` has the functions below these.
-Begin with `loading`, then `models`.
+ordinary slip, F_n in compression. Begin with `loading`, then `models`.
 """
 
 from importlib import import_module
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
         ModelScore,
         compare,
         fit,
+        fit_break_away,
         load_terrains,
     )
     from traction.trial_sets import TrialSet
@@ -45,6 +46,7 @@ _MODULES = {
     "TrialSet": "trial_sets",
     "compare": "models",
     "fit": "models",
+    "fit_break_away": "models",
     "load_session": "loading",
     "load_tables": "loading",
     "load_terrains": "models",
@@ -60,6 +62,7 @@ __all__ = [
     "check_packages",
     "compare",
     "fit",
+    "fit_break_away",
     "load_session",
     "load_tables",
     "load_terrains",

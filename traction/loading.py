@@ -4,7 +4,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from acquisition.errors import SessionError, SettingsError
-from analysis import api
+from analysis.data.load import load_trial as recorded_trial
+from analysis.data.tables import load_tables as tables_by_terrain
 from experiments.session.kept_files import check_kept
 from experiments.session.store import find_session
 from traction.trial_sets import TrialSet
@@ -40,7 +41,7 @@ def load_session(
     paths = folder.kept_trials()
     if not paths:
         raise SessionError(f"{folder.id}: no kept trials in {folder.path}.")
-    return TrialSet(folder.id, tuple(trial_of(api.load_trial(path)) for path in paths))
+    return TrialSet(folder.id, tuple(trial_of(recorded_trial(path)) for path in paths))
 
 
 def load_trial(path: Path | str) -> Trial:
@@ -61,7 +62,7 @@ def load_trial(path: Path | str) -> Trial:
     """
     path = Path(path)
     if path.suffix == _RECORDED:
-        return trial_of(api.load_trial(path))
+        return trial_of(recorded_trial(path))
     trials = load_tables(path)
     if len(trials) != 1:
         raise SettingsError(
@@ -96,6 +97,6 @@ def load_tables(
     """
     many = [paths] if isinstance(paths, str | Path) else list(paths)
     files = [Path(path) for path in many]
-    tables = api.load_tables(files, columns, terrain, None, units, rate)
+    tables = tables_by_terrain(files, columns, terrain, None, units, rate)
     name = files[0].name if len(files) == 1 else f"{len(files)} files"
     return TrialSet(name, tuple(trial_of(s) for of in tables.values() for s in of))

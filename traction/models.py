@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,12 +11,27 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from acquisition.errors import SettingsError
-from analysis import api
-from analysis.study.crossval import FoldResult
+from analysis.breakaway.fitting import fit_break_away as fit_of_terrains
+from analysis.breakaway.model import BreakAwayModel
+from analysis.breakaway.recorded import BreakAwayOptions
+from analysis.data.samples import TrainingSet
+from analysis.data.terrain_kinds import terrain_kind
+from analysis.study.crossval import FoldResult, plan_folds, run_fold
 from analysis.study.distribution import Distribution
+from analysis.study.jobs import run_tasks
 from analysis.study.metrics import standard_error
-from analysis.study.models import TITLES
+from analysis.study.models import (
+    GP_SE,
+    PAPER_MODELS,
+    TITLES,
+    TUSTIN,
+    FitOptions,
+    FittedModel,
+    ModelFitter,
+)
 from analysis.study.terrain_fit import mean_of
+from analysis.terrains.database import load
+from analysis.terrains.known import TerrainDatabase
 from analysis.tustin.model import UNITS
 from traction.frames import data_frame
 from traction.trial_sets import by_terrain
@@ -52,11 +67,11 @@ class Model:
     terrain: str
     trials: int
     samples: int
-    fitted: api.FittedModel
+    fitted: FittedModel
 
     def __repr__(self) -> str:
         values = ""
-        if self.name == api.TUSTIN:
+        if self.name == TUSTIN:
             parts = (f"{key} {self.parameters[key]:.3g} {UNITS[key]}" for key in UNITS)
             values = ": " + ", ".join(part.removesuffix(" 1") for part in parts)
         doubts = f" [{', '.join(self.flags)}]" if self.flags else ""
@@ -184,8 +199,8 @@ class Comparison:
 
 def fit(
     trials: Trial | Iterable[Trial],
-    model: str = api.GP_SE,
-    options: api.FitOptions | None = None,
+    model: str = GP_SE,
+    options: FitOptions | None = None,
 ) -> Model:
     """Return a model fitted to the kept samples of trials on one terrain.
 
@@ -197,7 +212,7 @@ def fit(
         trials: of one terrain, e.g. a session or `tables.on("S0")`.
         model: "tustin", "gp_se", "gp_nn", "gp_se_tustin", "gp_nn_tustin",
             "gp_se_noise", or "gp_se_trial" whose bands hold for a trial to come.
-        options: bounds, points and seed; see `analysis.api.FitOptions`.
+        options: bounds, points and seed; see `FitOptions`.
 
     Raises:
         SettingsError: there is no such model, the trials are of several terrains, or
@@ -211,18 +226,17 @@ def fit(
             hint='Choose one, e.g. trials.on("S0").',
         )
     ((terrain, prepared),) = groups.items()
-    if model == api.TUSTIN:
-        fitted: api.FittedModel = api.fit_tustin(prepared, options)
-    else:
-        fitted = api.fit_gp(prepared, model, options)
+    options = options or FitOptions()
+    training = TrainingSet.of(prepared, options.gp_points, options.seed)
+    fitted = ModelFitter(training, options).fit(model)
     samples = sum(trial.kept for trial in prepared)
     return Model(model, terrain, len(prepared), samples, fitted)
 
 
 def compare(
     trials: Iterable[Trial],
-    models: Sequence[str] = tuple(api.FITTERS),
-    options: api.FitOptions | None = None,
+    models: Sequence[str] = PAPER_MODELS,
+    options: FitOptions | None = None,
     n_jobs: int | None = None,
 ) -> Comparison:
     """Return how well models predict whole trials that they were not fitted to.
@@ -252,13 +266,34 @@ def compare(
             f"No trial can be left out on {', '.join(single) or 'no terrain'}.",
             hint="Give two trials of each terrain at least.",
         )
-    wanted = replace(options or api.FitOptions(), models=tuple(models))
-    folds = tuple(api.crossvalidate(groups, wanted, n_jobs))
+    wanted = replace(options or FitOptions(), models=tuple(models))
+    plan, _ = plan_folds(groups, wanted)
+    folds = tuple(run_tasks(run_fold, plan, n_jobs))
     scores = [s for terrain in groups for s in _scores(terrain, folds, wanted.models)]
     return Comparison(tuple(scores), folds)
 
 
-def load_terrains(path: Path | str) -> api.TerrainDatabase:
+def fit_break_away(
+    trials: Iterable[Trial],
+    kinds: Mapping[str, str] | None = None,
+    options: BreakAwayOptions | None = None,
+) -> dict[str, BreakAwayModel]:
+    """Return what every terrain of three trials or more gives before a foot slips.
+
+    `model.slip_risk(required, F_n)` and `model.available(F_n, risk)` answer for a push
+    from rest.
+
+    Args:
+        trials: of one terrain or several; stones share what they have in common.
+        kinds: "small", "big" or "flat" by terrain; by default the paper's, by name.
+        options: velocity that makes a slip, and number of resampled fits.
+    """
+    groups = by_terrain(trials)
+    known = {name: terrain_kind(name) for name in groups} | dict(kinds or {})
+    return fit_of_terrains(groups, known, options)
+
+
+def load_terrains(path: Path | str) -> TerrainDatabase:
     """Return the terrain database that `traction export --terrain-db` wrote.
 
     `known.terrain("S0").predict(F_n=3.5, v_t=0.05)` is the traction to expect [N],
@@ -268,7 +303,7 @@ def load_terrains(path: Path | str) -> api.TerrainDatabase:
     Raises:
         SettingsError: the file cannot be read or is none.
     """
-    return api.load_terrains(path)
+    return load(path)
 
 
 def _scores(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from acquisition.errors import SettingsError
-from analysis import api
+from analysis.data.prepare import PreparedTrial
 from analysis.data.terrain_kinds import terrain_kind
 from experiments.report.quantities import KEPT
 from experiments.report.table_columns import columns_of
@@ -139,9 +139,9 @@ class TrialSet(Sequence[Trial]):
         )
 
 
-def by_terrain(trials: Iterable[Trial]) -> dict[str, list[api.PreparedTrial]]:
+def by_terrain(trials: Iterable[Trial]) -> dict[str, list[PreparedTrial]]:
     """Return the kept samples of trials by terrain."""
-    groups: dict[str, list[api.PreparedTrial]] = {}
+    groups: dict[str, list[PreparedTrial]] = {}
     for trial in trials:
         groups.setdefault(trial.terrain, []).append(trial.kept)
     return groups

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from analysis import api
-from analysis.data.prepare import prepare_trial
-from analysis.data.series import Array
+from analysis.data.load import RecordedTrial
+from analysis.data.prepare import PreparedTrial, PrepareOptions, prepare_trial
+from analysis.data.series import Array, TractionSeries
 from experiments.report.quantities import KEPT, QUANTITIES
 from experiments.report.table_columns import TableColumn, columns_of
 from traction.frames import data_frame
@@ -30,9 +30,9 @@ class Trial:
         recorded: joints, wrench and sole as recorded; None for a table.
     """
 
-    series: api.TractionSeries
-    kept: api.PreparedTrial
-    recorded: api.RecordedTrial | None = None
+    series: TractionSeries
+    kept: PreparedTrial
+    recorded: RecordedTrial | None = None
 
     def __repr__(self) -> str:
         kind = ", simulated" if self.is_simulated else ""
@@ -130,10 +130,10 @@ class Trial:
         ]
 
 
-def trial_of(source: api.RecordedTrial | api.TractionSeries) -> Trial:
+def trial_of(source: RecordedTrial | TractionSeries) -> Trial:
     """Return a recording or a series as a trial, prepared by the default rule."""
-    if isinstance(source, api.TractionSeries):
-        return Trial(source, prepare_trial(source, api.PrepareOptions()))
-    options = api.PrepareOptions(container_travel=source.frame.travel)
+    if isinstance(source, TractionSeries):
+        return Trial(source, prepare_trial(source, PrepareOptions()))
+    options = PrepareOptions(container_travel=source.frame.travel)
     series = source.series()
     return Trial(series, prepare_trial(series, options), source)

@@ -119,6 +119,16 @@ class TrainingSet:
     lengths: tuple[int, ...]
     chosen: Indices
 
+    @classmethod
+    def of(
+        cls, trials: Sequence[PreparedTrial], points: int, seed: int
+    ) -> "TrainingSet":
+        """Return all kept samples of `trials`, `points` of them chosen at random."""
+        rows = SampleTable.of(trials)
+        rng = np.random.default_rng(seed)
+        chosen = rng.choice(rows.count, min(points, rows.count), replace=False)
+        return cls(rows, tuple(trial.kept for trial in trials), chosen)
+
     @property
     def subset(self) -> SampleTable:
         """Return the chosen rows."""

@@ -20,7 +20,7 @@ from analysis.figures.style import (
     terrain_colours,
 )
 from analysis.findings.findings import StudyResults
-from analysis.study.models import FITTERS, GP_SE, TITLES, TUSTIN
+from analysis.study.models import GP_SE, TITLES, TUSTIN, compared
 from analysis.study.study import Study
 from analysis.study.terrain_fit import TerrainResult
 
@@ -32,16 +32,17 @@ _MAP_COLUMNS = 2  # heat maps side by side
 def draw_errors(results: StudyResults) -> Figure | None:
     """Return Fig. 9: error per terrain and model, standard error over the folds."""
     terrains = [r for r in results.study.terrains.values() if r.folds]
-    if not terrains:
+    if not terrains or not _models_of(results.study):
         return None
+    models = _models_of(results.study)
     is_narrow = len(terrains) <= _MOST_NARROW
     figure = new_figure(3.1, ONE_COLUMN if is_narrow else WIDTH)
     ax = figure.subplots()
-    width = 0.8 / len(FITTERS)
-    for k, model in enumerate(FITTERS):
+    width = 0.8 / len(models)
+    for k, model in enumerate(models):
         folds = [[e for e in r.maes(model) if e is not None] for r in terrains]
         ax.bar(
-            np.arange(len(terrains)) + (k - (len(FITTERS) - 1) / 2) * width,
+            np.arange(len(terrains)) + (k - (len(models) - 1) / 2) * width,
             [float(np.mean(errors)) if errors else 0.0 for errors in folds],
             width * 0.92,
             yerr=[_standard_error(errors) for errors in folds],
@@ -75,7 +76,7 @@ def caption_errors(results: StudyResults) -> str:
     errors = {
         (name, model): mae
         for name, result in study.terrains.items()
-        for model in FITTERS
+        for model in _models_of(study)
         if (mae := result.mae(model)) is not None
     }
     if not errors:
@@ -101,11 +102,12 @@ def draw_cross_bars(results: StudyResults) -> Figure | None:
     study = results.study
     if not 2 <= len(study.terrains) <= _MOST_BARS or not _has_models(study):
         return None
-    figure = new_figure(2.1 * len(FITTERS) + 0.5)
-    axes = figure.subplots(len(FITTERS), 1, sharex=True, sharey=True, squeeze=False)
+    models = _models_of(study)
+    figure = new_figure(2.1 * len(models) + 0.5)
+    axes = figure.subplots(len(models), 1, sharex=True, sharey=True, squeeze=False)
     tested = list(study.terrains)
     colours = terrain_colours(study.kinds)
-    for ax, model in zip(axes[:, 0], FITTERS, strict=True):
+    for ax, model in zip(axes[:, 0], models, strict=True):
         cross, spread = study.cross(model), study.cross_errors(model)
         width = 0.84 / max(len(cross), 1)
         for k, (terrain, errors) in enumerate(cross.items()):
@@ -144,7 +146,7 @@ def caption_cross(results: StudyResults) -> str:
     study = results.study
     values = [
         f"{TITLES[model]}: {_describe_ratios(study, model)}"
-        for model in FITTERS
+        for model in _models_of(study)
         if study.cross(model)
     ]
     return (
@@ -159,13 +161,13 @@ def draw_cross_map(results: StudyResults) -> Figure | None:
     if len(study.terrains) < 2 or not _has_models(study):
         return None
     tested = list(study.terrains)
-    side, rows = WIDTH / _MAP_COLUMNS, -(-len(FITTERS) // _MAP_COLUMNS)
+    tables = {model: study.cross(model) for model in _models_of(study)}
+    side, rows = WIDTH / _MAP_COLUMNS, -(-len(tables) // _MAP_COLUMNS)
     figure = new_figure(rows * (side + 0.2))
     grid = figure.subplots(rows, _MAP_COLUMNS, squeeze=False)
-    axes = grid.ravel()[: len(FITTERS)]
-    for spare in grid.ravel()[len(FITTERS) :]:
+    axes = grid.ravel()[: len(tables)]
+    for spare in grid.ravel()[len(tables) :]:
         spare.remove()
-    tables = {model: study.cross(model) for model in FITTERS}
     values = [e for c in tables.values() for row in c.values() for e in row.values()]
     top = max(value for value in values if value is not None)
     for ax, (model, cross) in zip(axes, tables.items(), strict=True):
@@ -210,8 +212,12 @@ def _draw_map(
     ax.set_yticks(np.arange(len(cross)) + 0.5, [plain(name) for name in cross])
 
 
+def _models_of(study: Study) -> tuple[str, ...]:
+    return compared(study.options.fit.models)
+
+
 def _has_models(study: Study) -> bool:
-    return any(study.cross(model) for model in FITTERS)
+    return any(study.cross(model) for model in _models_of(study))
 
 
 def _standard_error(errors: list[float]) -> float:

@@ -16,7 +16,7 @@ from analysis.findings.paper_measures import (
 )
 from analysis.findings.trends import explained_share, held_out_residual
 from analysis.study.metrics import PairedComparison, compare, standard_error
-from analysis.study.models import FITTERS, GP_NN, GP_SE, TUSTIN
+from analysis.study.models import GP_NN, GP_SE, PAPER_MODELS, TUSTIN
 from analysis.study.terrain_fit import TerrainResult, mean_of
 from analysis.terrains.identify import KEPT_PER_SECOND
 from analysis.tustin.model import NO_STRIBECK, NOT_IDENTIFIABLE
@@ -109,7 +109,7 @@ def largest_gap(results: Sequence[TerrainResult]) -> float | None:
     gaps = [
         max(errors) / min(errors) - 1.0
         for result in results
-        if len(errors := [e for m in FITTERS if (e := result.mae(m))]) > 1
+        if len(errors := [e for m in PAPER_MODELS if (e := result.mae(m))]) > 1
     ]
     return max(gaps) if gaps else None
 

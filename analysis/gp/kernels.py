@@ -30,6 +30,9 @@ _STRETCHES = (0.1, 0.35, 1.0, 3.5)  # l / sd(x) that a search may start with
 _MOVES = (-2.5, -1.2, 1.2, 2.5, 10.0)  # of log l, to another top; the last: not used
 
 
+KERNELS: dict[str, type] = {}  # by name: results that are kept name their kernel
+
+
 class Kernel(Protocol):
     """A covariance function with hyperparameters theta, natural logarithms."""
 
@@ -71,9 +74,13 @@ class Kernel(Protocol):
 
 
 class Composable:
-    """Gives a kernel its matrix, `+` and `*`."""
+    """Gives a kernel its matrix, `+` and `*`, and a place among the `KERNELS`."""
 
     __slots__ = ()
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        KERNELS[cls.__name__] = cls
 
     def matrix(self: Kernel, theta: Array, X: Array, X_other: Array) -> Array:
         """Return the covariances of the rows of X (n, d) and X_other (m, d): (n, m)."""

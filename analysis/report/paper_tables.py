@@ -10,7 +10,7 @@ from analysis.findings.trends import traction_ratio
 from analysis.report.page_model import ReportTable
 from analysis.study.fits import flag_counts, tustin_medians
 from analysis.study.metrics import standard_error
-from analysis.study.models import FITTERS, TITLES, TUSTIN
+from analysis.study.models import TITLES, TUSTIN, compared
 from analysis.study.study import Study
 from analysis.study.terrain_fit import PooledTustinFit, TerrainResult, mean_of
 from analysis.tustin.identifiability import Interval
@@ -39,6 +39,7 @@ PAPER = {
 
 def summary(study: Study) -> ReportTable:
     """Return one line per terrain: how much was recorded, how well it is predicted."""
+    models = compared(study.options.fit.models)
     return ReportTable(
         name="Samples and errors",
         header=(
@@ -47,11 +48,11 @@ def summary(study: Study) -> ReportTable:
             "kept samples",
             "slips",
             "F_t/F_n",
-            *(f"{TITLES[model]} MAE [N]" for model in FITTERS),
+            *(f"{TITLES[model]} MAE [N]" for model in models),
             "constant MAE [N]",
             "F_n ≤ 0",
         ),
-        rows=[_summary_row(result) for result in study.terrains.values()],
+        rows=[_summary_row(result, models) for result in study.terrains.values()],
         note="F_t/F_n: ratio of the means of a trial, mean of the trials ± their "
         "standard deviation. MAE: mean absolute error on trials that were left out of "
         "the fit, mean over trials ± its standard error. Constant: always the median "
@@ -91,10 +92,11 @@ def verdicts(study: Study) -> list[str]:
 
     Without errors of a model and of the constant nothing is said.
     """
+    models = compared(study.options.fit.models)
     return [
         f"{name}: F_t/F_n {traction_ratio(result)}; {verdict} ({numbers})."
         for name, result in study.terrains.items()
-        for verdict, numbers in _verdict(result)
+        for verdict, numbers in _verdict(result, models)
     ]
 
 
@@ -199,22 +201,22 @@ def _statement_row(claim: PaperClaim) -> tuple[str, ...]:
     return claim.place, claim.statement, claim.shown, claim.agreement.value
 
 
-def _summary_row(result: TerrainResult) -> list[str]:
+def _summary_row(result: TerrainResult, models: Sequence[str]) -> list[str]:
     return [
         result.terrain,
         str(len(result.trials)),
         str(result.kept),
         str(sum(map(len, result.slips))),
         traction_ratio(result),
-        *(with_error(result.maes(model)) for model in FITTERS),
+        *(with_error(result.maes(model)) for model in models),
         with_error([result.constant_mae]),
         f"{result.lifted_share:.1%}",
     ]
 
 
-def _verdict(result: TerrainResult) -> Iterator[tuple[str, str]]:
+def _verdict(result: TerrainResult, models: Sequence[str]) -> Iterator[tuple[str, str]]:
     """Yield what the best model is worth, and the errors that say so, if any do."""
-    errors = {m: mae for m in FITTERS if (mae := result.mae(m)) is not None}
+    errors = {m: mae for m in models if (mae := result.mae(m)) is not None}
     constant = result.constant_mae
     if not errors or not constant:
         return

@@ -11,7 +11,13 @@ from analysis.data.inertia import WINDOW
 from analysis.data.load import Frame, RecordedTrial
 from analysis.data.prepare import PrepareOptions
 from analysis.data.series import TractionSeries
-from analysis.study.models import FITTERS, GP_NN, GP_NN_TUSTIN, GP_SE_TUSTIN, TUSTIN
+from analysis.study.models import (
+    GP_NN,
+    GP_NN_TUSTIN,
+    GP_SE_TUSTIN,
+    PAPER_MODELS,
+    TUSTIN,
+)
 from analysis.study.study import StudyOptions
 from analysis.tustin.model import TustinForm
 
@@ -161,21 +167,21 @@ def _of_samples(
         target = options.target or options.prepare
         return replace(options, prepare=prepare(options.prepare), target=target)
 
-    return StudyVariant(key, value, tuple(FITTERS), change)
+    return StudyVariant(key, value, PAPER_MODELS, change)
 
 
 def _lag(value: str) -> StudyVariant:
     late_ms = float(value)
     if not abs(late_ms) <= _LATEST_MS:
         raise ValueError(value)
-    return StudyVariant("lag", value, tuple(FITTERS), lag=late_ms * 1e-3)
+    return StudyVariant("lag", value, PAPER_MODELS, lag=late_ms * 1e-3)
 
 
 def _frame(value: str) -> StudyVariant:
     frames: Mapping[str, Frame] = {"sole": "sole", "terrain": "terrain"}
     if value not in frames:
         raise ValueError(value)
-    return StudyVariant("frame", value, tuple(FITTERS), frame=frames[value])
+    return StudyVariant("frame", value, PAPER_MODELS, frame=frames[value])
 
 
 def _drift(value: str) -> StudyVariant:
@@ -183,14 +189,14 @@ def _drift(value: str) -> StudyVariant:
     return StudyVariant(
         "drift",
         value,
-        tuple(FITTERS),
+        PAPER_MODELS,
         is_interpolated=is_interpolated,
     )
 
 
 def _inertia(value: str) -> StudyVariant:
     is_massless = _one_of(value, "removed", "kept")
-    return StudyVariant("inertia", value, tuple(FITTERS), is_massless=is_massless)
+    return StudyVariant("inertia", value, PAPER_MODELS, is_massless=is_massless)
 
 
 def _kernel(value: str) -> StudyVariant:

@@ -4,7 +4,7 @@ The five of Fig. 9 are the default; others go beyond the paper: a Gaussian proce
 noise is chosen per fold, and processes whose bands are those of a new trial.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Protocol
 
@@ -34,21 +34,8 @@ GP_SE_TRIAL = "gp_se_trial"
 GP_NN_TRIAL = "gp_nn_trial"
 GP_SE_TUSTIN_TRIAL = "gp_se_tustin_trial"
 GP_NN_TUSTIN_TRIAL = "gp_nn_tustin_trial"
-NEW_TRIAL = frozenset(
-    {GP_SE_TRIAL, GP_NN_TRIAL, GP_SE_TUSTIN_TRIAL, GP_NN_TUSTIN_TRIAL}
-)
-TITLES = {
-    TUSTIN: "Tustin",
-    GP_SE: "GP (SE)",
-    GP_NN: "GP (NN)",
-    GP_SE_TUSTIN: "GP (SE, Tustin mean)",
-    GP_NN_TUSTIN: "GP (NN, Tustin mean)",
-    GP_SE_NOISE: "GP (SE, noise chosen)",
-    GP_SE_TRIAL: "GP (SE, new trial)",
-    GP_NN_TRIAL: "GP (NN, new trial)",
-    GP_SE_TUSTIN_TRIAL: "GP (SE, Tustin mean, new trial)",
-    GP_NN_TUSTIN_TRIAL: "GP (NN, Tustin mean, new trial)",
-}
+PAPER_MODELS = (TUSTIN, GP_SE, GP_NN, GP_SE_TUSTIN, GP_NN_TUSTIN)  # Fig. 9
+REPORTED = (*PAPER_MODELS, GP_SE_NOISE, GP_SE_TRIAL)  # by default
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,19 +61,19 @@ class FitOptions:
     bounds: TustinBounds = field(default_factory=TustinBounds)
     gp_points: int = 300
     seed: int = 0
-    models: tuple[str, ...] = (TUSTIN, GP_SE, GP_NN, GP_SE_TUSTIN, GP_NN_TUSTIN)
+    models: tuple[str, ...] = PAPER_MODELS
     form: TustinForm = field(default_factory=TustinForm)
     is_nn_as_printed: bool = False
     draws: int = 200
     effect: str = LEVEL
 
     def __post_init__(self) -> None:
-        unknown = [name for name in self.models if name not in TITLES]
+        unknown = [name for name in self.models if name not in MODELS]
         if unknown or self.gp_points < 1:
             raise SettingsError(
                 f"No study of {', '.join(unknown) or 'the models'} with "
                 f"{self.gp_points} points.",
-                hint=f"The models are {', '.join(TITLES)}; give at least one point.",
+                hint=f"The models are {', '.join(MODELS)}; give at least one point.",
             )
         if self.effect not in EFFECTS:
             raise SettingsError(
@@ -217,13 +204,12 @@ class ModelFitter:
         Raises:
             SettingsError: no such model, or rows that it cannot be fitted to.
         """
-        fit = FITTERS.get(name) or BEYOND.get(name)
-        if fit is None:
+        if name not in MODELS:
             raise SettingsError(
                 f"There is no model {name!r}.",
-                hint=f"The models are {', '.join(TITLES)}.",
+                hint=f"The models are {', '.join(MODELS)}.",
             )
-        return fit(self)
+        return MODELS[name].fit(self)
 
     def gp(self, kernel: Kernel) -> GpModel:
         """Return a Gaussian process with constant noise on the chosen rows."""
@@ -269,25 +255,85 @@ class ModelFitter:
         return Arcsine(as_printed=self.options.is_nn_as_printed)
 
 
-Fitter = Callable[[ModelFitter], FittedModel]
+@dataclass(frozen=True, slots=True)
+class ModelKind:
+    """A model that a study knows by name.
 
-# the five of Fig. 9, in its order
-FITTERS: Mapping[str, Fitter] = {
-    TUSTIN: lambda fitter: TustinModel(fitter.curve()),
-    GP_SE: lambda fitter: fitter.gp(SquaredExponential()),
-    GP_NN: lambda fitter: fitter.gp(fitter.nn_kernel),
-    GP_SE_TUSTIN: lambda fitter: fitter.gp_around_tustin(SquaredExponential()),
-    GP_NN_TUSTIN: lambda fitter: fitter.gp_around_tustin(fitter.nn_kernel),
-}
-# beyond the paper, where FitOptions.models asks for them
-BEYOND: Mapping[str, Fitter] = {
-    GP_SE_NOISE: ModelFitter.gp_with_chosen_noise,
-    GP_SE_TRIAL: lambda fitter: fitter.new_trial(SquaredExponential()),
-    GP_NN_TRIAL: lambda fitter: fitter.new_trial(fitter.nn_kernel),
-    GP_SE_TUSTIN_TRIAL: lambda fitter: fitter.new_trial(
-        SquaredExponential(), is_around_tustin=True
+    Attributes:
+        title: as figures and tables show it.
+        fit: fits it to the training rows of a `ModelFitter`.
+        is_compared: tables and figures have it beside the others; not what has its own.
+        is_of_new_trial: its bands are those of a trial to come.
+    """
+
+    title: str
+    fit: Callable[[ModelFitter], FittedModel]
+    is_compared: bool = True
+    is_of_new_trial: bool = False
+
+
+# Everything that goes by a model follows from its line here: titles, choices of the
+# commands, cross-validation, tables, figures and the results that are kept.
+MODELS: Mapping[str, ModelKind] = {
+    TUSTIN: ModelKind("Tustin", lambda fitter: TustinModel(fitter.curve())),
+    GP_SE: ModelKind("GP (SE)", lambda fitter: fitter.gp(SquaredExponential())),
+    GP_NN: ModelKind("GP (NN)", lambda fitter: fitter.gp(fitter.nn_kernel)),
+    GP_SE_TUSTIN: ModelKind(
+        "GP (SE, Tustin mean)",
+        lambda fitter: fitter.gp_around_tustin(SquaredExponential()),
     ),
-    GP_NN_TUSTIN_TRIAL: lambda fitter: fitter.new_trial(
-        fitter.nn_kernel, is_around_tustin=True
+    GP_NN_TUSTIN: ModelKind(
+        "GP (NN, Tustin mean)", lambda fitter: fitter.gp_around_tustin(fitter.nn_kernel)
+    ),
+    GP_SE_NOISE: ModelKind(
+        "GP (SE, noise chosen)", ModelFitter.gp_with_chosen_noise, is_compared=False
+    ),
+    GP_SE_TRIAL: ModelKind(
+        "GP (SE, new trial)",
+        lambda fitter: fitter.new_trial(SquaredExponential()),
+        is_compared=False,
+        is_of_new_trial=True,
+    ),
+    GP_NN_TRIAL: ModelKind(
+        "GP (NN, new trial)",
+        lambda fitter: fitter.new_trial(fitter.nn_kernel),
+        is_compared=False,
+        is_of_new_trial=True,
+    ),
+    GP_SE_TUSTIN_TRIAL: ModelKind(
+        "GP (SE, Tustin mean, new trial)",
+        lambda fitter: fitter.new_trial(SquaredExponential(), is_around_tustin=True),
+        is_compared=False,
+        is_of_new_trial=True,
+    ),
+    GP_NN_TUSTIN_TRIAL: ModelKind(
+        "GP (NN, Tustin mean, new trial)",
+        lambda fitter: fitter.new_trial(fitter.nn_kernel, is_around_tustin=True),
+        is_compared=False,
+        is_of_new_trial=True,
     ),
 }
+TITLES = {name: kind.title for name, kind in MODELS.items()}
+NEW_TRIAL = frozenset(name for name, kind in MODELS.items() if kind.is_of_new_trial)
+
+
+def compared(models: Sequence[str]) -> tuple[str, ...]:
+    """Return those of `models` that tables and figures have beside each other."""
+    return tuple(name for name in models if MODELS[name].is_compared)
+
+
+def parse_models(text: str) -> tuple[str, ...]:
+    """Return the models of "tustin,gp_se".
+
+    Raises:
+        SettingsError: there is no such model, or one is named twice.
+    """
+    names = tuple(name.strip() for name in text.split(",") if name.strip())
+    unknown = [name for name in names if name not in MODELS]
+    if unknown or not names or len(set(names)) < len(names):
+        what = f"no model {', '.join(unknown)}" if unknown else "no list of models"
+        raise SettingsError(
+            f"--models {text}: {what}.",
+            hint=f"Name each once, with commas between: {', '.join(MODELS)}.",
+        )
+    return names

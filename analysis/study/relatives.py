@@ -248,6 +248,3 @@ def _scores(
 def _every(tables: Sequence[SampleTable]) -> tuple[SampleTable, ...]:
     """Return every fifth row of tables."""
     return tuple(t.take(np.arange(0, t.count, _THIN)) for t in tables)
-
-
-STORED = (Dissipation, Ground, TerrainRows, RelativesOutcome, RelativesTask)

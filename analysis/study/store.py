@@ -33,20 +33,22 @@ from acquisition.errors import SettingsError
 from analysis.breakaway.censored import Family
 from analysis.breakaway.model import BreakAwayModel, PushLaw
 from analysis.data.samples import SampleTable
-from analysis.gp import kernels, noise, trial_noise
-from analysis.gp.arcsine import Arcsine
+from analysis.gp import noise, trial_noise
 from analysis.gp.ascent import Start
+from analysis.gp.ground import Ground
+from analysis.gp.kernels import KERNELS
 from analysis.gp.regression import GaussianProcess
-from analysis.study.crossval import FoldResult, FoldTask, ModelFold
+from analysis.study.all_ground import Dissipation, TerrainRows
+from analysis.study.crossval import FoldResult, ModelFold
 from analysis.study.digests import code_digest, value_digest
 from analysis.study.metrics import Score
-from analysis.study.models import FitOptions, GpModel, TustinModel
+from analysis.study.models import GpModel, TustinModel
 from analysis.study.new_trial import FamilyChoice, NewTrialModel
 from analysis.study.noise_selection import NoiseChoice, TailedNoise
-from analysis.study.relatives import STORED
+from analysis.study.relatives import RelativesOutcome
 from analysis.study.skew import ShapeMap
-from analysis.study.terrain_fit import PooledTustinFit, TerrainTask
-from analysis.study.trial_components import ComponentsTask, TimedRows, TrialComponents
+from analysis.study.terrain_fit import PooledTustinFit
+from analysis.study.trial_components import TrialComponents
 from analysis.tustin import model as tustin
 from analysis.tustin.identifiability import Interval, Profiles
 
@@ -58,29 +60,41 @@ MOST_BYTES = 256 * 1024**2  # of all results; a fold of a study has about 60 kB
 LARGEST = 16 * 1024**2  # bytes of one result; a larger file is none
 _KEPT = 0.9  # share of the size that is left when results go
 
-TYPES = {
+TYPES = KERNELS | {
     kind.__name__: kind
     for kind in (
-        *(Arcsine, ComponentsTask),
-        *(FamilyChoice, FitOptions),
-        *(FoldResult, FoldTask),
-        *(GaussianProcess, GpModel),
-        *(Interval, ModelFold),
-        *(NewTrialModel, NoiseChoice),
+        BreakAwayModel,
+        Dissipation,
+        Family,
+        FamilyChoice,
+        FoldResult,
+        GaussianProcess,
+        GpModel,
+        Ground,
+        Interval,
+        ModelFold,
+        NewTrialModel,
+        NoiseChoice,
+        PooledTustinFit,
         Profiles,
-        *(SampleTable, Score),
-        *(ShapeMap, Start),
+        PushLaw,
+        RelativesOutcome,
+        SampleTable,
+        Score,
+        ShapeMap,
+        Start,
         TailedNoise,
-        *(TimedRows, TrialComponents),
-        *(PooledTustinFit, TerrainTask),
+        TerrainRows,
+        TrialComponents,
         TustinModel,
-        *(kernels.Product, kernels.SquaredExponential, kernels.Sum),
-        *(noise.ConstantNoise, noise.LogLinearNoise),
-        *(trial_noise.TrialNoise, trial_noise.TrialRows),
-        *STORED,
-        *(BreakAwayModel, Family, PushLaw),
-        *(tustin.TustinBounds, tustin.TustinFit),
-        *(tustin.TustinForm, tustin.TustinParameters),
+        noise.ConstantNoise,
+        noise.LogLinearNoise,
+        trial_noise.TrialNoise,
+        trial_noise.TrialRows,
+        tustin.TustinBounds,
+        tustin.TustinFit,
+        tustin.TustinForm,
+        tustin.TustinParameters,
     )
 }
 

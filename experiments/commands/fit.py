@@ -74,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
     from experiments.operator.console import Console
     from experiments.report.choices import analysis_choices, repeat_study
     from experiments.report.progress import fitting
-    from experiments.report.sessions import REPORTED, require_samples
+    from experiments.report.sessions import require_samples
     from experiments.session.store import iso_utc
 
     console = Console(color=not args.no_color)
@@ -85,7 +85,7 @@ def run(args: argparse.Namespace) -> int:
     is_simulated = _is_simulated(trials)
     count = sum(len(series) for series in trials.values())
     console.say(f"{count} trials on {len(trials)} terrains: fitting ...")
-    fit = FitOptions(bounds=choices.bounds, seed=args.seed, models=REPORTED)
+    fit = FitOptions(bounds=choices.bounds, seed=args.seed, models=choices.models)
     options = StudyOptions(choices.prepare, fit=fit, scheduler=args.scheduler)
     with fitting(console) as progress:
         study = run_study(trials, options, is_simulated, progress)

@@ -11,6 +11,7 @@ from analysis.data.load import RecordedTrial
 from analysis.data.prepare import PrepareOptions
 from analysis.data.series import TractionSeries
 from analysis.report.what_if import StudyVariant, parse_choice, parse_window
+from analysis.study.models import REPORTED, parse_models
 from analysis.study.store import ResultStore
 from analysis.study.study import Study, run_study
 from analysis.tustin.model import TustinBounds
@@ -29,11 +30,13 @@ class AnalysisChoices:
     Attributes:
         prepare: smoothing, thinning and window.
         bounds: box of the Tustin fit.
+        models: names of the models.
         variants: what the study is repeated under.
     """
 
     prepare: PrepareOptions = field(default_factory=PrepareOptions)
     bounds: TustinBounds = field(default_factory=TustinBounds)
+    models: tuple[str, ...] = REPORTED
     variants: tuple[StudyVariant, ...] = ()
 
 
@@ -59,7 +62,8 @@ def analysis_choices(args: argparse.Namespace) -> AnalysisChoices:
         prepare = replace(prepare, slowest=slowest, fastest=fastest)
     bounds = TustinBounds(**_parse_bounds(args.bounds or ""))
     variants = tuple(parse_choice(text) for text in args.what_if)
-    return AnalysisChoices(prepare, bounds, variants)
+    models = REPORTED if args.models is None else parse_models(args.models)
+    return AnalysisChoices(prepare, bounds, models, variants)
 
 
 def _parse_bounds(text: str) -> Mapping[str, tuple[float, float]]:

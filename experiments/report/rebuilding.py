@@ -13,10 +13,10 @@ from acquisition.errors import SettingsError, TrialFileError
 from analysis.findings.findings import compute_results, findings_rows
 from analysis.findings.rig_health import with_tares
 from analysis.study.fits import to_csv
-from analysis.study.models import FitOptions
+from analysis.study.models import REPORTED, FitOptions
 from experiments.operator.console import Console
 from experiments.report.publication import ANALYSIS, TABLE
-from experiments.report.sessions import REPORTED, ReportRequest, study_sessions
+from experiments.report.sessions import ReportRequest, study_sessions
 from experiments.session.data_files import read_json
 from experiments.session.store import list_sessions
 

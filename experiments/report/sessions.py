@@ -22,7 +22,12 @@ from analysis.report.what_if import StudyVariant
 from analysis.report.what_if_tables import plain_choice, side_by_side
 from analysis.study.crossval import Prepared
 from analysis.study.jobs import Batch
-from analysis.study.models import FITTERS, GP_SE, GP_SE_NOISE, GP_SE_TRIAL, FitOptions
+from analysis.study.models import (
+    GP_SE,
+    GP_SE_TRIAL,
+    PAPER_MODELS,
+    FitOptions,
+)
 from analysis.study.store import TYPES, ResultStore
 from analysis.study.study import Study, StudyOptions, run_study
 from analysis.terrains.export import break_away_batch, break_away_of, database_of
@@ -45,8 +50,7 @@ from experiments.session.data_files import write_new_text
 from experiments.session.photos import photos_of
 from experiments.session.store import FOLDS, SessionFolder, iso_utc
 
-REPORTED = (*FITTERS, GP_SE_NOISE, GP_SE_TRIAL)  # Fig. 9, and those beyond the paper
-EXPORTED = (*FITTERS, GP_SE_TRIAL)
+EXPORTED = (*PAPER_MODELS, GP_SE_TRIAL)
 
 
 @dataclass(frozen=True, slots=True)
@@ -231,13 +235,13 @@ def report_sessions(
     Raises:
         SessionError: no session has a kept trial.
     """
-    fit = FitOptions(order.choices.bounds, seed=order.seed, models=REPORTED)
+    choices = order.choices
+    fit = FitOptions(choices.bounds, seed=order.seed, models=choices.models)
     analysed = study_sessions(sessions, data, order, console, fit)
     study, trials = analysed.study, analysed.trials
     store = results_below(data)
     break_away = break_away_of(study, store)
-    variants = order.choices.variants
-    others = repeat_study(study, analysed.files, variants, console, store)
+    others = repeat_study(study, analysed.files, choices.variants, console, store)
     every = [trial for group in trials.values() for trial in group]
     rig = with_tares([trial.health for trial in every], every)
     findings = cache(partial(compute_results, study, rig, break_away))

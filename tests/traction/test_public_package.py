@@ -4,6 +4,7 @@ import inspect
 import subprocess
 import sys
 import tomllib
+from dataclasses import asdict
 from importlib import metadata
 from pathlib import Path
 
@@ -12,7 +13,10 @@ import pytest
 
 import traction as tr
 from acquisition.errors import SessionError, SettingsError, TractionError
-from analysis import api
+from analysis.data.samples import TrainingSet
+from analysis.study.crossval import plan_folds, run_fold
+from analysis.study.models import FitOptions
+from analysis.tustin.model import fit_tustin
 from experiments.session.kept_files import KeptDataError
 
 ROOT = Path(__file__).parents[2]
@@ -181,8 +185,9 @@ def test_a_notebook_is_given_the_picture(session):
 
 def test_a_model_is_that_of_the_analysis(session):
     model = tr.fit(session, "tustin")
-    own = api.fit_tustin([trial.kept for trial in session])
-    assert model.parameters == own.describe()
+    rows = TrainingSet.of([trial.kept for trial in session], 1, 0).rows
+    own = fit_tustin(rows.F_n, rows.v_t, rows.F_t)
+    assert model.parameters == asdict(own.parameters)
     assert model.samples == sum(trial.kept.kept for trial in session)
 
 
@@ -204,7 +209,7 @@ def test_what_is_no_load_or_velocity_is_refused(session, F_n, v_t):
 
 
 def test_a_gaussian_process_is_fitted_by_name(session):
-    few = api.FitOptions(gp_points=40)
+    few = FitOptions(gp_points=40)
     model = tr.fit(session[0], "gp_se", few)
     error = np.abs(
         model.predict(session[0].kept.F_n, session[0].kept.v_t).mean
@@ -222,11 +227,10 @@ def test_a_model_that_there_is_not_is_refused(session):
 
 def test_models_are_compared_on_trials_left_out(session):
     scores = tr.compare(session, ["tustin"], n_jobs=1)
-    folds = api.crossvalidate(
-        {"TF": [trial.kept for trial in session]},
-        api.FitOptions(models=("tustin",)),
-        n_jobs=1,
+    plan, _ = plan_folds(
+        {"TF": [trial.kept for trial in session]}, FitOptions(models=("tustin",))
     )
+    folds = [run_fold(task) for task in plan]
     expected = np.mean([fold.models["tustin"].score.mae for fold in folds])
     assert scores.best("TF").mae == pytest.approx(expected, rel=1e-12)
     frame = scores.to_pandas()

@@ -11,7 +11,7 @@ from analysis.data.series import TractionSeries
 from analysis.data.tables import load_tables
 from analysis.report.paper_tables import table_one, verdicts
 from analysis.study.fits import to_fits
-from analysis.study.models import FITTERS, GP_SE, GP_SE_NOISE, TUSTIN, FitOptions
+from analysis.study.models import GP_SE, GP_SE_NOISE, PAPER_MODELS, TUSTIN, FitOptions
 from analysis.study.study import StudyOptions, run_study
 
 pytestmark = [pytest.mark.shared_data, pytest.mark.timeout(900)]
@@ -83,7 +83,7 @@ def test_errors_across_terrains_agree(fits, expected, model):
 @pytest.mark.parametrize("terrain", STONES + PLATES)
 def test_all_five_models_predict_alike(fits, terrain):
     maes = fits["terrains"][terrain]["mae"]
-    assert list(maes) == list(FITTERS)
+    assert list(maes) == list(PAPER_MODELS)
     # the paper's Fig. 9: no model stands out
     assert max(maes.values()) < 1.15 * min(maes.values())
 

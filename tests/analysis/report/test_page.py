@@ -19,7 +19,7 @@ from analysis.report.page_model import (
     ReportFigure,
     ReportTable,
 )
-from analysis.study.models import FITTERS, GP_SE_NOISE, FitOptions
+from analysis.study.models import GP_SE_NOISE, PAPER_MODELS, FitOptions
 from analysis.study.study import StudyOptions, run_study
 
 CHROMIUM = next(
@@ -210,6 +210,6 @@ def test_a_page_that_asks_or_complains_is_caught(tmp_path):
 @pytest.mark.shared_data
 def test_the_report_of_a_whole_study_is_readable(shared_data, tmp_path):
     trials = load_tables([shared_data / "rehearsal_trials.npz"])
-    options = StudyOptions(fit=FitOptions(models=(*FITTERS, GP_SE_NOISE)))
+    options = StudyOptions(fit=FitOptions(models=(*PAPER_MODELS, GP_SE_NOISE)))
     study = run_study(trials, options, simulated=True)
     assert_readable(written(study, tmp_path), tmp_path, least=18)

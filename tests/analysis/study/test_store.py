@@ -11,7 +11,7 @@ from analysis.breakaway.censored import Family
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.study.crossval import plan_folds, run_fold
 from analysis.study.jobs import run_tasks
-from analysis.study.models import FitOptions
+from analysis.study.models import MODELS, FitOptions
 from analysis.study.store import (
     LARGEST,
     ResultStore,
@@ -257,3 +257,12 @@ def test_an_interrupted_run_resumes_where_it_stopped():
     )
     assert found == [11, 12, 13, 14]
     assert seen == [(3, 4), (4, 4)]
+
+
+@pytest.mark.parametrize("model", list(MODELS))
+def test_every_model_of_the_registry_comes_back_from_disk(tmp_path, task, model):
+    one = replace(task, options=replace(task.options, models=(model,)))
+    store, fold = ResultStore(tmp_path), run_fold(one)
+    store.put(run_fold, one, fold)
+    assert encode(store.get(run_fold, one)) == encode(fold)
+    assert set(fold.models) == {model}

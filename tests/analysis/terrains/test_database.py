@@ -1,6 +1,7 @@
 """The file of a terrain database: its versions, its schema, and what it keeps."""
 
 import json
+from dataclasses import replace
 from math import inf, nan
 from pathlib import Path
 from statistics import NormalDist
@@ -12,6 +13,7 @@ import analysis.terrains
 from acquisition.errors import SettingsError
 from analysis.study.distribution import SHARES
 from analysis.terrains.database import load, to_text
+from analysis.terrains.export import database_of
 from analysis.terrains.known import KnownTerrain, TerrainDatabase
 from analysis.terrains.table import Table, rows_of
 
@@ -252,3 +254,13 @@ def test_the_schema_refuses_what_the_reader_refuses(tmp_path, changes, place):
     if "simulated" not in changes:  # the reader takes any truth value
         with pytest.raises(SettingsError):
             load(saved(tmp_path, content))
+
+
+def test_a_terrain_database_answers_from_rest_and_in_motion(small_study, tmp_path):
+    fit = replace(small_study.options.fit, models=("tustin",))
+    study = replace(small_study, options=replace(small_study.options, fit=fit))
+    path = tmp_path / "terrains.json"
+    path.write_text(database_of(study, None, "2027-01-15T08:00:00Z", 1))
+    known = load(path).terrain("S0")
+    assert known.slip_risk(6.0, 3.5).kind == "break-away"
+    assert known.risk_in_motion(6.0, 3.5).kind == "in motion"
