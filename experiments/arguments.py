@@ -216,7 +216,8 @@ def add_scheduler(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--scheduler",
         metavar="ADDRESS",
-        help="fit on the Dask cluster there: tls://HOST:PORT, or tcp://127.0.0.1:8786",
+        help="fit on the Dask cluster there: tls://HOST:PORT, or tcp://127.0.0.1:8786; "
+        "needs traction[cluster]",
     )
 
 

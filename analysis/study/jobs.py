@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar, runtime_checkable
 from urllib.parse import urlsplit
 
-from acquisition.errors import SettingsError
+from acquisition.errors import MissingLibraryError, SettingsError
 from acquisition.linear_algebra import keep_memory
 from acquisition.worker_processes import (
     WorkerLostError,
@@ -114,6 +114,7 @@ def run_tasks(
 
     Raises:
         SettingsError: the scheduler does not answer, or is reached without TLS.
+        MissingLibraryError: Dask is not installed.
     """
     (results,) = run_batches([Batch(function, tasks)], workers, progress, store)
     return results
@@ -259,7 +260,10 @@ def _on_cluster(
 
     Tasks that are shared go to every worker once.
     """
-    from distributed import KilledWorker
+    try:
+        from distributed import KilledWorker
+    except ImportError as error:
+        raise MissingLibraryError("distributed", "cluster") from error
     from joblib import Parallel, delayed, parallel_config
 
     shared = _shared(batches)

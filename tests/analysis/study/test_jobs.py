@@ -1,12 +1,13 @@
 import os
 import signal
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from acquisition.errors import TrialFileError
+from acquisition.errors import MissingLibraryError, TrialFileError
 from analysis.study.jobs import (
     Batch,
     WorkerLostError,
@@ -156,3 +157,10 @@ def test_few_tasks_are_given_to_the_processes_that_run_already():
     assert running_workers() >= expected
     assert Workers().count(2) == expected
     assert Workers(1).count(2) == 1
+
+
+def test_a_cluster_without_its_library_names_the_extra(monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(MissingLibraryError, match="distributed") as refused:
+        run_tasks(square, [1], Workers(scheduler="tcp://127.0.0.1:9"))
+    assert "traction[cluster]" in refused.value.hint
