@@ -3,6 +3,7 @@
 import re
 import sys
 from pathlib import Path
+from typing import Any
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent
@@ -45,3 +46,16 @@ def _as_page(text: str) -> str:
 for _name in _PAGES:
     _text = _as_page((ROOT / f"{_name}.md").read_text(encoding="utf-8"))
     (HERE / "project" / f"{_name.lower()}.md").write_text(_text, encoding="utf-8")
+
+
+def _link_pages(_app: object, _name: str, source: list[str]) -> None:
+    """Let links to the project's own folder reach the pages made from it above."""
+    names = "|".join(_PAGES)
+    source[0] = re.sub(
+        rf"\]\(\.\./({names})\.md", lambda m: f"](project/{m[1].lower()}.md", source[0]
+    )
+
+
+def setup(app: Any) -> None:  # noqa: ANN401
+    """Connect what changes a page while it is read."""
+    app.connect("source-read", _link_pages)
