@@ -218,17 +218,15 @@ def main(words: Sequence[str] | None = None) -> int:
     is_met = True
     for path in args.files:
         rows = table(load(path), args.points)
-        print(path.name)  # noqa: T201
-        print(  # noqa: T201
-            "terrain  model      slips held  Brier  calibration error  PIT (limit)"
-        )
+        print(path.name)
+        print("terrain  model      slips held  Brier  calibration error  PIT (limit)")
         for name, model, s in rows:
-            print(  # noqa: T201
+            print(
                 f"{name:8} {model:10} {s.slips:5} {s.held:4}  {s.brier:.3f}  "
                 f"{s.calibration_error:17.3f}  {s.pit:.3f} ({s.pit_limit:.3f})"
             )
         for text, holds in verdicts(rows):
-            print(f"{'met' if holds else 'MISSED'}: {text}")  # noqa: T201
+            print(f"{'met' if holds else 'MISSED'}: {text}")
             is_met = is_met and holds
     return int(not is_met)
 

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.friction_text import with_calibrations
+from studies.friction_page import with_calibrations
 from wam.calibration.joint_friction import joint_breakaway, speed_curve
 from wam.model.constants import load_constants
 from wam.model.friction import friction_of
@@ -170,7 +170,7 @@ def main() -> int:
             shown = verdicts([errors_of(*pair) for pair in files])
             missed += sum(not each.is_met for each in shown)
             rows += rows_of(share, shown)
-            print(*rows[-len(shown) :], sep="\n", flush=True)  # noqa: T201
+            print(*rows[-len(shown) :], sep="\n", flush=True)
     if options.write is not None:
         old = options.write.read_text() if options.write.exists() else ""
         part = page_part(options.seeds, rows)

@@ -3,7 +3,7 @@
 python -m studies.friction_sliding FOLDER [FOLDER ...] [--write docs/friction.md]
 
 Each FOLDER is one of `python -m studies.friction_calibrations --keep` or of
-`python -m benchmarks.friction --keep`: it has what a calibration found of a simulated
+`python -m studies.friction --keep`: it has what a calibration found of a simulated
 arm, and what the arm really has. The foot is put down on a plate at the far end and
 slid from there. Exits with 1 where the compensated load is off by more than 1 N.
 """
@@ -18,9 +18,9 @@ from pathlib import Path
 import numpy as np
 
 from acquisition.control_loop.states import ArmState
-from benchmarks.friction_text import with_sliding
 from fakes.ground.terrain import make_terrain
 from fakes.plant.push import HandView, Vector3
+from studies.friction_page import with_sliding
 from tests.fakes.scenes import CONSTANTS
 from tests.fakes.world.holding import HoldBench
 from wam.calibration.friction_file import friction_from_toml
@@ -135,7 +135,7 @@ def main() -> int:
         for share in SHARES:
             found[share].append(loads(*texts, share))
     part = page_part(given.folders, found)
-    print(part)  # noqa: T201
+    print(part)
     if given.write is not None:
         given.write.write_text(with_sliding(given.write.read_text(), part))
     compensated = [arm for share in SHARES if share for arm in found[share]]

@@ -252,16 +252,16 @@ def main() -> int:
         paths = dict.fromkeys(mutation.path for mutation in chosen)
         unsound = [path for path in paths if not tree.is_sound(path)]
         if unsound:
-            print("fail without a mutation:", *unsound)  # noqa: T201
+            print("fail without a mutation:", *unsound)
             return 2
         for mutation in chosen:
             is_dead = tree.is_killed(mutation)
             killed += is_dead
             word = "killed" if is_dead else "SURVIVED"
-            print(  # noqa: T201
+            print(
                 f"{word:8} {mutation.path}:{mutation.line} {mutation.text}", flush=True
             )
-    print(f"{killed} of {len(chosen)} killed, {killed / len(chosen):.0%}")  # noqa: T201
+    print(f"{killed} of {len(chosen)} killed, {killed / len(chosen):.0%}")
     return 0 if killed >= REQUIRED * len(chosen) else 1
 
 

@@ -271,7 +271,7 @@ def summary(soak: Soak) -> list[str]:
 def tell(soak: Soak) -> None:
     """Print a line now and then, for whoever waits."""
     if soak.counts["sessions"] % 20 == 0:
-        print(" · ".join(summary(soak)[:1] + summary(soak)[-5:]))  # noqa: T201
+        print(" · ".join(summary(soak)[:1] + summary(soak)[-5:]))
 
 
 def recorder(path: Path, seed: int) -> Callable[[Soak], None]:
@@ -359,7 +359,7 @@ def main() -> None:
     report = recorder(given.record, given.seed) if given.record else tell
     with tempfile.TemporaryDirectory(prefix="soak-") as place:
         soak = soaked(given.hours, given.seed, Path(place), report)
-    print("\n".join(summary(soak)))  # noqa: T201
+    print("\n".join(summary(soak)))
 
 
 if __name__ == "__main__":

@@ -220,7 +220,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                     file.write(json.dumps([asdict(case), asdict(one)]) + "\n")
     judged = claims(results)
     verdict = [f"{'met' if is_met else 'NOT MET'}: {text}" for text, is_met in judged]
-    print("\n".join([*table_lines(results), "", *verdict]))  # noqa: T201
+    print("\n".join([*table_lines(results), "", *verdict]))
     draw(results, args.out / "stances.png")
     return 0 if all(is_met for _, is_met in judged) else 1
 

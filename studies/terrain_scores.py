@@ -67,12 +67,12 @@ def main(words: Sequence[str] | None = None) -> int:
     is_met = True
     for path in args.files:
         found = identified(path)
-        print(path.name)  # noqa: T201
+        print(path.name)
         for text, holds in verdicts(found):
-            print(f"{'met' if holds else 'MISSED'}: {text}")  # noqa: T201
+            print(f"{'met' if holds else 'MISSED'}: {text}")
             is_met = is_met and holds
         for size in found.sizes:
-            print(  # noqa: T201
+            print(
                 f"{size / KEPT_PER_SECOND:g} s: the own one of {found.stones} terrains "
                 f"of stones likeliest in {found.exact_stones(size) or 0.0:.2f}"
             )

@@ -173,9 +173,9 @@ def main() -> int:
             calibrate(folder, given.share, given.seed)
         torque, ways = compare(folder, given.seconds)
     rms, worst = np.sqrt(np.mean(ways**2, axis=0)), np.abs(ways).max(axis=0)
-    print("torque, % of Coulomb:", np.round(100 * torque, 1))  # noqa: T201
-    print("windows, rms [mrad]: ", np.round(1e3 * rms, 2))  # noqa: T201
-    print("windows, worst [mrad]:", np.round(1e3 * worst, 2), len(ways))  # noqa: T201
+    print("torque, % of Coulomb:", np.round(100 * torque, 1))
+    print("windows, rms [mrad]: ", np.round(1e3 * rms, 2))
+    print("windows, worst [mrad]:", np.round(1e3 * worst, 2), len(ways))
     return int(bool((torque > MOST_TORQUE).any() or (rms > MOST_WAY).any()))
 
 

@@ -1,21 +1,14 @@
 """README's figures are those of a run: a drift of 5 % is noticed."""
 
 import json
-import re
 
 import pytest
 
 from benchmarks import readme
 from benchmarks.readme import (
-    BEGIN,
-    END,
-    MEASURED,
     README,
-    SHOWN,
     demo_rows,
     is_same,
-    measured_rows,
-    with_rows,
 )
 
 
@@ -44,8 +37,7 @@ def test_readme_has_every_row():
 def test_a_warning_of_the_demo_is_a_failure(tmp_path, monkeypatch, capsys):
     rows = demo_rows(results(0.4))
     page = tmp_path / "README.md"
-    shown = with_rows(f"{BEGIN}{END}", measured_rows(MEASURED.read_text()))
-    page.write_text("\n".join([*rows, shown]))
+    page.write_text("\n".join(rows))
     monkeypatch.setattr(readme, "README", page)
     (tmp_path / "study").mkdir()
     fits = tmp_path / "study" / "fits.json"
@@ -55,39 +47,3 @@ def test_a_warning_of_the_demo_is_a_failure(tmp_path, monkeypatch, capsys):
     fits.write_text(json.dumps({**results(0.4), "warnings": ["the force is late"]}))
     assert readme.main() == 1
     assert "! the force is late" in capsys.readouterr().out
-
-
-def test_readme_shows_what_was_measured():
-    rows = measured_rows(MEASURED.read_text())
-    assert with_rows(README.read_text(), rows) == README.read_text()
-    for row, words in zip(rows, SHOWN, strict=True):
-        assert row.startswith(f"| {words}")
-
-
-def test_figures_of_another_measurement_are_noticed_and_put_in(
-    tmp_path, monkeypatch, capsys
-):
-    page, table = tmp_path / "README.md", tmp_path / "measured.md"
-    page.write_text(README.read_text())
-    older = MEASURED.read_text()
-    table.write_text(re.sub(r"(\| SE fit, n = 300[^|]*\|) [\d.]+", r"\1 77.7", older))
-    monkeypatch.setattr(readme, "README", page)
-    monkeypatch.setattr(readme, "MEASURED", table)
-    monkeypatch.setattr("sys.argv", ["readme"])
-    assert readme.main() == 1
-    assert "--write" in capsys.readouterr().out
-    monkeypatch.setattr("sys.argv", ["readme", "--write"])
-    assert readme.main() == 0
-    assert "77.7 times" in page.read_text()
-    assert len(page.read_text().splitlines()) == len(README.read_text().splitlines())
-
-
-@pytest.mark.parametrize("page", ["", "| SE fit, n = 300 | - | fit |"])
-def test_a_figure_that_was_not_measured_is_none(page):
-    with pytest.raises(ValueError, match="no figure of"):
-        measured_rows(page)
-
-
-def test_a_readme_without_marks_is_not_written():
-    with pytest.raises(ValueError, match="no marks"):
-        with_rows("# Traction", [])

@@ -6,17 +6,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.friction_text import (
-    CALIBRATIONS,
-    SESSIONS,
-    page_text,
-    with_calibrations,
-)
 from studies.friction_calibrations import (
     CalibrationErrors,
     page_part,
     rows_of,
     verdicts,
+)
+from studies.friction_page import (
+    CALIBRATIONS,
+    SESSIONS,
+    page_text,
+    with_calibrations,
 )
 
 PAGE = Path(__file__).parents[2] / "docs" / "friction.md"

@@ -27,7 +27,7 @@ of the ground are not biased by joint friction. It limits the loads and speeds t
 trial reaches: F_n at rest, the push, and whether a slip goes back.
 """
 _SESSIONS = """
-`python -m benchmarks.friction --write docs/friction.md`: at each share one calibration,
+`python -m studies.friction --write docs/friction.md`: at each share one calibration,
 then ten trials on S0 without and with each compensation (seed 3).
 
 ![F_n at rest, hand and way back]({image})

@@ -1,6 +1,6 @@
 """What dry friction does to a session, with and without its compensation.
 
-python -m benchmarks.friction [--shares 0.02 0.4 1] [--terrain S0] [--trials 10]
+python -m studies.friction [--shares 0.02 0.4 1] [--terrain S0] [--trials 10]
     [--keep FOLDER] [--write docs/friction.md]
 
 The simulated arm is calibrated at each share of what is known of another arm; then a
@@ -25,8 +25,8 @@ from analysis.data.events import Slip, find_slips
 from analysis.data.load import RecordedTrial, load_trial
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.figures.style import new_figure, render, styled
-from benchmarks.friction_text import MEASURED, page_text
 from experiments.settings.load import load_settings
+from studies.friction_page import MEASURED, page_text
 from wam.calibration.friction_file import friction_from_toml
 from wam.calibration.friction_reach import (
     FrictionReach,
