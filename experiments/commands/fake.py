@@ -35,9 +35,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--sensor",
-        choices=("bota", "robotous", "optoforce"),
         default="bota",
-        help="kind of the sensor (default: bota)",
+        metavar="KIND",
+        help="kind of the sensor: bota (default), robotous, optoforce, or another make",
     )
     parser.add_argument(
         "--idle-first",
@@ -141,6 +141,15 @@ def _served(args: argparse.Namespace) -> ServedArm | None:
 
 
 def _line(args: argparse.Namespace) -> tuple[Path, str] | None:
+    """Return where a serial sensor is served and its kind; None = nowhere."""
+    from acquisition.errors import SettingsError
+    from ft_sensor.vendors.registry import SERIAL_KINDS
+
+    if args.sensor not in SERIAL_KINDS:
+        raise SettingsError(
+            f"--sensor {args.sensor[:40]!r}: there is no such serial sensor.",
+            hint=f"The kinds are {', '.join(SERIAL_KINDS)}. Nothing was started.",
+        )
     return (args.serial, args.sensor) if args.serial else None
 
 

@@ -18,3 +18,8 @@ SECTIONS: dict[str, type[SensorSection]] = {
     get_args(section.model_fields["kind"].annotation)[0]: section
     for section in get_args(AnySensor)
 }
+SERIAL_KINDS = tuple(  # those with a port, not on the arm's bus
+    kind
+    for kind, section in SECTIONS.items()
+    if section.model_fields["port"].is_required()
+)

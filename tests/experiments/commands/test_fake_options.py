@@ -110,3 +110,9 @@ def test_a_serial_sensor_needs_a_tool(tmp_path, arm):
     assert done.code == 2
     assert "no wrist sensor" in done.err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_sensor_that_there_is_not_is_refused_with_the_kinds(tmp_path):
+    done = traction("fake", "--serial", tmp_path / "line", "--sensor", "bosch")
+    assert done.code == 2
+    assert "bota, robotous, optoforce" in done.err
