@@ -2,7 +2,7 @@
 
 import pytest
 
-import fakes.serving
+from fakes.serving import home_arm
 from tests.experiments.program import traction
 
 FOOT = """\
@@ -17,13 +17,13 @@ sole = [0.0, 0.0, 0.09]
 def serve(monkeypatch, tmp_path):
     """Return a function that serves an arm, ends at once and returns what it is."""
     seen = []
-    build = fakes.serving.build_home_server
+    build = home_arm.build_home_server
 
     def keep(port, pose, clock):
         seen.append(pose)
         return build(port, pose, clock)
 
-    monkeypatch.setattr(fakes.serving, "build_home_server", keep)
+    monkeypatch.setattr(home_arm, "build_home_server", keep)
     script = tmp_path / "script"
     script.write_text("quit\n")
     where = ("--can", f"traction-fake:{tmp_path}/bus", "--script", script)
