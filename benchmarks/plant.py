@@ -3,8 +3,7 @@
 
 A trial on level ground is simulated once to note what every part was given, once again
 to time whole cycles, and then each part by itself is given the same. Medians are over
-cycles in contact; integration is what the other parts leave of the whole. All of it is
-of the dynamics in Pinocchio; the compiled ones, which have no parts, come last.
+cycles in contact; integration is what the other parts leave of the whole.
 """
 
 import argparse
@@ -22,8 +21,6 @@ import pinocchio as pin
 from acquisition.clock import PERIOD_NS
 from fakes.ground.contact import Contact, Motion
 from fakes.ground.terrain import Terrain, make_terrain
-from fakes.kernels.choice import COMPILED, PINOCCHIO, chosen_dynamics
-from fakes.plant.model import PlantOptions
 from fakes.plant.plant import ArmPlant
 from fakes.plant.push import HandView, Pace, Push, Vector3
 from fakes.randomness import TrialGenerators, trial_generators
@@ -119,8 +116,6 @@ def measure(cycles: int) -> list[PageSection]:
     timed["integration"] = [
         whole - sum(rest) for whole, *rest in zip(*timed.values(), strict=True)
     ]
-    if chosen_dynamics() == COMPILED:
-        timed["whole, compiled"] = list(_run(cycles, None, COMPILED))
     kept = {
         name: [
             us for us, touches in zip(row, notes.is_touching, strict=True) if touches
@@ -131,17 +126,11 @@ def measure(cycles: int) -> list[PageSection]:
     return [_part(name, row, whole) for name, row in kept.items()]
 
 
-def _run(
-    cycles: int, notes: Notes | None, dynamics: str = PINOCCHIO
-) -> Iterator[float]:
+def _run(cycles: int, notes: Notes | None) -> Iterator[float]:
     """Simulate a push; yield what each cycle took [us]."""
     model = ArmModel(load_constants(), _tool())
-    plant = _plant(model, dynamics)
+    plant = _plant(model)
     plant.terrain = _ground() if notes is None else _NotedGround(notes)
-    if plant.is_compiled:
-        from fakes.ground.compiled.grounds import compiled_ground
-
-        plant.terrain = compiled_ground(plant.terrain)
     plant.set_braking(is_braked=False, is_powered=True)
     plant.hand.put_down(plant.terrain.surface(0.0))
     for _ in range(_SETTLING):
@@ -248,10 +237,9 @@ def _tool() -> Tool:
     return Tool(sensor_body(), foot, np.array([0.01, 0.0, 0.112]))
 
 
-def _plant(model: ArmModel, dynamics: str) -> ArmPlant:
+def _plant(model: ArmModel) -> ArmPlant:
     q = solve_start(model, _FRAME, _START, 0.02)
-    options = PlantOptions(dynamics=dynamics)
-    return ArmPlant(model.constants, _tool(), _FRAME, q, options)
+    return ArmPlant(model.constants, _tool(), _FRAME, q)
 
 
 def _random() -> TrialGenerators:

@@ -59,34 +59,6 @@ def _blocks(generator: np.random.Generator, block: int) -> Iterator[list[float]]
         yield generator.standard_normal(block).tolist()
 
 
-class NormalArray:
-    """The same numbers in the same order, in an array for compiled functions.
-
-    Attributes:
-        numbers: shape (n,).
-        taken: how many of them are used up, shape (1,).
-    """
-
-    def __init__(self, generator: np.random.Generator, block: int = 4096) -> None:
-        self._generator, self._block = generator, block
-        self.numbers = np.empty(0)
-        self.taken = np.zeros(1, np.int64)
-
-    def keep_ready(self, count: int) -> None:
-        """Have at least `count` numbers that are not used up."""
-        taken = self.taken.item()
-        if self.numbers.size - taken < count:
-            drawn = self._generator.standard_normal(self._block)
-            self.numbers = np.concatenate((self.numbers[taken:], drawn))
-            self.taken[0] = 0
-
-    def next(self) -> float:
-        """Return the next number."""
-        self.keep_ready(1)
-        self.taken += 1
-        return float(self.numbers[self.taken[0] - 1])
-
-
 def _nothing() -> Iterator[float]:
     empty: list[float] = []
     return iter(empty)

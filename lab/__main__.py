@@ -45,11 +45,8 @@ NOT_READY = 75  # as EX_TEMPFAIL: something has to be installed first
 _MOST_MACHINES = 2  # unless more are asked for
 _STARTED = 30.0  # s until the emulator has its sockets
 _CLOCK = SystemClock()
-# Nothing is compiled in there: for another processor that takes minutes, and a served
-# arm on machine code of the host's did not answer in time in most scenarios.
 _JOB = """\
 export PATH=/usr/sbin:/usr/bin:/sbin:/bin
-export TRACTION_DYNAMICS=pinocchio
 cd {root}
 {python} -m lab.guest {names}
 echo b > /proc/sysrq-trigger

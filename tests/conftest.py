@@ -29,15 +29,6 @@ def pytest_configure(config: pytest.Config) -> None:
     config.pluginmanager.register(WallClock(), "wall-clock")
 
 
-def pytest_sessionstart(session: pytest.Session) -> None:
-    """Compile the simulation once, before several workers do it at the same time."""
-    from fakes.kernels.choice import is_compiled_first
-    from tests.fakes.scenes import make_plant
-
-    if not hasattr(session.config, "workerinput") and is_compiled_first():
-        make_plant()
-
-
 @pytest.fixture(autouse=True, scope="session")
 def cache_home(tmp_path_factory):
     """Keep what the program remembers out of the user's own folder."""

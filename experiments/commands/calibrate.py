@@ -91,7 +91,7 @@ def run(args: argparse.Namespace) -> int:
     fake: FakeOptions | None = None
     if args.fake:
         fake = FakeOptions(args.fast, args.seed, friction, cables=args.cables)
-    rig = connect_rig(settings, row, fake, console)
+    rig = connect_rig(settings, row, fake)
     kind = "SIMULATED" if rig.is_simulated else "LIVE RIG"
     console.say(f"traction calibrate {args.what}        {kind} · foot {row.foot}")
     stop = StopFlag()

@@ -100,7 +100,7 @@ def _check(args: argparse.Namespace, settings: Settings, console: Console) -> No
 
     first = settings.matrix.terrains[0].name
     row = settings.row(args.terrain or first)
-    fake = FakeOptions(args.fast, seed=1, is_brief=True) if args.fake else None
+    fake = FakeOptions(args.fast, seed=1) if args.fake else None
     rig = connect_rig(settings, row, fake)
     console.say("traction check        " + ("SIMULATED" if fake else "LIVE RIG"))
     with logging_bus(rig, args.can_log, console):

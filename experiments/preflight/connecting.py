@@ -8,8 +8,6 @@ from acquisition.errors import (
     TractionError,
 )
 from experiments.messages import preflight_error
-from experiments.operator.console import Console
-from experiments.rig.fake import compiling_words
 from experiments.rig.rig import FakeOptions, Rig, build_rig
 from experiments.settings.load import Settings
 from experiments.settings.matrix import TerrainRow
@@ -20,7 +18,6 @@ def connect_rig(
     settings: Settings,
     row: TerrainRow,
     fake: FakeOptions | None,
-    console: Console | None = None,
 ) -> Rig:
     """Return the rig with its bus open.
 
@@ -28,15 +25,10 @@ def connect_rig(
         settings: of the rig.
         row: of the matrix.
         fake: how a simulation runs; None = the real rig.
-        console: where it is said that a simulation is compiled first.
 
     Raises:
         PreflightError: the CAN interface cannot be used.
     """
-    if console is not None and fake is not None and fake.is_fast and not fake.is_brief:
-        words = compiling_words()
-        if words:
-            console.say(words)
     try:
         return build_rig(settings, row, fake)
     except LinkError as error:

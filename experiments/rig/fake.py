@@ -56,7 +56,6 @@ class SimulatedRig:
         pace: how the simulated person pushes.
         twin: calibrations of the arm whose twin it is; None = an arm of its own.
         cables: resonance of the joints on their cables [Hz]; None = stiff ones.
-        is_brief: it ends at once, and waits for no compiler.
     """
 
     rig: RigSettings
@@ -66,7 +65,6 @@ class SimulatedRig:
     pace: str
     twin: LawCalibrations | None = None
     cables: float | None = None
-    is_brief: bool = False
 
     def metadata(self) -> dict[str, Any]:
         """Return the world in plain values, for a process of its own."""
@@ -91,7 +89,6 @@ class SimulatedRig:
             "friction": self.friction,
             "pace": self.pace,
             "cables": self.cables,
-            "is_brief": self.is_brief,
             "body": None if self.twin is None else self._body(self.twin),
         }
 
@@ -124,13 +121,6 @@ def sensor_metadata(section: AnySensor) -> dict[str, Any]:
     """Return which simulated sensor fits the settings, in plain values."""
     options = {"kind", "sinc", "baudrate", "sensitivity", "serial_number"}
     return section.model_dump(include=options)
-
-
-def compiling_words() -> str:
-    """Return what to say before a stepped simulation that is compiled first, or ""."""
-    from fakes.kernels.choice import is_compiled_first
-
-    return "Compiling the simulation, once: about 15 s." if is_compiled_first() else ""
 
 
 def stepped(

@@ -41,7 +41,6 @@ class FakeOptions:
         pace: how the simulated person pushes, a name of `fakes.plant.push.PACES`.
         is_twin: the arm, its sensor and the containers are what calibrations say.
         cables: resonance of the joints on their cables [Hz]; None = stiff ones.
-        is_brief: it ends at once, and waits for no compiler.
     """
 
     is_fast: bool
@@ -50,7 +49,6 @@ class FakeOptions:
     pace: str = "steady"
     is_twin: bool = False
     cables: float | None = None
-    is_brief: bool = False
 
 
 @dataclass(slots=True)
@@ -177,7 +175,6 @@ def _world(
         pace=fake.pace,
         twin=calibrations if fake.is_twin else None,
         cables=fake.cables,
-        is_brief=fake.is_brief,
     )
 
 

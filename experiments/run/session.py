@@ -112,7 +112,7 @@ def run_session(request: SessionRequest, mode: OpenMode) -> int:
     """
     console, stop = request.console, StopFlag()
     source = _foresight_of(request, mode)
-    rig = connect_rig(request.settings, request.row, request.fake, console)
+    rig = connect_rig(request.settings, request.row, request.fake)
     with logging_bus(rig, request.can_log, console):
         host_faults = HostFaults(rig)
         faults = plan_faults(request.faults, rig.simulation, host_faults)

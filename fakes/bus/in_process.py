@@ -9,7 +9,7 @@ import can
 from acquisition.clock import NS_PER_S, Clock
 from fakes.pucks.event_queue import OutFrame
 from fakes.pucks.network import PuckNetwork
-from fakes.pucks.wire import lay_wire
+from fakes.pucks.wire import WiredNetwork
 from wam.bus.doors import PythonCanDoor
 from wam.bus.link import DRAIN_AT_MOST, as_frame
 from wam.bus.link import Frame as DoorFrame
@@ -26,17 +26,14 @@ class FakeCanBus(can.BusABC):
     controller that has left the bus (`is_off`) vanishes without a word, as in Linux.
     """
 
-    def __init__(
-        self, network: PuckNetwork, clock: Clock, *, is_compiled: bool = False
-    ) -> None:
-        """Lay the wire; compiled functions see to its usual traffic, or Python."""
+    def __init__(self, network: PuckNetwork, clock: Clock) -> None:
         self.channel_info = "fake bus"
         self.network = network
         self._faults, self._schedule = network.faults, network.schedule
         self._clock = clock
         self._inbox: deque[OutFrame] = deque()
         self._stuck: deque[can.Message] = deque()
-        self._wired = lay_wire(network, is_compiled=is_compiled)
+        self._wired = WiredNetwork(network)
         self._t_ns = -1  # how far it has gone on
         super().__init__(channel="fake")
 

@@ -152,7 +152,7 @@ FREE = 0.045  # from the centre line until the sole's edge meets a board [m]
 RIM = 0.04  # height of the boards above the plane [m]
 BOARD_K = 5000.0  # N/m
 BOARD_B = 2.0 * 0.4 * math.sqrt(BOARD_K * DAMPING_MASS)  # N s/m
-BOARD_MU = 0.3  # of a rubbing foot
+BOARD_MU = 0.3  # of a foot that slips along them
 
 
 class Container:
@@ -189,6 +189,6 @@ class Container:
         depth = abs(y) - FREE
         side = math.copysign(1.0, y)
         shared = max(0.0, BOARD_K * depth + BOARD_B * side * vy)
-        rubbing = BOARD_MU * shared * math.tanh(vx / 0.01)
+        friction = BOARD_MU * shared * math.tanh(vx / 0.01)
         F_t, F_y, F_n, M_x, M_y, M_z = contact
-        return F_t + rubbing, F_y - side * shared, F_n, M_x, M_y, M_z
+        return F_t + friction, F_y - side * shared, F_n, M_x, M_y, M_z

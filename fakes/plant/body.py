@@ -1,5 +1,5 @@
 # pyright: reportMissingImports=false
-"""What moves the arm: the seam, and the dynamics in Python and Pinocchio.
+"""The dynamics of the arm, one substep after the other.
 
     (M + dt D) (qd' - qd) = dt (tau + J_s^T w_s + J_h^T w_h + T^T f - nle)
     q' = q + dt qd'
@@ -9,19 +9,17 @@ w_h the hand's at the forearm, T the transmission, f the friction of the motors 
 D is the diagonal of the damping of friction and stops, which is an addition to the
 armature, so one articulated-body pass solves it. What a differential adds beside the
 diagonal is smaller and taken explicitly: steps stay stable.
-
-`PinocchioBody` runs wherever the program does, `compiled` has the same in machine code.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
+from acquisition.clock import PERIOD_NS
 from fakes.ground.contact import NO_CONTACT
 from fakes.ground.terrain import Terrain
-from fakes.kernels.choice import PINOCCHIO
 from fakes.plant.joints import JointDrives, JointLoads, JointState
 from fakes.plant.model import ArmAndHand
 from fakes.plant.push import HandView, Vector3
@@ -43,87 +41,18 @@ class HandLoad(NamedTuple):
     grip: tuple[float, float]
 
 
-class ArmBody(Protocol):
-    """Seven joints, foot on the ground, hand on the forearm; terrain frame.
-
-    Attributes:
-        dynamics: name of the implementation.
-        disturbance: joint torques from outside [N m], shape (7,).
-    """
-
-    dynamics: str
-    disturbance: Array
-
-    @property
-    def q(self) -> Array:
-        """Joint positions [rad], shape (7,); as they are now, also later."""
-        ...
-
-    @property
-    def qd(self) -> Array:
-        """Joint velocities [rad/s], shape (7,); as they are now, also later."""
-        ...
-
-    @property
-    def rotation(self) -> Array:
-        """Frame 7 to terrain as it was when the cycle began, shape (3, 3)."""
-        ...
-
-    def move(self, q: Array) -> None:
-        """Be at `q` [rad] with the velocities of now."""
-        ...
-
-    def hold(self, *, is_held: bool) -> None:
-        """Let the brakes hold the joints, or let go of them."""
-        ...
-
-    def drive(self, units: Sequence[float]) -> None:
-        """Apply torques [puck units] to motors 1 to 7 from now on."""
-        ...
-
-    def counts(self) -> list[float]:
-        """Return what the encoders of the motors count, seven."""
-        ...
-
-    def motion(self) -> Sequence[float]:
-        """Return position, velocity and turning rate of the sole, nine numbers."""
-        ...
-
-    def linearise(self) -> HandView:
-        """Take positions and Jacobians anew, once per cycle; return what a hand feels.
-
-        Positions [m] and velocities [m/s] of sole and hand point, terrain frame.
-        """
-        ...
-
-    def begin_cycle(self, load: HandLoad, t_ns: int) -> None:
-        """Take anew what stays as it is for 2 ms from `t_ns` on."""
-        ...
-
-    def go_on(self, steps: int, terrain: Terrain | None) -> None:
-        """Go on by `steps` substeps within a cycle."""
-        ...
-
-    def end_cycle(self) -> tuple[Sequence[float], Sequence[float]]:
-        """Return the sum of the ground's wrenches in the cycle, six, and `motion`."""
-        ...
-
-
 _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 _NOTHING = (0.0,) * 6
 
 
-class PinocchioBody:
-    """Implements `ArmBody`.
+class ArmBody:
+    """Seven joints, foot on the ground, hand on the forearm; terrain frame.
 
     Attributes:
-        dynamics: name of the implementation.
         disturbance: joint torques from outside [N m], shape (7,).
         drives: of the joints.
         rotation: frame 7 to terrain as it was when the cycle began, shape (3, 3).
     """
-
-    dynamics = PINOCCHIO
 
     def __init__(
         self,
@@ -131,7 +60,7 @@ class PinocchioBody:
         drives: JointDrives,
         j2mp: Array,
         q: Array,
-        times: tuple[float, float],
+        substep_ns: int,
     ) -> None:
         """Stand still at `q`, held; the hand keeps the turn of now.
 
@@ -140,14 +69,15 @@ class PinocchioBody:
             drives: of the joints.
             j2mp: motor angle = j2mp @ joint angle, shape (7, 7).
             q: joint positions [rad], shape (7,).
-            times: length of a substep, and how far into a cycle the Jacobians are
-                taken [s].
+            substep_ns: length of a substep [ns].
         """
         self._model, self._sole, self._hand = parts
         self._data = self._model.createData()
         self.drives, self.disturbance = drives, drives.disturbance
-        self._dt = times[0]
-        self._midway = np.array([1.0, times[1], 0.0])
+        self._dt = substep_ns * 1e-9
+        # Forces act at the beginning of each substep, on average here in a cycle [s].
+        midway = 5e-10 * (PERIOD_NS - substep_ns)
+        self._midway = np.array([1.0, midway, 0.0])
         self._is_held = True
         self._sum = _NOTHING
         self._force, self._grip = (0.0, 0.0, 0.0), NO_GRIP

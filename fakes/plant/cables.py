@@ -35,7 +35,8 @@ class CableDrives(JointDrives):
         self,
         constants: ArmConstants,
         friction: MotorFriction,
-        inertia: tuple[Array, Array],
+        inertia: Array,
+        swinging: Array,
         dt: float,
         resonance: float,
     ) -> None:
@@ -44,8 +45,8 @@ class CableDrives(JointDrives):
         Args:
             constants: of the arm.
             friction: of the motors.
-            inertia: that a motor moves when it turns, and what swings on its
-                cable [kg m^2], shapes (7,).
+            inertia: that a motor moves when it turns [kg m^2], shape (7,).
+            swinging: what swings on the cable of each motor [kg m^2], shape (7,).
             dt: length of a step [s].
             resonance: of a joint on its cable while motor and other joints are held
                 [Hz].
@@ -56,11 +57,11 @@ class CableDrives(JointDrives):
         if not 1.0 <= resonance <= _STIFFEST:
             raise ValueError(f"resonance {resonance} Hz is outside 1..{_STIFFEST:g}")
         rate = 2.0 * np.pi * resonance
-        self._stiffness = rate * rate * inertia[1]
-        self._cable_damping = 2.0 * _DAMPING * rate * inertia[1]
+        self._stiffness = rate * rate * swinging
+        self._cable_damping = 2.0 * _DAMPING * rate * swinging
         self._rotor = np.array(constants.drive_inertia)
         self.twist, self._speeds = np.zeros(7), np.zeros(7)
-        super().__init__(constants, friction, inertia[0], dt)
+        super().__init__(constants, friction, inertia, dt)
 
     def counts(self, q: Array) -> Array:
         """Return what the encoders at the motors count, shape (7,)."""

@@ -2,6 +2,7 @@
 """The body that the simulated arm is: links, sensor, foot and a person's forearm."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -11,9 +12,6 @@ from wam.model.arm_model import add_point, build_pinocchio, drive_inertia_matrix
 from wam.model.constants import ArmConstants, Array
 from wam.model.friction import MotorFriction
 from wam.model.tool import Tool
-
-# The model of the arm with the hand on it, and its frames: sole and hand.
-ArmAndHand = tuple["pin.Model", int, int]
 
 FOREARM_MASS = 1.0  # of the person's arm, carried by the person [kg]
 _HAND_ABOVE_PLATE = 0.030  # on the axis of joint 7 [m]
@@ -28,20 +26,31 @@ class PlantOptions:
             it). A real arm's is unknown; with more than 0.1 hardly a slip bounces.
         substeps: steps per 2 ms cycle.
         seed: draws the parameters of friction; None = the nominal ones.
-        rubbing: friction of the motors, given instead of drawn; None = drawn.
+        motors: friction of the motors, given instead of drawn; None = drawn.
         cables: resonance of the joints on their cables [Hz]; None = stiff cables.
         has_hand: a person holds the arm by its forearm, from the beginning.
-        dynamics: `fakes.kernels.COMPILED` or `PINOCCHIO`; None = as the environment
-            says, else compiled where that is possible.
     """
 
     friction: float = 0.02
     substeps: int = 4
     seed: int | None = None
-    rubbing: MotorFriction | None = None
+    motors: MotorFriction | None = None
     cables: float | None = None
     has_hand: bool = True
-    dynamics: str | None = None
+
+
+class ArmAndHand(NamedTuple):
+    """A model of the arm with the hand on it.
+
+    Attributes:
+        model: its world is the terrain frame.
+        sole: number of the sole's frame.
+        hand: number of the frame where a person holds the forearm.
+    """
+
+    model: "pin.Model"
+    sole: int
+    hand: int
 
 
 def arm_and_hand(
@@ -50,7 +59,7 @@ def arm_and_hand(
     frame: TerrainFrame,
     forearm: float = FOREARM_MASS,
 ) -> ArmAndHand:
-    """Return a model whose world is the terrain frame, and its frames: sole and hand.
+    """Return a model of the arm that stands before the terrain.
 
     The hand is on link 6, where a person holds the forearm, and has the mass of one:
     `forearm` [kg], 0 where there is no person.
@@ -58,7 +67,8 @@ def arm_and_hand(
     model = build_pinocchio(constants, (tool.sensor, tool.foot))
     _stand_in(model, frame)
     hand = _add_forearm(model, constants, forearm)
-    return model, add_point(model, constants, "sole", tool.sole), hand
+    sole = add_point(model, constants, "sole", tool.sole)
+    return ArmAndHand(model, sole, hand)
 
 
 def motor_inertia(model: "pin.Model", constants: ArmConstants, q: Array) -> Array:

@@ -1,9 +1,8 @@
 """The arm as a body: seven joints, foot on the ground, hand on the forearm.
 
-`body` has the equations, `compiled` the same ones in machine code. Ground and dynamics
-go on in substeps. Once in a cycle of 2 ms are taken anew: the Jacobians, the
-damping of the friction unless a motor is fast, and the force of the hand, of 10 Hz at
-most.
+`body` has the equations. Ground and dynamics go on in substeps. Once in a cycle of 2 ms
+are taken anew: the Jacobians, the damping of the friction unless a motor is fast, and
+the force of the hand, of 10 Hz at most.
 """
 
 from collections.abc import Sequence
@@ -13,8 +12,7 @@ import numpy as np
 
 from acquisition.clock import PERIOD_NS
 from fakes.ground.terrain import Terrain
-from fakes.kernels.choice import COMPILED, chosen_dynamics
-from fakes.plant.body import GRIP, NO_GRIP, ArmBody, HandLoad, PinocchioBody
+from fakes.plant.body import GRIP, NO_GRIP, ArmBody, HandLoad
 from fakes.plant.cables import CableDrives
 from fakes.plant.friction import draw_friction
 from fakes.plant.gauges import Wrench, WristGauges
@@ -22,7 +20,6 @@ from fakes.plant.hand import Hand
 from fakes.plant.joints import JointDrives
 from fakes.plant.model import (
     FOREARM_MASS,
-    ArmAndHand,
     PlantOptions,
     arm_and_hand,
     cable_inertia,
@@ -32,7 +29,6 @@ from fakes.plant.model import (
 from fakes.truth import Truth
 from ft_sensor.payload import TerrainFrame
 from wam.model.constants import GRAVITY, ArmConstants, Array
-from wam.model.friction import MotorFriction
 from wam.model.tool import Tool
 
 _NO_TORQUE = (0.0,) * 7
@@ -64,9 +60,9 @@ class ArmPlant:
         parts = arm_and_hand(constants, tool, frame, forearm)
         self._substeps = options.substeps
         self._substep_ns = PERIOD_NS // options.substeps
-        borne = motor_weights(parts[0], constants, q)
+        borne = motor_weights(parts.model, constants, q)
         drawn = draw_friction(constants, options.friction, options.seed, borne)
-        self.friction = drawn if options.rubbing is None else options.rubbing
+        self.friction = drawn if options.motors is None else options.motors
         up = frame.axes()[:, 2]
         self._up: list[float] = (up * forearm * GRAVITY).tolist()
         self._is_held = True
@@ -78,27 +74,23 @@ class ArmPlant:
         # Mean wrench of the ground over a cycle.
         self._ground: Wrench = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         self._push = (0.0, 0.0, 0.0)  # force of the hand
-        self._body: ArmBody = _build_body(parts, constants, self.friction, q, options)
+        inertia = motor_inertia(parts.model, constants, q)
+        dt = self._substep_ns * 1e-9
+        if options.cables is None:
+            drives = JointDrives(constants, self.friction, inertia, dt)
+        else:
+            drives = CableDrives(
+                constants,
+                self.friction,
+                inertia,
+                cable_inertia(parts.model, constants, q),
+                dt,
+                options.cables,
+            )
+        self._body = ArmBody(parts, drives, constants.j2mp, q, self._substep_ns)
         self.disturbance = self._body.disturbance
-        self._wrist = self._build_gauges(tool, up)
+        self._wrist = WristGauges(tool, up, PERIOD_NS * 1e-9)
         self._wrist.end_cycle(self._body.rotation, self._ground, [0.0] * 6)
-
-    @property
-    def dynamics(self) -> str:
-        """Name of the implementation that moves the arm."""
-        return self._body.dynamics
-
-    @property
-    def is_compiled(self) -> bool:
-        """Whether a ground with compiled steps is stepped fastest."""
-        return self._body.dynamics == COMPILED
-
-    def _build_gauges(self, tool: Tool, up: Array) -> WristGauges:
-        if not self.is_compiled:
-            return WristGauges(tool, up, PERIOD_NS * 1e-9)
-        from fakes.plant.compiled.gauges import CompiledGauges
-
-        return CompiledGauges(tool, up, PERIOD_NS * 1e-9)
 
     @property
     def q(self) -> Array:
@@ -210,38 +202,3 @@ class ArmPlant:
         if self.truth is not None:
             row = (*self.q.tolist(), *motion[:6], -x, y, z, *self._push)
             self.truth.add(self.t_ns, row)
-
-
-def _build_body(
-    parts: ArmAndHand,
-    constants: ArmConstants,
-    friction: MotorFriction,
-    q: Array,
-    options: PlantOptions,
-) -> ArmBody:
-    """Return the dynamics of an arm that stands still at `q`, held.
-
-    Arms whose joints swing on their cables have no compiled ones.
-
-    Args:
-        parts: the arm with the hand, its frames: sole and hand.
-        constants: of the arm.
-        friction: of the motors.
-        q: joint positions [rad], shape (7,).
-        options: of the plant.
-    """
-    model = parts[0]
-    substep_ns = PERIOD_NS // options.substeps
-    # Forces act at the beginning of each substep, on average here in a cycle [s].
-    times = (substep_ns * 1e-9, 5e-10 * (PERIOD_NS - substep_ns))
-    inertia = motor_inertia(model, constants, q)
-    chosen = options.dynamics or chosen_dynamics()
-    if chosen == COMPILED and options.cables is None:
-        from fakes.plant.compiled.body import CompiledBody
-
-        return CompiledBody(parts, constants, (friction, inertia), q, times)
-    drives = JointDrives(constants, friction, inertia, times[0])
-    if options.cables is not None:
-        both = inertia, cable_inertia(model, constants, q)
-        drives = CableDrives(constants, friction, both, times[0], options.cables)
-    return PinocchioBody(parts, drives, constants.j2mp, q, times)

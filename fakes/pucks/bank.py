@@ -1,8 +1,7 @@
 """The seven simulated motor pucks of an arm, and the motors behind them."""
 
-from collections.abc import Callable, Mapping, MutableSequence, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from operator import attrgetter
 from typing import Protocol
 
 from acquisition.devices import SafetyMode
@@ -13,15 +12,10 @@ from fakes.pucks.power import AWAKE, Power, PuckPower, power_after, power_at_sta
 from fakes.pucks.safety_module import puck_mode_in
 from wam.bus.frames import (
     MOTOR_NODES,
-    Group,
     Property,
     encode_positions,
     wrap_positions,
 )
-
-_node, _position_id = attrgetter("node"), attrgetter("position_id")
-_torque = attrgetter("torque")
-LOWER = 4  # motors of the lower arm; the others are the wrist's
 
 
 class MotorSide(Protocol):
@@ -120,26 +114,7 @@ class PuckBank:
             if puck.t_header == header and puck.is_driven:
                 puck.take_torque(units[puck.slot])
         self._motors.advance(self._schedule.now_ns)
-        self._motors.set_torques(list(map(_torque, self._pucks)))
-
-    def share_torques(self, torques: MutableSequence[int]) -> None:
-        """Keep the torques of all motors [puck units] in `torques` from now on."""
-        for puck in self._pucks:
-            torques[puck.node - 1] = puck.torque
-            puck.torques = torques
-
-    def driven_pucks(self) -> list[MotorPuck] | None:
-        """Return all pucks if they run as of one kind and follow the usual groups."""
-        pucks = self._pucks
-        parts = {
-            Group.ARM: pucks,
-            Group.LOWER_TORQUE: pucks[:LOWER],
-            Group.WRIST_TORQUE: pucks[LOWER:],
-        }
-        are_usual = all(self._group(group) == part for group, part in parts.items())
-        are_alike = len({(puck.p_number, puck.t_header) for puck in pucks}) == 1
-        are_at_work = all(puck.life.is_speaking and puck.is_driven for puck in pucks)
-        return pucks if are_usual and are_alike and are_at_work else None
+        self._motors.set_torques([puck.torque for puck in self._pucks])
 
     def _wake_up(self) -> None:
         for puck in self._pucks:
@@ -174,9 +149,9 @@ class PuckBank:
         if not speaking:
             return
         positions = [counts[puck.node - 1] + puck.offset for puck in speaking]
-        can_ids = list(map(_position_id, speaking))
-        self._schedule.emit_all(can_ids, encode_positions(positions))
-        nodes = map(_node, speaking)
+        for puck, data in zip(speaking, encode_positions(positions), strict=True):
+            self._schedule.emit(puck.position_id, data)
+        nodes = [puck.node for puck in speaking]
         self._on_positions(dict(zip(nodes, wrap_positions(positions), strict=True)))
 
     def _tell(self, puck: MotorPuck, number: int, value: int) -> None:
@@ -227,7 +202,7 @@ class PuckBank:
         is_driven = any(puck.is_driven for puck in self._pucks)
         is_powered = self._mode is not SafetyMode.E_STOP
         self._motors.set_braking(is_powered and not is_driven, is_powered)
-        self._motors.set_torques(list(map(_torque, self._pucks)))
+        self._motors.set_torques([puck.torque for puck in self._pucks])
 
     def _encoder_counts(self) -> Sequence[int]:
         self._motors.advance(self._schedule.now_ns)

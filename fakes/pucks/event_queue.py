@@ -1,6 +1,6 @@
 """The time of a simulated network: what happens later, and the frames sent."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from heapq import heappop, heappush
 
 from wam.bus.frames import encode_reply, property_reply_id
@@ -24,7 +24,6 @@ class EventQueue:
         now_ns: the network's time; it never runs back.
         next_ns: when the next plan or the alarm is due, `NEVER` if there is none.
         emit: sends a frame of a device now (identifier, data); see `intercept`.
-        is_intercepted: something comes between devices and wire, or once did.
         outbox: frames that want onto the wire, until they are taken.
     """
 
@@ -32,7 +31,6 @@ class EventQueue:
         self.now_ns = t_ns
         self.next_ns = NEVER
         self.emit: Callable[[int, bytes], None] = self.put
-        self.is_intercepted = False
         self._on_alarm: Callable[[], None] = lambda: None
         self._alarm_ns = NEVER
         self._plans: list[tuple[int, int, Callable[[], None]]] = []
@@ -49,17 +47,6 @@ class EventQueue:
     def intercept(self, emit: Callable[[int, bytes], None]) -> None:
         """Give every frame of a device to `emit` from now on, instead of `put`."""
         self.emit = emit
-        self.is_intercepted = True
-
-    def emit_all(self, can_ids: Sequence[int], payloads: Sequence[bytes]) -> None:
-        """Send frames of devices now, in this order."""
-        if self.is_intercepted:
-            for can_id, data in zip(can_ids, payloads, strict=True):
-                self.emit(can_id, data)
-        else:
-            now_ns = self.now_ns
-            frames = zip(can_ids, payloads, strict=True)
-            self.outbox += [(now_ns, can_id, data) for can_id, data in frames]
 
     def define_alarm(self, action: Callable[[], None]) -> None:
         """Call `action` when the alarm goes off."""

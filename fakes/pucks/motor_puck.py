@@ -1,10 +1,8 @@
 """One simulated motor puck: its power, its properties, its torque."""
 
-from collections.abc import MutableSequence
-
 from fakes.pucks.options import NetworkOptions
 from fakes.pucks.power import AWAKE, Power, PuckPower
-from wam.bus.frames import MOTOR_NODES, position_reply_id
+from wam.bus.frames import position_reply_id
 from wam.bus.properties import (
     MAGNETIC_ENCODER,
     Device,
@@ -32,7 +30,7 @@ class MotorPuck:
         position_id: identifier of its position replies.
         vers: its firmware.
         offset: its position less the encoder's [counts].
-        torques: of all motors [puck units], where its own is one.
+        torque: that it makes [puck units].
         p_number: number of the property P in its firmware.
         t_header: first byte of a torque frame that it takes.
         slot: which of the four torques of a frame is its own, 0 to 3.
@@ -47,7 +45,7 @@ class MotorPuck:
         i = node - 1
         self.vers = options.vers[i]
         self.offset = 0
-        self.torques: MutableSequence[int] = [0] * len(MOTOR_NODES)
+        self.torque = 0
         self._table = nearest_documented(self.vers)
         self.p_number = property_number(Device.MOTOR, "P", self._table)
         self.t_header = 0x80 | property_number(Device.MOTOR, "T", self._table)
@@ -74,15 +72,6 @@ class MotorPuck:
         self.is_driven = self._properties["MODE"] == _DRIVEN
         self.slot = (self._properties["PIDX"] - 1) & 3
         self.limit = self._properties["MT"]
-
-    @property
-    def torque(self) -> int:
-        """Torque it makes [puck units]."""
-        return int(self.torques[self.node - 1])
-
-    @torque.setter
-    def torque(self, units: int) -> None:
-        self.torques[self.node - 1] = units
 
     @property
     def is_awake(self) -> bool:

@@ -4,8 +4,6 @@ Seven motor pucks, the safety module and, where there is one, the force/torque s
 as far as hosts have described them.
 """
 
-from typing import NamedTuple
-
 from acquisition.devices import SafetyMode
 from fakes.pucks.bank import MotorSide, PuckBank
 from fakes.pucks.bus_faults import BusFaults, OtherMaster
@@ -32,20 +30,6 @@ from wam.bus.frames import (
 from wam.driver.pendant import PendantWord
 
 
-class NetworkParts(NamedTuple):
-    """What a network is made of.
-
-    Attributes:
-        bank: the seven motor pucks.
-        safety: the safety module.
-        motors: what the pucks drive.
-    """
-
-    bank: PuckBank
-    safety: FakeSafetyModule
-    motors: MotorSide
-
-
 class PuckNetwork:
     """The network as a host sees it: `receive` frames, `advance`, take what is `due`.
 
@@ -54,8 +38,6 @@ class PuckNetwork:
         options: the arm as it was found.
         faults: what goes wrong with frames on their way to the host.
         other_master: another program that may join.
-        parts: pucks, safety module and motors, for who looks and leaves no trace.
-        touches: how often pucks or safety module were got hold of otherwise.
     """
 
     def __init__(
@@ -70,23 +52,13 @@ class PuckNetwork:
         self.schedule = schedule = EventQueue(t_ns)
         self.faults = BusFaults(schedule)
         self.other_master = OtherMaster(schedule, self.receive)
-        self.touches = 0
-        safety = FakeSafetyModule(self.options, schedule, self._mode_changed)
-        bank = PuckBank(motors, self.options, schedule, safety.hear_positions)
-        self.parts = NetworkParts(bank, safety, motors)
+        self._safety = FakeSafetyModule(self.options, schedule, self._mode_changed)
+        self._bank = PuckBank(
+            motors, self.options, schedule, self._safety.hear_positions
+        )
         self._sensor: ForceTorquePuck | None = None
         if self.options.has_sensor:
             self._sensor = ForceTorquePuck(self.options, schedule, load or Load())
-
-    @property
-    def _bank(self) -> PuckBank:
-        self.touches += 1
-        return self.parts.bank
-
-    @property
-    def _safety(self) -> FakeSafetyModule:
-        self.touches += 1
-        return self.parts.safety
 
     @property
     def safety_mode(self) -> SafetyMode:

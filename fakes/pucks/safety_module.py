@@ -4,7 +4,7 @@ Neither the heartbeat's limit nor the content of the broadcast is known outside 
 the one is an option, the other the mode that the pucks go to.
 """
 
-from collections.abc import Callable, Mapping, MutableSequence, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Literal
 
 from acquisition.devices import SafetyMode
@@ -62,8 +62,6 @@ class FakeSafetyModule:
         mode: the true mode.
         is_mute: its transmit wire is cut.
         is_disobedient: it ignores a host that lowers its mode.
-        speeds: what it knows of the arm's speed.
-        largest: largest torques commanded last, by group [puck units].
     """
 
     def __init__(
@@ -84,12 +82,13 @@ class FakeSafetyModule:
         self._levels: dict[str, SafetyLevel] = dict.fromkeys(MONITORS, _SAFE)
         if not options.has_power:
             self._levels["other"] = _FAULT
-        self.speeds = SpeedMonitor(options.cts)
+        self._speeds = SpeedMonitor(options.cts)
         self._too_fast_since_ns: int | None = None
         self._bus_voltage = NOMINAL_VOLTAGE
         self._is_deaf = False
         self._spared: dict[str, int] = {}  # limits as they were before `strain`
-        self.largest: MutableSequence[int] = [0] * len(TORQUE_GROUPS)
+        # Largest torques commanded last [puck units].
+        self._largest: dict[int, int] = dict.fromkeys(TORQUE_GROUPS, 0)
         self._properties = {
             **{"VERS": options.safety_vers, "ROLE": int(PuckRole.SAFETY)},
             **{"SN": 1010, "ID": SAFETY_NODE, "ERROR": 0},
@@ -113,20 +112,6 @@ class FakeSafetyModule:
             button=PendantButton.E_STOP if is_stopped else PendantButton.NONE,
         )
 
-    @property
-    def calm_limits(self) -> tuple[int, int, int] | None:
-        """Torque, speed [units of VL1] and pause [ns] up to which it says nothing.
-
-        None unless the arm is at work and everything was within the limits so far.
-        """
-        levels, limits = self._levels, self._properties
-        is_safe = levels["velocity"] is _SAFE and levels["torque"] is _SAFE
-        is_watched = not self._is_deaf and self._too_fast_since_ns is None
-        if self.mode is not _ACTIVE or not (is_safe and is_watched):
-            return None
-        largest = min(limits["TL1"], limits["TL2"])
-        return largest, min(limits["VL1"], limits["VL2"]), self._heartbeat_ns
-
     def press(self, action: PendantAction) -> None:
         """Press a button of the pendant."""
         if action == "estop":
@@ -143,7 +128,7 @@ class FakeSafetyModule:
     def forget_positions(self) -> None:
         """Know no longer where the joints are, as after power-up."""
         self._properties["ZERO"] = 0
-        self.speeds.reset()
+        self._speeds.reset()
 
     def receive(self, request: Property) -> None:
         """Take a GET or SET sent to the module."""
@@ -190,12 +175,12 @@ class FakeSafetyModule:
         if self._is_deaf:
             return
         self._feel_beat()
-        self.speeds.on_positions(self._schedule.now_ns, positions)
+        self._speeds.on_positions(self._schedule.now_ns, positions)
         self._judge_speed()
 
     def hear_torques(self, group: int, units: Sequence[int]) -> None:
         """Judge a torque command as it stands on the bus, before a puck clips it."""
-        self.largest[TORQUE_GROUPS.index(group)] = max(map(abs, units))
+        self._largest[group] = max(map(abs, units))
         self._judge_torque()
 
     def _feel_beat(self) -> None:
@@ -230,18 +215,14 @@ class FakeSafetyModule:
     def _judge_speed(self) -> None:
         """Compare the speed with VL1 and VL2; a limit of 0 or less is off."""
         limits = self._properties
-        if self.speeds.bound() * COUNTS_PER_SPEED <= min(limits["VL1"], limits["VL2"]):
-            self._too_fast_since_ns = None
-            self._warn("velocity", is_warning=False)
-            return
-        is_zeroed = self._properties["ZERO"] == 1
-        speed = self.speeds.tip_speed() if is_zeroed else self.speeds.joint_speed()
+        is_zeroed = limits["ZERO"] == 1
+        speed = self._speeds.tip_speed() if is_zeroed else self._speeds.joint_speed()
         counts = speed * COUNTS_PER_SPEED
-        if counts <= self._properties["VL2"] or self._properties["VL2"] <= 0:
+        if counts <= limits["VL2"] or limits["VL2"] <= 0:
             self._too_fast_since_ns = None
             self._warn("velocity", is_warning=counts > limits["VL1"] > 0)
-        elif self._properties["IFAULT"] > 0:
-            self._properties["IFAULT"] -= 1
+        elif limits["IFAULT"] > 0:
+            limits["IFAULT"] -= 1
         else:
             self._fault("velocity")
             self._stop_if_still_too_fast()
@@ -270,7 +251,7 @@ class FakeSafetyModule:
             self._levels[monitor] = _WARNING if is_warning else _SAFE
 
     def _judge_torque(self) -> None:
-        largest = max(self.largest)
+        largest = max(self._largest.values())
         if self.mode is _ACTIVE and largest > self._properties["TL2"]:
             self._fault("torque")
         else:
@@ -288,7 +269,7 @@ class FakeSafetyModule:
         before, self.mode = self.mode, mode
         if mode is SafetyMode.E_STOP:
             self._properties["ZERO"] = 0
-            self.speeds.reset()
+            self._speeds.reset()
             self._too_fast_since_ns = None
         self._feel_beat()
         frame = encode_reply(_MODE, puck_mode_in(mode), is_wide=False)

@@ -27,41 +27,20 @@ class SpeedMonitor:
         per_count = [2 * pi / (count or 1) for count in cts[:_MAIN_JOINTS]]
         self._joints: list[_Row] = [(*row,) for row in (m2jp * per_count).tolist()]
         self.reset()
-        # Whatever the motors do at 1 count/s at most, neither of the speeds is larger.
-        joints = [sum(map(abs, row)) for row in self._joints]
-        tip = ELBOW * (joints[0] + joints[1]) + FOREARM * joints[3]
-        self._per_rate = 1.001 * max(tip, *joints)
 
     def reset(self) -> None:
         """Begin anew: the pucks have lost their power."""
-        self._history: list[deque[tuple[int, int]]] = [
+        # Times [ns] and positions [counts] by motor, oldest first.
+        self._seen: list[deque[tuple[int, int]]] = [
             deque(maxlen=HISTORY + 1) for _ in range(_MAIN_JOINTS)
         ]
 
-    @property
-    def _seen(self) -> Sequence[Sequence[tuple[int, int]]]:
-        """Times [ns] and positions [counts] by motor, oldest first."""
-        return self._history
-
     def on_positions(self, t_ns: int, positions: Mapping[int, int]) -> None:
         """Take positions [counts] by node, all latched at `t_ns`."""
-        for node, seen in enumerate(self._history, 1):
+        for node, seen in enumerate(self._seen, 1):
             counts = positions.get(node)
             if counts is not None and (not seen or t_ns > seen[-1][0]):
                 seen.append((t_ns, counts))
-
-    def bound(self) -> float:
-        """Return what neither speed is beyond, found sooner than they are.
-
-        Of joints [rad/s] as of points [m/s].
-        """
-        fastest = 0.0
-        for seen in self._seen:
-            if len(seen) > 1:
-                (since_ns, first), (t_ns, last) = seen[0], seen[-1]
-                rate = (last - first) / (t_ns - since_ns)
-                fastest = max(fastest, abs(rate))
-        return 1e9 * fastest * self._per_rate
 
     def joint_speed(self) -> float:
         """Return the speed of the fastest of joints 1 to 4 [rad/s]."""

@@ -154,17 +154,3 @@ class WiredNetwork:
             return t_ns
         self._sent.append((t_ns, can_id, data))
         return t_ns + FRAME_NS[len(data)]
-
-
-def lay_wire(network: PuckNetwork, *, is_compiled: bool) -> WiredNetwork:
-    """Return the wire of a network whose host is in this process.
-
-    Args:
-        network: what hangs on it.
-        is_compiled: compiled functions see to its usual traffic.
-    """
-    if not is_compiled:
-        return WiredNetwork(network)
-    from fakes.pucks.compiled import CyclicWire
-
-    return CyclicWire(network)

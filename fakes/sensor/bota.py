@@ -68,13 +68,7 @@ def bota_stream(
 ) -> SensorStream:
     """Return a Bota sensor that shows `source`."""
     firmware = BotaFirmware(options, start_ns)
-    begin = start_ns, options.clock_start_us
-    if errors is not None and errors.is_compiled:
-        from fakes.sensor.compiled import CompiledBotaStream
-
-        stream = CompiledBotaStream(firmware, source, errors, *begin)
-    else:
-        stream = SensorStream(firmware, source, errors, *begin)
+    stream = SensorStream(firmware, source, errors, start_ns, options.clock_start_us)
     stream.resets_on_open = options.resets_on_open
     return stream
 

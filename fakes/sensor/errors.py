@@ -81,12 +81,9 @@ class SensorErrors:
     averages away.
 
     Attributes:
-        is_compiled: they are added by compiled functions.
         warmth: how far the sensor is from its usual temperature [degrees Celsius].
         shift: what a fault has added to the zero [N, N m].
     """
-
-    is_compiled = False
 
     def __init__(
         self,

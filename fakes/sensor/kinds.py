@@ -3,10 +3,8 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-
 from fakes.sensor.bota import BotaOptions, bota_stream
-from fakes.sensor.errors import ErrorScale, SensorErrors
+from fakes.sensor.errors import SensorErrors
 from fakes.sensor.optoforce import (
     SENSITIVITY,
     SERIAL_NUMBER,
@@ -42,23 +40,6 @@ class SensorChoice:
     def is_on_bus(self) -> bool:
         """Whether it is a node of the arm's bus."""
         return self.kind == "barrett"
-
-
-def draw_errors(
-    rng: np.random.Generator, *scales: ErrorScale, is_compiled: bool
-) -> SensorErrors:
-    """Return the errors of a sensor, drawn from `rng`.
-
-    Args:
-        rng: where everything random comes from.
-        scales: of force and torque, none = those of a serial sensor.
-        is_compiled: compiled functions add them.
-    """
-    if not is_compiled:
-        return SensorErrors(rng, *scales)
-    from fakes.sensor.compiled import CompiledErrors
-
-    return CompiledErrors(rng, *scales)
 
 
 def make_stream(

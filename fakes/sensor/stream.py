@@ -191,22 +191,6 @@ class SensorStream:
             self._fault = None
         self._send(t_ns, self.faults.carry(data))
 
-    def _is_plain(self, t_ns: int, period_ns: float) -> bool:
-        """Whether a frame at `t_ns` shows gauges and clock as they are."""
-        return not (
-            self._is_silent
-            or t_ns < self._paused_until_ns
-            or self._wire_free_ns > t_ns + period_ns
-            or self._is_skipping
-            or self._is_saturated
-            or self._fault is not None
-            or self.ranges is not _NO_RANGES
-            or self.status
-            or self.warming
-            or self.is_clock_frozen
-            or self.faults.is_any
-        )
-
     def _measured(self, t_ns: int, wrench: Sequence[float]) -> Measurement:
         warmth = 0.0 if self.errors is None else self.errors.warmth
         if self.warming:
@@ -220,7 +204,8 @@ class SensorStream:
             saturated |= beyond
         fx, fy, fz, tx, ty, tz = wrench
         if not self.is_clock_frozen:
-            self._read_clock(t_ns)
+            passed_ns = round((t_ns - self.on_since_ns) * self.firmware.clock_rate)
+            self._device_us = self._clock_start_us + passed_ns // 1000
         return Measurement(
             self.faults.show((fx, fy, fz, tx, ty, tz)),
             saturated,
@@ -229,11 +214,6 @@ class SensorStream:
             self._is_skipping,
             ROOM + warmth,
         )
-
-    def _read_clock(self, t_ns: int) -> None:
-        """Let the device's clock show what it shows at `t_ns`."""
-        passed_ns = round((t_ns - self.on_since_ns) * self.firmware.clock_rate)
-        self._device_us = self._clock_start_us + passed_ns // 1000
 
     def _send(self, t_ns: int, data: bytes) -> None:
         """Put `data` on the wire as soon as it is free, not before `t_ns`."""

@@ -47,11 +47,6 @@ class StreamFaults:
         self._is_frozen = True
         self._last = None
 
-    @property
-    def is_any(self) -> bool:
-        """Whether anything goes wrong."""
-        return self.is_garbled or self.is_nonsense or self._is_frozen
-
     def clear_faults(self) -> None:
         """Show and send everything as it is."""
         self.is_garbled = self.is_nonsense = self._is_frozen = False

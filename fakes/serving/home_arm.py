@@ -7,7 +7,6 @@ import numpy as np
 
 from acquisition.clock import PERIOD_NS, Clock
 from acquisition.devices import SafetyMode
-from fakes.kernels.choice import PINOCCHIO
 from fakes.plant.model import PlantOptions
 from fakes.plant.plant import ArmPlant
 from fakes.pucks.bank import MotorSide
@@ -24,9 +23,8 @@ from wam.model.constants import ArmConstants, Body, load_constants
 from wam.model.tool import Tool
 
 _SEED = 1  # of the sensor's errors
-# An arm that is served at once waits for no compiler.
-_AIDED = PlantOptions(dynamics=PINOCCHIO)
-_UNAIDED = PlantOptions(friction=1.0, has_hand=False, dynamics=PINOCCHIO)
+_AIDED = PlantOptions()
+_UNAIDED = PlantOptions(friction=1.0, has_hand=False)
 _NO_BODY = Body(0.0, np.zeros(3), np.zeros((3, 3)))
 _PLATE = Tool(_NO_BODY, _NO_BODY, np.zeros(3), sensor_height=0.0)
 
@@ -102,7 +100,7 @@ class HomePose:
         frame: where the container stands.
         line: of a serial sensor; None = the sensor is on the bus.
         is_idle_first: powered, idle, pucks asleep; otherwise in E-STOP.
-        has_hand: a person carries the arm, whose joints hardly rub then; otherwise it
+        has_hand: a person carries the arm, with hardly any friction then; otherwise it
             has all the friction that was identified on another one.
         firmware: of the motor pucks, and of the safety module.
     """

@@ -143,8 +143,6 @@ def main(station: ChildContext) -> None:
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     request(RealtimeRequest(PRIORITY, station.settings.get("core")))
     with temporary_folder("traction", Path(tempfile.gettempdir())) as folder:
-        settings, clock = station.settings, WorldClock(SystemClock())
-        # What is served on the wall clock waits for no compiler.
-        fields = {**settings, "is_brief": True}
-        simulation = simulated_rig(fields, load_constants(), clock)
+        clock = WorldClock(SystemClock())
+        simulation = simulated_rig(station.settings, load_constants(), clock)
         RigServer(simulation, clock, folder, station.channel).serve()

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from acquisition.clock import Clock
-from fakes.kernels.choice import PINOCCHIO
 from fakes.plant.model import PlantOptions
 from fakes.plant.push import PACES
 from fakes.sensor.kinds import SensorChoice
@@ -40,7 +39,7 @@ def _scene_of(fields: Mapping[str, Any]) -> SimulatedScene:
 def arm_of(
     body: Mapping[str, Any] | None, constants: ArmConstants
 ) -> tuple[ArmConstants, MotorFriction | None]:
-    """Return the arm that is not the one of the drawings, and how its motors rub.
+    """Return the arm that is not the one of the drawings, and its motors' friction.
 
     Args:
         body: centres of mass of its links [m] and, unless None, friction of its motors;
@@ -51,8 +50,8 @@ def arm_of(
         return constants, None
     pairs = zip(constants.links, body["com"], strict=True)
     links = tuple(replace(link, com=np.array(com)) for link, com in pairs)
-    rubbing = None if body["motors"] is None else friction_of(body["motors"])
-    return replace(constants, links=links), rubbing
+    motors = None if body["motors"] is None else friction_of(body["motors"])
+    return replace(constants, links=links), motors
 
 
 def simulated_rig(
@@ -62,19 +61,17 @@ def simulated_rig(
 
     Args:
         fields: scene, tool, share of friction, pace, cables; "body" of a twin, which
-            has centres of mass of links and, unless None, friction of motors;
-            "is_brief" of one that waits for no compiler.
+            has centres of mass of links and, unless None, friction of motors.
         constants: of the arm by its drawings.
         clock: of the world.
     """
     scene = _scene_of(fields["scene"])
-    constants, rubbing = arm_of(fields.get("body"), constants)
+    constants, motors = arm_of(fields.get("body"), constants)
     options = PlantOptions(
         fields["friction"],
         seed=scene.seed,
-        rubbing=rubbing,
+        motors=motors,
         cables=fields.get("cables"),
-        dynamics=PINOCCHIO if fields.get("is_brief") else None,
     )
     rig = FakeRig(scene, constants, tool_of(fields["tool"]), clock, options)
     return LocalSimulation(rig, PACES[fields["pace"]])

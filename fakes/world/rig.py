@@ -11,7 +11,6 @@ from acquisition.sample import Record
 from fakes.bus.in_process import FakeCanBus
 from fakes.clock import SteppedClock
 from fakes.ground.terrain import Container, Terrain, make_terrain
-from fakes.kernels.choice import mark_ready
 from fakes.plant.hand import touched_place
 from fakes.plant.model import PlantOptions
 from fakes.plant.plant import ArmPlant
@@ -21,7 +20,8 @@ from fakes.pucks.network import PuckNetwork
 from fakes.pucks.options import NetworkOptions
 from fakes.pucks.safety_module import PendantAction
 from fakes.randomness import TrialGenerators, trial_generators
-from fakes.sensor.kinds import SensorChoice, draw_errors, make_stream
+from fakes.sensor.errors import SensorErrors
+from fakes.sensor.kinds import SensorChoice, make_stream
 from fakes.sensor.port import FakeSerialPort
 from fakes.truth import truth_records
 from fakes.world.faults import (
@@ -122,19 +122,14 @@ class FakeRig:
             chosen = replace(chosen, has_sensor=True)
         self.random = self._rake(0)
         kind = (SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS) if chosen.has_sensor else ()
-        self.errors = draw_errors(
-            self.random.sensor, *kind, is_compiled=self.plant.is_compiled
-        )
+        self.errors = SensorErrors(self.random.sensor, *kind)
         load = Load(self.plant.sensor_load, self.errors)
         self.network = PuckNetwork(self.plant, chosen, clock.now_ns(), load)
         self._body = BodyFaults(self.plant, self.network.schedule.after)
-        is_compiled = self.plant.is_compiled
-        self.bus = FakeCanBus(self.network, clock, is_compiled=is_compiled)
+        self.bus = FakeCanBus(self.network, clock)
         self.stream = make_stream(
             scene.sensor, self.plant.sensor_load, self.errors, clock.now_ns()
         )
-        if self.plant.is_compiled:
-            mark_ready()
         self._port: FakeSerialPort | None = None
         self._cable: Cable | None = None
 
@@ -207,10 +202,6 @@ class FakeRig:
         incline = scene.frame.incline
         drawn = make_terrain(scene.stones, scene.foot, incline, random.ground)
         self.ground: Terrain = Container(drawn)
-        if self.plant.is_compiled:
-            from fakes.ground.compiled.grounds import compiled_ground
-
-            self.ground = compiled_ground(self.ground)
         self.plant.terrain = self.ground
         return random
 
@@ -294,9 +285,12 @@ class LocalSimulation:
         return truth_records(self.rig.plant.take_truth(), self.rig.scene.frame)
 
     def parameters(self) -> dict[str, str]:
-        """Return the true parameters of the ground, and what moves the arm, as text."""
+        """Return the true parameters of the ground, and what moves the arm, as text.
+
+        The dynamics' name is kept for readers of files: once there were others.
+        """
         ground = {name: f"{v:.9g}" for name, v in self.rig.ground.truth().items()}
-        return {**ground, "dynamics": self.rig.plant.dynamics}
+        return {**ground, "dynamics": "pinocchio"}
 
     def friction(self) -> dict[str, list[float]]:
         """Return the true friction of the motors, by the names of its model."""

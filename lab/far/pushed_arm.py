@@ -34,9 +34,7 @@ class PushedArm:
 
         `has_line`: its sensor is on the serial line.
         """
-        world = SimulatedRig(
-            settings.rig, settings.row(row), seed, _FRICTION, "steady", is_brief=True
-        )
+        world = SimulatedRig(settings.rig, settings.row(row), seed, _FRICTION, "steady")
         self._clock = WorldClock(clock)
         simulation = simulated_rig(world.metadata(), load_constants(), self._clock)
         self._simulation, rig = simulation, simulation.rig

@@ -1,8 +1,8 @@
 """Digests of the cycles that one seed of the simulation records.
 
 `python -m tests.experiments.cycle_digest` writes them anew after a change that is meant
-to alter the simulation, the control law or the layout of a cycle; with the name of one
-implementation and a folder it prints those.
+to alter the simulation, the control law or the layout of a cycle; with the name of a
+folder it records there and prints them.
 """
 
 import hashlib
@@ -11,11 +11,9 @@ import sys
 import tempfile
 from pathlib import Path
 
-import pytest
 from mcap.reader import make_reader
 from threadpoolctl import threadpool_info
 
-from fakes.kernels.choice import COMPILED, ENVIRONMENT, PINOCCHIO
 from tests.experiments.program import only_session, traction, write_config
 
 KEPT = Path(__file__).parents[1] / "data" / "recorded" / "cycles.json"
@@ -49,37 +47,26 @@ def digests_of(session: Path) -> dict[str, str]:
     return {name: digest_of(session / "trials" / f"{name}.mcap") for name in TRIALS}
 
 
-def record(folder: Path, dynamics: str) -> Path:
-    """Record the session whose digests are kept on `dynamics`; return its folder."""
+def record(folder: Path) -> Path:
+    """Record the session whose digests are kept; return its folder."""
     config = write_config(folder, travel=TRAVEL)
     script = folder / "script"
     script.write_text("keep\nlast\nkeep\n")
     options = ("--fake", "--fast", "--trials", 3, "--seed", 5)
     places = ("--config", config, "--data", folder, "--operator-script", script)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv(ENVIRONMENT, dynamics)
-        traction("run", "TF", *options, *places)
+    traction("run", "TF", *options, *places)
     return only_session(folder)
 
 
-def tell(dynamics: str, folder: str) -> None:
-    """Print the digests of one implementation, recorded in `folder`."""
-    digests = digests_of(record(Path(folder), dynamics))
-    found = {"processor": processor(), "digests": digests}
-    sys.stdout.write(json.dumps(found) + "\n")
-
-
 def main() -> None:
-    """Write the digests of this machine's simulation, or tell those of one."""
+    """Write the digests of this machine's simulation, or tell them."""
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(temporary)
+        found = {"processor": processor(), "digests": digests_of(record(folder))}
     if len(sys.argv) > 1:
-        tell(*sys.argv[1:])
-        return
-    digests: dict[str, dict[str, str]] = {}
-    for dynamics in (COMPILED, PINOCCHIO):
-        with tempfile.TemporaryDirectory() as folder:
-            digests[dynamics] = digests_of(record(Path(folder), dynamics))
-    kept = {"processor": processor(), "digests": digests}
-    KEPT.write_text(json.dumps(kept, indent=1) + "\n")
+        sys.stdout.write(json.dumps(found) + "\n")
+    else:
+        KEPT.write_text(json.dumps(found, indent=1) + "\n")
 
 
 if __name__ == "__main__":

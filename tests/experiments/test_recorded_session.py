@@ -13,7 +13,6 @@ import pytest
 from acquisition.linear_algebra import openblas_settings
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.recover import recover_file
-from fakes.kernels.choice import COMPILED, PINOCCHIO
 from tests.experiments.cycle_digest import KEPT
 from tests.experiments.program import journal, only_session, traction
 
@@ -33,21 +32,16 @@ def recorded(tmp_path):
     return tmp_path, tmp_path / "rig.toml"
 
 
-@pytest.mark.parametrize("dynamics", [COMPILED, PINOCCHIO])
-def test_one_seed_records_the_cycles_it_always_did(tmp_path, dynamics):
-    if dynamics == COMPILED:
-        pytest.importorskip("numba")
+def test_one_seed_records_the_cycles_it_always_did(tmp_path):
     kept = json.loads(KEPT.read_text())
     # A process of its own, with the kernels that the program asks OpenBLAS for.
-    command = [sys.executable, "-m", "tests.experiments.cycle_digest", dynamics]
+    command = [sys.executable, "-m", "tests.experiments.cycle_digest", tmp_path]
     environment = os.environ | openblas_settings()
-    done = subprocess.run(
-        [*command, tmp_path], env=environment, capture_output=True, check=True
-    )
+    done = subprocess.run(command, env=environment, capture_output=True, check=True)
     found = json.loads(done.stdout.splitlines()[-1])
     if found["processor"] != kept["processor"]:
         pytest.skip(f"the digests hold for a {kept['processor']} processor")
-    assert found["digests"] == kept["digests"][dynamics]
+    assert found["digests"] == kept["digests"]
 
 
 def test_a_session_of_version_0_1_is_counted(recorded):

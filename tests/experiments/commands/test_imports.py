@@ -43,3 +43,14 @@ def test_a_report_prepares_workers_unless_its_results_are_kept(tmp_path, monkeyp
         os.utime(kept, ns=(recorded + age, recorded + age))
         main(report)
         assert len(prepared) == count
+
+
+def test_a_real_run_imports_no_simulated_device():
+    modules = ("experiments.commands.run", "experiments.rig.rig")
+    code = f"import sys, {', '.join(modules)}; print(*sys.modules)"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    loaded = set(done.stdout.split())
+    assert loaded.issuperset(modules)
+    assert "fakes" not in loaded

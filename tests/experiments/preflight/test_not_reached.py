@@ -3,9 +3,7 @@
 import pytest
 
 from acquisition.errors import LinkError, LinkFullError, PreflightError
-from experiments.operator.console import Console
 from experiments.preflight import connecting
-from experiments.rig.rig import FakeOptions
 from experiments.settings.load import load_settings
 from wam.bus.kernel_door import setup_command
 
@@ -32,23 +30,3 @@ def test_a_full_queue_is_no_missing_adapter(monkeypatch):
     text = refusal(full, monkeypatch)
     assert "Nobody acknowledges." in text
     assert "plugged in" not in text
-
-
-@pytest.mark.parametrize(
-    ("fake", "said"),
-    [
-        (FakeOptions(is_fast=True, seed=1), ["Compiling"]),
-        (FakeOptions(is_fast=True, seed=1, is_brief=True), []),
-        (FakeOptions(is_fast=False, seed=1), []),
-        (None, []),
-    ],
-)
-def test_only_a_simulation_that_is_compiled_first_says_so(monkeypatch, fake, said):
-    heard = []
-    monkeypatch.setattr(connecting, "build_rig", lambda *_: heard.append("built"))
-    monkeypatch.setattr(connecting, "compiling_words", lambda: "Compiling")
-    console = Console(color=False)
-    monkeypatch.setattr(console, "say", heard.append)
-    settings = load_settings(None)
-    connecting.connect_rig(settings, settings.matrix.terrains[0], fake, console)
-    assert heard == [*said, "built"]

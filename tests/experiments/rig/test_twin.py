@@ -163,9 +163,9 @@ def test_a_session_of_a_twin_stays_one_when_it_is_resumed(folder, monkeypatch):
     assert run_short(config, data, "TF", 1, "--twin", *fault).code == 4
     done = traction("resume", "--operator-script", "auto", "--data", data)
     assert done.code == 0, done.err
-    rubbing = [rig.plant.friction.coulomb.tolist() for rig in built.rigs]
-    assert len(rubbing) == 2
-    assert rubbing[0] == rubbing[1]
+    coulomb = [rig.plant.friction.coulomb.tolist() for rig in built.rigs]
+    assert len(coulomb) == 2
+    assert coulomb[0] == coulomb[1]
     stored = tomllib.loads((folder / "friction.toml").read_text())
-    assert rubbing[0] == stored["motors"]["coulomb"]
+    assert coulomb[0] == stored["motors"]["coulomb"]
     assert journal(only_session(data))[0]["fake"]["is_twin"] is True

@@ -24,9 +24,9 @@ SLIPPERY = draw_friction(CONSTANTS, 0.0, None, np.zeros(7))
 STUCK = replace(SLIPPERY, coulomb=np.full(7, 1e4), presliding=np.full(7, 1e-4))
 
 
-def free_arm(cables, rubbing):
+def free_arm(cables, motors):
     """Return a released arm that nobody holds, above nothing."""
-    options = PlantOptions(cables=cables, rubbing=rubbing, has_hand=False)
+    options = PlantOptions(cables=cables, motors=motors, has_hand=False)
     plant = ArmPlant(CONSTANTS, TOOL, FRAME, START_Q, options)
     release(plant)
     return plant

@@ -4,7 +4,6 @@ import numpy as np
 import pinocchio as pin  # noqa: TID253 - the arm cannot be simulated without it
 import pytest
 
-from fakes.kernels.choice import COMPILED, ENVIRONMENT, PINOCCHIO
 from fakes.plant.joints import JointLoads, JointState, JointStops
 from tests.fakes.scenes import (
     CONSTANTS,
@@ -22,14 +21,6 @@ from wam.model.arm_model import build_pinocchio, drive_inertia_matrix
 from wam.model.constants import GRAVITY
 
 S = 1_000_000_000
-
-
-@pytest.fixture(autouse=True, params=[COMPILED, PINOCCHIO])
-def dynamics(request, monkeypatch):
-    """Let every claim hold for both implementations."""
-    if request.param == COMPILED:
-        pytest.importorskip("numba")
-    monkeypatch.setenv(ENVIRONMENT, request.param)
 
 
 def total_inertia(plant):
@@ -340,7 +331,6 @@ def test_loads_on_foot_hand_and_joints_come_together_in_the_joints():
 
 @pytest.mark.parametrize(("away", "times"), [(0.5, 1), (0.02, 5)])
 def test_resistance_is_taken_at_every_substep_near_a_stop(monkeypatch, away, times):
-    monkeypatch.setenv(ENVIRONMENT, PINOCCHIO)
     plant = make_plant()
     plant.q[6] = CONSTANTS.q_upper[6] - away
     release(plant)

@@ -240,18 +240,6 @@ def test_a_fault_while_idle_bars_the_activation():
     assert host.mode is SafetyMode.IDLE
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_neither_speed_is_beyond_its_bound_which_is_no_wild_guess(seed):
-    watch = SpeedMonitor((4096,) * 7)
-    rng = np.random.default_rng(seed)
-    rates = rng.uniform(-200.0, 200.0, 4)
-    for step in range(8):
-        counts = np.rint(rates * step).astype(int).tolist()
-        watch.on_positions(step * CYCLE_NS, dict(enumerate(counts, 1)))
-        fastest = max(watch.tip_speed(), watch.joint_speed())
-        assert fastest <= watch.bound() <= 30.0 * fastest
-
-
 def test_speeds_begin_anew_after_a_stop():
     watch = SpeedMonitor((4096,) * 7)
     watch.on_positions(0, {1: 0})
@@ -259,7 +247,7 @@ def test_speeds_begin_anew_after_a_stop():
     assert watch.joint_speed() > 100
     watch.reset()
     watch.on_positions(2 * CYCLE_NS, {1: -100_000})
-    assert watch.joint_speed() == watch.bound() == 0.0
+    assert watch.joint_speed() == 0.0
 
 
 @pytest.mark.parametrize(

@@ -66,7 +66,7 @@ class HoldBench:
     """An arm without a hand on it, in hold.
 
     `error`: by how much rig.toml makes the foot too heavy [kg]. `compensation`: of
-    friction, in the law. `rubbing`: friction of the motors, given instead of drawn.
+    friction, in the law. `motors`: friction of the motors, given instead of drawn.
     `late`: cycles by which torques arrive late. `cables`: their resonance [Hz], None =
     stiff. `mass`: virtual, in float [kg]. `sent`: the torques beside gravity's
     [N m], cycle by cycle.
@@ -78,14 +78,14 @@ class HoldBench:
         friction=0.02,
         error=0.0,
         compensation=None,
-        rubbing=None,
+        motors=None,
         late=0,
         cables=None,
         mass=0.0,
     ):
         self.clock = SteppedClock()
         scene = SimulatedScene("S0", "small", "tread", FRAME, START_Q, 1)
-        options = PlantOptions(friction, rubbing=rubbing, cables=cables)
+        options = PlantOptions(friction, motors=motors, cables=cables)
         self.rig = FakeRig(scene, CONSTANTS, TOOL, self.clock, options)
         self.clock.attach(self.rig)
         finalize(self, self.rig.bus.shutdown)

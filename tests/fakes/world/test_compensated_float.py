@@ -17,20 +17,20 @@ STILL = 2e-4  # rad in a second: an encoder's counts
 KICK = 0.3  # rad/s
 
 
-def over(rubbing, factor):
+def over(motors, factor):
     """Return a compensation that takes the friction for so much larger."""
-    level = factor * rubbing.coulomb
+    level = factor * motors.coulomb
     return KnownFriction(level, level, NOTHING, NOTHING, NOTHING)
 
 
-def settled(rubbing, known, share=0.8, *, late=0, joint=1, grip="none", cables=None):
+def settled(motors, known, share=0.8, *, late=0, joint=1, grip="none", cables=None):
     """Kick a joint of a floating arm; return its positions in the sixth second.
 
     `grip`: "stiff" of a hand that carries, "loose" of one that lies on the arm.
     """
     compensation = FrictionCompensation(CONSTANTS, known, share)
     bench = HoldBench(
-        compensation=compensation, rubbing=rubbing, late=late, cables=cables
+        compensation=compensation, motors=motors, late=late, cables=cables
     )
     if grip != "none":
         bench.plant.hand.carry()
@@ -62,8 +62,8 @@ def every(cases, *daily):
     every(product(range(6), (0, 2)), *product((0, 1, 3, 5), (2,)), (1, 0)),
 )
 def test_an_overestimate_of_a_fifth_leaves_no_swing(joint, late):
-    rubbing = whole()
-    q = settled(rubbing, over(rubbing, 1.2), joint=joint, late=late)
+    motors = whole()
+    q = settled(motors, over(motors, 1.2), joint=joint, late=late)
     assert np.ptp(q, axis=0)[:6].max() < STILL
 
 
@@ -72,15 +72,15 @@ def test_an_overestimate_of_a_fifth_leaves_no_swing(joint, late):
     every(product((1, 3, 5), (0.25, 0.5, 2.0, 4.0)), (1, 0.25), (3, 4.0), (5, 0.25)),
 )
 def test_bristles_that_are_softer_or_stiffer_leave_no_swing(joint, presliding):
-    rubbing = whole(presliding=presliding)
-    q = settled(rubbing, over(rubbing, 1.2), joint=joint, late=2)
+    motors = whole(presliding=presliding)
+    q = settled(motors, over(motors, 1.2), joint=joint, late=2)
     assert np.ptp(q, axis=0)[:6].max() < STILL
 
 
 @pytest.mark.parametrize("joint", [1, 3])
 def test_a_person_who_holds_the_arm_feels_no_swing(joint):
-    rubbing = whole()
-    q = settled(rubbing, over(rubbing, 1.2), joint=joint, grip="stiff")
+    motors = whole()
+    q = settled(motors, over(motors, 1.2), joint=joint, grip="stiff")
     assert np.ptp(q, axis=0)[:6].max() < 5 * STILL
 
 
@@ -95,7 +95,7 @@ def test_a_person_who_holds_the_arm_feels_no_swing(joint):
     ),
 )
 def test_cables_that_give_way_leave_no_swing(cables, joint, grip):
-    rubbing = whole()
-    known = over(rubbing, 1.2)
-    q = settled(rubbing, known, joint=joint, grip=grip, cables=cables, late=2)
+    motors = whole()
+    known = over(motors, 1.2)
+    q = settled(motors, known, joint=joint, grip=grip, cables=cables, late=2)
     assert np.ptp(q, axis=0)[:6].max() < (STILL if grip == "none" else 5 * STILL)
