@@ -2,9 +2,8 @@
 
 import math
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import lru_cache
-from itertools import chain
 from operator import length_hint
 from typing import NamedTuple
 
@@ -37,31 +36,20 @@ def friction_generator(seed: int) -> np.random.Generator:
     return trial_generator(seed, "friction", 0)
 
 
-# Streams and processes below step up to 50 times per cycle of 2 ms. A chain hands the
-# numbers of a block out at half the cost of a generator, and a generator keeps its
-# frame between steps, which costs a third of a method's call.
-
-
 class NormalStream:
-    """Standard normal numbers one by one, drawn in blocks.
-
-    Attributes:
-        next: returns the next number.
-    """
+    """Standard normal numbers one by one, drawn in blocks."""
 
     def __init__(self, generator: np.random.Generator, block: int = 4096) -> None:
-        blocks = _blocks(generator, block)
-        self.next: Callable[[], float] = chain.from_iterable(blocks).__next__
+        self._generator = generator
+        self._block = block
+        self._rest: Iterator[float] = iter(())
 
-
-def _blocks(generator: np.random.Generator, block: int) -> Iterator[list[float]]:
-    while True:
-        yield generator.standard_normal(block).tolist()
-
-
-def _nothing() -> Iterator[float]:
-    empty: list[float] = []
-    return iter(empty)
+    def next(self) -> float:
+        """Return the next number."""
+        for number in self._rest:
+            return number
+        self._rest = iter(self._generator.standard_normal(self._block).tolist())
+        return next(self._rest)
 
 
 class DrawnAhead:
@@ -75,7 +63,7 @@ class DrawnAhead:
         self._generator = generator
         self._block = block
         self._state = generator.bit_generator.state
-        self._rest = _nothing()
+        self._rest: Iterator[float] = iter(())
 
     def next(self) -> float:
         """Return the next number."""
@@ -91,7 +79,7 @@ class DrawnAhead:
         if left:
             self._generator.bit_generator.state = self._state
             self._generator.random(self._block - left)
-            self._rest = _nothing()
+            self._rest = iter(())
 
 
 @lru_cache(maxsize=64)  # every 10 ms a sensor asks for the same seven again
@@ -113,48 +101,44 @@ class OrnsteinUhlenbeck:
     """Zero-mean Ornstein-Uhlenbeck process of standard deviation `sd`.
 
     It begins anywhere in its stationary distribution; see `exact_step`.
-
-    Attributes:
-        step: advances by one time step and returns the value.
     """
 
     def __init__(
         self, sd: float, time: float, dt: float, normals: NormalStream
     ) -> None:
-        start = sd * normals.next()
-        walk = _walk(start, *exact_step(sd, time, dt), normals)
-        self.step: Callable[[], float] = walk.__next__
+        self._value = sd * normals.next()
+        self._keep, self._kick = exact_step(sd, time, dt)
+        self._normals = normals
 
-
-def _walk(
-    value: float, keep: float, kick: float, normals: NormalStream
-) -> Iterator[float]:
-    next_normal = normals.next
-    while True:
-        value = keep * value + kick * next_normal()
-        yield value
+    def step(self) -> float:
+        """Advance by one time step and return the value."""
+        self._value = self._keep * self._value + self._kick * self._normals.next()
+        return self._value
 
 
 class Tremor:
     """Unit-rms noise through a resonator at 9.5 Hz, damping ratio 0.15.
 
-    Attributes:
-        step: advances by one time step and returns the value.
+    x'' + 2 zeta omega x' + omega^2 x = noise, by semi-implicit Euler. Its first step
+    draws where it begins.
     """
 
     def __init__(self, dt: float, normals: NormalStream) -> None:
-        self.step: Callable[[], float] = _resonance(dt, normals).__next__
+        omega, zeta = 2.0 * math.pi * 9.5, 0.15
+        self._dt, self._omega, self._normals = dt, omega, normals
+        self._spring, self._keep = -dt * omega * omega, 1.0 - dt * 2.0 * zeta * omega
+        # White input of this intensity gives unit variance: S = 4 zeta omega^3
+        self._intensity = math.sqrt(4.0 * zeta * omega**3 * dt)
+        self._x, self._v = 0.0, 0.0
+        self._has_begun = False
 
-
-def _resonance(dt: float, normals: NormalStream) -> Iterator[float]:
-    """Yield the resonator's values; semi-implicit Euler."""
-    omega, zeta = 2.0 * math.pi * 9.5, 0.15
-    spring, keep = -dt * omega * omega, 1.0 - dt * 2.0 * zeta * omega
-    # white input of this intensity gives unit variance: S = 4 zeta omega^3
-    intensity = math.sqrt(4.0 * zeta * omega**3 * dt)
-    next_normal = normals.next
-    x, v = next_normal(), omega * next_normal()
-    while True:
-        v = keep * v + spring * x + intensity * next_normal()
-        x += dt * v
-        yield x
+    def step(self) -> float:
+        """Advance by one time step and return the value."""
+        if not self._has_begun:
+            self._has_begun = True
+            self._x = self._normals.next()
+            self._v = self._omega * self._normals.next()
+        noise = self._intensity * self._normals.next()
+        self._v = self._keep * self._v + self._spring * self._x + noise
+        self._x += self._dt * self._v
+        return self._x

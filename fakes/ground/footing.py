@@ -7,11 +7,11 @@ being shifted sideways, turned and tilted like bristles that slip at a limit.
 import numpy as np
 
 from fakes.ground.contact import Contact, Motion
-from fakes.ground.profile import locate, smooth_profile
+from fakes.ground.profile import smooth_profile, value_at
 
-K_TURN = 10.0  # N m/rad, about each axis
+_K_TURN = 10.0  # N m/rad, about each axis
 _ARM = 0.03  # torsional friction limit per newton of normal force [m]
-TURN_PER_N = _ARM / K_TURN  # stretch of a torsional bristle at its limit [rad/N]
+_TURN_PER_N = _ARM / _K_TURN  # stretch of a torsional bristle at its limit [rad/N]
 
 
 class Footing:
@@ -20,11 +20,6 @@ class Footing:
     A bristle is stretched by what the sole moves, up to a limit at which it slips. The
     limit may be another at every step; the stored energy never grows by a change of it.
 
-    Attributes:
-        cop_x, cop_y: offset of the centre of pressure on the grid [m].
-        stiffness: of the lateral bristle [N/m].
-        aside: its stretch [m].
-        turn_x, turn_y, turn_z: of the torsional bristles [rad].
     """
 
     def __init__(
@@ -38,23 +33,19 @@ class Footing:
             length: over which it wanders [m].
             rng: of this trial's ground.
         """
-        self.cop_x = (spread * smooth_profile(rng, length)).tolist()
-        self.cop_y = (spread * smooth_profile(rng, length)).tolist()
-        self.stiffness = stiffness
+        self._cop_x = (spread * smooth_profile(rng, length)).tolist()
+        self._cop_y = (spread * smooth_profile(rng, length)).tolist()
+        self._stiffness = stiffness
         self.release()
 
     def release(self) -> None:
         """Lose contact."""
-        self.aside = self.turn_x = self.turn_y = self.turn_z = 0.0
+        self._aside = 0.0  # stretch of the lateral bristle [m]
+        self._turn_x = self._turn_y = self._turn_z = 0.0  # of the torsional ones [rad]
 
     def centre_of_pressure(self, x: float) -> tuple[float, float]:
         """Return its offset from the sole's centre with the sole at `x` [m]."""
-        row, share = locate(x)
-        a, b = self.cop_x, self.cop_y
-        return (
-            a[row] + share * (a[row + 1] - a[row]),
-            b[row] + share * (b[row + 1] - b[row]),
-        )
+        return value_at(self._cop_x, x), value_at(self._cop_y, x)
 
     def step(
         self, dt: float, motion: Motion, F_t: float, F_n: float, mu: float
@@ -73,22 +64,22 @@ class Footing:
             return F_t, 0.0, 0.0, 0.0, 0.0, 0.0
         at, _, _, _, vy, _, wx, wy, wz = motion
         x, y = self.centre_of_pressure(at)
-        k, most = self.stiffness, TURN_PER_N * F_n
-        # Written out four times: as a function it takes a third of this method's time.
-        s, limit = self.aside + vy * dt, mu * F_n / k
-        self.aside = limit if s > limit else -limit if s < -limit else s
-        s = self.turn_x + wx * dt
-        self.turn_x = turn_x = most if s > most else -most if s < -most else s
-        s = self.turn_y + wy * dt
-        self.turn_y = turn_y = most if s > most else -most if s < -most else s
-        s = self.turn_z + wz * dt
-        self.turn_z = turn_z = most if s > most else -most if s < -most else s
-        F_y = -k * self.aside
+        k, most = self._stiffness, _TURN_PER_N * F_n
+        self._aside = _slipped(self._aside + vy * dt, mu * F_n / k)
+        self._turn_x = _slipped(self._turn_x + wx * dt, most)
+        self._turn_y = _slipped(self._turn_y + wy * dt, most)
+        self._turn_z = _slipped(self._turn_z + wz * dt, most)
+        F_y = -k * self._aside
         return (
             F_t,
             F_y,
             F_n,
-            y * F_n - K_TURN * turn_x,
-            -x * F_n - K_TURN * turn_y,
-            x * F_y + y * F_t - K_TURN * turn_z,
+            y * F_n - _K_TURN * self._turn_x,
+            -x * F_n - _K_TURN * self._turn_y,
+            x * F_y + y * F_t - _K_TURN * self._turn_z,
         )
+
+
+def _slipped(stretch: float, limit: float) -> float:
+    """Return the stretch of a bristle that slips at `limit`."""
+    return limit if stretch > limit else -limit if stretch < -limit else stretch

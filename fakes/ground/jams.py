@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -12,13 +11,13 @@ from fakes.randomness import DrawnAhead, NormalStream
 _PHI = math.radians(35.0)  # friction angle of the bed
 _THETA = (math.radians(30.0), math.radians(52.0))  # of the flank that is ridden up
 _STEEPEST = 1.40  # rad
-MU_R, B_G, C_T = 0.28, 4.0, 20.0  # rolling stones; N s/m; N s/m
-V_C, A_C = 0.020, 0.14  # creep [m/s], its sensitivity to load
-LAM0, LAM1 = 0.4, 2.0  # shuffles per second
+_MU_R, _B_G, _C_T = 0.28, 4.0, 20.0  # rolling stones; N s/m; N s/m
+_V_C, _A_C = 0.020, 0.14  # creep [m/s], its sensitivity to load
+_LAM0, _LAM1 = 0.4, 2.0  # shuffles per second
 _S_LO, _S_HI = 0.7, 2.2  # capacity of a contact, in shares of the jam
-Q0, TAU = 0.75, 0.4  # strength of a fresh jam, time of ageing [s]
-TOUCH = 0.05  # N, below which no stone engages
-LITTLE = 1e-9  # N, keeps the load finite
+_Q0, _TAU = 0.75, 0.4  # strength of a fresh jam, time of ageing [s]
+_TOUCH = 0.05  # N, below which no stone engages
+_LITTLE = 1e-9  # N, keeps the load finite
 
 
 @dataclass(slots=True)
@@ -32,40 +31,20 @@ class Stone:
     anchor: float | None = None
 
 
-class Chances(Protocol):
-    """Numbers from 0 to below 1 of which those not taken can be given back."""
-
-    def next(self) -> float:
-        """Return the next number."""
-        ...
-
-    def give_back(self) -> None:
-        """Let the generator stand right behind the last number that was taken."""
-        ...
-
-
 class JamSequence:
     """One locked configuration of stones after another.
 
     Attributes:
         releases: how many have collapsed.
-        stones: contacts of the jam of now.
-        weights: sum of their weights.
-        J, T: its strength [N] and its grip per newton of load.
-        age: how long it has been loaded [s].
-        elastic: force of its stretched contacts [N].
-        is_loaded: a contact was attached in the last step.
-        c_t, b_g: damping of a pushed and of a rolling contact [N s/m].
-        chances: decide about shuffles.
     """
 
-    J: float
-    T: float
-    age: float
-    elastic: float
-    is_loaded: bool
-    stones: list[Stone]
-    weights: float
+    _J: float  # strength of the jam of now [N]
+    _T: float  # its grip per newton of load
+    _age: float  # how long it has been loaded [s]
+    _elastic: float  # force of its stretched contacts [N]
+    _is_loaded: bool  # a contact was attached in the last step
+    _stones: list[Stone]  # its contacts
+    _weights: float  # the sum of their weights
 
     def __init__(
         self, parameters: StoneParameters, strength: float, rng: np.random.Generator
@@ -79,44 +58,42 @@ class JamSequence:
         """
         self._p = parameters
         self._strength = strength
-        self.generator = rng
+        self._generator = rng
         self._normals = NormalStream(rng)
-        self.chances: Chances = DrawnAhead(rng)
-        self.c_t = C_T / parameters.N
-        self.b_g = B_G / parameters.N
+        self._chances = DrawnAhead(rng)
+        # Damping of a pushed and of a rolling contact [N s/m].
+        self._c_t, self._b_g = _C_T / parameters.N, _B_G / parameters.N
         self.releases = 0
         self._form(0.0, 0.0)
 
-    def step(
-        self, dt: float, motion: tuple[float, float], F_n: float, sunk: float
-    ) -> float:
+    def step(self, dt: float, x: float, vx: float, F_n: float, sunk: float) -> float:
         """Advance by `dt` [s] and return the force against x [N].
 
         Args:
             dt: time step [s].
-            motion: x [m] and vx [m/s] of the sole.
+            x: position of the sole [m].
+            vx: its velocity [m/s].
             F_n: normal force [N].
             sunk: share of the final slip sinkage, for the next jam.
         """
-        x, vx = motion
         capacity = self._capacity(dt, F_n)
-        load = self.elastic / capacity
-        creep = V_C * math.exp((load - 1.0) / A_C) * dt if 0.3 < load < 1.5 else 0.0
-        skin = MU_R * F_n / self.weights  # per share of the load
+        load = self._elastic / capacity
+        creep = _V_C * math.exp((load - 1.0) / _A_C) * dt if 0.3 < load < 1.5 else 0.0
+        skin = _MU_R * F_n / self._weights  # per share of the load
         elastic = rolling = 0.0
         pushed = detached = 0
-        for stone in self.stones:
+        for stone in self._stones:
             anchor = stone.anchor
             if anchor is None:
                 rolling += stone.weight
                 detached += 1
-                if x > stone.engage_at and F_n > TOUCH:
+                if x > stone.engage_at and F_n > _TOUCH:
                     stone.anchor = x
                 continue
             anchor += creep
             force = stone.k * (x - anchor)
             if force > stone.capacity:
-                self.break_stone(stone, x)
+                self._break(stone, x)
                 rolling += stone.weight
                 continue
             if force > 0.0:
@@ -127,20 +104,20 @@ class JamSequence:
                 anchor = x - force / stone.k
             stone.anchor = anchor
             elastic += force
-        self.elastic = elastic
-        self.is_loaded = detached < len(self.stones)
-        if self.is_loaded:
+        self._elastic = elastic
+        self._is_loaded = detached < len(self._stones)
+        if self._is_loaded:
             self._collapse_or_shuffle(dt, x, elastic / capacity, sunk)
-        total = elastic + (self.c_t * pushed + self.b_g * detached) * vx
+        total = elastic + (self._c_t * pushed + self._b_g * detached) * vx
         if rolling:
             total += skin * rolling * math.tanh(vx / 0.01)
         return total
 
     def lose_contact(self) -> None:
         """Let go of the foot, which has left the ground."""
-        self.elastic = 0.0
-        self.is_loaded = False
-        for stone in self.stones:
+        self._elastic = 0.0
+        self._is_loaded = False
+        for stone in self._stones:
             stone.anchor = None
 
     def begin_at(self, x: float) -> None:
@@ -153,63 +130,63 @@ class JamSequence:
 
     def _capacity(self, dt: float, F_n: float) -> float:
         """Return the force that the jam can bear now [N]."""
-        if self.is_loaded:
-            self.age += dt
-        aged = Q0 + (1.0 - Q0) * (1.0 - math.exp(-self.age / TAU))
-        strength, grip = self.J * aged, F_n * self.T
+        if self._is_loaded:
+            self._age += dt
+        aged = _Q0 + (1.0 - _Q0) * (1.0 - math.exp(-self._age / _TAU))
+        strength, grip = self._J * aged, F_n * self._T
         capacity = strength if strength < grip else grip
-        return capacity if capacity > LITTLE else LITTLE
+        return capacity if capacity > _LITTLE else _LITTLE
 
     def _collapse_or_shuffle(
         self, dt: float, x: float, load: float, sunk: float
     ) -> None:
         if load > 1.0:
-            self.collapse(x, sunk)
-        elif self.chances.next() < (LAM0 + LAM1 * load * load) * dt:
-            self.shuffle(x)
+            self._collapse(x, sunk)
+        elif self._chances.next() < (_LAM0 + _LAM1 * load * load) * dt:
+            self._shuffle(x)
 
-    def collapse(self, x: float, sunk: float) -> None:
+    def _collapse(self, x: float, sunk: float) -> None:
         """Let go at `x` [m] and form the next jam a free run ahead."""
-        self.chances.give_back()
+        self._chances.give_back()
         p = self._p
-        run_out = p.run * p.d50 * float(self.generator.gamma(p.k_run, 1.0 / p.k_run))
+        run_out = p.run * p.d50 * float(self._generator.gamma(p.k_run, 1.0 / p.k_run))
         self.releases += 1
         self._form(x + run_out, sunk)
 
-    def shuffle(self, x: float) -> None:
+    def _shuffle(self, x: float) -> None:
         """Let one attached contact lose some of its stretch."""
-        attached = [(s, s.anchor) for s in self.stones if s.anchor is not None]
+        attached = [(s, s.anchor) for s in self._stones if s.anchor is not None]
         if attached:
-            self.chances.give_back()
-            stone, anchor = attached[int(self.generator.integers(len(attached)))]
-            stone.anchor = anchor + float(self.generator.uniform(0.3, 1.0)) * (
+            self._chances.give_back()
+            stone, anchor = attached[int(self._generator.integers(len(attached)))]
+            stone.anchor = anchor + float(self._generator.uniform(0.3, 1.0)) * (
                 x - anchor
             )
 
-    def break_stone(self, stone: Stone, x: float) -> None:
+    def _break(self, stone: Stone, x: float) -> None:
         """Let `stone` go at `x` [m]; it meets its next seat after a gap."""
-        self.chances.give_back()
+        self._chances.give_back()
         p = self._p
         stone.anchor = None
-        stone.engage_at = x + p.gap * p.d50 * float(self.generator.gamma(2.0, 0.5))
-        stone.capacity = self.J / p.N * float(self.generator.uniform(_S_LO, _S_HI))
+        stone.engage_at = x + p.gap * p.d50 * float(self._generator.gamma(2.0, 0.5))
+        stone.capacity = self._J / p.N * float(self._generator.uniform(_S_LO, _S_HI))
 
     def _form(self, x: float, sunk: float) -> None:
         """Form a jam that begins at `x` [m]."""
-        p, rng = self._p, self.generator
+        p, rng = self._p, self._generator
         gamma = float(rng.gamma(p.k_J, 1.0 / p.k_J))
-        self.J = self._strength * gamma * (0.8 + 0.4 * sunk)
-        self.T = math.tan(min(_PHI + float(rng.uniform(*_THETA)), _STEEPEST))
-        self.age = self.elastic = 0.0
-        self.is_loaded = False
-        self.stones = [self._stone(x) for _ in range(p.N)]
-        self.weights = sum(stone.weight for stone in self.stones)
+        self._J = self._strength * gamma * (0.8 + 0.4 * sunk)
+        self._T = math.tan(min(_PHI + float(rng.uniform(*_THETA)), _STEEPEST))
+        self._age = self._elastic = 0.0
+        self._is_loaded = False
+        self._stones = [self._stone(x) for _ in range(p.N)]
+        self._weights = sum(stone.weight for stone in self._stones)
 
     def _stone(self, x: float) -> Stone:
-        p, rng = self._p, self.generator
+        p, rng = self._p, self._generator
         return Stone(
             weight=float(rng.gamma(p.k_w, 1.0 / p.k_w)) + 0.05,
             k=p.K_t / p.N * math.exp(p.sigma_k * self._normals.next()),
-            capacity=self.J / p.N * float(rng.uniform(_S_LO, _S_HI)),
+            capacity=self._J / p.N * float(rng.uniform(_S_LO, _S_HI)),
             engage_at=x + float(rng.random()) * p.disp * p.d50,
         )

@@ -23,16 +23,11 @@ def smooth_profile(rng: np.random.Generator, length: float) -> np.ndarray:
     return np.convolve(noise, taps / np.sqrt((taps**2).sum()), "valid")
 
 
-def locate(x: float) -> tuple[int, float]:
-    """Return (row, share of the next row) of `x` [m] in every table."""
+def value_at(table: list[float], x: float) -> float:
+    """Return a tabulated profile at `x` [m], linear between the points."""
     position = (x + _MARGIN) / GRID
     if not 0.0 <= position <= _LAST:
         position = 0.0 if position < 0.0 else _LAST
     row = int(position)
-    return row, position - row
-
-
-def value_at(table: list[float], x: float) -> float:
-    """Return a tabulated profile at `x` [m], linear between the points."""
-    row, share = locate(x)
+    share = position - row
     return table[row] + share * (table[row + 1] - table[row])

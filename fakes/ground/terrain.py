@@ -38,30 +38,22 @@ _COP_SPREAD, _COP_LENGTH = 0.003, 0.010  # of the centre of pressure [m]
 
 
 class Plate:
-    """A flat plate with LuGre friction per newton of normal force.
-
-    Attributes:
-        parameters: of surface and foot.
-        bristle: its stretch [m].
-        pressed: normal force of the last step [N].
-        c_n: normal damping [N s/m].
-        level, texture: multiples of the friction: of this trial, and on the grid.
-        footing: what the sole's size adds.
-    """
+    """A flat plate with LuGre friction per newton of normal force."""
 
     def __init__(self, parameters: PlateParameters, rng: np.random.Generator) -> None:
-        self.parameters = parameters
-        self.bristle = 0.0
-        self.pressed = 0.0
-        self.c_n = 2.0 * parameters.zeta * math.sqrt(parameters.k_n * DAMPING_MASS)
-        self.level = math.exp(0.02 * float(rng.standard_normal()))
-        self.texture = (1.0 + 0.03 * smooth_profile(rng, 0.03)).tolist()
-        self.footing = Footing(_K_LATERAL, _COP_SPREAD, _COP_LENGTH, rng)
+        self._parameters = parameters
+        self._bristle = 0.0  # its stretch [m]
+        self._pressed = 0.0  # normal force of the last step [N]
+        self._c_n = 2.0 * parameters.zeta * math.sqrt(parameters.k_n * DAMPING_MASS)
+        # Multiples of the friction: of this trial, and along the plate.
+        self._level = math.exp(0.02 * float(rng.standard_normal()))
+        self._texture = (1.0 + 0.03 * smooth_profile(rng, 0.03)).tolist()
+        self._footing = Footing(_K_LATERAL, _COP_SPREAD, _COP_LENGTH, rng)
 
     @property
     def stiffness(self) -> float:
         """Normal stiffness [N/m]."""
-        return self.parameters.k_n
+        return self._parameters.k_n
 
     def surface(self, x: float) -> float:
         """Return 0: a plate is flat."""
@@ -71,40 +63,40 @@ class Plate:
     def truth(self) -> dict[str, float]:
         """Return the parameters in force [SI]."""
         return {
-            "mu_s": self.parameters.mu_s * self.level,
-            "mu_k": self.parameters.mu_k * self.level,
-            "v_S": self.parameters.v_S,
-            "b": self.parameters.b,
+            "mu_s": self._parameters.mu_s * self._level,
+            "mu_k": self._parameters.mu_k * self._level,
+            "v_S": self._parameters.v_S,
+            "b": self._parameters.b,
         }
 
     def capacity(self, x: float, F_n: float) -> float:
         """Return the friction that the foot at `x` [m] can be given [N]."""
-        return self.parameters.mu_s * self.level * value_at(self.texture, x) * F_n
+        return self._parameters.mu_s * self._level * value_at(self._texture, x) * F_n
 
     def step(self, dt: float, motion: Motion) -> Contact:
         """Advance the bristle by `dt` and return the force."""
-        p = self.parameters
+        p = self._parameters
         x, _, z, v, _, vz, _, _, _ = motion
         if z >= 0.0:
-            self.bristle = self.pressed = 0.0
-            self.footing.release()
+            self._bristle = self._pressed = 0.0
+            self._footing.release()
             return NO_CONTACT
-        F_n = max(0.0, -p.k_n * z - self.c_n * vz)
-        m = self.level * value_at(self.texture, x)
+        F_n = max(0.0, -p.k_n * z - self._c_n * vz)
+        m = self._level * value_at(self._texture, x)
         g = (p.mu_k + (p.mu_s - p.mu_k) * math.exp(-((v / p.v_S) ** 2))) * m
-        before = self.bristle
-        if F_n > self.pressed:
+        before = self._bristle
+        if F_n > self._pressed:
             # Pressing harder stiffens the bristle; its force stays, or the stretch of a
             # light touch would be paid back with the energy of a heavy one.
-            before *= self.pressed / F_n
-        self.pressed = F_n
+            before *= self._pressed / F_n
+        self._pressed = F_n
         # backward Euler in z: the bristle is stiff at high speed
         bristle = (before + dt * v) / (1.0 + dt * p.s0 * abs(v) / g)
         limit = p.mu_s * m / p.s0
-        self.bristle = bristle = min(max(bristle, -limit), limit)
+        self._bristle = bristle = min(max(bristle, -limit), limit)
         rate = (bristle - before) / dt
         F_t = F_n * (p.s0 * bristle + p.s1 * rate) + p.b * v * min(1.0, F_n)
-        return self.footing.step(dt, motion, F_t, F_n, p.mu_k)
+        return self._footing.step(dt, motion, F_t, F_n, p.mu_k)
 
 
 class Terrain(Protocol):
@@ -149,10 +141,10 @@ def make_terrain(
 
 
 FREE = 0.045  # from the centre line until the sole's edge meets a board [m]
-RIM = 0.04  # height of the boards above the plane [m]
-BOARD_K = 5000.0  # N/m
-BOARD_B = 2.0 * 0.4 * math.sqrt(BOARD_K * DAMPING_MASS)  # N s/m
-BOARD_MU = 0.3  # of a foot that slips along them
+_RIM = 0.04  # height of the boards above the plane [m]
+_BOARD_K = 5000.0  # N/m
+_BOARD_B = 2.0 * 0.4 * math.sqrt(_BOARD_K * DAMPING_MASS)  # N s/m
+_BOARD_MU = 0.3  # of a foot that slips along them
 
 
 class Container:
@@ -184,11 +176,11 @@ class Container:
         if -FREE <= motion[1] <= FREE:
             return contact
         _, y, z, vx, vy, _, _, _, _ = motion
-        if z > RIM:
+        if z > _RIM:
             return contact
         depth = abs(y) - FREE
         side = math.copysign(1.0, y)
-        shared = max(0.0, BOARD_K * depth + BOARD_B * side * vy)
-        friction = BOARD_MU * shared * math.tanh(vx / 0.01)
+        shared = max(0.0, _BOARD_K * depth + _BOARD_B * side * vy)
+        friction = _BOARD_MU * shared * math.tanh(vx / 0.01)
         F_t, F_y, F_n, M_x, M_y, M_z = contact
         return F_t + friction, F_y - side * shared, F_n, M_x, M_y, M_z

@@ -119,11 +119,11 @@ class Push:
         self._K = pace.stiffness * math.exp(0.15 * n.next())
         self._speed = pace.speed * math.exp(0.22 * n.next())
         self._beta = math.radians(pace.press_deg + pace.press_spread_deg * n.next())
-        self._wander = OrnsteinUhlenbeck(0.25, 1.2, dt, n).step
-        self._effort = OrnsteinUhlenbeck(0.06, 0.4, dt, n).step
-        self._tilt = OrnsteinUhlenbeck(math.radians(9.0), 0.7, dt, n).step
-        self._press = OrnsteinUhlenbeck(0.8, 0.8, dt, n).step
-        self._tremor = Tremor(dt, n).step
+        self._wander = OrnsteinUhlenbeck(0.25, 1.2, dt, n)
+        self._effort = OrnsteinUhlenbeck(0.06, 0.4, dt, n)
+        self._tilt = OrnsteinUhlenbeck(math.radians(9.0), 0.7, dt, n)
+        self._press = OrnsteinUhlenbeck(0.8, 0.8, dt, n)
+        self._tremor = Tremor(dt, n)
         self._wait = float(rng.uniform(0.6, 1.0))
         self._age = 0.0
         self._x0 = view.hand[0]
@@ -145,7 +145,7 @@ class Push:
         self._watch(view.sole[0], view.sole_v[0])
         begun = (self._age - self._wait) / _RAMP
         begun = 0.0 if begun < 0.0 else begun if begun < 1.0 else 1.0
-        pace = 1.0 + self._wander()
+        pace = 1.0 + self._wander.step()
         v_e = begun * self._speed * pace if pace > 0.0 else 0.0
         moved = x - self._x0
         spring = self._K * (self._xe - moved)
@@ -158,8 +158,8 @@ class Push:
             self._react(self._react_in - dt, moved)
         force = spring + PUSH_B * (v_e - vx)
         force = force if force > _WEAKEST else _WEAKEST
-        unsteady = force * self._effort()
-        force += unsteady + (0.05 + 0.012 * abs(force)) * self._tremor()
+        unsteady = force * self._effort.step()
+        force += unsteady + (0.05 + 0.012 * abs(force)) * self._tremor.step()
         aside, lift = _ON_THE_WAY
         if self._pace.mishaps is not NO_MISHAPS:
             aside, lift = self._pace.mishaps.at(view.sole[0])
@@ -168,9 +168,9 @@ class Push:
 
     def _upward(self, push: float, view: HandView, begun: float, lift: float) -> float:
         dt, z, vz = self._dt, view.hand[2], view.hand_v[2]
-        tilt = self._beta + self._tilt()
+        tilt = self._beta + self._tilt.step()
         tilt = _FLATTEST if tilt < _FLATTEST else min(tilt, _STEEPEST)
-        wander = self._press() * begun
+        wander = self._press.step() * begun
         self._z_ref += dt * (z - self._z_ref) / _Z_TIME
         if lift > 0.0:
             if self._z_rest is None:
