@@ -46,15 +46,6 @@ class HandPhase(Enum):
     AWAY = auto()
 
 
-# Named once: to look a member of an Enum up takes longer than to compare it.
-_CARRY, _REST, _PUSH, _AWAY = (
-    HandPhase.CARRY,
-    HandPhase.REST,
-    HandPhase.PUSH,
-    HandPhase.AWAY,
-)
-
-
 class Hand:
     """Follows its orders with forces a person could exert."""
 
@@ -78,7 +69,7 @@ class Hand:
     @property
     def is_holding(self) -> bool:
         """Whether the hand is on the arm."""
-        return self.phase is not _AWAY
+        return self.phase is not HandPhase.AWAY
 
     def carry(self, *points: Vector3) -> None:
         """Carry the sole through `points` (terrain frame) and hold it there."""
@@ -121,13 +112,13 @@ class Hand:
         if self._pending is not None:
             self._push = Push(*self._pending, view, self._dt)
             self._pending = None
-            self.phase = _PUSH
+            self.phase = HandPhase.PUSH
         phase = self.phase
-        if phase is _PUSH and self._push is not None:
+        if phase is HandPhase.PUSH and self._push is not None:
             return self._push.step(view)
-        if phase is _CARRY:
+        if phase is HandPhase.CARRY:
             return self._carry_force(view)
-        if phase is _REST:
+        if phase is HandPhase.REST:
             return self._rest_force(view)
         return 0.0, 0.0, 0.0
 

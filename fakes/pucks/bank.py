@@ -8,7 +8,7 @@ from acquisition.devices import SafetyMode
 from fakes.pucks.event_queue import EventQueue
 from fakes.pucks.motor_puck import READ_ONLY, MotorPuck
 from fakes.pucks.options import NetworkOptions
-from fakes.pucks.power import AWAKE, Power, PuckPower, power_after, power_at_start
+from fakes.pucks.power import Power, PuckPower, power_after, power_at_start
 from fakes.pucks.safety_module import puck_mode_in
 from wam.bus.frames import (
     MOTOR_NODES,
@@ -231,4 +231,4 @@ class PuckBank:
 
 def _asked_for_positions(pucks: list[MotorPuck], number: int) -> list[MotorPuck]:
     """Return those that run and to which property `number` is their position."""
-    return [p for p in pucks if p.p_number == number and p.life.power is AWAKE]
+    return [p for p in pucks if p.p_number == number and p.life.power is Power.AWAKE]

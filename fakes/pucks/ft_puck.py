@@ -49,16 +49,16 @@ class Load:
     """What the gauges feel.
 
     Attributes:
-        of: the true load at an instant [ns]: fx fy fz tx ty tz [N, N m].
+        source: the true load at an instant [ns]: fx fy fz tx ty tz [N, N m].
         errors: added to it; None = felt as it is.
     """
 
-    of: Callable[[int], Sequence[float]] = lambda _: (0.0,) * 6
+    source: Callable[[int], Sequence[float]] = lambda _: (0.0,) * 6
     errors: SensorErrors | None = None
 
     def at(self, t_ns: int) -> Sequence[float]:
         """Return the load as the gauges feel it at `t_ns`."""
-        felt = self.of(t_ns)
+        felt = self.source(t_ns)
         return felt if self.errors is None else self.errors.apply(t_ns, felt)
 
 
@@ -80,9 +80,19 @@ class ForceTorquePuck:
         self._zero = (0.0,) * 6
         self._latched = 0
         self._properties = {
-            **{"ROLE": int(PuckRole.FORCE), "SN": 1008, "ID": SENSOR_NODE, "ERROR": 0},
-            **{"MODE": 0, "TEMP": 34, "PTEMP": 60, "OTEMP": 60, "VBUS": 48},
-            **{"GRPA": 10, "GRPB": 10, "GRPC": 10, "LED": 0},
+            "ROLE": int(PuckRole.FORCE),
+            "SN": 1008,
+            "ID": SENSOR_NODE,
+            "ERROR": 0,
+            "MODE": 0,
+            "TEMP": 34,
+            "PTEMP": 60,
+            "OTEMP": 60,
+            "VBUS": 48,
+            "GRPA": 10,
+            "GRPB": 10,
+            "GRPC": 10,
+            "LED": 0,
             **dict.fromkeys(("T1", "T2", "T3"), _THERMISTOR),
         }
 

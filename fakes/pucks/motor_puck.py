@@ -1,7 +1,7 @@
 """One simulated motor puck: its power, its properties, its torque."""
 
 from fakes.pucks.options import NetworkOptions
-from fakes.pucks.power import AWAKE, Power, PuckPower
+from fakes.pucks.power import Power, PuckPower
 from wam.bus.frames import position_reply_id
 from wam.bus.properties import (
     MAGNETIC_ENCODER,
@@ -14,8 +14,6 @@ from wam.bus.properties import (
     property_number,
 )
 
-# Named once: to look a member of an Enum up takes longer than to compare it.
-_DRIVEN = PuckMode.TORQUE
 READ_ONLY = frozenset(
     ("VERS", "ROLE", "SN", "ID", "ERROR", "TEMP", "PTEMP", "THERM", "VBUS")
 )
@@ -51,13 +49,26 @@ class MotorPuck:
         self.t_header = 0x80 | property_number(Device.MOTOR, "T", self._table)
         self._properties = {
             "ROLE": MAGNETIC_ENCODER | PuckRole.TATER,
-            **{"SN": 1000 + node, "ID": node, "ERROR": 0, "MODE": PuckMode.IDLE},
-            **{"TEMP": 35, "PTEMP": 60, "OTEMP": 60, "THERM": 33},
-            **{"VBUS": 48},
-            **{"GRPA": 0, "GRPB": 1 if node <= 4 else 2, "GRPC": 4},
-            **{"CTS": options.cts[i], "IPNM": options.ipnm[i], "MT": options.mt[i]},
-            **{"POLES": options.poles[i], "ECMIN": 0, "ECMAX": 0},
-            **{"PIDX": node if node <= 4 else node - 4, "JIDX": node},
+            "SN": 1000 + node,
+            "ID": node,
+            "ERROR": 0,
+            "MODE": PuckMode.IDLE,
+            "TEMP": 35,
+            "PTEMP": 60,
+            "OTEMP": 60,
+            "THERM": 33,
+            "VBUS": 48,
+            "GRPA": 0,
+            "GRPB": 1 if node <= 4 else 2,
+            "GRPC": 4,
+            "CTS": options.cts[i],
+            "IPNM": options.ipnm[i],
+            "MT": options.mt[i],
+            "POLES": options.poles[i],
+            "ECMIN": 0,
+            "ECMAX": 0,
+            "PIDX": node if node <= 4 else node - 4,
+            "JIDX": node,
         }
         self._monitor_vers = options.monitor_vers
         self._follow_properties()
@@ -69,14 +80,14 @@ class MotorPuck:
 
     def _follow_properties(self) -> None:
         """Take over what every torque frame asks for."""
-        self.is_driven = self._properties["MODE"] == _DRIVEN
+        self.is_driven = self._properties["MODE"] == PuckMode.TORQUE
         self.slot = (self._properties["PIDX"] - 1) & 3
         self.limit = self._properties["MT"]
 
     @property
     def is_awake(self) -> bool:
         """Whether its firmware runs."""
-        return self.life.power is AWAKE
+        return self.life.power is Power.AWAKE
 
     def hears(self, group: int) -> bool:
         """Return whether the puck belongs to `group` and runs."""

@@ -22,8 +22,6 @@ class Power(Enum):
     AWAKE = "running"
 
 
-# Named once: to look a member of an Enum up takes longer than to compare it.
-AWAKE = Power.AWAKE
 _LISTENING = (Power.AWAKE, Power.MONITOR)
 
 
@@ -75,7 +73,7 @@ class PuckPower:
     def cut(self, *, is_mute: bool) -> None:
         """Cut its transmit wire, or mend it."""
         self.is_mute = is_mute
-        self.is_speaking = self.power is AWAKE and not is_mute
+        self.is_speaking = self.power is Power.AWAKE and not is_mute
 
     def transition(self, stat: int) -> tuple[int, Power] | None:
         """Return what SET STAT does: a silence [ns] and the power after it, if any."""

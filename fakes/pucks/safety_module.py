@@ -36,15 +36,18 @@ _MODE = 8  # number of the property in every firmware
 _BROADCAST_ID = compose_id(SAFETY_NODE, Group.BUS, is_group=True)
 _READ_ONLY = frozenset(("VERS", "ROLE", "SN", "ID", "ERROR", "STAT"))
 _POWER_UP_LIMITS = {
-    **{"VL1": 2048, "VL2": 4096, "TL1": 4731, "TL2": 5204},
-    **{"VOLTL1": 36, "VOLTL2": 30, "VOLTH1": 54, "VOLTH2": 57},
+    "VL1": 2048,
+    "VL2": 4096,
+    "TL1": 4731,
+    "TL2": 5204,
+    "VOLTL1": 36,
+    "VOLTL2": 30,
+    "VOLTH1": 54,
+    "VOLTH2": 57,
 }
 _FAULT_LIMITS = {"velocity": "VL2", "torque": "TL2"}
 NOMINAL_VOLTAGE = 48.0  # of the power bus [V]
 _PATIENCE_NS = 500_000_000  # above VL2 for longer than this takes the power away
-# Named once: to look a member of an Enum up takes longer than to compare it.
-_ACTIVE = SafetyMode.ACTIVE
-_SAFE, _WARNING, _FAULT = SafetyLevel.SAFE, SafetyLevel.WARNING, SafetyLevel.FAULT
 _ZERO_CHARACTER, _E_CHARACTER = 0x3F, 0x79  # seven-segment patterns
 
 
@@ -79,9 +82,9 @@ class FakeSafetyModule:
         self._names = names(Device.SAFETY, vers)
         self._schedule = schedule
         self._on_change = on_change
-        self._levels: dict[str, SafetyLevel] = dict.fromkeys(MONITORS, _SAFE)
+        self._levels: dict[str, SafetyLevel] = dict.fromkeys(MONITORS, SafetyLevel.SAFE)
         if not options.has_power:
-            self._levels["other"] = _FAULT
+            self._levels["other"] = SafetyLevel.FAULT
         self._speeds = SpeedMonitor(options.cts)
         self._too_fast_since_ns: int | None = None
         self._bus_voltage = NOMINAL_VOLTAGE
@@ -90,11 +93,19 @@ class FakeSafetyModule:
         # Largest torques commanded last [puck units].
         self._largest: dict[int, int] = dict.fromkeys(TORQUE_GROUPS, 0)
         self._properties = {
-            **{"VERS": options.safety_vers, "ROLE": int(PuckRole.SAFETY)},
-            **{"SN": 1010, "ID": SAFETY_NODE, "ERROR": 0},
+            "VERS": options.safety_vers,
+            "ROLE": int(PuckRole.SAFETY),
+            "SN": 1010,
+            "ID": SAFETY_NODE,
+            "ERROR": 0,
             "STAT": int(PuckStatus.READY),
-            **{"GRPA": 1, "GRPB": 2, "GRPC": 3, "SAFE": 0, "IFAULT": 0},
-            **{"VNOM": round(NOMINAL_VOLTAGE), "ZERO": int(options.has_positions)},
+            "GRPA": 1,
+            "GRPB": 2,
+            "GRPC": 3,
+            "SAFE": 0,
+            "IFAULT": 0,
+            "VNOM": round(NOMINAL_VOLTAGE),
+            "ZERO": int(options.has_positions),
             **_POWER_UP_LIMITS,
         }
         schedule.define_alarm(self._miss_beat)
@@ -108,22 +119,22 @@ class FakeSafetyModule:
             **self._levels,
             segments=_E_CHARACTER if is_stopped else _ZERO_CHARACTER,
             is_idle_lit=self.mode is SafetyMode.IDLE,
-            is_active_lit=self.mode is _ACTIVE,
+            is_active_lit=self.mode is SafetyMode.ACTIVE,
             button=PendantButton.E_STOP if is_stopped else PendantButton.NONE,
         )
 
     def press(self, action: PendantAction) -> None:
         """Press a button of the pendant."""
         if action == "estop":
-            self._levels["other"] = _FAULT
+            self._levels["other"] = SafetyLevel.FAULT
             self._enter(SafetyMode.E_STOP)
         elif action == "idle":
-            self._levels = dict.fromkeys(self._levels, _SAFE)
+            self._levels = dict.fromkeys(self._levels, SafetyLevel.SAFE)
             self._enter(SafetyMode.IDLE)
             self._judge_torque()
             self._judge_voltage()
         elif self.mode is SafetyMode.IDLE and not self.pendant_word.faults:
-            self._enter(_ACTIVE)
+            self._enter(SafetyMode.ACTIVE)
 
     def forget_positions(self) -> None:
         """Know no longer where the joints are, as after power-up."""
@@ -185,7 +196,7 @@ class FakeSafetyModule:
 
     def _feel_beat(self) -> None:
         """Wait for the next position until the heartbeat is over, while ACTIVE."""
-        is_active = self.mode is _ACTIVE
+        is_active = self.mode is SafetyMode.ACTIVE
         due_ns = self._schedule.now_ns + self._heartbeat_ns
         self._schedule.set_alarm(due_ns if is_active else NEVER)
 
@@ -239,7 +250,7 @@ class FakeSafetyModule:
         if self.mode is SafetyMode.E_STOP:
             return  # the bus has no power, and nothing to judge
         if not limits["VOLTL2"] <= voltage <= limits["VOLTH2"]:
-            self._levels["voltage"] = _FAULT
+            self._levels["voltage"] = SafetyLevel.FAULT
             self._enter(SafetyMode.E_STOP)  # a choice: the effect is not known
         else:
             is_odd = not limits["VOLTL1"] <= voltage <= limits["VOLTH1"]
@@ -247,20 +258,22 @@ class FakeSafetyModule:
 
     def _warn(self, monitor: str, *, is_warning: bool) -> None:
         """Light or put out a warning; a fault stays until Shift-idle."""
-        if self._levels[monitor] is not _FAULT:
-            self._levels[monitor] = _WARNING if is_warning else _SAFE
+        if self._levels[monitor] is not SafetyLevel.FAULT:
+            self._levels[monitor] = (
+                SafetyLevel.WARNING if is_warning else SafetyLevel.SAFE
+            )
 
     def _judge_torque(self) -> None:
         largest = max(self._largest.values())
-        if self.mode is _ACTIVE and largest > self._properties["TL2"]:
+        if self.mode is SafetyMode.ACTIVE and largest > self._properties["TL2"]:
             self._fault("torque")
         else:
             self._warn("torque", is_warning=largest > self._properties["TL1"])
 
     def _fault(self, monitor: str) -> None:
         """Note a fault until Shift-idle and stop the arm."""
-        self._levels[monitor] = _FAULT
-        if self.mode is _ACTIVE:
+        self._levels[monitor] = SafetyLevel.FAULT
+        if self.mode is SafetyMode.ACTIVE:
             self._enter(SafetyMode.IDLE)
 
     def _enter(self, mode: SafetyMode) -> None:
