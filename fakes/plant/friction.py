@@ -167,36 +167,34 @@ class MotorBristles:
             tau: torques that they bear [N m].
         """
         ways: list[tuple[float, float]] = []
-        for angle, torque, row in zip(angles, tau, self._levels):
-            coulomb, load, asymmetry, of_sin, of_cos = row
+        for angle, torque, row in zip(angles, tau, self._levels, strict=True):
+            coulomb, load, asymmetry, ripple_sin, ripple_cos = row
             level = coulomb + load * abs(torque)
-            ripple = 1.0 + of_sin * math.sin(angle) + of_cos * math.cos(angle)
+            ripple = 1.0 + ripple_sin * math.sin(angle) + ripple_cos * math.cos(angle)
             ways.append(((level + asymmetry) * ripple, (level - asymmetry) * ripple))
         self._ways = ways
 
     def follow(self, speeds: Sequence[float]) -> None:
         """Bend the bristles by a step at `speeds` of the motors [rad/s]."""
         dt = self._dt
-        state = zip(self._keep, self._z, speeds)
+        state = zip(self._keep, self._z, speeds, strict=True)
         self._z = [keep * (z + dt * w) for keep, z, w in state]
 
     def is_lively(self, speeds: Sequence[float]) -> bool:
         """Return whether a motor bends its bristle far within a cycle."""
-        for speed, limit in zip(speeds, self._lively):
-            if not -limit <= speed <= limit:
-                return True
-        return False
+        state = zip(speeds, self._lively, strict=True)
+        return any(abs(speed) > limit for speed, limit in state)
 
     def take(self, speeds: Sequence[float]) -> None:
         """Take c, D and a anew at `speeds` of the motors [rad/s]."""
         dt = self._dt
         keeps, dampings = [1.0] * 7, self._bent_damping.copy()
         springs = self._bent_springs.copy()
-        state = zip(speeds, self._z, self._ways, self._columns)
+        state = zip(speeds, self._z, self._ways, self._columns, strict=True)
         for i, (w, z, (forward, backward), row) in enumerate(state):
             if z * w <= 0.0:
                 continue
-            more, slow, s0, of_bent, of_still, s1_dt, b = row
+            more, slow, s0, bent_damping, bent_spring, s1_dt, b = row
             x = w * slow
             # Bristle and speed have one sign: both are taken without it.
             speed, bend, g = (w, z, forward) if w > 0.0 else (-w, -z, backward)
@@ -205,13 +203,13 @@ class MotorBristles:
             if bent > ELASTIC:
                 rate = plastic_share(bent) * s0 * speed / g
                 keeps[i] = keep = 1.0 / (1.0 + dt * rate)
-                dampings[i] = keep * of_bent + b
-                springs[i] = keep * of_still - s1_dt
+                dampings[i] = keep * bent_damping + b
+                springs[i] = keep * bent_spring - s1_dt
         self._keep, self.damping, self._springs = keeps, dampings, springs
 
     def torques(self, speeds: Sequence[float]) -> list[float]:
         """Return the torques on the motors [N m], taken at their `speeds` [rad/s]."""
-        state = zip(self._springs, self._z, self.damping, speeds)
+        state = zip(self._springs, self._z, self.damping, speeds, strict=True)
         return [-c * z - d * w for c, z, d, w in state]
 
 
@@ -229,6 +227,13 @@ def bristle_columns(
     """
     s0 = friction.coulomb * friction.breakaway / friction.presliding
     s1 = _DAMPED * np.sqrt(s0 * inertia)
-    of_speed = (friction.breakaway - 1.0, 1.0 / friction.stribeck)
-    of_bristle = (s0, s0 * dt + s1, s0 + s1 / dt, s1 / dt)
-    return np.stack((*of_speed, *of_bristle, friction.viscous), axis=-1).tolist()
+    columns = (
+        friction.breakaway - 1.0,
+        1.0 / friction.stribeck,
+        s0,
+        s0 * dt + s1,
+        s0 + s1 / dt,
+        s1 / dt,
+        friction.viscous,
+    )
+    return np.stack(columns, axis=-1).tolist()

@@ -1,7 +1,6 @@
 """What the gauges in the wrist feel: ground, weight and inertia of the foot."""
 
 from collections.abc import Sequence
-from struct import Struct
 
 import numpy as np
 
@@ -11,7 +10,6 @@ from wam.model.constants import GRAVITY, Array
 from wam.model.tool import Tool
 
 Wrench = tuple[float, float, float, float, float, float]
-_FELT = Struct("15d")  # ground's wrench, change of the foot's rates, its turning rate
 
 
 class WristGauges:
@@ -41,9 +39,7 @@ class WristGauges:
         self._rates: Sequence[float] = (0.0,) * 6
         self._before: Sequence[float] = (0.0,) * 6
         self._load: Wrench | None = None
-        # The rows of _FELT, and below them what is up, which stays.
-        self._buffer = bytearray(_FELT.size) + up.tobytes()
-        self._felt = np.frombuffer(self._buffer).reshape(6, 3)
+        self._up: list[float] = up.tolist()
 
     def end_cycle(
         self, rotation: Array, ground: Sequence[float], rates: Sequence[float]
@@ -68,9 +64,10 @@ class WristGauges:
     def _compute(self) -> Wrench:
         """Work in plain numbers: for three of them numpy takes ten times as long."""
         before, now, period = self._before, self._rates, self._period
-        change = [(v - u) / period for u, v in zip(before, now)]
-        _FELT.pack_into(self._buffer, 0, *self._ground, *change, *now[3:])
-        felt = self._felt.dot(self._rotation.dot(self._turn))
+        change = [(v - u) / period for u, v in zip(before, now, strict=True)]
+        # Force, moment, accelerations, turning rate and what is up, one a row.
+        rows = np.array([*self._ground, *change, *now[3:], *self._up]).reshape(6, 3)
+        felt = rows.dot(self._rotation.dot(self._turn))
         force, moment, a, alpha, w, (gx, gy, gz) = felt.tolist()
         # The inertia is symmetric: rows of its products are I alpha and I w.
         (ix, iy, iz), (jx, jy, jz) = felt[3:5].dot(self._inertia).tolist()
@@ -83,14 +80,14 @@ class WristGauges:
             -m * (GRAVITY * gy + a[1] + euler[1] + inward[1]),
             -m * (GRAVITY * gz + a[2] + euler[2] + inward[2]),
         )
-        of_ground, of_weight = _cross(self._sole, force), _cross(self._com, weight)
+        lever, swing = _cross(self._sole, force), _cross(self._com, weight)
         return (
             s * (force[0] + weight[0]),
             s * (force[1] + weight[1]),
             s * (force[2] + weight[2]),
-            s * (moment[0] + of_ground[0] + of_weight[0] - ix - spin[0]),
-            s * (moment[1] + of_ground[1] + of_weight[1] - iy - spin[1]),
-            s * (moment[2] + of_ground[2] + of_weight[2] - iz - spin[2]),
+            s * (moment[0] + lever[0] + swing[0] - ix - spin[0]),
+            s * (moment[1] + lever[1] + swing[1] - iy - spin[1]),
+            s * (moment[2] + lever[2] + swing[2] - iz - spin[2]),
         )
 
 

@@ -1,7 +1,6 @@
 """What drives the joints and resists them: motors, their friction, the stops."""
 
 from collections.abc import Sequence
-from struct import Struct
 from typing import NamedTuple
 
 import numpy as np
@@ -15,11 +14,10 @@ from wam.model.friction import MotorFriction
 STOP_K, STOP_B = 2000.0, 20.0  # N m/rad, N m s/rad
 NEAR = 0.05  # of a stop: no joint goes further in 2 ms [rad]
 BEARING_NS = 4 * PERIOD_NS  # between two looks at load and ripple of the friction
-_SEVEN = Struct("7d")  # packed in half the time in which numpy looks through a list
 
 
 class StopForces(NamedTuple):
-    """What the stops do at one place and speed; seven numbers of each.
+    """What the stops do at one position and speed; seven numbers of each.
 
     Attributes:
         torques: with which they push back and damp [N m].
@@ -38,10 +36,9 @@ class JointStops:
     def __init__(self, constants: ArmConstants) -> None:
         """Take where the stops of the arm are."""
         lower, upper = constants.q_lower, constants.q_upper
-        ends = zip(lower.tolist(), upper.tolist(), strict=True)
-        self._ends: list[tuple[float, float]] = list(ends)
-        free = zip((lower + NEAR).tolist(), (upper - NEAR).tolist(), strict=True)
-        self._free: list[tuple[float, float]] = list(free)
+        self._ends: list[list[float]] = np.stack((lower, upper), axis=-1).tolist()
+        free = np.stack((lower + NEAR, upper - NEAR), axis=-1)
+        self._free: list[list[float]] = free.tolist()
 
     def at(self, q: Sequence[float], qd: Sequence[float]) -> StopForces:
         """Return what the stops do.
@@ -50,10 +47,8 @@ class JointStops:
             q: joint positions [rad].
             qd: joint velocities [rad/s].
         """
-        for angle, (low, high) in zip(q, self._free):
-            if not low <= angle <= high:
-                break
-        else:
+        free = zip(q, self._free, strict=True)
+        if all(low <= angle <= high for angle, (low, high) in free):
             return _CLEAR
         torques, damping = [0.0] * 7, [0.0] * 7
         for i, (angle, (lower, upper)) in enumerate(zip(q, self._ends, strict=True)):
@@ -96,9 +91,7 @@ class JointDrives:
         self._turns = np.array(constants.cts) / (2.0 * np.pi)  # counts per radian
         self._to_counts = self._turns[:, None] * constants.j2mp
         self._j2mp, self._ipnm = constants.j2mp, constants.ipnm
-        self._buffer = bytearray(_SEVEN.size)
-        self._seven = np.frombuffer(self._buffer)
-        self._of_units = constants.j2mp.T / np.array(constants.ipnm, dtype=float)
+        self._from_units = constants.j2mp.T / np.array(constants.ipnm, dtype=float)
         self._dampings = constants.j2mp.T**2  # of the joints by those of the motors
         self._inertia = np.diag(drive_inertia_matrix(constants))
         self._bristles = MotorBristles(friction, inertia, dt)
@@ -115,8 +108,7 @@ class JointDrives:
 
     def drive(self, units: Sequence[float]) -> None:
         """Apply torques [puck units] to motors 1 to 7 from now on."""
-        _SEVEN.pack_into(self._buffer, 0, *units)
-        self._tau = self._of_units.dot(self._seven)
+        self._tau = self._from_units.dot(np.array(units, dtype=float))
         self._units = tuple(units)
         self._add_up()
 
@@ -160,7 +152,7 @@ class JointDrives:
 
     def _bear(self, rows: Array, speeds: Sequence[float], t_ns: int) -> None:
         if t_ns % BEARING_NS == 0:
-            against = zip(self.sent(), self._bristles.torques(speeds))
+            against = zip(self.sent(), self._bristles.torques(speeds), strict=True)
             borne = [sent + friction for sent, friction in against]
             self._bristles.bear(self._j2mp.dot(rows[0]).tolist(), borne)
 
@@ -171,8 +163,7 @@ class JointDrives:
     def _resist(self, speeds: Sequence[float]) -> None:
         bristles = self._bristles
         bristles.take(speeds)
-        _SEVEN.pack_into(self._buffer, 0, *bristles.damping)
-        armature = self._dampings.dot(self._seven)
+        armature = self._dampings.dot(np.array(bristles.damping))
         if self._stopping.is_near:
             armature += self._stopping.damping
         armature *= self._dt
@@ -220,9 +211,6 @@ class JointState:
         return rows
 
 
-_LAYOUT = Struct("26d")  # wrench on foot and hand, against the motors, driving
-
-
 class JointLoads:
     """Turns wrenches on foot and hand and torques of motors into torques of the joints.
 
@@ -236,21 +224,18 @@ class JointLoads:
         """Take the transmission, motor angle = `j2mp` @ joint angle, shape (7, 7)."""
         self._B = np.vstack((np.zeros((12, 7)), j2mp, np.eye(7)))
         self.A = self._B[:19]
-        self._buffer = bytearray(_LAYOUT.size)
-        self._loads = np.frombuffer(self._buffer)
 
     def torques(
         self,
         wrench: Sequence[float],
-        of_motors: Sequence[float],
+        motors: Sequence[float],
         driving: Sequence[float],
     ) -> Array:
-        """Return A^T (`wrench`, `of_motors`) + `driving` [N m], shape (7,).
+        """Return A^T (`wrench`, `motors`) + `driving` [N m], shape (7,).
 
         Args:
             wrench: on foot and hand, twelve numbers in the order of the rows of A.
-            of_motors: torques on the motors [N m], seven.
+            motors: torques on the motors [N m], seven.
             driving: torques that drive the joints [N m], seven.
         """
-        _LAYOUT.pack_into(self._buffer, 0, *wrench, *of_motors, *driving)
-        return self._loads.dot(self._B)
+        return np.array([*wrench, *motors, *driving]).dot(self._B)

@@ -97,9 +97,9 @@ def cable_inertia(model: "pin.Model", constants: ArmConstants, q: Array) -> Arra
         q: joint positions [rad], shape (7,).
     """
     model.armature = np.zeros(7)
-    of_joints = np.diag(pin.crba(model, model.createData(), q))
+    joints = np.diag(pin.crba(model, model.createData(), q))
     ratios = constants.j2mp**2
-    shared = of_joints / ratios.sum(axis=0)
+    shared = joints / ratios.sum(axis=0)
     return np.where(ratios > 0.0, shared, 0.0).max(axis=1)
 
 

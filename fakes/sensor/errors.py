@@ -66,10 +66,10 @@ PER_DEGREE = (0.05, 0.05, 0.15, 0.002, 0.002, 0.002)  # [N, N m]; what warmth ad
 
 NO_SHIFT: Wrench = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
-SLOW_NS = 10_000_000  # between two updates of what changes over seconds
-CREEP_TIME = 20.0  # s
+_SLOW_NS = 10_000_000  # between two updates of what changes over seconds
+_CREEP_TIME = 20.0  # s
 _LAGGING = 0.05  # of the span: a larger change of load pulls the reading along
-_WARMTH, WARMTH_TIME = 0.3, 300.0  # of the room and the arm [degrees Celsius], s
+_WARMTH, _WARMTH_TIME = 0.3, 300.0  # of the room and the arm [degrees Celsius], s
 
 
 class SensorErrors:
@@ -117,12 +117,12 @@ class SensorErrors:
         step_ns = t_ns - before_ns if before_ns is not None and t_ns > before_ns else 0
         if step_ns != self._step_ns:  # samples come at an almost even pace
             self._pace_drifts(step_ns)
-        if self._slow_ns is None or t_ns - self._slow_ns >= SLOW_NS:
+        if self._slow_ns is None or t_ns - self._slow_ns >= _SLOW_NS:
             self._update_slow(t_ns, wrench)
         next_normal = self._normals.next
         shown: list[float] = []
         drifts: list[float] = []
-        rows = zip(wrench, self._slow, self._drifts, self._steps)
+        rows = zip(wrench, self._slow, self._drifts, self._steps, strict=True)
         for load, slow, drift, (keep, kick, white, step) in rows:
             moved = keep * drift + kick * next_normal()
             value = load + slow + moved + white * next_normal()
@@ -144,27 +144,23 @@ class SensorErrors:
         """Let walk, warmth and the effects of the load go on to `t_ns`."""
         passed_ns = 0 if self._slow_ns is None else t_ns - self._slow_ns
         self._slow_ns, dt, normal = t_ns, passed_ns * 1e-9, self._normals.next
-        keep, kick = exact_step(self._warmth_sd, WARMTH_TIME, dt)
+        keep, kick = exact_step(self._warmth_sd, _WARMTH_TIME, dt)
         self.warmth = keep * self.warmth + kick * normal()
         walk: list[float] = []
         for value, scale in zip(self._walk, self._scales, strict=True):
             keep, kick = exact_step(scale.walk, scale.walk_time, dt)
             walk.append(keep * value + kick * normal())
         self._walk = walk
-        warmth, of_load = self.warmth, self._load_errors.update(dt, wrench)
-        rows = zip(walk, PER_DEGREE, self.shift, of_load)
+        errors = self._load_errors.update(dt, wrench)
+        rows = zip(walk, PER_DEGREE, self.shift, errors, strict=True)
         self._slow = [
-            zero + warmth * gain + shift + error for zero, gain, shift, error in rows
+            zero + self.warmth * gain + shift + error
+            for zero, gain, shift, error in rows
         ]
 
 
 class LoadErrors:
-    """What the load itself makes the reading miss: creep, hysteresis, cross-talk.
-
-    Attributes:
-        cross_talk: share of the loads by column that shows in the axes by row.
-        rows: creep, hysteresis and largest stretch [N, N m] of each axis.
-    """
+    """What the load itself makes the reading miss: creep, hysteresis, cross-talk."""
 
     def __init__(self, scales: Sequence[ErrorScale], rng: np.random.Generator) -> None:
         """Draw the cross-talk of one sensor from `rng`."""
@@ -172,11 +168,13 @@ class LoadErrors:
         talk = np.array([[scale.cross_talk] for scale in scales])
         talk = talk * rng.standard_normal((6, 6)) * span[:, None] / span
         np.fill_diagonal(talk, 0.0)
-        self.cross_talk: list[list[float]] = talk.tolist()
+        # Share of the loads by column that shows in the axes by row.
+        self._cross_talk: list[list[float]] = talk.tolist()
         lagging: list[float] = (_LAGGING * span).tolist()
-        self.rows = [
+        # Creep, hysteresis and largest stretch [N, N m] of each axis.
+        self._rows = [
             (scale.creep, scale.hysteresis, most)
-            for scale, most in zip(scales, lagging)
+            for scale, most in zip(scales, lagging, strict=True)
         ]
         self._stretch: Sequence[float] = (0.0,) * 6
         self._before: Sequence[float] | None = None
@@ -193,8 +191,9 @@ class LoadErrors:
             self._before,
             self._stretch,
             self._taken_on,
-            self.rows,
-            [_along(row, wrench) for row in self.cross_talk],
+            self._rows,
+            [_dot(row, wrench) for row in self._cross_talk],
+            strict=True,
         )
         for load, before, stretch, taken, (creep, hysteresis, most), talk in rows:
             moved = stretch + load - before
@@ -208,8 +207,8 @@ class LoadErrors:
         return errors
 
 
-def _along(row: Sequence[float], wrench: Sequence[float]) -> float:
-    """Return the scalar product, added from the left in every implementation."""
+def _dot(row: Sequence[float], wrench: Sequence[float]) -> float:
+    """Return the scalar product; `sum` rounds as the version of Python does."""
     a, b, c, d, e, f = row
     fx, fy, fz, tx, ty, tz = wrench
     return a * fx + b * fy + c * fz + d * tx + e * ty + f * tz
@@ -218,4 +217,4 @@ def _along(row: Sequence[float], wrench: Sequence[float]) -> float:
 @lru_cache(maxsize=64)
 def _crept(dt: float) -> float:
     """Return the share of its way that the creep goes in `dt` [s]."""
-    return 1.0 - math.exp(-dt / CREEP_TIME)
+    return 1.0 - math.exp(-dt / _CREEP_TIME)
