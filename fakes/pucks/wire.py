@@ -60,28 +60,27 @@ class WiredNetwork:
         """
         schedule = self._schedule
         if schedule.next_ns > t_ns < self._next_ns and not schedule.outbox:
-            schedule.now_ns = t_ns if t_ns > schedule.now_ns else schedule.now_ns
+            schedule.now_ns = max(schedule.now_ns, t_ns)
             return []
         while True:
+            if schedule.outbox:  # something was said outside of all plans
+                self._take_due(schedule.now_ns)
             # At one instant the network is first: its frame may win the arbitration.
             own_ns, wire_ns = schedule.next_ns, self._next_ns
             if own_ns <= t_ns and own_ns <= wire_ns:
-                self._take_due(own_ns, t_ns)
+                self._take_due(own_ns)
             elif wire_ns <= t_ns:
                 self._carry(min(t_ns, own_ns - 1))
             else:
                 break
-        if schedule.outbox:
-            self._take_due(t_ns, t_ns)
-        elif schedule.now_ns < t_ns:  # nothing is planned till then
-            schedule.now_ns = t_ns
+        schedule.now_ns = max(schedule.now_ns, t_ns)  # nothing is planned till then
         sent, self._sent = self._sent, []
         return sent
 
-    def _take_due(self, t_ns: int, until_ns: int) -> None:
-        """Let the network go on to `t_ns`, and the wire perhaps to `until_ns`."""
+    def _take_due(self, t_ns: int) -> None:
+        """Let the network go on to `t_ns`; what it says wants onto the wire."""
         due = self.network.due(t_ns)
-        if not due or self._carry_at_once(due, until_ns):
+        if not due:
             return
         self._begin_at(due[0][0])
         waiting, order = self._waiting, self._order
@@ -89,31 +88,6 @@ class WiredNetwork:
             order += 1
             heappush(waiting, (can_id, order, data, False))
         self._order = order
-
-    def _carry_at_once(self, due: list[OutFrame], until_ns: int) -> bool:
-        """Carry frames that are ready now, if nobody can come between or before them.
-
-        Returns False, with nothing done, unless the wire is free, the lowest
-        identifier comes first, and the last of them ends by `until_ns` and before the
-        network does anything else.
-        """
-        if self._waiting or self._on_wire is not None or self._is_far:
-            return False
-        ready_ns = due[0][0]
-        t_ns = ready_ns if ready_ns > self._free_ns else self._free_ns
-        sent: list[OutFrame] = []
-        before = 0
-        for _, can_id, data in due:
-            if can_id < before:
-                return False
-            before = can_id
-            t_ns += FRAME_NS[len(data)]
-            sent.append((t_ns, can_id, data))
-        if t_ns > until_ns or t_ns >= self._schedule.next_ns:
-            return False
-        self._sent += sent
-        self._free_ns = t_ns
-        return True
 
     def _begin_at(self, ready_ns: int) -> None:
         """Let a frame that is ready at `ready_ns` have a wire for which none waits."""
