@@ -12,23 +12,18 @@ from dataclasses import replace
 from pathlib import Path
 
 from acquisition.clock import NS_PER_S, SystemClock
-from lab import initramfs, report, timer_rate
+from lab import initramfs, report
 from lab.follower import PANICKED, Follower
 from lab.guest.scenarios.registry import ALL, Scenario, chosen
-from lab.kernel import Kernel, fetch_kernel
+from lab.kernel import fetch_kernel
 from lab.machine import (
-    SLOWNESS,
     Machine,
     Sockets,
     emulator_version,
     processor_name,
 )
 from lab.requirements import LabError, install_line, missing_packages, program
-from lab.results import (
-    ScenarioResult,
-    TimerAddresses,
-    from_line,
-)
+from lab.results import ScenarioResult
 
 ROOT = Path(__file__).parents[1]
 _PROGRAM = (
@@ -43,7 +38,6 @@ _PROGRAM = (
 CACHE = ROOT / ".lab"
 NOT_READY = 75  # as EX_TEMPFAIL: something has to be installed first
 _MOST_MACHINES = 2  # unless more are asked for
-_STARTED = 30.0  # s until the emulator has its sockets
 _CLOCK = SystemClock()
 _JOB = """\
 export PATH=/usr/sbin:/usr/bin:/sbin:/bin
@@ -217,38 +211,14 @@ def boot(
         first_root = folder / "initramfs"
         busybox = Path(program("busybox"))
         first_root.write_bytes(initramfs.build(busybox, kernel.modules, job))
-        names = ("line", "monitor", "debug", "memory")
+        names = ("line", "monitor", "memory")
         sockets = Sockets(*(folder / name for name in names))
-        addresses = known_timer(kernel)
         machine = Machine(kernel, first_root, sockets)
         try:
-            if addresses is not None:
-                wait_for(sockets.debugger)
-                timer_rate.preset(sockets.debugger, addresses, SLOWNESS)
-            run = Follower(sockets.debugger, kernel.timer, is_shown=is_shown)
+            run = Follower(is_shown=is_shown)
             return run.follow(machine, [one.name for one in scenarios])
         finally:
             machine.close()
-
-
-def known_timer(kernel: Kernel) -> TimerAddresses | None:
-    """Return where an earlier start of the kernel had its timer, if there was one."""
-    if not kernel.timer.exists():
-        return None
-    message = from_line(kernel.timer.read_text(encoding="utf-8"))
-    if isinstance(message, TimerAddresses):
-        return message
-    kernel.timer.unlink()  # of another version of this program
-    return None
-
-
-def wait_for(path: Path) -> None:
-    """Wait until a machine that was started has made a socket."""
-    end_ns = _CLOCK.now_ns() + int(_STARTED * NS_PER_S)
-    while not path.exists():
-        if _CLOCK.now_ns() > end_ns:
-            raise LabError(f"the emulator has not made {path}.")
-        _CLOCK.sleep_until(_CLOCK.now_ns() + NS_PER_S // 100)
 
 
 if __name__ == "__main__":

@@ -2,20 +2,16 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Protocol
 
 from acquisition.clock import NS_PER_S, SystemClock
-from lab import report, timer_rate
-from lab.machine import SLOWNESS
+from lab import report
 from lab.results import (
     Begun,
     Finished,
     ScenarioResult,
-    TimerAddresses,
     Verdict,
     from_line,
-    to_line,
 )
 
 # s of processor time (of wall time, too, on an idle host): until the first scenario
@@ -43,10 +39,8 @@ class ReadConsole(Protocol):
 class Follower:
     """Reads a machine's console to its end; what has not come then has hung."""
 
-    def __init__(self, debugger: Path, timer: Path, *, is_shown: bool) -> None:
-        """Read on; `timer`: where the addresses of the kernel's timer are kept."""
-        self._debugger = debugger
-        self._timer = timer
+    def __init__(self, *, is_shown: bool) -> None:
+        """Begin; `is_shown`: the machine's own output is printed, too."""
         self._is_shown = is_shown
         self._results: list[ScenarioResult] = []
         self._running = "boot"
@@ -97,8 +91,6 @@ class Follower:
             case Begun(name):
                 self._running = name
                 self._allow(LIMIT, machine.processor_seconds())
-            case TimerAddresses() as addresses:
-                self._correct(addresses)
             case Finished():
                 self._is_over = True
             case ScenarioResult() as result:
@@ -108,14 +100,6 @@ class Follower:
                 self._own.append(line)
                 if self._is_shown:
                     print(line, flush=True)
-
-    def _correct(self, addresses: TimerAddresses) -> None:
-        """Correct the timer, unless its rate was known; then it is next time."""
-        if self._timer.exists():
-            return
-        offsets, events = addresses.offsets, addresses.events
-        timer_rate.correct(self._debugger, offsets, events, SLOWNESS)
-        self._timer.write_text(to_line(addresses), encoding="utf-8")
 
     def _allow(self, limit: float, taken_before: float) -> None:
         """Begin a time limit [s of processor time] anew."""

@@ -39,13 +39,11 @@ class Kernel:
         image: the file to boot.
         modules: files of the modules to load, in this order.
         release: its name.
-        timer: file with the message that says where its timer is, once it ran.
     """
 
     image: Path
     modules: tuple[Path, ...]
     release: str
-    timer: Path
 
 
 def image_package(depends: str) -> str:
@@ -75,7 +73,7 @@ def fetch_kernel(cache: Path) -> Kernel:
         folder = _unpack(cache)
     release = folder.name.removeprefix("linux-image-")
     image = _unpacked(folder / "boot" / f"vmlinuz-{release}", folder / "vmlinux")
-    return Kernel(image, _load_order(folder, release), release, folder / "timer")
+    return Kernel(image, _load_order(folder, release), release)
 
 
 def _unpacked(packed: Path, plain: Path) -> Path:

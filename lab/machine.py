@@ -37,13 +37,11 @@ class Sockets:
     Attributes:
         line: the far end of the serial adapter.
         monitor: QEMU's, to plug devices in and out.
-        debugger: for `timer_rate`.
         memory: a file that guest and simulated arm share.
     """
 
     line: Path
     monitor: Path
-    debugger: Path
     memory: Path
 
 
@@ -72,9 +70,6 @@ def command(kernel: Kernel, initramfs: Path, sockets: Sockets, proxy: int) -> li
         *_serial_adapter(sockets.line),
         *_monitor(sockets.monitor),
         *_far_side(sockets.memory, proxy),
-        *("-chardev", f"socket,id=debug,path={sockets.debugger},server=on,wait=off"),
-        *("-gdb", "chardev:debug"),
-        *(["-S"] if kernel.timer.exists() else []),  # it waits for its timer's rate
     ]
 
 

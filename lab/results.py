@@ -58,33 +58,16 @@ class Begun:
 
 
 @dataclass(frozen=True, slots=True)
-class TimerAddresses:
-    """Where the kernel keeps its timer, for `timer_rate`; the machine waits meanwhile.
-
-    Attributes:
-        offsets: of the processors' parts of the memory.
-        events: the timer within such a part.
-        period: its ticks between two of the kernel's, 0 until it is measured.
-        setup: of the function that measures it.
-    """
-
-    offsets: int
-    events: int
-    period: int
-    setup: int
-
-
-@dataclass(frozen=True, slots=True)
 class Finished:
     """The machine has run everything; `boot_seconds`: guest time until the first."""
 
     boot_seconds: float
 
 
-Message = ScenarioResult | Begun | TimerAddresses | Finished
+Message = ScenarioResult | Begun | Finished
 
 
-_PLAIN = {one.__name__: one for one in (Begun, TimerAddresses, Finished)}
+_PLAIN = {one.__name__: one for one in (Begun, Finished)}
 
 
 def to_line(message: Message) -> str:

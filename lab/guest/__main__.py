@@ -4,7 +4,6 @@ import importlib
 import os
 import sys
 import traceback
-from pathlib import Path
 
 from lab.guest.commands import ScenarioError, seconds, wait
 from lab.guest.machine_room import PLACE, MachineRoom
@@ -14,7 +13,6 @@ from lab.results import (
     Finished,
     Message,
     ScenarioResult,
-    TimerAddresses,
     Verdict,
     to_line,
 )
@@ -45,13 +43,6 @@ _GIT = {
     "GIT_CONFIG_KEY_2": "safe.directory",
     "GIT_CONFIG_VALUE_2": "*",
 }
-_SYMBOLS = (
-    "__per_cpu_offset",
-    "lapic_events",
-    "lapic_timer_period",
-    "setup_boot_APIC_clock",
-)
-_PAUSE = 0.2  # s
 _OVER = 5.0  # s, in which what a failed scenario left behind lets go of the bus
 _LONGEST_OUTPUT = 8000  # characters of a failed scenario, its end
 
@@ -65,8 +56,6 @@ def main(names: list[str]) -> None:
     os.environ["HOME"] = str(PLACE)
     os.environ.update(_GIT)
     (PLACE / "tmp").mkdir(parents=True, exist_ok=True)
-    _tell(_timer_addresses())
-    wait(_PAUSE)  # the host writes into the kernel's memory
     # Guest time jumps while the host's files are read: read them before it counts.
     for name in _WARM:
         importlib.import_module(name)
@@ -75,15 +64,6 @@ def main(names: list[str]) -> None:
         _tell(Begun(scenario.name))
         _tell(_result(scenario, is_echoed="--echo" in names))
     _tell(Finished(round(booted, 2)))
-
-
-def _timer_addresses() -> TimerAddresses:
-    symbols: dict[str, int] = {}
-    with Path("/proc/kallsyms").open(encoding="ascii") as lines:
-        for line in lines:
-            address, _, name, *_ = line.split()
-            symbols[name] = int(address, 16)
-    return TimerAddresses(*(symbols[name] for name in _SYMBOLS))
 
 
 def _result(scenario: Scenario, *, is_echoed: bool) -> ScenarioResult:

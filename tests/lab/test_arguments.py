@@ -8,7 +8,7 @@ from lab.guest.scenarios.registry import ALL, Scenario, chosen
 from lab.kernel import Kernel, image_package
 from lab.machine import SLOWNESS, Sockets, command
 from lab.requirements import LabError, install_line, missing_packages
-from lab.results import ScenarioResult, TimerAddresses, Verdict, to_line
+from lab.results import ScenarioResult, Verdict
 
 
 def test_what_is_missing_is_named_once_as_a_package():
@@ -76,33 +76,14 @@ def test_the_machine_has_read_only_files_and_two_cards_on_one_bus(
     monkeypatch, tmp_path
 ):
     monkeypatch.setattr("lab.machine.program", lambda name: f"/usr/bin/{name}")
-    sockets = Sockets(*(tmp_path / name for name in "abcd"))
-    kernel = Kernel(tmp_path / "vmlinux", (), "6.1", tmp_path / "timer")
+    sockets = Sockets(*(tmp_path / name for name in "abc"))
+    kernel = Kernel(tmp_path / "vmlinux", (), "6.1")
     words = command(kernel, tmp_path / "initramfs", sockets, 9)
     assert any("path=/," in word and "readonly=on" in word for word in words)
     cards = [word for word in words if word.startswith("kvaser_pci")]
     assert len(cards) == 2
     assert all("canbus=bus0" in card for card in cards)
     assert f"tsc_early_khz={SLOWNESS}000000" in words[words.index("-append") + 1]
-
-
-def test_a_machine_whose_timer_is_known_waits_for_its_rate(monkeypatch, tmp_path):
-    monkeypatch.setattr("lab.machine.program", lambda name: f"/usr/bin/{name}")
-    sockets = Sockets(*(tmp_path / name for name in "abcd"))
-    kernel = Kernel(tmp_path / "vmlinux", (), "6.1", tmp_path / "timer")
-    assert program.known_timer(kernel) is None
-    assert "-S" not in command(kernel, tmp_path / "initramfs", sockets, 9)
-    addresses = TimerAddresses(1, 2, 3, 4)
-    kernel.timer.write_text(to_line(addresses))
-    assert program.known_timer(kernel) == addresses
-    assert "-S" in command(kernel, tmp_path / "initramfs", sockets, 9)
-
-
-def test_a_timer_of_another_version_is_measured_again(tmp_path):
-    kernel = Kernel(tmp_path / "vmlinux", (), "6.1", tmp_path / "timer")
-    kernel.timer.write_text("@lab {}")
-    assert program.known_timer(kernel) is None
-    assert not kernel.timer.exists()
 
 
 def weighed(*weights):

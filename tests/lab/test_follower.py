@@ -1,7 +1,6 @@
 """What the host makes of a machine's console: results, silence, a sudden end."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -10,7 +9,6 @@ from lab.results import (
     Begun,
     Finished,
     ScenarioResult,
-    TimerAddresses,
     Verdict,
     to_line,
 )
@@ -43,8 +41,7 @@ class Tape:
 
 
 def follow(tape, *names):
-    no = Path("no such file")
-    return Follower(no, no, is_shown=False).follow(tape, names)
+    return Follower(is_shown=False).follow(tape, names)
 
 
 def test_results_come_out_in_the_order_in_which_they_came():
@@ -72,18 +69,6 @@ def test_a_machine_that_leaves_scenarios_out_is_not_taken_for_complete():
     lines = [to_line(Begun("bench")), to_line(SENT), FINISHED]
     results = follow(Tape(*lines), "bench", "session")
     assert results[-1].verdict is Verdict.HUNG
-
-
-def test_a_timer_that_is_corrected_is_known_from_then_on(tmp_path, monkeypatch):
-    corrected = []
-    monkeypatch.setattr(
-        "lab.timer_rate.correct", lambda *given: corrected.append(given[1:3])
-    )
-    timer, line = tmp_path / "timer", to_line(TimerAddresses(1, 2, 3, 4))
-    for _ in range(2):
-        Follower(tmp_path, timer, is_shown=False).follow(Tape(line), [])
-    assert corrected == [(1, 2)]
-    assert timer.read_text() == line
 
 
 class Starved(Tape):
