@@ -45,11 +45,6 @@ COMMANDS = {
     "identify": "classify the terrain of a trial: probabilities over time",
     "fit": "fit and compare models of external data, npz or CSV",
 }
-_JOINED = {
-    "publish": "export",
-    "watch": "replay",
-    "stance": "run",
-}  # commands that share a file with another
 _OF_THE_DISK = {
     errno.EIO,
     errno.ENOSPC,
@@ -123,9 +118,7 @@ def build_parser(wanted: Collection[str] = COMMANDS) -> argparse.ArgumentParser:
         if name not in wanted:
             commands.add_parser(name, help=help_text)
             continue
-        file = _JOINED.get(name, name)
-        module = importlib.import_module(f"experiments.commands.{file}")
-        command = getattr(module, name.upper(), module)
+        command = importlib.import_module(f"experiments.commands.{name}")
         child = commands.add_parser(
             name,
             help=help_text,

@@ -4,7 +4,6 @@ import math
 import shlex
 from argparse import SUPPRESS, ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 FRICTION = 0.4  # of the simulated joints, as a share of another arm's; ASSUMED
@@ -19,21 +18,6 @@ _FORMER: Mapping[str, Mapping[str, str]] = {  # names that scripts may still use
     "report": _SEED,
 }
 PACES = ("steady", "slow", "fast", "clumsy")  # of the simulated person
-
-
-@dataclass(frozen=True, slots=True)
-class JoinedCommand:
-    """A command that shares its file with another, and is named as a module is.
-
-    Attributes:
-        EXAMPLES: for its help.
-        add_arguments: declares its options.
-        run: runs it and returns the exit code.
-    """
-
-    EXAMPLES: str
-    add_arguments: Callable[[ArgumentParser], None]
-    run: Callable[[Namespace], int]
 
 
 def add_global_options(
@@ -228,6 +212,53 @@ def add_pdf(parser: ArgumentParser) -> None:
     )
 
 
+def add_recording(parser: ArgumentParser) -> None:
+    """Declare what every command takes that opens a new session."""
+    parser.add_argument("terrain", metavar="TERRAIN", help="a name in matrix.toml")
+    parser.add_argument("--fake", action="store_true", help="simulated devices")
+    parser.add_argument(
+        "--fast", action="store_true", help="stepped time, only with --fake"
+    )
+    parser.add_argument(
+        "--trials", type=int, metavar="N", help="trials to keep (of the terrain)"
+    )
+    parser.add_argument(
+        "--operator", default="", metavar="NAME", help="name of the operator"
+    )
+    add_simulated_arm(parser)
+    parser.add_argument(
+        "--pace",
+        choices=PACES,
+        default=PACES[0],
+        help="how the simulated person pushes (steady)",
+    )
+    parser.add_argument(
+        "--twin",
+        action="store_true",
+        help="simulate the arm, sensor and containers that calibrations of rig.toml "
+        "describe, only with --fake",
+    )
+    add_fault(parser)
+    parser.add_argument(
+        "--operator-script",
+        metavar="FILE|auto",
+        help="keys, one per line: keep, redo 1..5, remark TEXT, quit; before a trial "
+        "pause, note TEXT, view, last",
+    )
+    parser.add_argument(
+        "--new", action="store_true", help="close an unfinished session first"
+    )
+    parser.add_argument(
+        "--foresight",
+        type=Path,
+        metavar="FILE",
+        help="terrain database for foresight (that of report --all)",
+    )
+    parser.add_argument(
+        "--can-log", type=Path, metavar="FILE", help="write every CAN frame there"
+    )
+
+
 def add_reopening(parser: ArgumentParser) -> None:
     """Declare what every command takes that opens a session once more."""
     parser.add_argument(
@@ -274,6 +305,17 @@ def add_fault(parser: ArgumentParser) -> None:
         default=[],
         metavar="NAME[@Tn+SECONDSs]",
         help="raise a fault, only if simulated; can be repeated",
+    )
+
+
+def add_port(parser: ArgumentParser, when: str = "") -> None:
+    """Declare where viewers are served; `when` says with which other option."""
+    parser.add_argument(
+        "--port",
+        type=number_within(0, 65_535, "a whole number 0..65535, e.g. 8765"),
+        default=8765,
+        metavar="N",
+        help=f"{when}where to serve on 127.0.0.1 (8765), 0 = any that is free",
     )
 
 

@@ -1,7 +1,4 @@
-"""traction replay and watch: a trial shown again, a bus log in words; a second screen.
-
-`watch` serves the session that another process records to viewers on this computer.
-"""
+"""traction replay: a trial shown again, or a bus log in words."""
 
 from __future__ import annotations
 
@@ -9,21 +6,15 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from experiments.arguments import JoinedCommand, add_allow_missing, number_within
+from experiments.arguments import add_allow_missing, add_port, number_within
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from experiments.operator.console import Console
-    from experiments.run.stop import StopFlag
     from wam.bus.log import BusSummary, DecodedLine
 
 EXAMPLES = """\
   traction replay S012 T04 --speed 2        a trial, twice as fast as it was
   traction replay --can bus.log --summary   a bus log, totals only"""
-WATCH_EXAMPLES = """\
-  traction watch                the session that is recorded, at ws://127.0.0.1:8765
-  traction watch S012 --port 0  this session, at any free port"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -59,18 +50,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="serve the trial to viewers on this computer; needs traction[live]",
     )
-    _add_port(parser, "--serve: ")
+    add_port(parser, "--serve: ")
     parser.add_argument("--summary", action="store_true", help="totals only")
-
-
-def _add_port(parser: argparse.ArgumentParser, when: str) -> None:
-    parser.add_argument(
-        "--port",
-        type=number_within(0, 65_535, "a whole number 0..65535, e.g. 8765"),
-        default=8765,
-        metavar="N",
-        help=f"{when}where to serve on 127.0.0.1 (8765), 0 = any that is free",
-    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -125,39 +106,15 @@ def _serve_trial(args: argparse.Namespace, path: Path, console: Console) -> int:
 
     stop = StopFlag()
     with handle_signals(stop):
-        is_over = _gone(stop, console)
-        serve(path, args.speed, int(args.port), SystemClock(), console, is_over)
+        serve(
+            path,
+            args.speed,
+            int(args.port),
+            SystemClock(),
+            console,
+            is_over=lambda: stop.count > 0 or console.is_lost,
+        )
     return 0
-
-
-def _gone(stop: StopFlag, console: Console) -> Callable[[], bool]:
-    """Return what says that nobody wants this any more."""
-    return lambda: stop.count > 0 or console.is_lost
-
-
-def _add_watch_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "session", nargs="?", metavar="SESSION", help="S012 (the one that is recorded)"
-    )
-    _add_port(parser, "")
-
-
-def _watch(args: argparse.Namespace) -> int:
-    """Serve what is recorded until Ctrl-C and return the exit code."""
-    from acquisition.clock import SystemClock
-    from experiments.live.watching import watch
-    from experiments.operator.console import Console
-    from experiments.run.stop import StopFlag, handle_signals
-
-    console, stop = Console(color=not args.no_color), StopFlag()
-    with handle_signals(stop):
-        is_over = _gone(stop, console)
-        port = int(args.port)
-        watch(args.data, args.session, port, console, SystemClock(), is_over)
-    return 0
-
-
-WATCH = JoinedCommand(WATCH_EXAMPLES, _add_watch_arguments, _watch)
 
 
 def _prove_foresight(path: Path, database: Path, console: Console) -> int:

@@ -3,17 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from experiments.arguments import (
-    PACES,
-    JoinedCommand,
-    add_fault,
-    add_simulated_arm,
-    data_option,
-    friction_share,
-)
+from experiments.arguments import add_recording, data_option, friction_share
 
 if TYPE_CHECKING:
     from experiments.run.resume import ResumeRequest
@@ -28,62 +20,15 @@ EXAMPLES = """\
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `run`."""
-    parser.add_argument("terrain", metavar="TERRAIN", help="a name in matrix.toml")
-    parser.add_argument("--fake", action="store_true", help="simulated devices")
-    parser.add_argument(
-        "--fast", action="store_true", help="stepped time, only with --fake"
-    )
-    parser.add_argument(
-        "--trials", type=int, metavar="N", help="trials to keep (of the terrain)"
-    )
-    parser.add_argument(
-        "--operator", default="", metavar="NAME", help="name of the operator"
-    )
-    _add_simulation(parser)
-    parser.add_argument(
-        "--operator-script",
-        metavar="FILE|auto",
-        help="keys, one per line: keep, redo 1..5, remark TEXT, quit; before a trial "
-        "pause, note TEXT, view, last",
-    )
-    parser.add_argument(
-        "--new", action="store_true", help="close an unfinished session first"
-    )
-    parser.add_argument(
-        "--foresight",
-        type=Path,
-        metavar="FILE",
-        help="terrain database for foresight (that of report --all)",
-    )
-    parser.add_argument(
-        "--can-log", type=Path, metavar="FILE", help="write every CAN frame there"
-    )
-
-
-def _add_simulation(parser: argparse.ArgumentParser) -> None:
-    """Declare what is simulated, and how."""
-    add_simulated_arm(parser)
-    parser.add_argument(
-        "--pace",
-        choices=PACES,
-        default=PACES[0],
-        help="how the simulated person pushes (steady)",
-    )
-    parser.add_argument(
-        "--twin",
-        action="store_true",
-        help="simulate the arm, sensor and containers that calibrations of rig.toml "
-        "describe, only with --fake",
-    )
-    add_fault(parser)
+    add_recording(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Run one session and return the exit code."""
-    return _run(args, None)
+    return record_session(args)
 
 
-def _run(args: argparse.Namespace, stance: StanceTask | None) -> int:
+def record_session(args: argparse.Namespace, stance: StanceTask | None = None) -> int:
     """Run one session of pushes, or of stances; return the exit code."""
     from experiments.operator.console import Console
     from experiments.operator.scripted import choose_operator
@@ -184,56 +129,3 @@ def _check_arguments(args: argparse.Namespace) -> None:
         raise SettingsError(
             f"--seed {args.seed} - expected a whole number >= 0, e.g. 1.", hint=nothing
         )
-
-
-_STANCE_EXAMPLES = """\
-  traction stance S0 --fake --fast --policy constant-mu
-  traction stance S10 --policy avoid-slip --risk 0.05 --fake --fast --trials 2"""
-_STANCES_OF_A_TRIAL = 25
-
-
-def _add_stance_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of `stance`."""
-    add_arguments(parser)
-    parser.add_argument(
-        "--policy",
-        choices=("avoid-slip", "constant-mu", "none", "oracle"),
-        default="avoid-slip",
-        help="what chooses normal force and traction (avoid-slip)",
-    )
-    parser.add_argument(
-        "--risk",
-        type=float,
-        default=0.05,
-        metavar="R",
-        help="share of stances that may slip, 0.01..0.5 (0.05)",
-    )
-    parser.add_argument(
-        "--peak",
-        type=float,
-        default=6.0,
-        metavar="N",
-        help="peak of the required traction [N], 4..10 (6)",
-    )
-    parser.add_argument(
-        "--stances",
-        type=int,
-        default=_STANCES_OF_A_TRIAL,
-        metavar="N",
-        help="stances per recording (25)",
-    )
-
-
-def _stance(args: argparse.Namespace) -> int:
-    """Let the foot stand by itself, in the simulation only."""
-    from acquisition.errors import PreflightError
-    from experiments.run.stances import LIVE_STANCE
-    from experiments.session.stance_task import StanceTask
-
-    task = StanceTask(args.policy, args.risk, args.peak, args.stances)
-    if not args.fake:
-        raise PreflightError(LIVE_STANCE, hint="Add --fake. Nothing was started.")
-    return _run(args, task)
-
-
-STANCE = JoinedCommand(_STANCE_EXAMPLES, _add_stance_arguments, _stance)

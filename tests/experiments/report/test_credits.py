@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from acquisition.errors import SettingsError
-from experiments.commands import export
+from experiments.commands import publish
 from experiments.report.credits import (
     LICENCES,
     Author,
@@ -98,6 +98,6 @@ def test_the_readme_names_terrains_and_how_to_check(about):
 
 def test_the_command_offers_every_licence_that_there_is():
     parser = argparse.ArgumentParser()
-    export.PUBLISH.add_arguments(parser)
+    publish.add_arguments(parser)
     usage = parser.format_usage()
     assert f"{{{','.join(LICENCES)}}}" in usage

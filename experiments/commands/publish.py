@@ -1,0 +1,63 @@
+"""traction publish: recordings, tables and results together, for an archive."""
+
+import argparse
+from pathlib import Path
+
+from experiments.arguments import add_allow_missing, add_seed
+
+EXAMPLES = """\
+  traction publish S012 S013 --to crate --author "Family, Given" --licence CC-BY-4.0
+  traction publish --all --to crate --author "Family, Given" --licence CC0-1.0"""
+
+_LICENCES = ("CC-BY-4.0", "CC-BY-SA-4.0", "CC0-1.0", "ODC-By-1.0")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `publish`."""
+    parser.add_argument(
+        "sessions", nargs="*", metavar="SESSION", help="id, folder name or path"
+    )
+    parser.add_argument("--all", action="store_true", help="every session with trials")
+    parser.add_argument(
+        "--to", type=Path, required=True, metavar="DIR", help="an empty or new folder"
+    )
+    parser.add_argument(
+        "--author",
+        action="append",
+        required=True,
+        metavar="NAME",
+        help='"Family, Given" or "Family, Given <ORCID>"; can be repeated',
+    )
+    parser.add_argument(
+        "--licence", choices=_LICENCES, required=True, help="licence of the data"
+    )
+    parser.add_argument(
+        "--title", default="", metavar="TEXT", help="title of the study"
+    )
+    parser.add_argument(
+        "--description", default="", metavar="TEXT", help="a sentence or two"
+    )
+    add_allow_missing(parser)
+    add_seed(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the publication and return the exit code."""
+    from experiments.operator.console import Console
+    from experiments.report.choices import choose_sessions, tell_missing
+    from experiments.report.credits import LICENCES, parse_author
+    from experiments.report.publication import PublishRequest, publish_sessions
+    from experiments.report.sessions import ReportRequest
+    from experiments.settings.load import load_settings
+
+    authors = [parse_author(text) for text in args.author]
+    request = PublishRequest(
+        args.title, args.description, authors, LICENCES[args.licence]
+    )
+    console = Console(color=not args.no_color)
+    sessions = choose_sessions(args.data, args.sessions, every=args.all)
+    order = [row.name for row in load_settings(args.config).matrix.terrains]
+    missing = tell_missing(sessions, console, allow_missing=args.allow_missing)
+    wanted = ReportRequest(order, args.seed, missing=missing)
+    publish_sessions(sessions, args.data, args.to, wanted, request, console)
+    return 0

@@ -1,0 +1,37 @@
+"""traction watch: the session that another process records, on a second screen."""
+
+import argparse
+
+from experiments.arguments import add_port
+
+EXAMPLES = """\
+  traction watch                the session that is recorded, at ws://127.0.0.1:8765
+  traction watch S012 --port 0  this session, at any free port"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `watch`."""
+    parser.add_argument(
+        "session", nargs="?", metavar="SESSION", help="S012 (the one that is recorded)"
+    )
+    add_port(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Serve what is recorded until Ctrl-C and return the exit code."""
+    from acquisition.clock import SystemClock
+    from experiments.live.watching import watch
+    from experiments.operator.console import Console
+    from experiments.run.stop import StopFlag, handle_signals
+
+    console, stop = Console(color=not args.no_color), StopFlag()
+    with handle_signals(stop):
+        watch(
+            args.data,
+            args.session,
+            int(args.port),
+            console,
+            SystemClock(),
+            is_over=lambda: stop.count > 0 or console.is_lost,
+        )
+    return 0
