@@ -30,7 +30,7 @@ from analysis.foresight.scores import ground_answers, score_ground, score_slips
 from analysis.foresight.ticks import ForesightRun
 from analysis.foresight.training import fit_foresight
 from analysis.foresight.watching import WatchedTrial, watch_all, watch_series
-from experiments.rig.foresight import state_record
+from experiments.rig.foresight_process import state_record
 from tests.analysis.foresight.databases import BREAKS
 
 LEAST_RECALL, LEAST_OF_ONE, LEAST_LEAD = 0.80, 0.75, 0.1

@@ -31,7 +31,8 @@ import pytest
 from acquisition.clock import NS_PER_S, SystemClock
 from acquisition.devices import SafetyMode
 from experiments.messages import CATALOGUE
-from experiments.operator.prompts import AutoOperator, Prompt
+from experiments.operator.auto_operator import AutoOperator
+from experiments.operator.prompts import Prompt
 from experiments.session.reducer import replay
 from experiments.session.store import find_session
 from fakes.clock import START_NS

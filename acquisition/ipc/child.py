@@ -20,8 +20,8 @@ from acquisition.control_loop.realtime import die_with_parent
 from acquisition.errors import TractionError
 from acquisition.ipc.channel import Channel, ChannelClosedError
 from acquisition.ipc.layout import SharedLayout
-from acquisition.ipc.rings import SharedMemory
 from acquisition.ipc.rpc import send_call
+from acquisition.ipc.shared_memory import SharedMemory
 from acquisition.linear_algebra import ONE_THREAD
 
 _ROOT = str(Path(__file__).parents[2])

@@ -9,7 +9,8 @@ from typing import Final
 from acquisition.control_loop.faults import GuardVerdict, from_plain, to_plain
 from acquisition.control_loop.states import ArmState, ControlStatus
 from acquisition.devices import BusCondition, SafetyMode
-from acquisition.ipc.rings import Ring, Slot
+from acquisition.ipc.latest_value import Slot
+from acquisition.ipc.ring_buffer import Ring
 
 _COMMAND: Final = struct.Struct("<QIi12d")
 _STATUS: Final = struct.Struct("<QBB?B4xqQQQQ")

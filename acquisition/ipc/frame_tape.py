@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from acquisition.clock import Clock
-from acquisition.ipc.rings import Ring
+from acquisition.ipc.ring_buffer import Ring
 from acquisition.sample import Record
 
 SECONDS = 2.0

@@ -13,7 +13,9 @@ import numpy as np
 
 from acquisition.devices import WrenchSample
 from acquisition.errors import LinkError
-from acquisition.ipc.rings import LINE, Ring, SharedMemory, Slot, lines
+from acquisition.ipc.latest_value import Slot
+from acquisition.ipc.ring_buffer import Ring
+from acquisition.ipc.shared_memory import LINE, SharedMemory, lines
 from acquisition.sample import Record
 from acquisition.schema import CYCLE, FORESIGHT
 

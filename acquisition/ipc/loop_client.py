@@ -9,7 +9,7 @@ from acquisition.control_loop.law import SoleGoal
 from acquisition.control_loop.states import ArmState, ControlStatus
 from acquisition.ipc.commands import CommandKind, CommandQueue, LoopStatus, StatusSlot
 from acquisition.ipc.layout import ProcessRole, SharedLayout
-from acquisition.ipc.rings import RingReader
+from acquisition.ipc.ring_buffer import RingReader
 from acquisition.sample import Record
 
 PORTION = 10  # cycles between two looks of the console: 20 ms

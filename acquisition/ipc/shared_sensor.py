@@ -2,7 +2,7 @@
 
 from acquisition.devices import WrenchSample
 from acquisition.ipc.layout import pack_wrench, unpack_wrenches
-from acquisition.ipc.rings import Ring
+from acquisition.ipc.ring_buffer import Ring
 
 
 class SharedSensor:

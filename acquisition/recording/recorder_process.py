@@ -10,8 +10,8 @@ from acquisition.control_loop.realtime import RealtimeRequest, request
 from acquisition.errors import TrialFileError
 from acquisition.ipc.channel import ChannelClosedError
 from acquisition.ipc.child import Child, ChildContext, name_process
+from acquisition.ipc.heap import give_back_heap
 from acquisition.ipc.layout import SharedLayout
-from acquisition.ipc.rings import give_back_heap
 from acquisition.ipc.rpc import RpcServer, bind, make_proxy
 from acquisition.recording.recorder import Recorder, TrialRecording
 from acquisition.trial_file.header import TrialHeader

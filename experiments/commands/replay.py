@@ -119,8 +119,8 @@ def _serve_trial(args: argparse.Namespace, path: Path, console: Console) -> int:
 
 def _prove_foresight(path: Path, database: Path, console: Console) -> int:
     """Say whether the record gives what was foreseen; 0 if bit for bit, 1 if not."""
-    from experiments.report.foresight import replay_foresight
-    from experiments.rig.foresight import read_foresight
+    from experiments.report.foresight_replay import replay_foresight
+    from experiments.rig.foresight_source import read_foresight
 
     replay = replay_foresight(path, read_foresight(database))
     console.say(

@@ -6,14 +6,9 @@ from pathlib import Path
 from acquisition.errors import SettingsError
 from acquisition.settings import read_text
 from experiments.messages import CATALOGUE
+from experiments.operator.auto_operator import READY_SECONDS, AutoOperator
 from experiments.operator.keys import REJECT_REASONS, Operand, script_keys
-from experiments.operator.prompts import (
-    READY_SECONDS,
-    AutoOperator,
-    OperatorInput,
-    Prompt,
-    PromptState,
-)
+from experiments.operator.prompts import OperatorInput, Prompt, PromptState
 from experiments.operator.terminal import TerminalInput
 
 _PROMPTS = (Prompt.LIFT, Prompt.READY, Prompt.REVIEW)

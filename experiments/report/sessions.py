@@ -34,11 +34,7 @@ from analysis.terrains.export import break_away_batch, break_away_of, database_o
 from analysis.terrains.identify import identify_study
 from experiments.operator.console import Console
 from experiments.report.choices import AnalysisChoices, repeat_study
-from experiments.report.foresight import (
-    StudyForesight,
-    study_foresight,
-    watched_trials,
-)
+from experiments.report.foresight import StudyForesight, study_foresight, watched_trials
 from experiments.report.progress import fitting
 from experiments.report.tables import report_tables, summary_table
 from experiments.report.truth_errors import (

@@ -16,7 +16,8 @@ from acquisition.recording.recorder import Recorder, TrialRecording
 from analysis.foresight.model import RigIdentity
 from experiments.rig.build import LoopConfig, build_loop_server
 from experiments.rig.claim import release
-from experiments.rig.foresight import ForesightSource, ForesightWorker
+from experiments.rig.foresight_process import ForesightWorker
+from experiments.rig.foresight_source import ForesightSource
 from wam.bus.link import CanLink
 from wam.driver.arm import WamArm
 from wam.driver.startup import ArmInfo

@@ -12,13 +12,13 @@ from acquisition.errors import LinkError, PreflightError, TractionError
 from acquisition.ipc.child import Child, ProcessLostError
 from acquisition.ipc.layout import SharedLayout
 from acquisition.ipc.loop_client import LoopClient
-from acquisition.ipc.rings import require_ordered_stores
 from acquisition.ipc.rpc import make_proxy
+from acquisition.ipc.shared_memory import require_ordered_stores
 from acquisition.recording.recorder_process import RemoteRecorder
 from acquisition.simulation import DeviceServer
 from analysis.foresight.model import RigIdentity
 from experiments.rig.arm_lock import ArmLock
-from experiments.rig.foresight import ForesightSource
+from experiments.rig.foresight_source import ForesightSource
 from experiments.rig.services import ArmService, SensorService
 from wam.driver.startup import ArmInfo
 
@@ -160,7 +160,7 @@ class MultiProcessBackend:
             "along": list(along),
             "core": self._other_core,
         }
-        self._spawn(_FORESIGHT, "experiments.rig.foresight:main", settings)
+        self._spawn(_FORESIGHT, "experiments.rig.foresight_process:main", settings)
         self._reported.add(_FORESIGHT)
 
     @property

@@ -15,7 +15,7 @@ from experiments.rig.arm_lock import ArmLock
 from experiments.rig.backend import RigBackend
 from experiments.rig.build import build_tool, terrain_frame
 from experiments.rig.fake import SimulatedRig, stepped
-from experiments.rig.foresight import ForesightSource
+from experiments.rig.foresight_source import ForesightSource
 from experiments.rig.law_calibrations import (
     LawCalibrations,
     build_law,

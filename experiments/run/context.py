@@ -11,8 +11,9 @@ from analysis.next_push.records import Aim
 from experiments.messages import REPORT, ComputerLoad, FaultContext, fault_text
 from experiments.operator.console import Console
 from experiments.operator.feedback import OperatorFeedback, build_feedback
+from experiments.operator.foot_gesture import FootKeys
 from experiments.operator.graphs import packed
-from experiments.operator.keys import FootKeys, screen_keys
+from experiments.operator.keys import screen_keys
 from experiments.operator.prompts import OperatorInput, Prompt
 from experiments.rig.rig import Rig
 from experiments.run.console_loop import ConsoleLoop

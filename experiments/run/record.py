@@ -24,7 +24,7 @@ from experiments.operator.screens import (
     live_line,
     recording_lines,
 )
-from experiments.rig.foresight import foresight_view
+from experiments.rig.foresight_view import foresight_view
 from experiments.rig.rig import Rig
 from experiments.run.console_loop import TICK
 from experiments.run.context import RunContext

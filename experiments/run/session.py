@@ -28,7 +28,11 @@ from experiments.preflight.conditions import (
 from experiments.preflight.connecting import connect_rig
 from experiments.preflight.preflight import Preflight, run_preflight
 from experiments.rig.bus_log import logging_bus
-from experiments.rig.foresight import STUDY_DATABASE, ForesightSource, read_foresight
+from experiments.rig.foresight_source import (
+    STUDY_DATABASE,
+    ForesightSource,
+    read_foresight,
+)
 from experiments.rig.rig import FakeOptions, Rig
 from experiments.rig.simulation import SimulatedHand
 from experiments.run.console_loop import ConsoleLoop

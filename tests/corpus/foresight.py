@@ -11,7 +11,8 @@ import numpy as np
 from acquisition.sample import Record
 from acquisition.trial_file.reader import TrialReader
 from analysis.foresight.engine import ForesightState
-from experiments.rig.foresight import read_foresight, state_record, states_of
+from experiments.rig.foresight_process import state_record, states_of
+from experiments.rig.foresight_source import read_foresight
 from tests.acquisition.trials import make_cycles
 from tests.analysis.foresight.made import OTHER_RIG, RATE, RIG, push_on_stones
 

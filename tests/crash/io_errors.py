@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.operator.prompts import AutoOperator
+from experiments.operator.auto_operator import AutoOperator
 from tests.crash.inspection import acknowledged, problems, recordings
 from tests.crash.syscalls import recorded
 from tests.experiments.program import Done, run_short, traction, write_config

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from experiments.__main__ import main
-from experiments.operator.prompts import AutoOperator
+from experiments.operator.auto_operator import AutoOperator
 from fakes.world.rig import FakeRig
 from tests.experiments.built import watch_builds
 

@@ -16,7 +16,8 @@ from acquisition.control_loop.states import ArmState
 from acquisition.devices import SafetyMode
 from acquisition.trial_file.verify import verify_file
 from experiments.calibrating import gravity
-from experiments.operator.prompts import AutoOperator, Prompt
+from experiments.operator.auto_operator import AutoOperator
+from experiments.operator.prompts import Prompt
 from experiments.run import pose_walk
 from fakes.pucks.bank import PuckBank
 from fakes.world import plain_world

@@ -60,7 +60,8 @@ import fcntl, sys, termios
 if sys.stdout.isatty():
     fcntl.ioctl(1, termios.TIOCSCTTY, 0)
 from pathlib import Path
-from experiments.operator.prompts import AutoOperator, Prompt
+from experiments.operator.auto_operator import AutoOperator
+from experiments.operator.prompts import Prompt
 from experiments.rig.simulation import SimulatedHand
 prompt, marker = sys.argv.pop(1), Path(sys.argv.pop(1))
 answer, follow = AutoOperator.answer, SimulatedHand.follow

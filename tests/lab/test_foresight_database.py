@@ -3,7 +3,7 @@
 import json
 
 from analysis.foresight.model import RigIdentity
-from experiments.rig.foresight import read_foresight
+from experiments.rig.foresight_source import read_foresight
 from lab.guest.scenarios.foresight import DATABASE
 from tests.analysis.foresight.databases import laboratory_database
 from tests.analysis.foresight.made import OTHER_RIG, RIG

@@ -10,7 +10,8 @@ from acquisition.ipc.child import Child
 from acquisition.ipc.layout import SharedLayout
 from acquisition.schema import CYCLE
 from acquisition.trial_file.reader import TrialReader
-from experiments.rig.foresight import read_foresight, state_record, states_of
+from experiments.rig.foresight_process import state_record, states_of
+from experiments.rig.foresight_source import read_foresight
 from tests.acquisition.trials import make_cycles
 from tests.analysis.foresight.databases import write_database
 from tests.analysis.foresight.made import RIG, STONES, trial
@@ -42,7 +43,9 @@ def test_a_process_says_bit_for_bit_what_the_record_gives(tmp_path, cycles):
     source = read_foresight(write_database(tmp_path / "terrains.json"))
     shared = SharedLayout.create()
     settings = {**source.settings(), "rig": RIG.to_dict(), "along": ALONG}
-    child = Child("foresight", "experiments.rig.foresight:main", settings, shared)
+    child = Child(
+        "foresight", "experiments.rig.foresight_process:main", settings, shared
+    )
     try:
         reader = shared.foresight.reader()
         data = memoryview(cycles.tobytes())
@@ -69,7 +72,9 @@ def test_a_process_at_rest_says_nothing(tmp_path, cycles):
     source = read_foresight(write_database(tmp_path / "terrains.json"))
     shared = SharedLayout.create()
     settings = {**source.settings(), "rig": RIG.to_dict(), "along": ALONG}
-    child = Child("foresight", "experiments.rig.foresight:main", settings, shared)
+    child = Child(
+        "foresight", "experiments.rig.foresight_process:main", settings, shared
+    )
     try:
         shared.cycles.write(cycles[:1].tobytes())
         assert not until(lambda: shared.foresight.written > 0, 1.0)

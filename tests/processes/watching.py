@@ -17,7 +17,7 @@ from acquisition.clock import NS_PER_S, SystemClock
 from acquisition.devices import SafetyMode
 from acquisition.ipc.commands import StatusSlot
 from acquisition.ipc.layout import SharedLayout
-from acquisition.ipc.rings import SharedMemory
+from acquisition.ipc.shared_memory import SharedMemory
 from fakes.bus.client import SocketBus
 from tests.experiments.program import changed, write_config
 from tests.stalls import stall_witness

@@ -4,7 +4,7 @@ import pytest
 
 from acquisition.ipc.frame_tape import FrameTape, last_frames
 from acquisition.ipc.layout import FRAME_DTYPE
-from acquisition.ipc.rings import Ring
+from acquisition.ipc.ring_buffer import Ring
 from acquisition.trial_file.views import encode_can_batch
 from tests.acquisition.ros import decode
 from tests.fakes.stepped import SteppedClock

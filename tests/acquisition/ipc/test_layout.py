@@ -10,7 +10,7 @@ from acquisition.ipc.layout import (
     pack_wrench,
     unpack_wrenches,
 )
-from acquisition.ipc.rings import SharedMemory
+from acquisition.ipc.shared_memory import SharedMemory
 from acquisition.schema import CYCLE
 
 finite = st.floats(allow_nan=False)

@@ -5,7 +5,7 @@ import platform
 import pytest
 
 from acquisition.errors import PreflightError
-from acquisition.ipc.rings import require_ordered_stores
+from acquisition.ipc.shared_memory import require_ordered_stores
 
 
 @pytest.mark.parametrize("machine", ["x86_64", "AMD64", "i386", "i686"])

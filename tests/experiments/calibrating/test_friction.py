@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from acquisition.devices import SafetyMode
-from experiments.operator.prompts import AutoOperator, Prompt
+from experiments.operator.auto_operator import AutoOperator
+from experiments.operator.prompts import Prompt
 from fakes.plant.model import PlantOptions
 from fakes.world import plain_world
 from studies.friction_calibrations import SEEDS, SHARES, errors_of, verdicts

@@ -9,7 +9,8 @@ import pytest
 
 from acquisition.devices import SafetyMode
 from experiments.calibrating import gravity
-from experiments.operator.prompts import AutoOperator, Prompt
+from experiments.operator.auto_operator import AutoOperator
+from experiments.operator.prompts import Prompt
 from experiments.run import pose_walk as walk
 from fakes.plant.model import PlantOptions
 from fakes.plant.plant import ArmPlant

@@ -6,7 +6,8 @@ import pytest
 from acquisition.devices import SafetyMode
 from acquisition.ipc.loop_client import LoopClient
 from acquisition.ipc.loop_server import SILENT_NS
-from experiments.operator.prompts import AutoOperator, Prompt
+from experiments.operator.auto_operator import AutoOperator
+from experiments.operator.prompts import Prompt
 from tests.experiments.built import watch_builds
 from tests.experiments.program import traction
 

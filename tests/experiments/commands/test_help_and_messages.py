@@ -19,7 +19,8 @@ from experiments import settings
 from experiments.fault_injection.host_faults import COMPUTER_FAULTS
 from experiments.fault_injection.plan import FaultPlan
 from experiments.messages import CATALOGUE
-from experiments.operator.prompts import AutoOperator, Prompt
+from experiments.operator.auto_operator import AutoOperator
+from experiments.operator.prompts import Prompt
 from experiments.preflight import preflight
 from experiments.rig import backend as inline_crew
 from experiments.rig.build import build_tool

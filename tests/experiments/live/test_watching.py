@@ -10,7 +10,7 @@ import pytest
 from acquisition.clock import SystemClock
 from acquisition.errors import LinkError, SettingsError
 from acquisition.ipc.layout import SharedLayout
-from acquisition.ipc.rings import SharedMemory
+from acquisition.ipc.shared_memory import SharedMemory
 from acquisition.schema import CYCLE, FORESIGHT
 from experiments.live.channels import LIVE_TOPICS
 from experiments.live.server import LiveServer

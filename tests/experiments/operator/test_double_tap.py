@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from acquisition.trial_file.reader import TrialReader
-from experiments.operator.keys import DoubleTap
+from experiments.operator.foot_gesture import DoubleTap
 from experiments.operator.prompts import Prompt
 from tests.experiments.program import journal, run_watched, write_config
 

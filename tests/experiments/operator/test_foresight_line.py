@@ -4,7 +4,7 @@ import pytest
 from acquisition.schema import FORESIGHT
 from analysis.foresight.engine import ForesightFlag
 from experiments.operator.screens import ForesightView, foresight_line
-from experiments.rig.foresight import foresight_view
+from experiments.rig.foresight_view import foresight_view
 
 TERRAINS = ("S10", "B0", "TF")
 GOOD = ForesightFlag.VALID | ForesightFlag.CONTACT | ForesightFlag.GROUND

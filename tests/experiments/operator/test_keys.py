@@ -8,6 +8,7 @@ import pytest
 
 from acquisition.errors import SettingsError
 from experiments.commands.run import add_arguments
+from experiments.operator.auto_operator import AutoOperator
 from experiments.operator.keys import (
     KEYS,
     REJECT_REASONS,
@@ -19,7 +20,7 @@ from experiments.operator.keys import (
     screen_keys,
     script_keys,
 )
-from experiments.operator.prompts import AutoOperator, Prompt, PromptState
+from experiments.operator.prompts import Prompt, PromptState
 from experiments.operator.scripted import ScriptedOperator
 
 PAGE = Path(__file__).parents[3] / "docs" / "sessions.md"

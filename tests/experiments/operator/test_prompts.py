@@ -5,13 +5,12 @@ import pytest
 
 from acquisition.errors import SettingsError
 from experiments.fault_injection.plan import FaultPlan, parse_fault
-from experiments.operator.prompts import (
+from experiments.operator.auto_operator import (
     AUTO_ATTEMPTS,
     AUTO_PATIENCE,
     AutoOperator,
-    Prompt,
-    PromptState,
 )
+from experiments.operator.prompts import Prompt, PromptState
 from experiments.operator.scripted import choose_operator
 from experiments.operator.terminal import TerminalInput
 from experiments.rig.simulation import SimulatedHand

@@ -6,7 +6,8 @@ import termios
 
 import pytest
 
-from experiments.operator.prompts import AutoOperator, Prompt, PromptState
+from experiments.operator.auto_operator import AutoOperator
+from experiments.operator.prompts import Prompt, PromptState
 from experiments.operator.terminal import LONGEST_LINE, Cbreak, TerminalInput, keyboard
 
 

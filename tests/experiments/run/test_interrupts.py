@@ -90,7 +90,7 @@ def test_ctrl_c_ends_every_phase_with_the_arm_at_rest(
     def line(keys, asked):
         press(asked, None)
 
-    monkeypatch.setattr("experiments.operator.prompts.AutoOperator.line", line)
+    monkeypatch.setattr("experiments.operator.auto_operator.AutoOperator.line", line)
     session = run_watched(config, tmp_path, 1, press=press)
     events, state = journal(session.folder), replay(journal(session.folder))
     assert seen[1:] == [moment.phase]  # it came once, and where it should

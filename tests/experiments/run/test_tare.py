@@ -10,7 +10,7 @@ from acquisition.control_loop.states import ArmState
 from acquisition.devices import WrenchSample
 from acquisition.errors import PreflightError
 from acquisition.ipc.layout import WRENCH_DTYPE, pack_wrench
-from acquisition.ipc.rings import Ring
+from acquisition.ipc.ring_buffer import Ring
 from acquisition.sample import Sample
 from experiments.fault_injection.plan import FaultTrigger
 from experiments.operator.prompts import Prompt

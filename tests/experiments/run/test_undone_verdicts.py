@@ -6,8 +6,9 @@ import pytest
 
 from acquisition.control_loop.faults import Action, Fault, GuardVerdict
 from acquisition.errors import DeviceFaultError
+from experiments.operator.auto_operator import AutoOperator
 from experiments.operator.keys import REJECT_REASONS
-from experiments.operator.prompts import AutoOperator, Prompt
+from experiments.operator.prompts import Prompt
 from experiments.run.console_loop import TICK
 from experiments.run.context import UNDO_NS
 from experiments.run.ready import wait_ready

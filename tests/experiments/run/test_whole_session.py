@@ -6,7 +6,8 @@ import os
 import pytest
 
 from acquisition.errors import TrialFileError
-from experiments.operator.prompts import AutoOperator, Prompt
+from experiments.operator.auto_operator import AutoOperator
+from experiments.operator.prompts import Prompt
 from experiments.session.reducer import replay
 from tests.experiments.program import (
     digest,
@@ -51,7 +52,7 @@ def digests(folder):
 
 def shorten(monkeypatch):
     """Let every push end by key before the foot has crossed the container, at once."""
-    for module in ("prompts", "scripted"):
+    for module in ("auto_operator", "scripted"):
         monkeypatch.setattr(f"experiments.operator.{module}.READY_SECONDS", 0.1)
     usual = AutoOperator.answer
 

@@ -1,6 +1,7 @@
 from pathlib import Path
 
-from acquisition.ipc.rings import SharedMemory, give_back_heap
+from acquisition.ipc.heap import give_back_heap
+from acquisition.ipc.shared_memory import SharedMemory
 
 MB = 1_000_000
 

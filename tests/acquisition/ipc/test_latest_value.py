@@ -1,6 +1,7 @@
 import pytest
 
-from acquisition.ipc.rings import LINE, Slot
+from acquisition.ipc.latest_value import Slot
+from acquisition.ipc.shared_memory import LINE
 
 
 @pytest.fixture

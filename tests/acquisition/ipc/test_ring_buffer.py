@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from acquisition.ipc.rings import Ring
+from acquisition.ipc.ring_buffer import Ring
 from acquisition.schema import CYCLE
 from tests.acquisition.trials import make_cycles
 
