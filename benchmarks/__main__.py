@@ -23,8 +23,16 @@ ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "measured.md"
 BEGIN, END = "<!-- python -m benchmarks -->", "<!-- end of the table -->"
 NAMES = (
-    *("lockstep", "fit", "analysis_speed", "scale", "cluster"),
-    *("can_doors", "codec", "load", "recorder", "whole_programs"),
+    "lockstep",
+    "fit",
+    "analysis_speed",
+    "scale",
+    "cluster",
+    "can_doors",
+    "codec",
+    "load",
+    "recorder",
+    "whole_programs",
 )
 PEERS = ("scikit-learn", "GPy", "tinygp", "jax", "numpy", "scipy", "python-can", "mcap")
 _LIMIT_S = 600

@@ -149,12 +149,16 @@ def rows() -> list[BenchRow]:
     return [
         BenchRow(
             f"Dask: two workers against one, {count} folds",
-            *(costs.ratio, "times", _GOAL, True),
+            costs.ratio,
+            "times",
+            _GOAL,
+            is_least=True,
         ),
         *(
             BenchRow(
                 f"Dask: {workers} workers busy, {FOLDS} folds, schedule",
-                *(100.0 * efficiency(costs, workers), "%"),
+                100.0 * efficiency(costs, workers),
+                "%",
                 note=f"{1e3 * costs.beyond:.0f} ms a task beyond its work, "
                 f"{1e3 * costs.sending:.0f} ms to give a worker the trials",
             )

@@ -158,8 +158,12 @@ class ComputerLoad:
 
 # What a computer that comes too late looks like, and what such messages blame.
 _OF_TIME = {
-    *(Fault.LOOP_LATE, Fault.CONSOLE_SILENT, Fault.RECORDER_SILENT, Fault.FT_STALE),
-    *(Fault.CAN_SILENCE, Fault.SAFETY_SILENT),
+    Fault.LOOP_LATE,
+    Fault.CONSOLE_SILENT,
+    Fault.RECORDER_SILENT,
+    Fault.FT_STALE,
+    Fault.CAN_SILENCE,
+    Fault.SAFETY_SILENT,
 }
 _HARDWARE = re.compile(r"cable|adapter|power|puck|traction check", re.IGNORECASE)
 

@@ -63,8 +63,11 @@ def command(kernel: Kernel, initramfs: Path, sockets: Sockets, proxy: int) -> li
         program("qemu-system-x86_64"),
         *options.split(),
         *_memory(),
-        *("-kernel", str(kernel.image), "-initrd", str(initramfs)),
-        *("-append", _APPEND),
+        *_options(
+            ("-kernel", str(kernel.image)),
+            ("-initrd", str(initramfs)),
+            ("-append", _APPEND),
+        ),
         *_host_files(),
         *_can_cards(),
         *_serial_adapter(sockets.line),
@@ -91,60 +94,66 @@ def processor_name() -> str:
     return f"{os.cpu_count()} x {next(iter(names), ' unknown').strip()}"
 
 
+def _options(*pairs: tuple[str, str]) -> list[str]:
+    """Return options, each with its value, as words of a command."""
+    return [word for pair in pairs for word in pair]
+
+
 def _host_files() -> list[str]:
     where = "local,id=host,path=/,security_model=none,readonly=on,multidevs=remap"
-    return [
-        *("-fsdev", where),
-        *("-device", "virtio-9p-pci,fsdev=host,mount_tag=host"),
-        *("-device", "virtio-rng-pci"),
-    ]
+    return _options(
+        ("-fsdev", where),
+        ("-device", "virtio-9p-pci,fsdev=host,mount_tag=host"),
+        ("-device", "virtio-rng-pci"),
+    )
 
 
 def _can_cards() -> list[str]:
     """Two cards on one bus; each can be pulled out of its slot."""
-    return [
-        *("-object", "can-bus,id=bus0"),
-        *("-device", "kvaser_pci,canbus=bus0,id=card0,addr=0x10"),
-        *("-device", "kvaser_pci,canbus=bus0,id=card1,addr=0x11"),
-    ]
+    return _options(
+        ("-object", "can-bus,id=bus0"),
+        ("-device", "kvaser_pci,canbus=bus0,id=card0,addr=0x10"),
+        ("-device", "kvaser_pci,canbus=bus0,id=card1,addr=0x11"),
+    )
 
 
 def _serial_adapter(socket: Path) -> list[str]:
-    return [
-        *("-device", "qemu-xhci,id=usb"),
-        *("-device", "virtio-serial-pci,id=ports"),
-        *("-chardev", f"socket,id=line,path={socket},server=on,wait=off"),
-        *("-device", "usb-serial,chardev=line,always-plugged=on,id=adapter"),
-        *("-chardev", f"socket,id=far,path={socket}"),
-        *("-device", "virtserialport,chardev=far,name=lab.line,nr=1"),
-    ]
+    return _options(
+        ("-device", "qemu-xhci,id=usb"),
+        ("-device", "virtio-serial-pci,id=ports"),
+        ("-chardev", f"socket,id=line,path={socket},server=on,wait=off"),
+        ("-device", "usb-serial,chardev=line,always-plugged=on,id=adapter"),
+        ("-chardev", f"socket,id=far,path={socket}"),
+        ("-device", "virtserialport,chardev=far,name=lab.line,nr=1"),
+    )
 
 
 def _monitor(socket: Path) -> list[str]:
-    return [
-        *("-chardev", f"socket,id=monitor,path={socket},server=on,wait=off"),
-        *("-mon", "chardev=monitor,mode=control"),
-        *("-chardev", f"socket,id=operator,path={socket}"),
-        *("-device", "virtserialport,chardev=operator,name=lab.monitor,nr=2"),
-    ]
+    return _options(
+        ("-chardev", f"socket,id=monitor,path={socket},server=on,wait=off"),
+        ("-mon", "chardev=monitor,mode=control"),
+        ("-chardev", f"socket,id=operator,path={socket}"),
+        ("-device", "virtserialport,chardev=operator,name=lab.monitor,nr=2"),
+    )
 
 
 def _memory() -> list[str]:
     """Memory that has a descriptor: the proxy device sends it to its other end."""
-    return [
-        *("-m", str(MEMORY_MB), "-machine", "memory-backend=ram"),
-        *("-object", f"memory-backend-memfd,id=ram,size={MEMORY_MB}M,share=on"),
-    ]
+    return _options(
+        ("-m", str(MEMORY_MB)),
+        ("-machine", "memory-backend=ram"),
+        ("-object", f"memory-backend-memfd,id=ram,size={MEMORY_MB}M,share=on"),
+    )
 
 
 def _far_side(memory: Path, proxy: int) -> list[str]:
     """Memory shared with the simulated arm, and the device that it is called by."""
     size = f"share=on,mem-path={memory},size={MEMORY_SIZE}"
-    return [
-        *("-object", f"memory-backend-file,id=shared,{size}"),
-        *("-device", "ivshmem-plain,memdev=shared"),
-        *("-device", f"x-pci-proxy-dev,fd={proxy}"),
-    ]
+    return _options(
+        ("-object", f"memory-backend-file,id=shared,{size}"),
+        ("-device", "ivshmem-plain,memdev=shared"),
+        ("-device", f"x-pci-proxy-dev,fd={proxy}"),
+    )
 
 
 class Machine:

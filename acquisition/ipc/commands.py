@@ -139,8 +139,14 @@ class StatusSlot:
         verdict = _verdict_of(raw[_STATUS.size :])
         control = ControlStatus(ArmState(state), SafetyMode(safety), verdict, age)
         return LoopStatus(
-            *(obeyed, running, BusCondition(bus)),
-            *(cycles, skipped, late, worst, control),
+            obeyed=obeyed,
+            is_running=running,
+            bus_condition=BusCondition(bus),
+            cycles=cycles,
+            skipped=skipped,
+            late=late,
+            worst_late_ns=worst,
+            control=control,
         )
 
 

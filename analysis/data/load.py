@@ -114,7 +114,12 @@ class RecordedTrial:
         """
         v_t, F_t, F_n = (self.traction if frame == "terrain" else self._on_sole()).T
         return TractionSeries(
-            *(self.terrain, self.name, self.t, v_t, F_n, F_t),
+            terrain=self.terrain,
+            name=self.name,
+            t=self.t,
+            v_t=v_t,
+            F_n=F_n,
+            F_t=F_t,
             stones=self.stones,
             incline_deg=float(np.degrees(self.frame.incline)),
             stamped_lag=self.stamped_lag,

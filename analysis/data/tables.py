@@ -121,7 +121,9 @@ class _TableForm:
             raise SettingsError(f"{name}: {error.message}", hint=error.hint) from error
         terrain = self.terrain or origin.terrain or DEFAULT_TERRAIN
         return TractionSeries(
-            *(terrain, name, *(table.rows * factors).T),
+            terrain,
+            name,
+            *(table.rows * factors).T,
             stones=self.stones.get(terrain, origin.stones),
             incline_deg=origin.incline_deg,
             stamped_lag=origin.force_age,

@@ -111,7 +111,9 @@ def new_figure(height: float, width: float = WIDTH) -> Figure:
 def mark_simulated(figure: Figure) -> None:
     """Write SIMULATED across a figure."""
     figure.text(
-        *(0.5, 0.5, "SIMULATED"),
+        0.5,
+        0.5,
+        "SIMULATED",
         ha="center",
         va="center",
         rotation=20,

@@ -227,8 +227,18 @@ class Foresight:
             traction = self._traction(shares, F_n, v_t)
         flags |= self._alarm(slip, is_slipping=signals.is_slipping)
         return ForesightState(
-            *(sample.cycle, self._since, sample.host_ns, flags),
-            *(slip, risk, traction, v_t, F_t, F_n, none, terrains),
+            sample.cycle,
+            self._since,
+            sample.host_ns,
+            flags,
+            slip,
+            risk,
+            traction,
+            v_t,
+            F_t,
+            F_n,
+            none,
+            terrains,
         )
 
     def _slip(self, signals: Signals) -> float:

@@ -96,8 +96,17 @@ class GroundWindow:
         step_F = F_t - terms[-1][2] if terms else 0.0
         step_v = v - self._v[-1] if terms else 0.0
         new = (
-            *(ratio, ratio * ratio, F_t, F_t * F_t, v, v * v),
-            *(F_n, F_n * F_n, F_n * F_t, step_F * step_F, step_v * step_v),
+            ratio,
+            ratio * ratio,
+            F_t,
+            F_t * F_t,
+            v,
+            v * v,
+            F_n,
+            F_n * F_n,
+            F_n * F_t,
+            step_F * step_F,
+            step_v * step_v,
         )
         for sums in self._sums:
             is_full = self.count >= sums.size

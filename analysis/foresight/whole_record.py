@@ -67,8 +67,11 @@ class FootRecord:
         for part in np.split(rows, breaks):
             if part.size:
                 yield FootRecord(
-                    *(self.cycle[part], self.host_ns[part]),
-                    *(self.x[part], self.F_t[part], self.F_n[part]),
+                    cycle=self.cycle[part],
+                    host_ns=self.host_ns[part],
+                    x=self.x[part],
+                    F_t=self.F_t[part],
+                    F_n=self.F_n[part],
                 )
 
 
@@ -216,7 +219,10 @@ def _features(stretch: FootRecord, of: _Filtered, rows: Indices) -> Array:
         _slope(push, 60)[rows],
         _slope(stretch.F_n, 25)[rows],
         (stretch.F_n - _ago(stretch.F_n, 100))[rows],
-        *(v30, v100, v200, *speeds),
+        v30,
+        v100,
+        v200,
+        *speeds,
         v - _ago(of.v_t, 25, before=0.0)[rows],
         _log(_at_least(_at_most(waited, live.LONGEST), live.LEAST_TIME)),
         _log(gone + live.LEAST_WAY),

@@ -132,8 +132,15 @@ def figure_specs() -> Mapping[str, FigureSpec]:
     )
 
     families = (
-        *(excerpts, curves, surfaces, errors, uncertainty),
-        *(break_away, confusion, trials, rig),
+        excerpts,
+        curves,
+        surfaces,
+        errors,
+        uncertainty,
+        break_away,
+        confusion,
+        trials,
+        rig,
     )
     return {spec.key: spec for family in families for spec in family.FIGURES}
 

@@ -119,8 +119,17 @@ def _stance_table(groups: Sequence[StanceGroup]) -> ReportTable:
         for number, one in enumerate(group.outcomes, 1)
     ]
     header = (
-        *("terrain", "policy", "stance", "spot [mm]", "risk foreseen", "F_n [N]"),
-        *("F_t [N]", "impulse [N s]", "time [s]", "moved [mm]", "outcome"),
+        "terrain",
+        "policy",
+        "stance",
+        "spot [mm]",
+        "risk foreseen",
+        "F_n [N]",
+        "F_t [N]",
+        "impulse [N s]",
+        "time [s]",
+        "moved [mm]",
+        "outcome",
     )
     return ReportTable("Every stance", header, rows, section=ReportSection.STANCES)
 

@@ -205,7 +205,8 @@ def _say_trouble(foreign: Collection[int], errors: BusErrors, console: Console) 
 
     names = ", ".join(f"{can_id:03X}" for can_id in sorted(foreign))
     console.check(
-        *(WARNING if names else GOOD, "masters"),
+        WARNING if names else GOOD,
+        "masters",
         f"another program drives the arm: {names}" if names else "none",
     )
     is_sound = errors.condition is BusCondition.SOUND

@@ -92,10 +92,8 @@ def run(args: argparse.Namespace) -> int:
     require_samples(study)
     others = repeat_study(study, trials, choices.variants, console)
     context = ReportContext(
-        *(
-            "Traction from external data",
-            f"{count} trials from {len(args.files)} files",
-        ),
+        "Traction from external data",
+        f"{count} trials from {len(args.files)} files",
         is_simulated=study.simulated,
         is_foreign=True,
         generated_utc=iso_utc(SystemClock().utc_ns()),

@@ -24,9 +24,15 @@ EXAMPLES = """\
   traction report --all --what-if smoothing=25     the study under another choice"""
 
 _WORK = (  # what fits and figures need, the first needed first
-    *("analysis.breakaway.fitting", "analysis.study.relatives", "analysis.study.store"),
-    *("analysis.foresight.judged", "analysis.terrains.export", "analysis.report.page"),
-    *("scipy.signal", "matplotlib.backends.backend_agg", "analysis.figures.curves"),
+    "analysis.breakaway.fitting",
+    "analysis.study.relatives",
+    "analysis.study.store",
+    "analysis.foresight.judged",
+    "analysis.terrains.export",
+    "analysis.report.page",
+    "scipy.signal",
+    "matplotlib.backends.backend_agg",
+    "analysis.figures.curves",
 )
 
 
@@ -76,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
     order = [row.name for row in load_settings(args.config).matrix.terrains]
     missing = tell_missing(sessions, console, allow_missing=args.allow_missing)
     wanted = ReportRequest(
-        *(order, args.seed, args.scheduler, choices, missing), with_pdf=args.pdf
+        order, args.seed, args.scheduler, choices, missing, with_pdf=args.pdf
     )
     page = report_sessions(sessions, data, wanted, console)
     if args.json:

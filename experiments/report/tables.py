@@ -19,8 +19,16 @@ from experiments.session.data_files import read_json
 from experiments.session.store import SessionFolder
 
 _SLIP_HEADER = (
-    *("terrain", "slips", "recall", "lead [ms]", "0.1 s ahead", "needless time"),
-    *("false alarms/min", "false-alarm share", "recall by chance", "calibration error"),
+    "terrain",
+    "slips",
+    "recall",
+    "lead [ms]",
+    "0.1 s ahead",
+    "needless time",
+    "false alarms/min",
+    "false-alarm share",
+    "recall by chance",
+    "calibration error",
 )
 _SLIP_NOTE = (
     "Every trial is predicted by models of the other four fifths of the trials, the "
@@ -218,10 +226,14 @@ def _slip_table(scores: Mapping[str, SlipScore]) -> ReportTable:
         (
             name,
             str(score.onsets),
-            *(_share(score.recall), _number(1e3 * score.lead, ".0f")),
-            *(_share(score.early) if score.onsets else "-", _share(score.needless)),
-            *(_number(score.per_minute, ".1f"), _share(score.false_share)),
-            *(_share(score.chance), _number(score.calibration, ".3f")),
+            _share(score.recall),
+            _number(1e3 * score.lead, ".0f"),
+            _share(score.early) if score.onsets else "-",
+            _share(score.needless),
+            _number(score.per_minute, ".1f"),
+            _share(score.false_share),
+            _share(score.chance),
+            _number(score.calibration, ".3f"),
         )
         for name, score in scores.items()
     ]

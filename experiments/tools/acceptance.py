@@ -202,9 +202,19 @@ def _record(arguments: list[str], place: Path) -> int:
 def _arguments(plan: AcceptancePlan, terrain: str, data: Path) -> list[str]:
     config = [] if plan.config is None else ["--config", str(plan.config)]
     return [
-        *("run", terrain, "--fake", "--fast", "--operator-script", "auto"),
-        *("--trials", str(plan.trials), "--seed", str(plan.seed)),
-        *("--data", str(data), "--no-color"),
+        "run",
+        terrain,
+        "--fake",
+        "--fast",
+        "--operator-script",
+        "auto",
+        "--trials",
+        str(plan.trials),
+        "--seed",
+        str(plan.seed),
+        "--data",
+        str(data),
+        "--no-color",
         *config,
         *_arm(plan),
     ]
