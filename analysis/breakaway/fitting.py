@@ -109,7 +109,7 @@ def _fit_group(
     ).reshape(-1, best.size)
     is_trial_seen = _trial_gain(likelihood, best) >= _SEEN
     return {
-        r.name: _model(r, k, (family, best, draws), options, is_trial_seen)
+        r.name: _model(r, k, family, best, draws, options, is_trial_seen)
         for k, r in enumerate(group)
     }
 
@@ -162,11 +162,12 @@ def _trial_gain(likelihood: CensoredLikelihood, best: Array) -> float:
 def _model(
     recorded: TerrainPushes,
     number: int,
-    fit: tuple[Family, Array, Array],
+    family: Family,
+    best: Array,
+    draws: Array,
     options: BreakAwayOptions,
     is_trial_seen: bool,
 ) -> BreakAwayModel:
-    family, best, draws = fit
     columns = [number, -3, -2, -1]
     laws = np.vstack([best, draws])[:, columns]
     laws[:, 2:] = np.exp(laws[:, 2:])

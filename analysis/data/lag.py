@@ -57,23 +57,21 @@ def force_lag(t: Array, v_t: Array, F_t: Array) -> ForceLag | None:
         return None
     count = round(steps) + 1
     even = t[0] + np.arange(count) / rate  # a lost row is no shift of those behind it
-    rows = (even, np.interp(even, t, v_t), np.interp(even, t, F_t))
+    v, F = np.interp(even, t, v_t), np.interp(even, t, F_t)
     with np.errstate(all="ignore"):  # absurd numbers come to nothing by themselves
         for low, high, least in BANDS:
-            lag = _in_band(rows, rate, (low, high))
+            lag = _in_band(even, v, F, rate, low, high)
             if lag.explained >= least:
                 return lag
     return None
 
 
 def _in_band(
-    rows: tuple[Array, Array, Array], rate: float, band: tuple[float, float]
+    t: Array, v: Array, F: Array, rate: float, low: float, high: float
 ) -> ForceLag:
     """Return the offset at which motion explains most of the force in a band."""
     from scipy.signal import butter, sosfiltfilt
 
-    low, high = band
-    t, v, F = rows
     cuts = (low, min(high, 0.4 * rate))
     filtered = butter(_ORDER, cuts, "band", fs=rate, output="sos")
     motion = sosfiltfilt(filtered, np.stack([np.gradient(v, t), v]))

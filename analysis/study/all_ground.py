@@ -173,7 +173,7 @@ def fit_all_ground(
     if start is None:
         c: float | None = _BENDS[0]
         process = GroundPosterior(rows_of(few, c), unit[c]).climbed()
-        likeliest = max(_BENDS, key=lambda c: _rated(few, F_t, (process, unit), c))
+        likeliest = max(_BENDS, key=lambda c: _rated(few, F_t, process, unit, c))
         if likeliest != c:
             begin = in_unit(process.theta, unit[likeliest] / unit[c])
             c = likeliest
@@ -189,11 +189,11 @@ def fit_all_ground(
 def _rated(
     few: Sequence[TerrainRows],
     F_t: Array,
-    tuned: tuple[GroundProcess, Mapping[float | None, float]],
+    process: GroundProcess,
+    unit: Mapping[float | None, float],
     c: float | None,
 ) -> float:
     """Return the log posterior density of y under a warp, theta only rescaled."""
-    process, unit = tuned
     theta = in_unit(process.theta, unit[c] / unit[_BENDS[0]])
     value = GroundPosterior(rows_of(few, c), unit[c])(theta)[0]
     return value + float(log_warp_slope(F_t, c).sum())

@@ -233,8 +233,7 @@ class ModelFitter:
         training, constant = self.training, self.gp(SquaredExponential())
         outputs = training.subset.F_t
         changing = refit_gp(constant.process, outputs, noise=LogLinearNoise())
-        processes = (constant.process, changing)
-        choice = choose_noise(training, processes, self.options.seed)
+        choice = choose_noise(training, constant.process, changing, self.options.seed)
         if choice.chosen == "constant":
             return replace(constant, choice=choice)
         tails = (

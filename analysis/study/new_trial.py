@@ -98,9 +98,11 @@ class NewTrialModel:
 
     def predict(self, F_n: Array, v_t: Array) -> NewTrialPrediction:
         """Return the distribution of measurements of a new trial."""
-        inputs, around = np.column_stack([F_n, v_t]), (self.curve, self.c)
-        said = self.process.predict(inputs)
-        prediction = _prediction(self.process, inputs, said, self.trials, around)
+        inputs = np.column_stack([F_n, v_t])
+        mean, variance = self.process.predict(inputs)
+        prediction = _prediction(
+            self.process, inputs, mean, variance, self.trials, self.curve, self.c
+        )
         return replace(prediction, shape=self.shape)
 
     def describe(self) -> dict[str, Any]:
@@ -235,13 +237,21 @@ class NewTrialFit:
         """Return log density and normal score of rows of every trial left out."""
         if len(self._left_out) < 2:
             return [(np.zeros(1), np.zeros(1))]
-        process, around = candidate.process, (self._curve, candidate.c)
+        process = candidate.process
         without, count = LeaveOut(process), len(self._left_out) - 1
         found = []
         for rows, block in zip(self._left_out, self._trials.blocks(), strict=True):
             tested = self._training.rows.take(rows)
-            said = without.predict(block, tested.inputs)
-            made = _prediction(process, tested.inputs, said, count, around)
+            mean, variance = without.predict(block, tested.inputs)
+            made = _prediction(
+                process,
+                tested.inputs,
+                mean,
+                variance,
+                count,
+                self._curve,
+                candidate.c,
+            )
             found.append((made.log_density(tested.F_t), made.normal_score(tested.F_t)))
         return found
 
@@ -262,20 +272,23 @@ def family_counts(models: Sequence[NewTrialModel]) -> Mapping[str, int]:
 def _prediction(
     process: GaussianProcess,
     inputs: Array,
-    said: tuple[Array, Array],
+    mean: Array,
+    variance: Array,
     trials: int,
-    around: tuple[TustinFit | None, float | None],
+    curve: TustinFit | None,
+    c: float | None,
 ) -> NewTrialPrediction:
     """Return what a process of z says of forces, around a curve, warped with c.
 
     Args:
         process: of z.
         inputs: where, shape (n, 2).
-        said: its mean and variance there, noise included.
+        mean: of z there, shape (n,).
+        variance: of z there, noise included, shape (n,).
         trials: number of trials that it was given.
-        around: curve and c.
+        curve: mean function of the force; None = 0.
+        c: of the warp; None = there is none.
     """
-    (curve, c), (mean, variance) = around, said
     between = np.zeros(mean.shape)
     if isinstance(process.noise, TrialNoise):
         theta = process.theta[len(process.kernel.names) :]

@@ -86,7 +86,8 @@ class NoiseChoice(NamedTuple):
 
 def choose_noise(
     training: TrainingSet,
-    processes: tuple[GaussianProcess, GaussianProcess],
+    constant: GaussianProcess,
+    changing: GaussianProcess,
     seed: int,
 ) -> NoiseChoice:
     """Return the noise that predicts left-out training trials best.
@@ -96,15 +97,18 @@ def choose_noise(
 
     Args:
         training: the training trials; the trial a fold is tested on is not among them.
-        processes: with constant noise and with noise that changes with the inputs,
-            fitted to the chosen rows.
+        constant: process with constant noise, fitted to the chosen rows.
+        changing: the same with noise that changes with the inputs.
         seed: of the choice of the rows of the inner fits.
     """
     groups = min(_GROUPS, len(training.lengths))
     if groups < 2:
         return NoiseChoice("constant", {})
     nlpd = np.concatenate(
-        [_left_out(training, group, processes, seed) for group in range(groups)]
+        [
+            _left_out(training, group, constant, changing, seed)
+            for group in range(groups)
+        ]
     )
     averages = {str(n): float(x) for n, x in zip(NAMES, nlpd.mean(axis=0), strict=True)}
     return NoiseChoice(NAMES[clearly_best(nlpd)], averages)
@@ -149,7 +153,8 @@ def predict_normal(process: GaussianProcess, rows: SampleTable) -> Prediction:
 def _left_out(
     training: TrainingSet,
     group: int,
-    processes: tuple[GaussianProcess, GaussianProcess],
+    constant: GaussianProcess,
+    changing: GaussianProcess,
     seed: int,
 ) -> Array:
     """Return the NLPD of every trial of a group under every noise, (trials, 3)."""
@@ -161,15 +166,15 @@ def _left_out(
     rng = np.random.default_rng((seed, group))
     inner = TrainingSet(rows, lengths, rng.choice(rows.count, count, replace=False))
     subset = inner.subset
-    constant, changing = (
-        refit_gp(p.given(subset.inputs, subset.F_t), subset.F_t) for p in processes
-    )
+    constant = refit_gp(constant.given(subset.inputs, subset.F_t), subset.F_t)
+    changing = refit_gp(changing.given(subset.inputs, subset.F_t), subset.F_t)
     tails = TailedNoise.of(changing, inner)
     return np.array(
         [
             _nlpds(
                 training.rows.take(thinned(np.flatnonzero(trial == k), _SCORED)),
-                (constant, changing),
+                constant,
+                changing,
                 tails,
             )
             for k in range(group, len(training.lengths), _GROUPS)
@@ -179,13 +184,15 @@ def _left_out(
 
 def _nlpds(
     rows: SampleTable,
-    processes: tuple[GaussianProcess, GaussianProcess],
+    constant: GaussianProcess,
+    changing: GaussianProcess,
     tails: TailedNoise | None,
 ) -> list[float]:
     """Return the NLPD of one trial under every noise; without tails a normal's."""
-    constant, changing = (predict_normal(process, rows) for process in processes)
-    tailed = changing if tails is None else tails.applied_to(changing)
+    of_constant = predict_normal(constant, rows)
+    of_changing = predict_normal(changing, rows)
+    tailed = of_changing if tails is None else tails.applied_to(of_changing)
     return [
         -float(np.mean(log_density(rows.F_t, prediction)))
-        for prediction in (constant, changing, tailed)
+        for prediction in (of_constant, of_changing, tailed)
     ]

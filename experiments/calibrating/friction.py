@@ -122,12 +122,11 @@ class FrictionGuide:
 
     def _fit(self, recorded: _RecordedWay) -> FrictionFit:
         rig = self._rig
-        models = rig.model, rig.law_model
         is_known = rig.settings.rig.gravity.model == "calibrated"
         return fit_friction(
             rig.model.constants,
-            sliding_rows(models, recorded.fitted),
-            sliding_rows(models, recorded.held_out),
+            sliding_rows(rig.model, rig.law_model, recorded.fitted),
+            sliding_rows(rig.model, rig.law_model, recorded.held_out),
             np.full(21, _KNOWN if is_known else _DRAWN),
         )
 

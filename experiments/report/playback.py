@@ -190,7 +190,7 @@ def serve(
                 described = {DESCRIPTION_TOPIC: encoder.description}
                 server.publish(described, player.position(now_ns))
             tick += 1
-            _send(server, player, (rows, foresight, encoder), now_ns)
+            _send(server, player, rows, foresight, encoder, now_ns)
             clock.sleep_until(now_ns + _SERVE_NS)
     finally:
         server.close()
@@ -199,14 +199,15 @@ def serve(
 def _send(
     server: LiveServer,
     player: _Player,
-    content: tuple[TopicRows, TopicRows, LiveEncoder],
+    rows: TopicRows,
+    foresight: TopicRows,
+    encoder: LiveEncoder,
     now_ns: int,
 ) -> None:
     """Send what lies between the newest message and where the playback stands.
 
     Cycles go out at 50 Hz of the person's time, the newest of each share.
     """
-    rows, foresight, encoder = content
     at = player.position(now_ns)
     row = int(np.searchsorted(player.t_ns, at, side="right")) - 1
     if row <= player.row:

@@ -165,11 +165,13 @@ class InProcessBackend:
         self,
         shared: SharedLayout,
         clock: Clock,
-        devices: tuple[WamArm, CanLink],
+        arm: WamArm,
+        link: CanLink,
         open_sensor: Callable[[], WrenchSensor],
         parts: Callable[[WrenchSensor], LoopConfig],
     ) -> None:
-        self.arm, self._link = devices
+        self.arm = arm
+        self._link = link
         self._shared = shared
         self._clock = clock
         self._open_sensor = open_sensor

@@ -160,7 +160,7 @@ def stepped(
             is_simulated=True,
         )
 
-    backend = InProcessBackend(shared, clock, (arm, link), sensor, parts)
+    backend = InProcessBackend(shared, clock, arm, link, sensor, parts)
     return clock, backend, simulation
 
 

@@ -125,7 +125,7 @@ def _moments(
     normal = np.diag(1.0 / np.maximum(gravity_deviation, 1e-9) ** 2)
     torques = np.zeros(21)
     for shown, fit in zip(rows, fits, strict=True):
-        columns = _columns(shown, (fit.stribeck, fit.excess), fit.load_at)
+        columns = _columns(shown, fit.stribeck, fit.excess, fit.load_at)
         rest = shown.friction - columns[:, :_COLUMNS] @ fit.values[:_COLUMNS]
         weights = _weights(shown, float(np.median(np.abs(shown.friction))))
         weighted = shown.gravity * weights[:, None]
@@ -194,13 +194,16 @@ def _fit_motor(rows: SlidingRows, turns: float, gravity: Array) -> _MotorFit:
     """Return the best of the grid, refined once around it."""
     load_at = float(np.abs(rows.borne).mean())
     scale = float(np.median(np.abs(rows.friction)))
-    best = _search(rows, (turns * _STRIBECK, _EXCESS), load_at, (scale, gravity))
-    finer = (
-        best[0] * np.geomspace(0.8, 1.25, 7),
-        np.maximum(best[1] + np.linspace(-0.05, 0.05, 11), 0.0),
+    coarse = _search(rows, turns * _STRIBECK, _EXCESS, load_at, scale, gravity)
+    stribeck, excess = _search(
+        rows,
+        coarse[0] * np.geomspace(0.8, 1.25, 7),
+        np.maximum(coarse[1] + np.linspace(-0.05, 0.05, 11), 0.0),
+        load_at,
+        scale,
+        gravity,
     )
-    stribeck, excess = _search(rows, finer, load_at, (scale, gravity))
-    A, y, prior = _system(rows, (stribeck, excess), load_at, (scale, gravity))
+    A, y, prior = _system(rows, stribeck, excess, load_at, scale, gravity)
     values, normal = _solve(A, y, prior)
     covariance = _sandwich(A, y - A @ values, rows.block, normal)
     return _MotorFit(stribeck, excess, load_at, values, covariance)
@@ -208,15 +211,17 @@ def _fit_motor(rows: SlidingRows, turns: float, gravity: Array) -> _MotorFit:
 
 def _search(
     rows: SlidingRows,
-    grid: tuple[Array, Array],
+    stribecks: Array,
+    excesses: Array,
     load_at: float,
-    known: tuple[float, Array],
+    scale: float,
+    gravity: Array,
 ) -> tuple[float, float]:
-    """Return (w_s, s - 1) of the least weighted squares on `grid`."""
-    best, least = (float(grid[0][0]), float(grid[1][0])), np.inf
-    for stribeck in grid[0].tolist():
-        for excess in grid[1].tolist():
-            A, y, prior = _system(rows, (stribeck, excess), load_at, known)
+    """Return (w_s, s - 1) of the least weighted squares on the grid of both."""
+    best, least = (float(stribecks[0]), float(excesses[0])), np.inf
+    for stribeck in stribecks.tolist():
+        for excess in excesses.tolist():
+            A, y, prior = _system(rows, stribeck, excess, load_at, scale, gravity)
             values, _ = _solve(A, y, prior)
             cost = float(((y - A @ values) ** 2).sum() + (prior * values**2).sum())
             if cost < least:
@@ -226,13 +231,23 @@ def _search(
 
 def _system(
     rows: SlidingRows,
-    pair: tuple[float, float],
+    stribeck: float,
+    excess: float,
     load_at: float,
-    known: tuple[float, Array],
+    scale: float,
+    gravity: Array,
 ) -> tuple[Array, Array, Array]:
-    """Return the weighted columns, the weighted torques and the prior's weights."""
-    scale, gravity = known
-    A = _columns(rows, pair, load_at)
+    """Return the weighted columns, the weighted torques and the prior's weights.
+
+    Args:
+        rows: of one motor.
+        stribeck: w_s [rad/s].
+        excess: s - 1.
+        load_at: load at which Coulomb friction is stated [N m].
+        scale: the motor's friction [N m].
+        gravity: how well each of the first moments is known [kg m].
+    """
+    A = _columns(rows, stribeck, excess, load_at)
     weights = _weights(rows, scale)
     weights *= np.where(rows.speed == 0.0, _PEAK_WEIGHT, 1.0)
     ripple = 1.0 / (_RIPPLE * scale) ** 2
@@ -246,9 +261,10 @@ def _weights(rows: SlidingRows, scale: float) -> Array:
     return 1.0 / np.hypot(_NOISE * scale, _INERTIA * rows.inertia)
 
 
-def _columns(rows: SlidingRows, pair: tuple[float, float], load_at: float) -> Array:
+def _columns(
+    rows: SlidingRows, stribeck: float, excess: float, load_at: float
+) -> Array:
     """Return what multiplies the values, shape (n, 28)."""
-    stribeck, excess = pair
     weakening = 1.0 + excess / (1.0 + (rows.speed / stribeck) ** 2)
     along = rows.sense * weakening
     columns = [
@@ -285,7 +301,7 @@ def _residuals(
     """Return what `rows` leave unexplained, rms as share of Coulomb, shape (7,)."""
     shares: list[float] = []
     for coulomb, fit, shown in zip(friction.coulomb, fits, rows, strict=True):
-        A = _columns(shown, (fit.stribeck, fit.excess), fit.load_at)
+        A = _columns(shown, fit.stribeck, fit.excess, fit.load_at)
         rest = shown.friction - A @ fit.values
         shares.append(float(np.sqrt(np.mean(rest**2)) / coulomb))
     return np.array(shares)

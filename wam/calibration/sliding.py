@@ -88,12 +88,13 @@ class _Motion:
 
 
 def sliding_rows(
-    models: tuple[ArmModel, ArmModel], legs: Sequence[RecordedLeg]
+    model: ArmModel, weighed: ArmModel, legs: Sequence[RecordedLeg]
 ) -> list[SlidingRows]:
     """Return what each of the seven motors showed on `legs`.
 
     Args:
-        models: the arm with its tool, and as it was weighed.
+        model: the arm with its tool.
+        weighed: the arm as its gravity was calibrated.
         legs: recorded one after the other.
     """
     parts: list[list[SlidingRows]] = [[] for _ in range(7)]
@@ -101,9 +102,9 @@ def sliding_rows(
     for leg in legs:
         if len(leg.q) < 6 * HALF:
             continue
-        motion = _motion(models, leg)
+        motion = _motion(model, weighed, leg)
         for motor in range(7):
-            parts[motor].append(_of_motor(models, motion, motor, leg, first))
+            parts[motor].append(_of_motor(model, weighed, motion, motor, leg, first))
         first += 1 + int(len(leg.q) * _PERIOD / BLOCK)
     return [_joined(part) for part in parts]
 
@@ -124,9 +125,8 @@ def check_enough(motor: int, rows: SlidingRows) -> None:
     )
 
 
-def _motion(models: tuple[ArmModel, ArmModel], leg: RecordedLeg) -> _Motion:
+def _motion(model: ArmModel, weighed: ArmModel, leg: RecordedLeg) -> _Motion:
     """Return the leg with the same smoothing for everything in it."""
-    model, weighed = models
     j2mp = model.constants.j2mp
     to_motors = np.linalg.inv(j2mp)
     q, qd = _line(leg.q)
@@ -167,14 +167,14 @@ def _line(values: Array, half: int = HALF) -> tuple[Array, Array]:
 
 
 def _of_motor(
-    models: tuple[ArmModel, ArmModel],
+    model: ArmModel,
+    weighed: ArmModel,
     motion: _Motion,
     motor: int,
     leg: RecordedLeg,
     first: int,
 ) -> SlidingRows:
     """Return the rows of one motor on one leg; its blocks are counted from `first`."""
-    model = models[0]
     turns = float(motor_turns(model.constants)[motor])
     angle, speed = motion.angle[:, motor], motion.speed[:, motor]
     rows = _every(len(angle))
@@ -186,7 +186,7 @@ def _of_motor(
     if leg.speed <= _SLOW:
         friction_before = motion.friction[:, motor]
         if motor == _QUICK_MOTOR:
-            friction_before = _quick_friction(models, leg, motor, turns)
+            friction_before = _quick_friction(model, weighed, leg, motor, turns)
         broken = _break_away(motion.angle[:, motor], friction_before, motor, turns)
         if broken is not None:
             index, way = broken
@@ -275,13 +275,12 @@ def _compliance(angle: Array, friction: Array) -> Array:
 
 
 def _quick_friction(
-    models: tuple[ArmModel, ArmModel], leg: RecordedLeg, motor: int, turns: float
+    model: ArmModel, weighed: ArmModel, leg: RecordedLeg, motor: int, turns: float
 ) -> Array:
     """Return the friction of a motor before it breaks away, smoothed over 18 ms.
 
     0 where it is not asked for, shape (n,).
     """
-    model, weighed = models
     friction = np.zeros(len(leg.q))
     end = _broken_at(leg.q @ model.constants.j2mp[motor], motor, turns)
     if end is None:

@@ -24,7 +24,7 @@ def chosen_for(data):
     rows = data.subset
     constant = fit_gp(rows.inputs, rows.F_t)
     changing = refit_gp(constant, rows.F_t, noise=LogLinearNoise())
-    return choose_noise(data, (constant, changing), seed=0)
+    return choose_noise(data, constant, changing, seed=0)
 
 
 def test_constant_noise_is_kept_where_it_is_the_truth():

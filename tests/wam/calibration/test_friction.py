@@ -247,7 +247,7 @@ def leg_of(model, motor_torque, way):
 
 
 def test_rows_show_what_weight_does_not_explain_at_the_motor(model):
-    rows = sliding_rows((model, model), [leg_of(model, 0.05, 1.0)])[3]
+    rows = sliding_rows(model, model, [leg_of(model, 0.05, 1.0)])[3]
     away = np.abs(np.abs(rows.friction) - 0.05)
     assert np.abs(rows.speed) == pytest.approx(1.8, abs=0.02)
     assert away.max() < 0.001
@@ -256,14 +256,14 @@ def test_rows_show_what_weight_does_not_explain_at_the_motor(model):
 
 
 def test_no_row_is_taken_before_the_bristle_is_bent_again(model):
-    rows = sliding_rows((model, model), [leg_of(model, 0.05, 1.0)])[3]
+    rows = sliding_rows(model, model, [leg_of(model, 0.05, 1.0)])[3]
     turning = -18.0 * (UPRIGHT[3] + 0.2)
     back = rows.angle[rows.sense > 0.0]
     assert np.abs(back - turning).min() > 18.0 * 6e-3
 
 
 def test_a_motor_that_stands_shows_nothing(model):
-    rows = sliding_rows((model, model), [leg_of(model, 0.05, 1.0)])
+    rows = sliding_rows(model, model, [leg_of(model, 0.05, 1.0)])
     assert [len(shown) for shown in rows] == [0, 0, 0, len(rows[3]), 0, 0, 0]
 
 
@@ -290,7 +290,7 @@ def jumping_leg(model, peak):
 
 def test_a_light_joint_shows_its_break_away_before_it_is_thrown(model):
     peak = 0.007
-    rows = sliding_rows((model, model), [jumping_leg(model, peak)])[6]
+    rows = sliding_rows(model, model, [jumping_leg(model, peak)])[6]
     broken = rows.friction[rows.speed == 0.0]
     assert np.abs(broken) == pytest.approx([peak], rel=0.15)
 
