@@ -24,7 +24,7 @@ import numpy as np
 from mcap.reader import make_reader
 from numpy.typing import NDArray
 
-from acquisition.ipc.layout import WRENCH_DTYPE
+from acquisition.ipc.shared_sensor import WRENCH_DTYPE
 from acquisition.recording.recorder import seal
 from acquisition.sample import Flag, Record
 from acquisition.schema import CYCLE, schema_text

@@ -18,7 +18,8 @@ from acquisition.clock import NS_PER_S, PERIOD_NS, SystemClock
 from acquisition.devices import WrenchSample
 from acquisition.ipc.child import Child
 from acquisition.ipc.frame_tape import FrameTape
-from acquisition.ipc.layout import SharedLayout, pack_wrench
+from acquisition.ipc.layout import SharedLayout
+from acquisition.ipc.shared_sensor import pack_wrench
 from acquisition.recording.recorder_process import RemoteRecorder
 from acquisition.sample import Sample
 from acquisition.schema import CYCLE

@@ -1,6 +1,5 @@
 """When what happened in each cycle, and what a series of cycles says of the loop."""
 
-import struct
 from dataclasses import dataclass
 from typing import Final
 
@@ -8,9 +7,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.control_loop.loop import Tick
+from acquisition.record_layout import struct_of
 from acquisition.sample import Record
 
-_TIMING: Final = struct.Struct("<7Q")
+TIMING_DTYPE = np.dtype(
+    [
+        ("number", "<u8"),
+        ("deadline_ns", "<u8"),
+        ("woke_ns", "<u8"),
+        ("replies_ns", "<u8"),
+        ("sent_ns", "<u8"),
+        ("ended_ns", "<u8"),
+        ("is_late", "<u8"),
+    ]
+)
+_TIMING: Final = struct_of(TIMING_DTYPE)
 QUANTILES = (50.0, 99.0, 99.9, 100.0)
 SLOW_EXCHANGE_NS = 1_300_000  # p99 of the seventh position; the cycle may not close
 

@@ -6,15 +6,26 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Final
 
+import numpy as np
+
 from acquisition.control_loop.faults import GuardVerdict, from_plain, to_plain
 from acquisition.control_loop.states import ArmState, ControlStatus
 from acquisition.devices import BusCondition, SafetyMode
 from acquisition.ipc.latest_value import Slot
 from acquisition.ipc.ring_buffer import Ring
+from acquisition.record_layout import struct_of
 
-_COMMAND: Final = struct.Struct("<QIi12d")
+_VALUES = 12  # numbers that a command has at most
+COMMAND_DTYPE = np.dtype(
+    [
+        ("number", "<u8"),
+        ("kind", "<u4"),
+        ("argument", "<i4"),
+        ("values", "<f8", (_VALUES,)),
+    ]
+)
+_COMMAND: Final = struct_of(COMMAND_DTYPE)
 _STATUS: Final = struct.Struct("<QBB?B4xqQQQQ")
-_VALUES = 12
 _NOTHING = (0.0,) * _VALUES
 
 

@@ -1,6 +1,5 @@
 """The flight record: the last two seconds with raw frames, written on a fault."""
 
-import struct
 from collections.abc import Iterable
 from typing import Final
 
@@ -8,10 +7,20 @@ import numpy as np
 
 from acquisition.clock import Clock
 from acquisition.ipc.ring_buffer import Ring
+from acquisition.record_layout import GAP, struct_of
 from acquisition.sample import Record
 
 SECONDS = 2.0
-_FRAME: Final = struct.Struct("<QIB3x8s")
+FRAME_DTYPE = np.dtype(
+    [
+        ("t_ns", "<u8"),
+        ("can_id", "<u4"),
+        ("length", "u1"),
+        (GAP, "V3"),
+        ("data", "V8"),
+    ]
+)
+_FRAME: Final = struct_of(FRAME_DTYPE)
 
 
 class FrameTape:

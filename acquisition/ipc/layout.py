@@ -1,67 +1,25 @@
-"""The board: everything that loop, recorder, sensor reader and console share.
+"""The shared memory of loop, recorder, sensor reader and console, laid out.
 
 Memory is laid out once, here, so that a process which is given the descriptor finds
 everything in it. Each area has one writer.
 """
 
-import struct
 import zlib
+from collections.abc import Mapping
 from enum import IntEnum
-from typing import Final
+from itertools import accumulate, pairwise
 
-import numpy as np
-
-from acquisition.devices import WrenchSample
+from acquisition.control_loop.timing import TIMING_DTYPE
 from acquisition.errors import LinkError
+from acquisition.ipc.commands import COMMAND_DTYPE
+from acquisition.ipc.frame_tape import FRAME_DTYPE
 from acquisition.ipc.latest_value import Slot
-from acquisition.ipc.ring_buffer import Ring
+from acquisition.ipc.ring_buffer import LayoutType, Ring
 from acquisition.ipc.shared_memory import LINE, SharedMemory, lines
-from acquisition.sample import Record
+from acquisition.ipc.shared_sensor import WRENCH_DTYPE
 from acquisition.schema import CYCLE, FORESIGHT
 
-CYCLE_SLOTS = 8192  # 16 s at 500 Hz
 WRENCH_SLOTS = 32_768  # 6.5 s of the fastest sensor
-FRAME_SLOTS = 32_768  # 5 s of a bus with 13 frames per cycle
-TIMING_SLOTS = 32_768  # 65 s of cycles
-COMMAND_SLOTS = 256
-FORESIGHT_SLOTS = 2048  # 20 s
-_SLOT_BYTES = 8192
-_MARK_BYTES = 64
-
-WRENCH_DTYPE = np.dtype(
-    [
-        ("t_ns", "<u8"),
-        ("counter", "<u4"),
-        ("status", "<u2"),
-        ("is_valid", "?"),
-        ("saturated", "u1"),
-        ("wrench", "<f8", (6,)),
-    ]
-)
-_WRENCH: Final = struct.Struct("<QIH?B6d")
-FRAME_DTYPE = np.dtype(
-    [
-        ("t_ns", "<u8"),
-        ("can_id", "<u4"),
-        ("length", "u1"),
-        ("gap", "V3"),
-        ("data", "V8"),
-    ]
-)
-TIMING_DTYPE = np.dtype(
-    [
-        ("number", "<u8"),
-        ("deadline_ns", "<u8"),
-        ("woke_ns", "<u8"),
-        ("replies_ns", "<u8"),
-        ("sent_ns", "<u8"),
-        ("ended_ns", "<u8"),
-        ("is_late", "<u8"),
-    ]
-)
-COMMAND_DTYPE = np.dtype(
-    [("number", "<u8"), ("kind", "<u4"), ("argument", "<i4"), ("values", "<f8", (12,))]
-)
 
 
 class ProcessRole(IntEnum):
@@ -88,6 +46,31 @@ class Heartbeats:
         return self._times[role]
 
 
+_SLOTS: Mapping[str, int] = {  # largest value of each [bytes]
+    "status": 8192,
+    "recorder": 8192,
+    "health": 8192,
+    "trial_start": 64,
+}
+_RINGS: Mapping[str, tuple[LayoutType, int]] = {  # type and number of records
+    "commands": (COMMAND_DTYPE, 256),
+    "cycles": (CYCLE.dtype, 8192),  # 16 s at 500 Hz
+    "wrenches": (WRENCH_DTYPE, WRENCH_SLOTS),
+    "frames": (FRAME_DTYPE, 32_768),  # 5 s of a bus with 13 frames per cycle
+    "timings": (TIMING_DTYPE, 32_768),  # 65 s of cycles
+    "foresight": (FORESIGHT.dtype, 2048),  # 20 s
+}
+_AREAS: Mapping[str, int] = {  # in the order of the memory [bytes]
+    "identity": LINE,
+    "heartbeats": lines(8 * len(ProcessRole)),
+    **{name: LINE + most for name, most in _SLOTS.items()},
+    **{name: lines(Ring.size_of(*ring)) for name, ring in _RINGS.items()},
+}
+_SIZE = sum(_AREAS.values())
+# What tells one layout from another; it is never 0, which new memory is.
+_IDENTITY = 1 + zlib.crc32(repr([(d.descr, n) for d, n in _RINGS.values()]).encode())
+
+
 class SharedLayout:
     """The shared memory of one rig.
 
@@ -109,30 +92,34 @@ class SharedLayout:
 
     def __init__(self, memory: SharedMemory) -> None:
         self.memory = memory
-        self._end = 0
-        self._identity = self._take(LINE)[:8].cast("Q")
-        self.heartbeats = Heartbeats(self._take(lines(8 * len(ProcessRole))))
-        self.status = Slot(self._take(LINE + _SLOT_BYTES))
-        self.recorder = Slot(self._take(LINE + _SLOT_BYTES))
-        self.health = Slot(self._take(LINE + _SLOT_BYTES))
-        self.trial_start = Slot(self._take(LINE + _MARK_BYTES))
-        self.commands = self._ring(COMMAND_DTYPE, COMMAND_SLOTS)
-        self.cycles = self._ring(CYCLE.dtype, CYCLE_SLOTS)
-        self.wrenches = self._ring(WRENCH_DTYPE, WRENCH_SLOTS)
-        self.frames = self._ring(FRAME_DTYPE, FRAME_SLOTS)
-        self.timings = self._ring(TIMING_DTYPE, TIMING_SLOTS)
-        self.foresight = self._ring(FORESIGHT.dtype, FORESIGHT_SLOTS)
+        ends = list(accumulate(_AREAS.values(), initial=0))
+        areas = {
+            name: memory.view[start:end]
+            for name, (start, end) in zip(_AREAS, pairwise(ends), strict=True)
+        }
+        self._identity = areas["identity"][:8].cast("Q")
+        self.heartbeats = Heartbeats(areas["heartbeats"])
+        self.status = Slot(areas["status"])
+        self.recorder = Slot(areas["recorder"])
+        self.health = Slot(areas["health"])
+        self.trial_start = Slot(areas["trial_start"])
+        self.commands = Ring(areas["commands"], *_RINGS["commands"])
+        self.cycles = Ring(areas["cycles"], *_RINGS["cycles"])
+        self.wrenches = Ring(areas["wrenches"], *_RINGS["wrenches"])
+        self.frames = Ring(areas["frames"], *_RINGS["frames"])
+        self.timings = Ring(areas["timings"], *_RINGS["timings"])
+        self.foresight = Ring(areas["foresight"], *_RINGS["foresight"])
 
     @classmethod
     def create(cls) -> "SharedLayout":
-        """Return a new, empty board."""
+        """Return new, empty memory."""
         layout = cls(SharedMemory.create(_SIZE))
         layout._identity[0] = _IDENTITY
         return layout
 
     @classmethod
     def of_process(cls, pid: int) -> "SharedLayout | None":
-        """Return the board of a running process, to be read only; None for none.
+        """Return the memory of a running process, to be read only; None for none.
 
         Raises:
             PermissionError: the process belongs to somebody else.
@@ -155,51 +142,3 @@ class SharedLayout:
     def close(self) -> None:
         """Give the descriptor back."""
         self.memory.close()
-
-    def _take(self, size: int) -> memoryview:
-        start, self._end = self._end, self._end + size
-        return self.memory.view[start : self._end]
-
-    def _ring(self, dtype: "np.dtype[np.void]", slots: int) -> Ring:
-        return Ring(self._take(lines(Ring.size_of(dtype, slots))), dtype, slots)
-
-
-_RINGS = (
-    (COMMAND_DTYPE, COMMAND_SLOTS),
-    (CYCLE.dtype, CYCLE_SLOTS),
-    (WRENCH_DTYPE, WRENCH_SLOTS),
-    (FRAME_DTYPE, FRAME_SLOTS),
-    (TIMING_DTYPE, TIMING_SLOTS),
-    (FORESIGHT.dtype, FORESIGHT_SLOTS),
-)
-_SIZE = (
-    2 * LINE
-    + lines(8 * len(ProcessRole))
-    + 3 * (LINE + _SLOT_BYTES)
-    + _MARK_BYTES
-    + sum(lines(Ring.size_of(dtype, slots)) for dtype, slots in _RINGS)
-)
-# What tells one layout from another; it is never 0, which new memory is.
-_IDENTITY = 1 + zlib.crc32(repr([(d.descr, n) for d, n in _RINGS]).encode())
-
-
-def pack_wrench(sample: WrenchSample) -> bytes:
-    """Return the bytes of one sample for the ring of wrenches."""
-    return _WRENCH.pack(
-        sample.t_ns,
-        sample.counter & 0xFFFFFFFF,
-        sample.status & 0xFFFF,
-        sample.is_valid,
-        sample.saturated,
-        *sample.wrench,
-    )
-
-
-def unpack_wrenches(records: Record) -> list[WrenchSample]:
-    """Return the samples of records of the ring of wrenches, oldest first."""
-    return [
-        WrenchSample(t_ns, counter, tuple(wrench), status, valid, saturated)
-        for t_ns, counter, status, valid, saturated, *wrench in _WRENCH.iter_unpack(
-            records.tobytes()
-        )
-    ]

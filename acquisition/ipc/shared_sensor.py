@@ -1,12 +1,29 @@
 """A wrist sensor that another process reads, as the loop sees it."""
 
+from typing import Final
+
+import numpy as np
+
 from acquisition.devices import WrenchSample
-from acquisition.ipc.layout import pack_wrench, unpack_wrenches
 from acquisition.ipc.ring_buffer import Ring
+from acquisition.record_layout import struct_of
+from acquisition.sample import Record
+
+WRENCH_DTYPE = np.dtype(
+    [
+        ("t_ns", "<u8"),
+        ("counter", "<u4"),
+        ("status", "<u2"),
+        ("is_valid", "?"),
+        ("saturated", "u1"),
+        ("wrench", "<f8", (6,)),
+    ]
+)
+_WRENCH: Final = struct_of(WRENCH_DTYPE)
 
 
 class SharedSensor:
-    """Takes samples from the board; implements `acquisition.devices.WrenchSensor`."""
+    """Takes samples from shared memory; is an `acquisition.devices.WrenchSensor`."""
 
     def __init__(self, ring: Ring) -> None:
         self._reader = ring.reader()
@@ -34,6 +51,28 @@ class SharedSensor:
 
 
 def publish(samples: list[WrenchSample], ring: Ring) -> None:
-    """Write samples into the board's ring, oldest first."""
+    """Write samples into a ring buffer, oldest first."""
     for sample in samples:
         ring.write(pack_wrench(sample))
+
+
+def pack_wrench(sample: WrenchSample) -> bytes:
+    """Return the bytes of one sample for the ring buffer of wrenches."""
+    return _WRENCH.pack(
+        sample.t_ns,
+        sample.counter & 0xFFFFFFFF,
+        sample.status & 0xFFFF,
+        sample.is_valid,
+        sample.saturated,
+        *sample.wrench,
+    )
+
+
+def unpack_wrenches(records: Record) -> list[WrenchSample]:
+    """Return the samples of records of the ring buffer, oldest first."""
+    return [
+        WrenchSample(t_ns, counter, tuple(wrench), status, valid, saturated)
+        for t_ns, counter, status, valid, saturated, *wrench in _WRENCH.iter_unpack(
+            records.tobytes()
+        )
+    ]

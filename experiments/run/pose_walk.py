@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from acquisition.errors import PreflightError, TractionError
-from acquisition.ipc.layout import unpack_wrenches
+from acquisition.ipc.shared_sensor import unpack_wrenches
 from experiments.messages import FaultContext, fault_text, rest_text
 from experiments.operator.prompts import Prompt
 from experiments.run.console_loop import TICK, ConsoleLoop

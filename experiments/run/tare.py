@@ -11,7 +11,7 @@ import numpy as np
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import WrenchSample
 from acquisition.errors import PreflightError, TractionError
-from acquisition.ipc.layout import unpack_wrenches
+from acquisition.ipc.shared_sensor import unpack_wrenches
 from experiments.fault_injection.plan import FaultTrigger
 from experiments.messages import CATALOGUE, preflight_error
 from experiments.operator.console import GOOD

@@ -12,10 +12,9 @@ import numpy as np
 
 from acquisition.clock import NS_PER_S
 from acquisition.control_loop.states import ArmState
-from acquisition.control_loop.timing import LoopReport, loop_report
+from acquisition.control_loop.timing import TIMING_DTYPE, LoopReport, loop_report
 from acquisition.devices import SafetyMode
 from acquisition.errors import PreflightError
-from acquisition.ipc.layout import TIMING_DTYPE
 from acquisition.sample import Record
 from acquisition.trial_file.header import TrialHeader
 from acquisition.trial_file.reader import TrialReader

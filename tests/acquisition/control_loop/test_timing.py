@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 
 from acquisition.clock import PERIOD_NS
-from acquisition.control_loop.timing import loop_report
-from acquisition.ipc.layout import TIMING_DTYPE
+from acquisition.control_loop.timing import TIMING_DTYPE, loop_report
 
 START_NS = 10**12
 

@@ -2,8 +2,7 @@ import struct
 
 import pytest
 
-from acquisition.ipc.frame_tape import FrameTape, last_frames
-from acquisition.ipc.layout import FRAME_DTYPE
+from acquisition.ipc.frame_tape import FRAME_DTYPE, FrameTape, last_frames
 from acquisition.ipc.ring_buffer import Ring
 from acquisition.trial_file.views import encode_can_batch
 from tests.acquisition.ros import decode

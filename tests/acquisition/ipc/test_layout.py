@@ -4,13 +4,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.devices import WrenchSample
-from acquisition.ipc.layout import (
-    ProcessRole,
-    SharedLayout,
-    pack_wrench,
-    unpack_wrenches,
-)
+from acquisition.ipc.layout import ProcessRole, SharedLayout
 from acquisition.ipc.shared_memory import SharedMemory
+from acquisition.ipc.shared_sensor import pack_wrench, unpack_wrenches
 from acquisition.schema import CYCLE
 
 finite = st.floats(allow_nan=False)

@@ -10,7 +10,8 @@ import pytest
 from mcap.writer import Writer
 
 from acquisition.errors import TrialFileError
-from acquisition.ipc.layout import FRAME_DTYPE, WRENCH_DTYPE
+from acquisition.ipc.frame_tape import FRAME_DTYPE
+from acquisition.ipc.shared_sensor import WRENCH_DTYPE
 from acquisition.recording.recorder import seal
 from acquisition.sample import CHANNELS, Flag
 from acquisition.schema import EARLIER_FORESIGHTS, FORESIGHT, TRUTH, schema_text

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from acquisition.ipc.layout import WRENCH_DTYPE
+from acquisition.ipc.shared_sensor import WRENCH_DTYPE
 from experiments.operator.console import BAD, GOOD, WARNING
 from experiments.preflight.host_checks import (
     check_code,

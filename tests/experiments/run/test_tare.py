@@ -9,8 +9,8 @@ from acquisition.control_loop.faults import Action, Fault, GuardVerdict
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import WrenchSample
 from acquisition.errors import PreflightError
-from acquisition.ipc.layout import WRENCH_DTYPE, pack_wrench
 from acquisition.ipc.ring_buffer import Ring
+from acquisition.ipc.shared_sensor import WRENCH_DTYPE, pack_wrench
 from acquisition.sample import Sample
 from experiments.fault_injection.plan import FaultTrigger
 from experiments.operator.prompts import Prompt
