@@ -2,9 +2,10 @@
 
 For what happens between trials; nothing here belongs into a running loop.
 
-A `Protocol` is the contract. `make_proxy` returns an object that has its methods and
-sends every call; `bind` and `RpcServer` carry calls out on an object that implements
-it. Arguments and results are checked against the annotations on both sides.
+A class is the contract: a `Protocol`, or the class that carries the calls out.
+`make_proxy` returns an object that has its public methods and sends every call; `bind`
+and `RpcServer` carry calls out on an object that has them. Arguments and results are
+checked against the annotations on both sides.
 """
 
 import base64

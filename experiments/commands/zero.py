@@ -50,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
             console.say("Nothing was changed. ARM: idle, braked.")
             return 5
         _check_encoders(rig, _start(rig), console)  # it was moved until now
-        rig.backend.define_position(home.tolist())
+        rig.backend.arm.define_position(home.tolist())
         console.check(GOOD, "zero", "positions defined at home")
     finally:
         rig.backend.close()

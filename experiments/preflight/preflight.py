@@ -25,7 +25,7 @@ from experiments.preflight.host_checks import (
     reach_words,
 )
 from experiments.preflight.page import Add, CheckResult, ChecksPage
-from experiments.rig.backend import EXCHANGE_CYCLES
+from experiments.rig.arm_operations import EXCHANGE_CYCLES
 from experiments.rig.law_calibrations import law_words
 from experiments.rig.rig import Rig
 from wam.driver.health import complaints, temperature_range
@@ -205,7 +205,7 @@ def start_devices(rig: Rig) -> ArmInfo:
 
 def _check_exchange(rig: Rig, add: Add) -> None:
     """Grade the way from the request to the seventh position over this adapter."""
-    times = np.array(rig.backend.measure_exchange())
+    times = np.array(rig.backend.arm.measure_exchange())
     lost = EXCHANGE_CYCLES - len(times)
     if len(times) < EXCHANGE_CYCLES // 2:
         add(BAD, "exchange", f"{lost} of {EXCHANGE_CYCLES} cycles incomplete")

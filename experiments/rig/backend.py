@@ -4,9 +4,7 @@ import os
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-import numpy as np
-
-from acquisition.clock import PERIOD_NS, Clock
+from acquisition.clock import Clock
 from acquisition.control_loop.loop import Loop
 from acquisition.control_loop.realtime import Grant
 from acquisition.devices import SafetyMode, WrenchSensor
@@ -14,6 +12,7 @@ from acquisition.ipc.layout import SharedLayout
 from acquisition.ipc.loop_client import LoopClient
 from acquisition.recording.recorder import Recorder, TrialRecording
 from analysis.foresight.model import RigIdentity
+from experiments.rig.arm_operations import ArmOperations
 from experiments.rig.build import LoopConfig, build_loop_server
 from experiments.rig.claim import release
 from experiments.rig.foresight_process import ForesightWorker
@@ -22,17 +21,17 @@ from wam.bus.link import CanLink
 from wam.driver.arm import WamArm
 from wam.driver.startup import ArmInfo
 
-EXCHANGE_CYCLES = 100
-
 
 class RigBackend(Protocol):
     """Arm, sensor, loop and recorder as the console uses them.
 
     Attributes:
         loop_client: the console's side of the loop.
+        arm: what is asked of the arm while the loop does not run.
     """
 
     loop_client: LoopClient
+    arm: ArmOperations
 
     @property
     def recorder(self) -> TrialRecording:
@@ -51,24 +50,12 @@ class RigBackend(Protocol):
         """
         ...
 
-    def measure_exchange(self) -> list[int]:
-        """Ask 100 times for the positions, without torque.
-
-        Returns:
-            From request to seventh position [ns]; incomplete ones are left out.
-        """
-        ...
-
     def open_sensor(self) -> dict[str, str]:
         """Open the wrist sensor; return what it says about itself."""
         ...
 
     def sensor_metadata(self) -> dict[str, str]:
         """Return what became of the sensor's samples since it was opened, as text."""
-        ...
-
-    def define_position(self, q: Sequence[float]) -> None:
-        """Tell the arm that its joints stand at `q` [rad]; see `WamArm`."""
         ...
 
     def begin(self) -> None:
@@ -102,33 +89,6 @@ class RigBackend(Protocol):
     def close(self) -> None:
         """Brake the arm if it got torques, and end everything; safe to repeat."""
         ...
-
-
-def measure_exchange(
-    arm: WamArm, clock: Clock, on_cycle: Callable[[int], object] | None = None
-) -> list[int]:
-    """Ask `arm` 100 times for its positions, one period apart, without torque.
-
-    Args:
-        arm: the arm.
-        clock: the time of the loop.
-        on_cycle: called with the time [ns] after every exchange, for what must not
-            wait meanwhile.
-
-    Returns:
-        From request to seventh position [ns]; incomplete exchanges are left out.
-    """
-    times: list[int] = []
-    next_ns = clock.now_ns() + PERIOD_NS
-    for _ in range(EXCHANGE_CYCLES):
-        clock.sleep_until(next_ns)
-        reading = arm.read(clock.now_ns())
-        if reading.is_complete:
-            times.append(reading.arm_ns - reading.host_ns)
-        if on_cycle is not None:
-            on_cycle(clock.now_ns())
-        next_ns = max(next_ns + PERIOD_NS, clock.now_ns())
-    return times
 
 
 _GATHERED = 130  # cycles that the recorder in this thread writes at once, 0.26 s
@@ -170,8 +130,9 @@ class InProcessBackend:
         open_sensor: Callable[[], WrenchSensor],
         parts: Callable[[WrenchSensor], LoopConfig],
     ) -> None:
-        self.arm = arm
+        self._arm = arm
         self._link = link
+        self.arm = ArmOperations(lambda: arm, clock, self._poll)
         self._shared = shared
         self._clock = clock
         self._open_sensor = open_sensor
@@ -190,14 +151,6 @@ class InProcessBackend:
         """Find, wake and question the arm; raises as `WamArm.start`."""
         return self.arm.start()
 
-    def measure_exchange(self) -> list[int]:
-        """Ask 100 times for the positions, without torque.
-
-        The sensor's port is read meanwhile, or its buffer overflows before the loop.
-        """
-        poll = self._sensor.poll if self._sensor is not None else None
-        return measure_exchange(self.arm, self._clock, poll)
-
     def open_sensor(self) -> dict[str, str]:
         """Open the wrist sensor; return what it says about itself."""
         self._sensor = self._open_sensor()
@@ -206,10 +159,6 @@ class InProcessBackend:
     def sensor_metadata(self) -> dict[str, str]:
         """Return what became of the sensor's samples since it was opened, as text."""
         return self._sensor.stream_metadata() if self._sensor is not None else {}
-
-    def define_position(self, q: Sequence[float]) -> None:
-        """Tell the arm that its joints stand at `q` [rad]; see `WamArm`."""
-        self.arm.define_position(np.array(q))
 
     def begin(self) -> None:
         """Let the loop run from here on, whenever the console waits."""
@@ -242,11 +191,16 @@ class InProcessBackend:
     def close(self) -> None:
         """Brake the arm if it got torques, give bus and port back; safe to repeat."""
         self.recorder.abandon()
-        release(self.arm, self._link)
+        release(self._arm, self._link)
         if self._sensor is not None:
             self._sensor.close()
             self._sensor = None
         self._shared.close()
+
+    def _poll(self, now_ns: int) -> None:
+        """Read the sensor's port before the loop runs, or its buffer overflows."""
+        if self._sensor is not None:
+            self._sensor.poll(now_ns)
 
     def _advance(self, cycles: int) -> None:
         """Let `cycles` periods of the loop pass."""

@@ -130,7 +130,7 @@ def stepped(
     law: LawParts,
     shared: SharedLayout,
 ) -> tuple[Clock, RigBackend, SimulationControl]:
-    """Return (clock, crew, handle) of a simulation in this thread, under `law`."""
+    """Return (clock, backend, handle) of a simulation in this thread, under `law`."""
     from fakes.bus.in_process import InProcessDoor
     from fakes.clock import SteppedClock
     from fakes.world.plain_world import simulated_rig

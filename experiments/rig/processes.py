@@ -18,8 +18,9 @@ from acquisition.recording.recorder_process import RemoteRecorder
 from acquisition.simulation import DeviceServer
 from analysis.foresight.model import RigIdentity
 from experiments.rig.arm_lock import ArmLock
+from experiments.rig.arm_operations import ArmOperations
 from experiments.rig.foresight_source import ForesightSource
-from experiments.rig.services import ArmService, SensorService
+from experiments.rig.services import ControlService, SensorService
 from wam.driver.startup import ArmInfo
 
 _CONTROL, _READER = "control", "sensor reader"  # names of processes
@@ -82,7 +83,7 @@ class MultiProcessBackend:
             self.fake = self._spawn_fake(jobs.fake)
         jobs.control["core"] = loop_core
         self._control = self._spawn_control()
-        self._arm = make_proxy(ArmService, self._control.call)
+        self.arm, self._service = self._proxies()
         recorder = self._spawn(
             "recorder",
             "acquisition.recording.recorder_process:main",
@@ -110,20 +111,16 @@ class MultiProcessBackend:
                 it then, not even at the end.
         """
         try:
-            self._arm.claim()
+            self._service.claim()
         except (PreflightError, LinkError):
             self._is_claimed = False
             raise
         self._is_claimed = True
-        return self._arm.start_arm()
-
-    def measure_exchange(self) -> list[int]:
-        """Ask 100 times for the positions, without torque."""
-        return self._arm.measure_exchange()
+        return self.arm.start()
 
     def open_sensor(self) -> dict[str, str]:
         """Open the wrist sensor; return what it says about itself."""
-        return (self._sensor or self._arm).open_sensor()
+        return (self._sensor or self._service).open_sensor()
 
     def sensor_metadata(self) -> dict[str, str]:
         """Return what became of the sensor's samples since it was opened, as text.
@@ -132,20 +129,16 @@ class MultiProcessBackend:
         """
         return self._sensor.sensor_metadata() if self._sensor is not None else {}
 
-    def define_position(self, q: Sequence[float]) -> None:
-        """Tell the arm that its joints stand at `q` [rad]; see `WamArm`."""
-        self._arm.define_position(list(q))
-
     def begin(self) -> None:
         """Let the loop run from here on."""
         self.loop_client.beat()
-        self._arm.begin()
+        self._service.begin()
 
     def grants(self) -> dict[str, list[Grant]]:
         """Return what the kernel granted to each process."""
         grants: dict[str, list[Grant]] = {}
         if not self.loop_client.loop.is_running:
-            grants[_CONTROL] = self._arm.grants()
+            grants[_CONTROL] = self._service.grants()
         if self._sensor is not None:
             grants[_READER] = self._sensor.grants()
         return grants
@@ -189,13 +182,13 @@ class MultiProcessBackend:
             return self._rescue()
         if self.loop_client.loop.is_running:
             return self.loop_client.idle()
-        return self._arm.idle()
+        return self.arm.idle()
 
     def safety_mode(self) -> SafetyMode:
         """Return the safety module's newest mode."""
         if self.loop_client.loop.is_running or not self._control.is_alive:
             return self.loop_client.status.safety
-        return self._arm.safety_mode()
+        return self.arm.safety_mode()
 
     def close(self) -> None:
         """Brake the arm if it got torques and end all processes; safe to repeat."""
@@ -243,6 +236,11 @@ class MultiProcessBackend:
         target = "experiments.rig.workers:control"
         return self._spawn(_CONTROL, target, self._jobs.control)
 
+    def _proxies(self) -> tuple[ArmOperations, ControlService]:
+        """Return what the process with the arm answers while its loop does not run."""
+        call = self._control.call
+        return make_proxy(ArmOperations, call), make_proxy(ControlService, call)
+
     def _spawn(self, name: str, target: str, settings: dict[str, Any]) -> Child:
         child = Child(name, target, settings, self._shared)
         self._children[name] = child
@@ -261,8 +259,8 @@ class MultiProcessBackend:
         """Brake the arm of a dead process through a new one."""
         self._children.pop(_CONTROL).stop()
         self._control = self._spawn_control()
-        self._arm = make_proxy(ArmService, self._control.call)
+        self.arm, self._service = self._proxies()
         try:
-            return self._arm.idle()
+            return self.arm.idle()
         except TractionError:
             return False

@@ -5,14 +5,11 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
-from collections.abc import Sequence
-
-import numpy as np
 
 from acquisition.clock import SystemClock
 from acquisition.control_loop.loop import Loop
 from acquisition.control_loop.realtime import Grant, RealtimeRequest, request
-from acquisition.devices import SafetyMode, WrenchSensor
+from acquisition.devices import WrenchSensor
 from acquisition.errors import TractionError
 from acquisition.ipc.channel import ChannelClosedError
 from acquisition.ipc.child import ChildContext, name_process
@@ -20,7 +17,7 @@ from acquisition.ipc.layout import ProcessRole
 from acquisition.ipc.loop_server import LoopServer
 from acquisition.ipc.rpc import RpcServer, bind
 from acquisition.ipc.shared_sensor import SharedSensor, publish
-from experiments.rig.backend import measure_exchange
+from experiments.rig.arm_operations import ArmOperations
 from experiments.rig.build import (
     LoopConfig,
     build_arm,
@@ -31,7 +28,7 @@ from experiments.rig.build import (
 )
 from experiments.rig.claim import check_alone, check_inactive, release
 from experiments.rig.law_calibrations import LawCalibrations, build_law
-from experiments.rig.services import ArmService, SensorService
+from experiments.rig.services import ControlService, SensorService
 from experiments.settings.matrix import TerrainRow
 from experiments.settings.rig import RigSettings
 from ft_sensor.serial_line.link import open_port
@@ -40,7 +37,6 @@ from ft_sensor.serial_line.sensor import SerialSensor
 from wam.bus.doors import open_door
 from wam.bus.link import CanLink
 from wam.driver.arm import WamArm
-from wam.driver.startup import ArmInfo
 
 CONTROL_PRIORITY = 80
 READER_PRIORITY = 60
@@ -54,7 +50,7 @@ def control(context: ChildContext) -> None:
 
 
 class ControlWorker:
-    """The process that drives the arm, one thread; implements `ArmService`."""
+    """The process that drives the arm, one thread; implements `ControlService`."""
 
     def __init__(self, context: ChildContext) -> None:
         settings = context.settings
@@ -82,7 +78,10 @@ class ControlWorker:
 
     def serve(self) -> None:
         """Answer until the console hangs up; an arm that got torques is braked then."""
-        server = RpcServer(bind(ArmService, self))
+        server = RpcServer(
+            bind(ArmOperations, ArmOperations(self._opened, self._clock)),
+            bind(ControlService, self),
+        )
         try:
             while not self._is_orphaned:
                 server.answer(self._context.channel)
@@ -113,26 +112,6 @@ class ControlWorker:
         except TractionError:
             self._release()
             raise
-
-    def start_arm(self) -> ArmInfo:
-        """Discover, wake and query the arm; raises as `WamArm.start`."""
-        return self._opened().start()
-
-    def measure_exchange(self) -> list[int]:
-        """Return how long 100 exchanges took [ns]."""
-        return measure_exchange(self._opened(), self._clock)
-
-    def define_position(self, q: Sequence[float]) -> None:
-        """Set the joint positions to `q` [rad]; see `WamArm`."""
-        self._opened().define_position(np.array(q))
-
-    def idle(self) -> bool:
-        """Brake the arm; return whether that is confirmed."""
-        return self._opened().idle()
-
-    def safety_mode(self) -> SafetyMode:
-        """Return the mode that the safety module reported last."""
-        return self._opened().safety_mode()
 
     def grants(self) -> list[Grant]:
         """Return what the kernel granted."""

@@ -22,7 +22,8 @@ from experiments.messages import CATALOGUE
 from experiments.operator.auto_operator import AutoOperator
 from experiments.operator.prompts import Prompt
 from experiments.preflight import preflight
-from experiments.rig import backend as inline_crew
+from experiments.rig.arm_operations import ArmOperations
+from experiments.rig.backend import InProcessBackend
 from experiments.rig.build import build_tool
 from experiments.run import ready
 from experiments.run import tare as taring
@@ -310,7 +311,7 @@ def _saturate(scene):
 
 
 def _no_exchange(scene):
-    scene.patch.setattr(inline_crew, "measure_exchange", lambda *_: [])
+    scene.patch.setattr(ArmOperations, "measure_exchange", lambda _: [])
     return resume(scene)
 
 
@@ -321,9 +322,7 @@ def _no_loop(scene):
 
 def _lost_sensor(scene):
     fields = {"trouble": "The port is gone.", "reopened": "0"}
-    scene.patch.setattr(
-        inline_crew.InProcessBackend, "sensor_metadata", lambda _: fields
-    )
+    scene.patch.setattr(InProcessBackend, "sensor_metadata", lambda _: fields)
     return resume(scene)
 
 
