@@ -21,7 +21,7 @@ from analysis.data.terrain_kinds import groups_of
 from analysis.foresight.ground_window import FASTEST, SLOWEST, windows_of
 from analysis.foresight.model import RigIdentity
 from analysis.foresight.signals import PERIOD, FootSample
-from analysis.foresight.whole_record import FootRecord, ticks_of_record
+from analysis.foresight.foot_record import FootRecord, ticks_of_record
 
 HORIZON = 0.2  # s
 FLAT_SURFACE, ROCKY_SURFACE = "flat", "rocky"

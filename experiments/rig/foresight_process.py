@@ -20,7 +20,7 @@ from acquisition.schema import FORESIGHT, MOST_TERRAINS
 from analysis.breakaway.model import BreakAwayModel
 from analysis.foresight.engine import Foresight, ForesightState
 from analysis.foresight.model import ForesightModel, RigIdentity
-from analysis.foresight.whole_record import FootRecord
+from analysis.foresight.foot_record import FootRecord
 
 NICE = 10
 PERIOD_S = 0.01  # s between two looks at the samples
