@@ -1,7 +1,7 @@
 """The foot over a whole record: its samples, and what the filters say every 10 ms.
 
-The filters are those that run in the loop (`signals`), sample by sample, so that what is
-learnt from records holds for what is seen live.
+The filters are those that run in the loop (`signals`), sample by sample, so that what
+is learnt from records holds for what is seen live.
 """
 
 from collections.abc import Iterator, Sequence

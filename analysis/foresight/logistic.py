@@ -145,6 +145,33 @@ def fit_logistic(
     return RidgeLogistic(plain_mean, plain_scale, pairs, plain_w)
 
 
+def fit_balanced(
+    parts: Sequence[tuple[Array, bool]], new: float
+) -> RidgeLogistic | None:
+    """Return the regression of windows on features and squares; None of one kind only.
+
+    Both kinds weigh alike. Windows that overlap are correlated, so the loss counts
+    every window as the share of it that is new.
+
+    Args:
+        parts: features of windows, shape (m, n), and whether they are positive.
+        new: share of a window that the one before did not have.
+    """
+    filled = [(features, kind) for features, kind in parts if len(features)]
+    if len({kind for _, kind in filled}) < 2:
+        return None
+    X = np.concatenate([features for features, _ in filled])
+    truth = np.concatenate([np.full(len(part), kind) for part, kind in filled])
+    share = float(truth.mean())
+    balance = np.where(truth, 0.5 / share, 0.5 / (1.0 - share)) * new
+    return fit_logistic(X, truth, balance, squares(X.shape[1]))
+
+
+def squares(count: int) -> Pairs:
+    """Return every feature with itself."""
+    return tuple((k, k) for k in range(count))
+
+
 def all_pairs(chosen: Sequence[int]) -> Pairs:
     """Return every pair of the chosen features, squares included."""
     return tuple((i, j) for at, i in enumerate(chosen) for j in chosen[at:])

@@ -18,7 +18,12 @@ from analysis.foresight.ground import (
     log_speed,
 )
 from analysis.foresight.ground_window import WINDOWS
-from analysis.foresight.logistic import RidgeLogistic, all_pairs, fit_logistic
+from analysis.foresight.logistic import (
+    RidgeLogistic,
+    all_pairs,
+    fit_balanced,
+    fit_logistic,
+)
 from analysis.foresight.model import ForesightModel, Provenance, SlipModel
 from analysis.foresight.watching import FLAT_SURFACE, ROCKY_SURFACE, WatchedTrial
 
@@ -172,22 +177,10 @@ def _fit_surfaces(
 ) -> tuple[tuple[int, RidgeLogistic], ...]:
     """Return the regression of rocky ground by window; none with one surface only."""
     known = [t for t in trials if t.surface in (FLAT_SURFACE, ROCKY_SURFACE)]
-    if len({trial.surface for trial in known}) < 2:
-        return ()
     fitted: list[tuple[int, RidgeLogistic]] = []
     for size in WINDOWS:
-        rows = [trial.windows[size] for trial in known]
-        is_rocky = np.concatenate(
-            [
-                np.full(len(own), trial.surface == ROCKY_SURFACE)
-                for own, trial in zip(rows, known, strict=True)
-            ]
-        )
-        if not 0 < int(is_rocky.sum()) < is_rocky.size:
-            continue
-        X = np.concatenate(rows)
-        share = float(is_rocky.mean())
-        balance = np.where(is_rocky, 0.5 / share, 0.5 / (1.0 - share)) * _NEW
-        squares = tuple((k, k) for k in range(X.shape[1]))
-        fitted.append((size, fit_logistic(X, is_rocky, balance, squares)))
+        parts = [(t.windows[size], t.surface == ROCKY_SURFACE) for t in known]
+        regression = fit_balanced(parts, _NEW)
+        if regression is not None:
+            fitted.append((size, regression))
     return tuple(fitted)

@@ -18,10 +18,10 @@ from analysis.data.load import RecordedTrial, load_trial
 from analysis.data.prepare import PrepareOptions, Smoothed, smoothed
 from analysis.data.series import Array, Indices, TractionSeries
 from analysis.data.terrain_kinds import groups_of
+from analysis.foresight.foot_record import FootRecord, ticks_of_record
 from analysis.foresight.ground_window import FASTEST, SLOWEST, windows_of
 from analysis.foresight.model import RigIdentity
 from analysis.foresight.signals import PERIOD, FootSample
-from analysis.foresight.foot_record import FootRecord, ticks_of_record
 
 HORIZON = 0.2  # s
 FLAT_SURFACE, ROCKY_SURFACE = "flat", "rocky"

@@ -14,7 +14,7 @@ from analysis.data.series import Array
 from analysis.terrains.classifier import (
     FLAT_GROUND,
     ROCKY_GROUND,
-    LogisticModel,
+    fit_surface,
 )
 from analysis.terrains.recognition import Expert, TerrainScores, score_trial
 from analysis.terrains.verdict import WindowLimits
@@ -153,7 +153,7 @@ def surface_probabilities(
     }
     probabilities = []
     for number in sorted({t.number for trials in known.values() for t in trials}):
-        model = LogisticModel.of_trials(evidence.labelled(number), size)
+        model = fit_surface(evidence.labelled(number), size)
         if model is None:
             continue
         probabilities += [
@@ -161,7 +161,7 @@ def surface_probabilities(
             for name, trials in known.items()
             for trial in trials
             if trial.number == number and len(trial.features[size])
-            for rocky in model.probability(trial.features[size])
+            for rocky in model.probabilities(trial.features[size])
         ]
     return probabilities
 

@@ -15,7 +15,8 @@ import numpy as np
 from analysis.data.prepare import PreparedTrial
 from analysis.data.series import Array
 from analysis.data.terrain_kinds import groups_of
-from analysis.terrains.classifier import FLAT_GROUND, ROCKY_GROUND, LogisticModel
+from analysis.foresight.logistic import RidgeLogistic
+from analysis.terrains.classifier import FLAT_GROUND, ROCKY_GROUND
 from analysis.terrains.known import KnownTerrain, TerrainDatabase
 from analysis.terrains.parts import roughness_in, surfaces_in
 from analysis.terrains.recognition import Expert, TerrainScores, score_trial
@@ -144,7 +145,7 @@ class _Known:
 
     limits: Mapping[str, WindowLimits]
     surface: Mapping[str, str]
-    classifier: LogisticModel | None
+    classifier: RidgeLogistic | None
 
     @classmethod
     def of(cls, database: TerrainDatabase, window: int) -> "_Known":
@@ -167,7 +168,7 @@ class _Known:
         if self.classifier is None:
             rocky, surface = None, scores.likeliest_group(rows, self.surface)
         else:
-            rocky = float(self.classifier.probability(judged.features[None, :])[0])
+            rocky = self.classifier.probability(judged.features.tolist())
             surface = ROCKY_GROUND if rocky > 0.5 else FLAT_GROUND
         return WindowEvidence(
             t=float(judged.trial.smooth.t[judged.trial.indices[rows.stop - 1]]),

@@ -9,10 +9,10 @@ import pytest
 
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.series import TractionSeries
+from analysis.foresight.logistic import fit_balanced
 from analysis.terrains.classifier import (
     FLAT_GROUND,
     ROCKY_GROUND,
-    LogisticModel,
     SurfaceClassifier,
     fit_surfaces,
 )
@@ -110,11 +110,15 @@ def drawn(seed=0, count=4000, shift=0.7):
     return X, is_rocky
 
 
+def fitted(X, is_rocky):
+    return fit_balanced([(X[is_rocky], True), (X[~is_rocky], False)], 0.2)
+
+
 def test_probabilities_are_those_of_the_kinds_that_made_the_windows():
-    model = LogisticModel.fit(*drawn())
+    model = fitted(*drawn())
     X, is_rocky = drawn(seed=1)
     exact = 1.0 / (1.0 + np.exp(-2.0 * 0.7 * X[:, :2].sum(axis=1)))
-    found = model.probability(X)
+    found = model.probabilities(X)
     assert np.abs(found - exact).mean() < 0.04
     assert ((found > 0.5) == is_rocky).mean() == pytest.approx(0.84, abs=0.02)
 
@@ -124,7 +128,7 @@ def test_the_fit_is_that_of_an_independent_program():
 
     X, is_rocky = drawn(count=500, shift=0.4)
     is_rocky[:200] = True  # far more of one kind
-    model = LogisticModel.fit(X, is_rocky)
+    model = fitted(X, is_rocky)
     z = np.clip((X - X.mean(axis=0)) / X.std(axis=0), -5.0, 5.0)
     share = is_rocky.mean()
     weight = np.where(is_rocky, 0.5 / share, 0.5 / (1.0 - share)) * 0.2
@@ -136,9 +140,9 @@ def test_the_fit_is_that_of_an_independent_program():
 
 def test_kinds_that_never_overlap_have_finite_weights():
     X = np.linspace(-1.0, 1.0, 200)[:, None] * np.ones(len(FEATURES))
-    model = LogisticModel.fit(1e6 * X, X[:, 0] > 0.0)
+    model = fitted(1e6 * X, X[:, 0] > 0.0)
     assert np.isfinite(model.weights).all()
-    assert ((model.probability(1e6 * X) > 0.5) == (X[:, 0] > 0.0)).all()
+    assert ((model.probabilities(1e6 * X) > 0.5) == (X[:, 0] > 0.0)).all()
 
 
 def labelled(rough=0.6, smooth=0.1, trials=4):
@@ -166,7 +170,7 @@ def classifier():
 def test_windows_of_new_trials_are_told_apart(classifier, size, rough, is_rocky):
     trial = record(rough, seed=50)
     features = window_features(trial, windows_of(trial.kept, size))
-    rocky = classifier.models[size].probability(features)
+    rocky = classifier.models[size].probabilities(features)
     assert ((rocky > 0.5) == is_rocky).all()
 
 
@@ -180,8 +184,8 @@ def test_a_stored_classifier_answers_alike(classifier):
     stored = SurfaceClassifier.from_dict(json.loads(json.dumps(classifier.to_dict())))
     X, _ = drawn(count=50)
     for size, model in classifier.models.items():
-        assert stored.models[size].probability(X) == pytest.approx(
-            model.probability(X), abs=1e-6
+        assert stored.models[size].probabilities(X) == pytest.approx(
+            model.probabilities(X), abs=1e-6
         )
 
 
