@@ -45,7 +45,7 @@ def to_parquet(
     about = {} if origin is None else {_KEY: origin.model_dump_json()}
     table = arrow.Table.from_arrays(arrays, schema=arrow.schema(fields, about))
     sink = arrow.BufferOutputStream()
-    words = [name for name, of in columns.items() if of.dtype.kind in "US"]
+    words = [name for name, column in columns.items() if column.dtype.kind in "US"]
     arrow.parquet.write_table(
         table, sink, compression="zstd", compression_level=_LEVEL, use_dictionary=words
     )

@@ -158,7 +158,8 @@ def draw_shares(results: StudyResults) -> Figure | None:
 def caption_shares(results: StudyResults) -> str:
     """State how far the shares are from even, in standard errors."""
     values = [
-        f"{of.terrain} {np.abs(of.density - 1.0).max():.2f}" for of in results.shares
+        f"{shares.terrain} {np.abs(shares.density - 1.0).max():.2f}"
+        for shares in results.shares
     ]
     return (
         "Probability integral transform: the share of the distribution predicted for a "

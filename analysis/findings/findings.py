@@ -142,7 +142,9 @@ def plain_findings(results: StudyResults) -> dict[str, Any]:
         else results.identification.numbers(),
         "break_away": {n: found.numbers() for n, found in results.break_away.items()},
         "noise": {summary.terrain: _noise(summary) for summary in results.noise},
-        "new_trial": {of.terrain: plain_shares(of) for of in results.shares},
+        "new_trial": {
+            shares.terrain: plain_shares(shares) for shares in results.shares
+        },
         "trends": {
             name: {key: _trend(trend) for key, trend in trends.items()}
             for name, trends in results.trends.items()

@@ -169,7 +169,9 @@ def windows_of(tick: Indices, motion: Array) -> dict[int, Array]:
             if window.count >= size:
                 rows[size].append(window.features(size))
     width = len(GROUND_FEATURES)
-    return {size: np.array(of).reshape(-1, width) for size, of in rows.items()}
+    return {
+        size: np.array(features).reshape(-1, width) for size, features in rows.items()
+    }
 
 
 def _log(value: float) -> float:

@@ -168,7 +168,7 @@ def plan_judged(
         break_away: models by terrain.
     """
     surface = groups_of(kinds)["surface"]
-    sources = [source_of(t, surface[name]) for name, of in trials.items() for t in of]
+    sources = [source_of(t, surface[name]) for name, own in trials.items() for t in own]
     return JudgedTask(tuple(sources), dict(break_away))
 
 

@@ -173,10 +173,14 @@ def score_ground(answers: Sequence[GroundAnswers]) -> GroundScore | None:
     Args:
         answers: of models to trials that they have not seen.
     """
-    count = sum(of.trials for of in answers)
-    begun = [list(chain(*of)) for of in zip(*(a.begun for a in answers), strict=True)]
-    anew = [list(chain(*of)) for of in zip(*(a.anew for a in answers), strict=True)]
-    back = [time for of in answers for time in of.back]
+    count = sum(answer.trials for answer in answers)
+    begun = [
+        list(chain(*parts)) for parts in zip(*(a.begun for a in answers), strict=True)
+    ]
+    anew = [
+        list(chain(*parts)) for parts in zip(*(a.anew for a in answers), strict=True)
+    ]
+    back = [time for answer in answers for time in answer.back]
     if not count or not all(anew):
         return None
     p, is_rocky = (np.array(column) for column in zip(*anew[0], strict=True))

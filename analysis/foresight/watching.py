@@ -203,4 +203,4 @@ def watch_all(
         kinds: kind by terrain, as of `terrain_kind`.
     """
     surface = groups_of(kinds)["surface"]
-    return [watch(t, surface[name]) for name, of in trials.items() for t in of]
+    return [watch(t, surface[name]) for name, own in trials.items() for t in own]

@@ -64,15 +64,15 @@ def expected_pushes(
     nearest = sorted(records, key=lambda r: _apart(r, centre))[:_TEMPLATES]
     pushes: list[PushRecord] = []
     for k, sigma in enumerate(_SIGMA):
-        of = nearest[k % len(nearest)]
+        neighbour = nearest[k % len(nearest)]
         where = centre + following.scatter * np.array(sigma)
-        load, speed = np.exp(np.clip(where - of.mean.log, -_FURTHEST, _FURTHEST))
+        load, speed = np.exp(np.clip(where - neighbour.mean.log, -_FURTHEST, _FURTHEST))
         pushes.append(
             replace(
-                of,
-                F_n=of.F_n * load,
-                v_t=np.clip(of.v_t * speed, _SLOWEST, _FASTEST),
-                slips=of.slips * load,
+                neighbour,
+                F_n=neighbour.F_n * load,
+                v_t=np.clip(neighbour.v_t * speed, _SLOWEST, _FASTEST),
+                slips=neighbour.slips * load,
                 aim=aim,
             )
         )

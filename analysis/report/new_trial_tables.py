@@ -78,16 +78,16 @@ def worth_table(study: Study) -> ReportTable:
     rows = [
         [
             name,
-            _between(of),
-            _with_interval(of, "within", "N"),
-            _with_interval(of, "tau", "s"),
-            _measurement(of),
-            f"{of.independent:.0f}",
-            f"{of.level_sd(1):.2f}",
-            f"{of.level_sd(_ENOUGH):.2f}",
+            _between(components),
+            _with_interval(components, "within", "N"),
+            _with_interval(components, "tau", "s"),
+            _measurement(components),
+            f"{components.independent:.0f}",
+            f"{components.level_sd(1):.2f}",
+            f"{components.level_sd(_ENOUGH):.2f}",
         ]
         for name, result in study.terrains.items()
-        if (of := result.components) is not None
+        if (components := result.components) is not None
     ]
     return ReportTable(
         name="Variance components",
@@ -116,16 +116,16 @@ def relatives_table(study: Study) -> ReportTable:
     rows = [
         [
             name,
-            ", ".join(of.relatives) or "none",
-            f"{_mean(of.joint, 'nlpd'):.3f}",
-            f"{_mean(of.alone, 'nlpd'):.3f}",
-            _all_own(study.terrains[name], of),
-            "relatives" if of.uses_relatives else "own trials alone",
-            f"{_mean(of.unseen, 'nlpd'):.3f}",
-            f"{_mean(of.unseen, 'coverage90'):.1%}",
-            _below_zero(of.dissipation),
+            ", ".join(outcome.relatives) or "none",
+            f"{_mean(outcome.joint, 'nlpd'):.3f}",
+            f"{_mean(outcome.alone, 'nlpd'):.3f}",
+            _all_own(study.terrains[name], outcome),
+            "relatives" if outcome.uses_relatives else "own trials alone",
+            f"{_mean(outcome.unseen, 'nlpd'):.3f}",
+            f"{_mean(outcome.unseen, 'coverage90'):.1%}",
+            _below_zero(outcome.dissipation),
         ]
-        for name, of in study.relatives.items()
+        for name, outcome in study.relatives.items()
     ]
     return ReportTable(
         name="Transfer from other terrains",
@@ -154,13 +154,13 @@ def relatives_table(study: Study) -> ReportTable:
 
 def few_relatives(outcomes: Sequence[RelativesOutcome]) -> str:
     """Return where relatives are too few, as a sentence; empty where nowhere."""
-    few = [of for of in outcomes if of.has_few]
+    few = [outcome for outcome in outcomes if outcome.has_few]
     if not few:
         return ""
     listed = "; ".join(
-        f"{of.terrain} ({', '.join(of.relatives) or 'none'}: "
-        f"{'used' if of.uses_relatives else 'own trials alone are better'})"
-        for of in few
+        f"{outcome.terrain} ({', '.join(outcome.relatives) or 'none'}: "
+        f"{'used' if outcome.uses_relatives else 'own trials alone are better'})"
+        for outcome in few
     )
     return (
         f"Too few related terrains to estimate how far they differ: {listed}. There "
@@ -173,13 +173,13 @@ def oracle_table(results: StudyResults) -> ReportTable:
     """Return bands of a new trial beside those that assume no distribution."""
     rows = [
         [
-            of.terrain,
+            shares.terrain,
             f"{band.nominal:.0%}",
             f"{band.coverage:.1%} ± {band.coverage_error:.1%}",
             f"{band.width:.2f}",
         ]
-        for of in results.shares
-        for band in of.oracle
+        for shares in results.shares
+        for band in shares.oracle
     ]
     return ReportTable(
         name="Distribution-free bands (conformal)",
@@ -197,31 +197,32 @@ def _mean(scores: Sequence[Score], key: str) -> float:
     return float(np.mean([getattr(score, key) for score in scores]))
 
 
-def _all_own(result: TerrainResult, of: RelativesOutcome) -> str:
+def _all_own(result: TerrainResult, outcome: RelativesOutcome) -> str:
     """Return the NLPD of the terrain's own folds on the trials predicted."""
     nlpd = result.scores(GP_SE_TRIAL, "nlpd")
-    mean = mean_of([nlpd[k] for k in of.tested])
+    mean = mean_of([nlpd[k] for k in outcome.tested])
     return "–" if mean is None else f"{mean:.3f}"
 
 
-def _below_zero(of: Dissipation) -> str:
-    return f"{of.latent:.1%}, {of.predicted:.1%}, {of.measured:.1%}"
+def _below_zero(dissipation: Dissipation) -> str:
+    shares = (dissipation.latent, dissipation.predicted, dissipation.measured)
+    return ", ".join(f"{share:.1%}" for share in shares)
 
 
-def _between(of: TrialComponents) -> str:
-    if not of.is_told_apart:
-        return f"not distinguishable from 0 (gain {of.gain:.1f})"
-    return f"{_with_interval(of, 'between', 'N')} (gain {of.gain:.1f})"
+def _between(components: TrialComponents) -> str:
+    if not components.is_told_apart:
+        return f"not distinguishable from 0 (gain {components.gain:.1f})"
+    return f"{_with_interval(components, 'between', 'N')} (gain {components.gain:.1f})"
 
 
-def _measurement(of: TrialComponents) -> str:
-    if of.measurement < _LEAST * of.within:  # the search ends there
+def _measurement(components: TrialComponents) -> str:
+    if components.measurement < _LEAST * components.within:  # the search ends there
         return "not distinguishable from 0"
-    return _with_interval(of, "measurement", "N")
+    return _with_interval(components, "measurement", "N")
 
 
-def _with_interval(of: TrialComponents, name: str, unit: str) -> str:
-    value, interval = getattr(of, name), of.intervals.get(name)
+def _with_interval(components: TrialComponents, name: str, unit: str) -> str:
+    value, interval = getattr(components, name), components.intervals.get(name)
     if interval is None:
         return f"{value:.2f} {unit}"
     return f"{value:.2f} ({interval.lower:.2f} to {interval.upper:.2f}) {unit}"

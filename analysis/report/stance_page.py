@@ -191,10 +191,12 @@ def draw_stances(
 def _bars(
     ax: Axes, groups: Mapping[str, Sequence[tuple[str, StanceTotals]]], name: str
 ) -> None:
-    policies = list(dict.fromkeys(label for of in groups.values() for label, _ in of))
+    policies = list(
+        dict.fromkeys(label for group in groups.values() for label, _ in group)
+    )
     width = 0.8 / len(policies)
     for k, policy in enumerate(policies):
-        rows = [(i, dict(of).get(policy)) for i, of in enumerate(groups.values())]
+        rows = [(i, dict(group).get(policy)) for i, group in enumerate(groups.values())]
         known = [(i, one) for i, one in rows if one is not None]
         at = np.array([i - 0.4 + width * (k + 0.5) for i, _ in known])
         height = np.array([getattr(one, name) for _, one in known])

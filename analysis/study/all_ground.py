@@ -118,9 +118,10 @@ class AllGroundModel:
         that it was not fitted to.
         """
         scores: tuple[list[Array], list[Array]] = ([], [])
-        for of in known:
-            scores[of.ground.is_plate].extend(
-                self.predict(of.ground, t.inputs).normal_score(t.F_t) for t in of.trials
+        for rows in known:
+            scores[rows.ground.is_plate].extend(
+                self.predict(rows.ground, t.inputs).normal_score(t.F_t)
+                for t in rows.trials
             )
         (stones, _), (plates, _) = (choose_shape(parts) for parts in scores)
         return replace(self, shapes=(stones, plates))
@@ -142,16 +143,16 @@ class AllGroundModel:
 
 def rows_of(known: Sequence[TerrainRows], c: float | None) -> GroundRows:
     """Return the rows of trials with warped forces, as the process takes them."""
-    tables = [table for of in known for table in of.trials]
+    tables = [table for terrain in known for table in terrain.trials]
     sizes = [table.count for table in tables]
-    place = [g for g, of in enumerate(known) for _ in of.trials]
+    place = [g for g, terrain in enumerate(known) for _ in terrain.trials]
     rows = SampleTable.joined(tables)
     return GroundRows(
         inputs=rows.inputs,
         y=warped(rows.F_t, c),
         ground=np.repeat(np.array(place, dtype=np.intp), sizes),
         trial=np.repeat(np.arange(len(tables)), sizes),
-        grounds=tuple(of.ground for of in known),
+        grounds=tuple(terrain.ground for terrain in known),
     )
 
 
@@ -167,8 +168,8 @@ def fit_all_ground(
     Raises:
         SettingsError: there are no rows, or their covariance cannot be factorised.
     """
-    few = [of.thinned(_TUNED) for of in known]
-    F_t = SampleTable.joined([table for of in few for table in of.trials]).F_t
+    few = [rows.thinned(_TUNED) for rows in known]
+    F_t = SampleTable.joined([table for rows in few for table in rows.trials]).F_t
     unit = {c: _unit(F_t, c) for c in _BENDS}
     if start is None:
         c: float | None = _BENDS[0]
@@ -182,7 +183,7 @@ def fit_all_ground(
         c = start.c
         posterior = GroundPosterior(rows_of(few, c), unit[c])
         process = posterior.climbed(start.process.theta)
-    given = [of.thinned(GIVEN) for of in known]
+    given = [rows.thinned(GIVEN) for rows in known]
     return AllGroundModel.of(process, c, given).shaped(given)
 
 

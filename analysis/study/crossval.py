@@ -158,20 +158,20 @@ class FoldPlan(Sequence[FoldTask]):
     def _wholes(self) -> dict[str, str]:
         """Digests of all trials of every terrain: with a fold's number its training."""
         return {
-            terrain: blake2b(repr(sorted(of.items())).encode()).hexdigest()
-            for terrain, of in self._digests[0].items()
+            terrain: blake2b(repr(sorted(digests.items())).encode()).hexdigest()
+            for terrain, digests in self._digests[0].items()
         }
 
     def _others(self, terrain: str, fold: int) -> list[int]:
         return [k for k in self._usable[terrain] if k != fold]
 
     def _met(
-        self, terrain: str, fold: int, of: Callable[[str, int], T]
+        self, terrain: str, fold: int, value_of: Callable[[str, int], T]
     ) -> dict[str, tuple[T, ...]]:
-        """Return `of` every trial of another terrain that a fold is tested on."""
+        """Return `value_of` every trial of another terrain that a fold is tested on."""
         own = self._usable[terrain]
         return {
-            other: tuple(of(other, k) for k in met_trials(fold, own, tests))
+            other: tuple(value_of(other, k) for k in met_trials(fold, own, tests))
             for other, tests in self._usable.items()
             if other != terrain
         }

@@ -71,7 +71,9 @@ def to_fits(study: Study) -> dict[str, Any]:
             for name, result in study.terrains.items()
         },
         "cross": {model: study.cross(model) for model in study.options.fit.models},
-        "relatives": {name: of.numbers() for name, of in study.relatives.items()},
+        "relatives": {
+            name: outcome.numbers() for name, outcome in study.relatives.items()
+        },
         "units": UNITS | _OTHER_UNITS,
         "options": asdict(study.options),
         "notes": list(study.notes),

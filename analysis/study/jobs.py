@@ -273,7 +273,9 @@ def _on_cluster(
         with parallel_config("dask", client=client, scatter=scattered):
             parallel: Any = Parallel(return_as="generator_unordered")
             try:
-                yield from parallel(delayed(call)(*of) for call, *of in calls)
+                yield from parallel(
+                    delayed(call)(*arguments) for call, *arguments in calls
+                )
             except KilledWorker as error:
                 raise WorkerLostError from error
 

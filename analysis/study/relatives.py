@@ -104,8 +104,8 @@ class RelativesOutcome:
     def numbers(self) -> dict[str, Any]:
         """Return the outcome as plain values: means over the trials."""
         scores = {
-            f"{key}_{name}": float(np.mean([getattr(s, key) for s in of]))
-            for name, of in (
+            f"{key}_{name}": float(np.mean([getattr(s, key) for s in tested]))
+            for name, tested in (
                 ("with_relatives", self.joint),
                 ("alone", self.alone),
                 ("never_recorded", self.unseen),
@@ -163,21 +163,21 @@ def plan_relatives(
         for name in grounds
     }
     rows = {
-        name: TerrainRows(grounds[name], tuple(of.values())).thinned(GIVEN)
-        for name, of in tables.items()
-        if of
+        name: TerrainRows(grounds[name], tuple(own_tables.values())).thinned(GIVEN)
+        for name, own_tables in tables.items()
+        if own_tables
     }
     tasks: list[RelativesTask] = []
-    for name, of in tables.items():
+    for name, own_tables in tables.items():
         others = tuple(r for other, r in rows.items() if other != name)
-        if len(of) <= KNOWN or not others:
+        if len(own_tables) <= KNOWN or not others:
             continue
         key = (options.seed, zlib.crc32(name.encode()), draw, _STREAM)
         dice = np.random.default_rng(key)
-        known = sorted(dice.permutation(list(of))[:KNOWN].tolist())
-        own = TerrainRows(grounds[name], tuple(of[k] for k in known))
-        numbers = tuple(k for k in of if k not in known)
-        thin = _every([of[k] for k in numbers])
+        known = sorted(dice.permutation(list(own_tables))[:KNOWN].tolist())
+        own = TerrainRows(grounds[name], tuple(own_tables[k] for k in known))
+        numbers = tuple(k for k in own_tables if k not in known)
+        thin = _every([own_tables[k] for k in numbers])
         tasks.append(RelativesTask(own, thin, numbers, others, options))
     return tasks
 
@@ -195,12 +195,12 @@ def run_relatives(task: RelativesTask) -> RelativesOutcome | None:
     except TractionError:
         return None
     ground = task.own.ground
-    is_kin = [of.ground.is_plate == ground.is_plate for of in task.others]
+    is_kin = [other.ground.is_plate == ground.is_plate for other in task.others]
     return RelativesOutcome(
         terrain=ground.terrain,
         relatives=tuple(
-            of.ground.terrain
-            for of, kin in zip(task.others, is_kin, strict=True)
+            other.ground.terrain
+            for other, kin in zip(task.others, is_kin, strict=True)
             if kin
         ),
         tested=task.numbers,
@@ -228,7 +228,7 @@ def _alone(task: RelativesTask) -> NewTrialModel:
 
 def _inner(joint: AllGroundModel, task: RelativesTask) -> float:
     """Return the NLPD of the own trials, each left out with theta kept."""
-    others = [of.thinned(_INNER) for of in task.others]
+    others = [other.thinned(_INNER) for other in task.others]
     ground, own = task.own.ground, task.own.trials
     scores: list[float] = []
     for k, table in enumerate(own):

@@ -156,14 +156,16 @@ def run_study(
     *_, folds, outcomes, fitted, wholes = run_batches(
         batches, Workers(options.n_jobs, options.scheduler), progress, store
     )
-    components = {task.terrain: of for task, of in zip(apart, fitted, strict=True)}
+    components = {task.terrain: fit for task, fit in zip(apart, fitted, strict=True)}
     notes += [note for fold in folds for note in fold.notes]
     results = {
         name: _result(trials[name], prepared[name], folds, whole, components.get(name))
         for name, whole in zip(prepared, wholes, strict=True)
     }
     warnings = (*_contradictions(trials), *_all_warnings(results, options))
-    relatives = {of.terrain: of for of in outcomes if of is not None}
+    relatives = {
+        outcome.terrain: outcome for outcome in outcomes if outcome is not None
+    }
     return Study(simulated, options, results, tuple(notes), warnings, relatives)
 
 
@@ -259,7 +261,10 @@ def _all_warnings(
 ) -> list[str]:
     is_bounded = options.prepare.container_travel is not None
     doubts = _doubts(result.trials for result in results.values())
-    return [*doubts, *(w for of in results.values() for w in _warnings(of, is_bounded))]
+    return [
+        *doubts,
+        *(w for result in results.values() for w in _warnings(result, is_bounded)),
+    ]
 
 
 def _warnings(result: TerrainResult, has_container: bool) -> list[str]:

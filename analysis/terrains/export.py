@@ -202,18 +202,18 @@ def _tasks(study: Study) -> tuple[tuple[Array, Array], list[TableTask]]:
         name: tuple(trial for trial in result.trials if trial.kept)
         for name, result in study.terrains.items()
     }
-    trials = {name: of for name, of in trials.items() if of}
+    trials = {name: own for name, own in trials.items() if own}
     if not trials:
         raise SettingsError("No terrain has kept samples.", hint="Record some trials.")
-    axes = _axes([t for of in trials.values() for t in of], study.options.prepare)
+    axes = _axes([t for own in trials.values() for t in own], study.options.prepare)
     return axes, [
         TableTask(
             name,
-            tuple(SampleTable.of([trial]) for trial in of),
+            tuple(SampleTable.of([trial]) for trial in own),
             axes,
             study.options.fit,
         )
-        for name, of in trials.items()
+        for name, own in trials.items()
     ]
 
 
