@@ -227,18 +227,18 @@ class Foresight:
             traction = self._traction(shares, F_n, v_t)
         flags |= self._alarm(slip, is_slipping=signals.is_slipping)
         return ForesightState(
-            sample.cycle,
-            self._since,
-            sample.host_ns,
-            flags,
-            slip,
-            risk,
-            traction,
-            v_t,
-            F_t,
-            F_n,
-            none,
-            terrains,
+            cycle=sample.cycle,
+            since=self._since,
+            host_ns=sample.host_ns,
+            flags=flags,
+            slip_probability=slip,
+            break_away_risk=risk,
+            traction=traction,
+            v_t=v_t,
+            F_t=F_t,
+            F_n=F_n,
+            none=none,
+            terrains=terrains,
         )
 
     def _slip(self, signals: Signals) -> float:
