@@ -21,9 +21,9 @@ from analysis.figures.style import render, styled
 from analysis.foresight.engine import RiskTable
 from analysis.foresight.model import ForesightModel
 from analysis.report.stance_page import draw_stances
+from analysis.stance.interface import StanceRequest, risk_tables
 from analysis.stance.outcomes import StanceTotals, totals
 from analysis.stance.policies import POLICIES
-from analysis.stance.seam import StanceRequest, risk_tables
 from analysis.stance.sequence import StancePlan
 from tests.fakes.point_foot import GROUNDS
 from tests.fakes.stance_bench import (

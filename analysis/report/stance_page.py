@@ -23,8 +23,8 @@ from analysis.report.page_model import (
     ReportFigure,
     ReportTable,
 )
+from analysis.stance.interface import StanceRequest
 from analysis.stance.outcomes import StanceOutcome, StanceTotals, totals
-from analysis.stance.seam import StanceRequest
 
 HEADER = (
     "terrain",

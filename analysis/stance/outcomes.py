@@ -12,7 +12,7 @@ from math import exp, inf, isfinite, log, nan, sqrt
 from typing import Any
 
 from analysis.breakaway.pushes import FootPush
-from analysis.stance.seam import (
+from analysis.stance.interface import (
     ENOUGH,
     FAST,
     MOVED,

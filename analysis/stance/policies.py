@@ -17,7 +17,7 @@ from functools import lru_cache
 from math import isnan
 from typing import Final
 
-from analysis.stance.seam import (
+from analysis.stance.interface import (
     ENOUGH,
     FAST,
     LEAST_F_N,

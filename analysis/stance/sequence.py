@@ -13,13 +13,7 @@ from typing import Final
 
 from acquisition.control_loop.law import SoleGoal
 from analysis.foresight.engine import RiskTable
-from analysis.stance.outcomes import (
-    StanceOutcome,
-    StanceWatch,
-    adapted,
-    stated_risk,
-)
-from analysis.stance.seam import (
+from analysis.stance.interface import (
     BEGIN,
     StanceCommand,
     StanceForesight,
@@ -27,6 +21,12 @@ from analysis.stance.seam import (
     StancePolicy,
     StanceRequest,
     StanceSample,
+)
+from analysis.stance.outcomes import (
+    StanceOutcome,
+    StanceWatch,
+    adapted,
+    stated_risk,
 )
 
 TICK: Final = 0.02  # s

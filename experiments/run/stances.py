@@ -13,9 +13,9 @@ from analysis.breakaway.fitting import fit_pushes
 from analysis.breakaway.model import BreakAwayModel
 from analysis.breakaway.recorded import BreakAwayOptions
 from analysis.foresight.engine import ForesightFlag
+from analysis.stance.interface import risk_tables
 from analysis.stance.outcomes import FRESH_SCALE, StanceOutcome, totals
 from analysis.stance.policies import POLICIES
-from analysis.stance.seam import risk_tables
 from analysis.stance.sequence import SoleView, StancePlan, StanceSequence
 from experiments.fault_injection.plan import FaultTrigger
 from experiments.messages import FaultContext

@@ -11,9 +11,9 @@ from typing import Any
 
 from acquisition.errors import SessionError, SettingsError
 from analysis.breakaway.pushes import FootPush
+from analysis.stance.interface import StanceRequest
 from analysis.stance.outcomes import StanceOutcome, adapted
 from analysis.stance.policies import POLICIES
-from analysis.stance.seam import StanceRequest
 from analysis.stance.sequence import LEAST_TRAVEL
 from experiments.arguments import did_you_mean
 from experiments.session.data_files import read_json, write_json

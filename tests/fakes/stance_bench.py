@@ -22,15 +22,15 @@ from analysis.foresight.model import ForesightModel, Provenance, RigIdentity
 from analysis.foresight.signals import FootSample
 from analysis.foresight.training import fit_ground
 from analysis.foresight.watching import WatchedTrial, watch_series
-from analysis.stance.outcomes import StanceOutcome
-from analysis.stance.policies import avoid_slip
-from analysis.stance.seam import (
+from analysis.stance.interface import (
     StanceCommand,
     StanceForesight,
     StancePhase,
     StanceRequest,
     StanceSample,
 )
+from analysis.stance.outcomes import StanceOutcome
+from analysis.stance.policies import avoid_slip
 from analysis.stance.sequence import SoleView, StancePlan, StanceSequence
 from fakes.ground.terrain import make_terrain
 from fakes.randomness import trial_generators

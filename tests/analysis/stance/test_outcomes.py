@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from analysis.stance.interface import StanceRequest
 from analysis.stance.outcomes import StanceOutcome, StanceWatch, adapted, totals, wilson
-from analysis.stance.seam import StanceRequest
 
 REQUEST = StanceRequest(6.0, 0.1)
 TICK = 0.02

@@ -1,4 +1,4 @@
-"""The seam of a stance: what the four policies answer, and that they are pure."""
+"""What the four policies answer, and that they are pure."""
 
 import math
 from dataclasses import replace
@@ -9,15 +9,7 @@ import pytest
 from acquisition.errors import SettingsError
 from analysis.breakaway.censored import Family
 from analysis.breakaway.model import BREAK_AWAY, BreakAwayModel, PushLaw
-from analysis.stance.policies import (
-    POLICIES,
-    avoid_slip,
-    constant_mu,
-    no_policy,
-    oracle,
-    planned,
-)
-from analysis.stance.seam import (
+from analysis.stance.interface import (
     BEGIN,
     StanceCommand,
     StanceForesight,
@@ -25,6 +17,14 @@ from analysis.stance.seam import (
     StanceRequest,
     StanceSample,
     risk_tables,
+)
+from analysis.stance.policies import (
+    POLICIES,
+    avoid_slip,
+    constant_mu,
+    no_policy,
+    oracle,
+    planned,
 )
 
 REQUEST = StanceRequest(6.0, 0.1)

@@ -4,9 +4,9 @@ from itertools import pairwise
 
 import pytest
 
+from analysis.stance.interface import StanceRequest, risk_tables
 from analysis.stance.outcomes import totals
 from analysis.stance.policies import POLICIES
-from analysis.stance.seam import StanceRequest, risk_tables
 from analysis.stance.sequence import SoleView, StancePlan, StanceSequence
 from studies.stances import KNOWN, StanceCase, claims
 from tests.fakes.stance_bench import (

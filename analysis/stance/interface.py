@@ -1,4 +1,4 @@
-"""The seam of a stance: what a policy is given, and what it answers.
+"""What a policy of a stance is given, and what it answers.
 
 A policy is a pure function of what it is given: no clock, no randomness, nothing kept.
 What it wants to know of its own past it leaves in its command, which comes back with
