@@ -2,12 +2,13 @@
 
 import io
 import re
-import stat
 import tomllib
 from pathlib import Path
 from typing import Annotated, Any, cast
 
 from pydantic import BaseModel, ConfigDict, Field
+
+from acquisition.files import NotRegularError, UnfitFileError, read_regular
 
 # strict: a number in quotes, or `true`, is a mistake and no number
 Number = Annotated[float, Field(strict=True)]
@@ -37,14 +38,13 @@ def read_text(path: Path) -> str:
         OSError: it cannot be read.
         ValueError: it is not a file, larger than 1 MB, or no text.
     """
-    if not stat.S_ISREG(path.stat().st_mode):
-        raise ValueError("it is not a file")
-    with path.open("rb") as file:
-        data = file.read(_LARGEST + 1)
-    if len(data) > _LARGEST:
-        raise ValueError(f"it is larger than {_LARGEST // 1_000_000} MB")
     try:
+        data = read_regular(path, _LARGEST, is_link_followed=True)
         return io.TextIOWrapper(io.BytesIO(data), encoding="utf-8").read()
+    except NotRegularError as error:
+        raise ValueError("it is not a file") from error
+    except UnfitFileError as error:
+        raise ValueError(f"it {error}") from error
     except UnicodeDecodeError as error:
         raise ValueError("it is not text") from error
 

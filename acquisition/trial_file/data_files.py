@@ -16,6 +16,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from acquisition.errors import TrialFileError
+from acquisition.files import FOLDER, UNFOLLOWED, open_directory
 
 SUBFOLDERS = ("trials", "rejected", "faults")
 # Most bytes of a file, by how its name ends.
@@ -29,8 +30,6 @@ SIZE_LIMITS: Mapping[str, int] = {
     ".partial": 64 * 2**20,
 }
 _OTHERS = 16 * 2**20
-_FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC
-_FILE = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
 _KINDS = (
     (stat.S_ISLNK, "is a symbolic link"),
     (stat.S_ISDIR, "is a folder"),
@@ -59,14 +58,12 @@ def open_folder(path: Path) -> Generator[int]:
         OSError: it is missing or no folder.
     """
     if path.name not in SUBFOLDERS:
-        descriptor = os.open(path, _FOLDER)
-    else:
-        outer = os.open(path.parent, _FOLDER)
-        try:
-            _check_kind(path, _stat(path.name, outer), is_folder=True)
-            descriptor = os.open(path.name, _FOLDER | os.O_NOFOLLOW, dir_fd=outer)
-        finally:
-            os.close(outer)
+        with open_directory(path) as descriptor:
+            yield descriptor
+        return
+    with open_directory(path.parent) as outer:
+        _check_kind(path, _stat(path.name, outer), is_folder=True)
+        descriptor = os.open(path.name, FOLDER | os.O_NOFOLLOW, dir_fd=outer)
     try:
         yield descriptor
     finally:
@@ -127,7 +124,7 @@ def open_data(path: Path, flags: int = os.O_RDONLY) -> int:
     with open_folder(path.parent) as folder:
         with contextlib.suppress(FileNotFoundError):
             _check_kind(path, _stat(path.name, folder))
-        descriptor = os.open(path.name, flags | _FILE, 0o644, dir_fd=folder)
+        descriptor = os.open(path.name, flags | UNFOLLOWED, 0o644, dir_fd=folder)
     try:
         _check_open(descriptor, path)
     except BaseException:

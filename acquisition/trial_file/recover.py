@@ -13,11 +13,11 @@ from mcap.records import Attachment, Channel, Message, Metadata, Schema
 from mcap.writer import CompressionType, Writer
 
 from acquisition.errors import TrialFileError
+from acquisition.files import publish_file
 from acquisition.sample import Flag
 from acquisition.schema import CYCLE, EARLIER_CYCLES
 from acquisition.temporary_folders import temporary_folder
 from acquisition.trial_file.chunks import as_trial_file_error, read_file
-from acquisition.trial_file.publishing import publish_file
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.salvage import Salvaged, SoundRecords
 from acquisition.trial_file.verify import VerifiedFile, verify_file

@@ -11,10 +11,10 @@ from mcap.writer import CompressionType, Writer
 
 from acquisition.cdr import CdrWriter, encode_log, encode_string
 from acquisition.errors import TrialFileError
+from acquisition.files import publish_file, sync_directory
 from acquisition.sample import CHANNELS, FORESIGHT_CHANNELS, Flag, Record
 from acquisition.schema import CYCLE, FORESIGHT, TRUTH, Layout, schema_text
 from acquisition.trial_file.header import TrialHeader, WriterCounts
-from acquisition.trial_file.publishing import publish_file, sync_directory
 from acquisition.trial_file.views import VIEW_TOPICS, encode_can_batch, encode_views
 
 CHUNK_BYTES = 262_144

@@ -8,7 +8,6 @@ read. The form is Data Package 1.0 of https://specs.frictionlessdata.io; `unit` 
 
 import hashlib
 import os
-import stat
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -17,12 +16,12 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from acquisition.errors import SettingsError
+from acquisition.files import UnfitFileError, open_regular, read_regular
 
 DESCRIPTOR = "datapackage.json"
 _LARGEST = 16_000_000  # bytes of a descriptor; a study of 80 trials has 2 million
 _MOST = 5000  # files
 _ABSENT = ("", "NaN")  # cells without a value
-_NO_LINKS = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
 _CHANGED = "Copy the file again, or read it alone, outside of its package."
 
 
@@ -174,14 +173,13 @@ class PackagedTable:
             SettingsError: it is missing, no regular file, or not as it was written.
         """
         try:
-            descriptor = os.open(self.path, _NO_LINKS)
-            with os.fdopen(descriptor, "rb") as file:
-                status = os.fstat(descriptor)
-                if not stat.S_ISREG(status.st_mode):
-                    raise SettingsError(f"{self.path}: it is not a regular file.")
-                if status.st_size != self.entry.bytes:
-                    raise self._changed(f"{status.st_size} bytes", self.entry.bytes)
+            with open_regular(self.path) as file:
+                size = os.fstat(file.fileno()).st_size
+                if size != self.entry.bytes:
+                    raise self._changed(f"{size} bytes", self.entry.bytes)
                 digest = hashlib.file_digest(file, "sha256").hexdigest()
+        except UnfitFileError as error:
+            raise SettingsError(f"{self.path}: it {error}.") from error
         except OSError as error:
             raise SettingsError(
                 f"{self.path}: cannot be read ({error.strerror}).",
@@ -249,14 +247,9 @@ def _check_folders(top: Path, file: Path) -> None:
 
 def _read(path: Path) -> DataPackage:
     try:
-        descriptor = os.open(path, _NO_LINKS)
-        with os.fdopen(descriptor, "rb") as file:
-            if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-                raise SettingsError(f"{path}: it is not a regular file.")
-            text = file.read(_LARGEST + 1)
-        if len(text) > _LARGEST:
-            raise SettingsError(f"{path}: it is larger than {_LARGEST / 1e6:.0f} MB.")
-        return DataPackage.model_validate_json(text)
+        return DataPackage.model_validate_json(read_regular(path, _LARGEST))
+    except UnfitFileError as error:
+        raise SettingsError(f"{path}: it {error}.") from error
     except OSError as error:
         raise SettingsError(
             f"{path}: cannot be read ({error.strerror}).",

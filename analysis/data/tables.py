@@ -4,7 +4,7 @@ Every byte is taken as hostile: sizes are checked before anything is unpacked, n
 is unpickled, and whatever does not fit becomes one SettingsError that names the file.
 """
 
-import stat
+import os
 import zipfile
 import zlib
 from collections.abc import Mapping, Sequence
@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from acquisition.errors import SettingsError
+from acquisition.files import UnfitFileError, open_regular
 from analysis.data.columns import (
     COLUMNS,
     PREPARED,
@@ -150,12 +151,11 @@ def _load(path: Path, form: _TableForm) -> list[TractionSeries]:
 def _first_bytes(path: Path) -> bytes:
     """Return how a file begins that may be read; refuse every other one."""
     try:
-        status = path.stat()
-        size = status.st_size
-        if not stat.S_ISREG(status.st_mode):
-            raise refusal(path, "it is not a regular file", "Give tables of trials.")
-        with path.open("rb") as file:
+        with open_regular(path, is_link_followed=True) as file:
+            size = os.fstat(file.fileno()).st_size
             start = file.read(4)
+    except UnfitFileError as error:
+        raise refusal(path, f"it {error}", "Give tables of trials.") from error
     except OSError as error:
         raise SettingsError(
             f"{path}: cannot be read ({error.strerror}).", hint="Check the name."

@@ -19,8 +19,6 @@ import hashlib
 import json
 import math
 import os
-import stat
-import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
 from enum import Enum
@@ -30,6 +28,7 @@ from typing import Any
 import numpy as np
 
 from acquisition.errors import SettingsError
+from acquisition.files import open_directory, read_regular, replace_file
 from analysis.breakaway.censored import Family
 from analysis.breakaway.model import BreakAwayModel, PushLaw
 from analysis.data.samples import SampleTable
@@ -120,7 +119,7 @@ class ResultStore:
         """Return the result of a task done before, None if there is none."""
         path = self._path(function, task)
         try:
-            content = json.loads(_read(path))
+            content = json.loads(read_regular(path, LARGEST))
             is_whole = content["digest"] == _digest(content["result"])
             result = decode(content["result"], self._types) if is_whole else None
         except (OSError, ValueError, KeyError, TypeError, RecursionError):
@@ -151,21 +150,6 @@ class ResultStore:
 
     def _path(self, function: Function, task: Any) -> Path:  # noqa: ANN401
         return self._folder / f"{task_key(function, task)}.json"
-
-
-def _read(path: Path) -> bytes:
-    """Return the content of a regular file that is no link and not too large.
-
-    Raises:
-        OSError: it cannot be opened.
-        ValueError: it is no such file.
-    """
-    flags = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
-    with os.fdopen(os.open(path, flags), "rb") as file:
-        found = os.fstat(file.fileno())
-        if not stat.S_ISREG(found.st_mode) or found.st_size > LARGEST:
-            raise ValueError("no result")
-        return file.read(LARGEST)
 
 
 def remove_oldest(folder: Path, most: int) -> int:
@@ -313,18 +297,8 @@ def write_atomic(path: Path, content: bytes) -> None:
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        temporary = Path(name)
-        try:
-            with os.fdopen(descriptor, "wb") as file:
-                file.write(content)
-                file.flush()
-                os.fsync(file.fileno())
-            temporary.chmod(0o644)  # mkstemp makes it private
-            temporary.replace(path)
-        except BaseException:
-            temporary.unlink(missing_ok=True)
-            raise
+        with open_directory(path.parent) as folder:
+            replace_file(folder, path.name, content)
     except OSError as error:
         raise SettingsError(
             f"{path}: cannot be written ({error.strerror}).",

@@ -19,7 +19,6 @@ as normal distributions.
 """
 
 import json
-import stat
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -27,6 +26,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from acquisition.errors import SettingsError
+from acquisition.files import UnfitFileError, read_regular
 from analysis.data.series import Array
 from analysis.study.distribution import SHARES
 from analysis.terrains.known import KnownTerrain, TerrainDatabase
@@ -51,12 +51,10 @@ def load(path: Path | str) -> TerrainDatabase:
     """
     path = Path(path)
     try:
-        status = path.stat()
-        if not stat.S_ISREG(status.st_mode):
-            raise ValueError("it is not a regular file")
-        if status.st_size > _LARGEST:
-            raise ValueError(f"it is larger than {_LARGEST / 1e6:.0f} MB")
-        return _database(json.loads(path.read_bytes()))
+        content = read_regular(path, _LARGEST, is_link_followed=True)
+        return _database(json.loads(content))
+    except UnfitFileError as error:
+        raise _no_database(path, f"it {error}") from error
     except OSError as error:
         raise SettingsError(
             f"{path} cannot be read ({error.strerror}).",
@@ -64,10 +62,14 @@ def load(path: Path | str) -> TerrainDatabase:
         ) from error
     except (ValueError, TypeError, KeyError, RecursionError, OverflowError) as error:
         what = f"{error} is missing" if isinstance(error, KeyError) else str(error)
-        raise SettingsError(
-            f"{path} is not a terrain database: {what}.",
-            hint="Make it with: traction export --terrain-db FILE.",
-        ) from error
+        raise _no_database(path, what) from error
+
+
+def _no_database(path: Path, what: str) -> SettingsError:
+    return SettingsError(
+        f"{path} is not a terrain database: {what}.",
+        hint="Make it with: traction export --terrain-db FILE.",
+    )
 
 
 class _Header(NamedTuple):

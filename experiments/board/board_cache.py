@@ -13,13 +13,18 @@ import hashlib
 import json
 import os
 import re
-import stat
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from acquisition.clock import SystemClock
+from acquisition.files import (
+    UnfitFileError,
+    open_directory,
+    open_regular,
+    replace_file,
+)
 from experiments.board.session_summaries import (
     SessionSummary,
     glance,
@@ -154,30 +159,20 @@ def _signature_of(folder: Path) -> tuple[str, int]:
 
 
 def _replace(path: Path, content: bytes) -> None:
-    import tempfile
-
     path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-    descriptor, temporary = tempfile.mkstemp(dir=path.parent, prefix=path.name)
-    try:
-        with os.fdopen(descriptor, "wb") as file:
-            file.write(content)
-        Path(temporary).replace(path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+    with open_directory(path.parent) as folder:
+        replace_file(folder, path.name, content, mode=0o600)
 
 
 def _load(path: Path) -> dict[str, Any]:
     """Return what the file holds, nothing where it is not to be believed."""
-    flags = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
     try:
-        with os.fdopen(os.open(path, flags), "rb") as file:
+        with open_regular(path) as file:
             status = os.fstat(file.fileno())
-            is_own = status.st_uid == os.geteuid() and not status.st_mode & 0o022
-            if not (is_own and stat.S_ISREG(status.st_mode)):
+            if status.st_uid != os.geteuid() or status.st_mode & 0o022:
                 return {}
             content = file.read(_LARGEST + 100)
-    except OSError:
+    except (OSError, UnfitFileError):
         return {}
     digest, _, body = content.partition(b"\n")
     if len(body) > _LARGEST or hashlib.sha256(body).hexdigest().encode() != digest:

@@ -3,18 +3,17 @@
 import hashlib
 import os
 import re
-import stat
 from dataclasses import dataclass
 from pathlib import Path
 
 from acquisition.errors import TrialFileError
-from experiments.session.data_files import write_new
+from acquisition.files import open_regular, read_regular
+from experiments.session.data_files import reading, write_new
 
 SUMS = "SHA256SUMS"
 _LINE = re.compile(r"(?P<digest>[0-9a-f]{64})  (?P<path>[^\0\n]{1,1000})")
 _LARGEST = 16_000_000  # bytes of the list
 _MOST = 100_000  # files below a folder
-_NO_LINKS = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,14 +39,8 @@ def digest_of(path: Path) -> str:
     Raises:
         TrialFileError: it cannot be read, or is not a regular file.
     """
-    try:
-        descriptor = os.open(path, _NO_LINKS)
-        with os.fdopen(descriptor, "rb") as file:
-            if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-                raise TrialFileError(path, "is not a regular file")
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError as error:
-        raise TrialFileError(path, f"cannot be read ({error.strerror})") from error
+    with reading(path), open_regular(path) as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def write_sums(folder: Path) -> None:
@@ -96,11 +89,8 @@ def _files(folder: Path) -> set[str]:
 
 
 def _read_sums(path: Path) -> dict[str, str]:
-    digest_of(path)  # a regular file, and no link
-    with path.open("rb") as file:
-        text = file.read(_LARGEST + 1)
-    if len(text) > _LARGEST:
-        raise TrialFileError(path, f"is larger than {_LARGEST / 1e6:.0f} MB")
+    with reading(path):
+        text = read_regular(path, _LARGEST)
     sums: dict[str, str] = {}
     for number, line in enumerate(text.decode(errors="replace").splitlines(), 1):
         match = _LINE.fullmatch(line)

@@ -5,8 +5,7 @@ The folder is a data folder of Traction too: `--data` takes it.
 
 import json
 import os
-from collections.abc import Collection, Generator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import metadata
 from pathlib import Path
@@ -37,7 +36,7 @@ from experiments.report.credits import (
 )
 from experiments.report.export import export_sessions, make_empty
 from experiments.report.sessions import ReportRequest, report_sessions
-from experiments.session.data_files import write_new
+from experiments.session.data_files import reading, write_new
 from experiments.session.photos import PhotoError, kept_photo
 from experiments.session.store import SessionFolder, iso_utc
 
@@ -148,7 +147,7 @@ def _copy_session(session: SessionFolder, to: Path) -> SessionFolder:
         for path in list_folder(source):
             if path.name.endswith(_LEFT) or _PHOTO in path.name or path.is_dir():
                 continue
-            with _reading(path), os.fdopen(open_data(path), "rb") as file:
+            with reading(path), os.fdopen(open_data(path), "rb") as file:
                 content = file.read()
             write_new(target / path.name, content)
     return copy
@@ -186,14 +185,6 @@ def _copy_photos(
                     )
                 )
     return photos
-
-
-@contextmanager
-def _reading(path: Path) -> Generator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise TrialFileError(path, f"cannot be read ({error.strerror})") from error
 
 
 def _credits(

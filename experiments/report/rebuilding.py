@@ -9,7 +9,8 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import cast
 
-from acquisition.errors import SettingsError, TrialFileError
+from acquisition.errors import SettingsError
+from acquisition.files import read_regular
 from analysis.findings.findings import compute_results, findings_rows
 from analysis.findings.rig_health import with_tares
 from analysis.study.fits import to_csv
@@ -17,7 +18,7 @@ from analysis.study.models import REPORTED, FitOptions
 from experiments.operator.console import Console
 from experiments.report.publication import ANALYSIS, TABLE
 from experiments.report.sessions import ReportRequest, study_sessions
-from experiments.session.data_files import read_json
+from experiments.session.data_files import read_json, reading
 from experiments.session.store import list_sessions
 
 TOLERANCE = 1e-9  # relative
@@ -107,11 +108,5 @@ def _rows(text: str) -> Iterator[tuple[tuple[str, ...], float]]:
 
 
 def _text(path: Path) -> str:
-    try:
-        with path.open("rb") as file:
-            content = file.read(_LARGEST + 1)
-    except OSError as error:
-        raise TrialFileError(path, f"cannot be read ({error.strerror})") from error
-    if len(content) > _LARGEST:
-        raise TrialFileError(path, f"is larger than {_LARGEST / 1e6:.0f} MB")
-    return content.decode(errors="replace")
+    with reading(path):
+        return read_regular(path, _LARGEST).decode(errors="replace")

@@ -23,11 +23,11 @@ from urllib.parse import quote
 
 from acquisition.clock import NS_PER_S, SystemClock
 from acquisition.errors import PreflightError
+from acquisition.files import UNFOLLOWED
 from experiments.messages import preflight_error
 
 FOLDERS = (Path("/run/lock"), Path("/var/lock"), Path("/var/tmp"), Path("/tmp"))
 _SHARED = stat.S_ISVTX | stat.S_IWOTH  # everybody may write, nobody removes another's
-_FLAGS = os.O_NOFOLLOW | os.O_CLOEXEC | os.O_NONBLOCK | os.O_NOCTTY
 _MODE = 0o666  # any user may be the next owner
 _LONGEST_NAME = 200
 _LONGEST_COMMAND = 120
@@ -141,13 +141,13 @@ def _open_safely(path: Path) -> int:
 def _open_or_make(path: Path) -> int:
     for _ in range(_TRIES):
         try:
-            return os.open(path, os.O_RDWR | _FLAGS)
+            return os.open(path, os.O_RDWR | UNFOLLOWED)
         except FileNotFoundError:
             pass
         except PermissionError:
-            return os.open(path, os.O_RDONLY | _FLAGS)  # enough for the lock
+            return os.open(path, os.O_RDONLY | UNFOLLOWED)  # enough for the lock
         try:
-            made = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | _FLAGS, _MODE)
+            made = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | UNFOLLOWED, _MODE)
         except FileExistsError:
             continue  # another program was faster
         os.fchmod(made, _MODE)  # whatever the umask is

@@ -12,14 +12,18 @@ from pathlib import Path
 from typing import Any, cast
 
 from acquisition.errors import TrialFileError
+from acquisition.files import (
+    UnfitFileError,
+    create_file,
+    removed_at_error,
+    replace_file,
+)
 from acquisition.trial_file.data_files import (
     check_absent,
     open_data,
     open_folder,
     read_data,
 )
-
-_NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL
 
 
 def read_json(path: Path) -> dict[str, Any]:
@@ -60,12 +64,8 @@ def write_text(path: Path, text: str) -> None:
     Raises:
         TrialFileError: the disk is full or gone.
     """
-    temporary = path.name + ".tmp"
     with writing(path), open_folder(path.parent) as folder:
-        with suppress(FileNotFoundError):
-            os.unlink(temporary, dir_fd=folder)
-        _write_new(folder, temporary, text.encode())
-        os.replace(temporary, path.name, src_dir_fd=folder, dst_dir_fd=folder)
+        replace_file(folder, path.name, text.encode())
         os.fsync(folder)
 
 
@@ -81,8 +81,8 @@ def write_new(path: Path, content: bytes) -> None:
         TrialFileError: it exists, or the disk is full or gone.
     """
     with writing(path), open_folder(path.parent) as folder:
-        _write_new(folder, path.name, content)
-        with _removed_at_error(folder, path.name):
+        create_file(folder, path.name, content)
+        with removed_at_error(folder, path.name):
             os.fsync(folder)
 
 
@@ -139,6 +139,17 @@ def writing(path: Path) -> Generator[None, None, None]:
         ) from error
 
 
+@contextmanager
+def reading(path: Path) -> Generator[None, None, None]:
+    """Turn what a file raises that cannot be read into a TrialFileError."""
+    try:
+        yield
+    except OSError as error:
+        raise TrialFileError(path, f"cannot be read ({error.strerror})") from error
+    except UnfitFileError as error:
+        raise TrialFileError(path, str(error)) from error
+
+
 def sha256_of(path: Path) -> str:
     """Return the hex digest of a file.
 
@@ -146,11 +157,8 @@ def sha256_of(path: Path) -> str:
         TrialFileError: it is not a regular file of the session, too large, or cannot be
             read.
     """
-    try:
-        with os.fdopen(open_data(path), "rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError as error:
-        raise TrialFileError(path, f"cannot be read ({error.strerror})") from error
+    with reading(path), os.fdopen(open_data(path), "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _is_same(target: Path, source: Path) -> bool:
@@ -158,25 +166,6 @@ def _is_same(target: Path, source: Path) -> bool:
         return os.path.samestat(target.lstat(), source.lstat())
     except OSError:
         return False
-
-
-def _write_new(folder: int, name: str, content: bytes) -> None:
-    descriptor = os.open(name, _NEW | os.O_CLOEXEC, 0o644, dir_fd=folder)
-    with _removed_at_error(folder, name), os.fdopen(descriptor, "wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-
-
-@contextmanager
-def _removed_at_error(folder: int, name: str) -> Generator[None, None, None]:
-    """Take the new file `name` away if it does not reach the disk."""
-    try:
-        yield
-    except OSError:
-        with suppress(OSError):
-            os.unlink(name, dir_fd=folder)
-        raise
 
 
 def _finite(text: str) -> float:

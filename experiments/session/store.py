@@ -13,6 +13,7 @@ from typing import Any, BinaryIO
 
 from acquisition.clock import SystemClock
 from acquisition.errors import SessionError, SettingsError, TrialFileError
+from acquisition.files import make_directories, sync_directory
 from acquisition.trial_file.data_files import (
     check_absent,
     check_folders,
@@ -21,7 +22,6 @@ from acquisition.trial_file.data_files import (
     open_data,
     read_data,
 )
-from acquisition.trial_file.publishing import make_directories, sync_directory
 from experiments.session.data_files import (
     journal_line,
     parse_line,
