@@ -68,6 +68,10 @@ class PreflightError(TractionError):
     exit_code = 3
 
 
+class UnfitDeviceError(PreflightError):
+    """A device of the rig, its cable or its power does not let it run."""
+
+
 class LinkError(TractionError):
     """A bus or port cannot be opened, or broke."""
 

@@ -1,7 +1,6 @@
 """The message catalogue: what happened, what the arm does, what to do."""
 
 import os
-import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -16,7 +15,7 @@ from acquisition.control_loop.faults import (
     ReplySilence,
 )
 from acquisition.devices import BusCondition, SafetyMode
-from acquisition.errors import PreflightError
+from acquisition.errors import PreflightError, UnfitDeviceError
 from experiments.operator.keys import AFTER_FAULT
 from experiments.operator.prompts import Prompt
 
@@ -36,6 +35,7 @@ class Message:
         arm: what the arm is doing now; empty where no arm is involved.
         example: of a `what` that a driver words; empty where it stands for itself.
         prompt: the one whose keys `do` names; empty where it names none.
+        blames_hardware: as a refusal it sends people to cables and devices.
     """
 
     what: str
@@ -45,6 +45,7 @@ class Message:
     arm: str = ""
     example: str = ""
     prompt: str = ""
+    blames_hardware: bool = False
 
     def text(self, fields: Mapping[str, object], saved: str = "") -> str:
         """Return the message in one line."""
@@ -76,7 +77,8 @@ CATALOGUE: Mapping[str, Message] = _load()
 def preflight_error(name: str, **fields: object) -> PreflightError:
     """Return the refusal of a rig that is called `name` in the catalogue."""
     message = CATALOGUE[name]
-    return PreflightError(
+    kind = UnfitDeviceError if message.blames_hardware else PreflightError
+    return kind(
         message.what.format_map(fields),
         hint=message.do.format_map(fields),
         arm_state=message.arm,
@@ -156,7 +158,7 @@ class ComputerLoad:
         )
 
 
-# What a computer that comes too late looks like, and what such messages blame.
+# What a computer that comes too late looks like.
 _OF_TIME = {
     Fault.LOOP_LATE,
     Fault.CONSOLE_SILENT,
@@ -165,12 +167,6 @@ _OF_TIME = {
     Fault.CAN_SILENCE,
     Fault.SAFETY_SILENT,
 }
-_HARDWARE = re.compile(r"cable|adapter|power|puck|traction check", re.IGNORECASE)
-
-
-def blames_hardware(error: PreflightError) -> bool:
-    """Return whether a refusal sends people to cables and devices."""
-    return _HARDWARE.search(f"{error.message} {error.hint}") is not None
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,11 +198,13 @@ def fault_text(verdict: GuardVerdict, context: FaultContext, saved: str = "") ->
     silence is the bus's, or that of the pucks that are silent.
     """
     detail, causes = verdict.detail, ""
+    is_of_time = verdict.fault in _OF_TIME
     name, silent = verdict.reason, list[int]()
     if isinstance(detail, CircuitCauses):
         causes = ", ".join(
             f"{cause} fault" for cause in detail.causes if cause != _BUTTON
         )
+        is_of_time = is_of_time or _HEARTBEAT in detail.causes
         if causes and verdict.fault is not None:
             name = _BY_MONITOR[verdict.fault]
     elif isinstance(detail, ReplySilence):
@@ -225,7 +223,6 @@ def fault_text(verdict: GuardVerdict, context: FaultContext, saved: str = "") ->
     }
     values |= {**asdict(detail), "causes": causes}
     message = CATALOGUE[name]
-    is_of_time = verdict.fault in _OF_TIME or _HEARTBEAT in causes
     if context.load is not None and is_of_time:
         values |= {**asdict(context.load), "what": message.what.format_map(values)}
         message = replace(CATALOGUE["too-busy"], arm=message.arm)

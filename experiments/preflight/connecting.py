@@ -1,11 +1,13 @@
 """Connects the rig, and says why an arm cannot be reached."""
 
 from acquisition.errors import (
+    DeviceFaultError,
     LinkError,
     LinkFullError,
     LinkTimeoutError,
     PreflightError,
     TractionError,
+    UnfitDeviceError,
 )
 from experiments.messages import preflight_error
 from experiments.rig.rig import FakeOptions, Rig, build_rig
@@ -52,4 +54,6 @@ def not_reached(error: TractionError, settings: RigSettings) -> PreflightError:
 def as_preflight(error: TractionError, arm_state: str) -> PreflightError:
     """Return `error` as a refusal to begin; `arm_state` where it names none."""
     arm_state = error.arm_state or arm_state
-    return PreflightError(error.message, hint=error.hint, arm_state=arm_state)
+    is_of_device = isinstance(error, LinkError | DeviceFaultError | UnfitDeviceError)
+    kind = UnfitDeviceError if is_of_device else PreflightError
+    return kind(error.message, hint=error.hint, arm_state=arm_state)

@@ -5,7 +5,7 @@ from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
-from acquisition.errors import PreflightError, TractionError
+from acquisition.errors import TractionError, UnfitDeviceError
 from acquisition.trial_file.data_files import is_there
 from experiments.arguments import data_option
 from experiments.board.board_cache import row_of
@@ -13,7 +13,6 @@ from experiments.board.session_summaries import glance_sessions
 from experiments.board.upcoming import next_steps
 from experiments.fault_injection.host_faults import HostFaults
 from experiments.fault_injection.plan import plan_faults
-from experiments.messages import blames_hardware
 from experiments.operator.console import WARNING, Console
 from experiments.operator.prompts import OperatorInput
 from experiments.operator.terminal import keyboard
@@ -131,9 +130,9 @@ def run_session(request: SessionRequest, mode: OpenMode) -> int:
             console.say(request.stance.text)
         try:
             page = _check_rig(request, rig, host_faults)
-        except PreflightError as error:
+        except UnfitDeviceError as error:
             load = busy_load(rig, is_rehearsed=bool(request.faults))
-            if load is None or not blames_hardware(error):
+            if load is None:
                 raise
             raise load.blamed(error) from error
         sensor = sensor_conditions(page.devices)

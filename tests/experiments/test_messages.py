@@ -11,16 +11,17 @@ from acquisition.control_loop.faults import (
     Fault,
     verdict_for,
 )
-from acquisition.errors import PreflightError
+from acquisition.errors import LinkTimeoutError, PreflightError, UnfitDeviceError
 from experiments.messages import (
     CATALOGUE,
     ComputerLoad,
     FaultContext,
     Message,
-    blames_hardware,
     catalogue_table,
     fault_text,
+    preflight_error,
 )
+from experiments.preflight.connecting import as_preflight
 from tests.experiments.program import traction
 
 PAGE = Path(__file__).parents[2] / "docs" / "messages.md"
@@ -135,13 +136,21 @@ def test_what_is_no_matter_of_time_is_not_blamed_on_the_computer():
 
 
 def test_a_refusal_that_blames_cables_says_the_computer_first():
-    error = PreflightError("Puck 5 does not answer.", hint="Check its cable.")
-    assert blames_hardware(error)
+    error = UnfitDeviceError("Puck 5 does not answer.", hint="Check its cable.")
     told = LOAD.blamed(error)
     assert told.message.startswith("This computer is too busy")
     assert "Puck 5 does not answer." in told.message
     assert "cable" not in told.hint
-    assert not blames_hardware(PreflightError("2 GB free.", hint="Make room."))
+
+
+def test_a_refusal_says_by_its_kind_whether_a_device_is_unfit():
+    lost = {"lost": 60, "cycles": 100}
+    assert isinstance(preflight_error("exchange", **lost), UnfitDeviceError)
+    assert not isinstance(preflight_error("loop-dead"), UnfitDeviceError)
+    silent = LinkTimeoutError("Node 8 does not answer.", hint="Check its cable.")
+    assert isinstance(as_preflight(silent, "idle"), UnfitDeviceError)
+    full = PreflightError("2 GB free.", hint="Make room.")
+    assert not isinstance(as_preflight(full, "idle"), UnfitDeviceError)
 
 
 def test_a_computer_is_too_busy_where_programs_wait_for_a_core():

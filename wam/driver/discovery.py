@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 
 from acquisition.clock import Clock
 from acquisition.devices import BusCondition, SafetyMode
-from acquisition.errors import DeviceFaultError, LinkFullError, PreflightError
+from acquisition.errors import DeviceFaultError, LinkFullError, UnfitDeviceError
 from wam.bus.frames import MOTOR_NODES, SAFETY_NODE
 from wam.bus.properties import PuckStatus
 from wam.bus.property_client import PropertyClient
@@ -29,7 +29,8 @@ def discover_pucks(
     at most.
 
     Raises:
-        PreflightError: a puck or the safety module is silent, or the arm is in E-stop.
+        UnfitDeviceError: a puck or the safety module is silent, or the arm is in
+            E-stop.
         DeviceFaultError: a puck says that it does not work.
         LinkError: the bus is down.
     """
@@ -83,29 +84,29 @@ def _check_bus(condition: BusCondition) -> None:
     """Say why nobody answers where the bus's controller knows it.
 
     Raises:
-        PreflightError: it has left the bus, or is alone on it.
+        UnfitDeviceError: it has left the bus, or is alone on it.
     """
     if condition is BusCondition.OFF:
-        raise PreflightError(
+        raise UnfitDeviceError(
             "The CAN controller has left the bus after too many errors (bus-off).",
             hint="Check cable and bit rate. Set up with restart-ms it comes back by "
             "itself, otherwise: ip link set can0 down, then up.",
         )
     if condition is BusCondition.UNHEARD:
-        raise PreflightError(
+        raise UnfitDeviceError(
             "No device on the CAN bus acknowledges.",
             hint="Is the arm powered, is the bus terminated, is the cable in?",
         )
 
 
 def _check_present(stats: dict[int, int], mode: SafetyMode) -> None:
-    """Raise PreflightError or DeviceFaultError unless seven healthy pucks answer."""
+    """Raise UnfitDeviceError or DeviceFaultError unless seven healthy pucks answer."""
     present = [node for node in MOTOR_NODES if node in stats]
     missing = [node for node in MOTOR_NODES if node not in stats]
     if SAFETY_NODE not in stats:
         raise _without_safety(stats, missing)
     if missing and mode is SafetyMode.E_STOP:
-        raise PreflightError(
+        raise UnfitDeviceError(
             "The arm is in E-stop: its pucks have no power.",
             hint="Release the stop, press Shift-idle, then start again.",
         )
@@ -117,7 +118,9 @@ def _check_present(stats: dict[int, int], mode: SafetyMode) -> None:
                 "Is this a four-joint WAM? Traction needs the wrist. Otherwise check "
                 "the cable behind puck 4."
             )
-        raise PreflightError(f"{pucks_verb(missing)} not answer ({others}).", hint=hint)
+        raise UnfitDeviceError(
+            f"{pucks_verb(missing)} not answer ({others}).", hint=hint
+        )
     ill = [n for n in present if stats[n] not in (PuckStatus.RESET, PuckStatus.READY)]
     if ill:
         raise DeviceFaultError(
@@ -126,14 +129,14 @@ def _check_present(stats: dict[int, int], mode: SafetyMode) -> None:
         )
 
 
-def _without_safety(stats: dict[int, int], missing: list[int]) -> PreflightError:
+def _without_safety(stats: dict[int, int], missing: list[int]) -> UnfitDeviceError:
     """Return the error that names everything that is silent at once."""
     others = ",".join(map(str, stats)) or "nobody"
     who = "The safety module does"
     if missing and stats:
         names = ",".join(map(str, missing))
         who = f"The safety module and puck{'s' * (len(missing) > 1)} {names} do"
-    return PreflightError(
+    return UnfitDeviceError(
         f"{who} not answer ({others} on the bus).",
         hint="Check the arm's power, the CAN cable and its terminators.",
     )

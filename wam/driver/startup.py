@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from acquisition.clock import Clock
 from acquisition.devices import SafetyMode
-from acquisition.errors import DeviceFaultError, PreflightError, SettingsError
+from acquisition.errors import DeviceFaultError, SettingsError, UnfitDeviceError
 from wam.bus.frames import MOTOR_NODES, SAFETY_NODE, Group
 from wam.bus.properties import (
     FIRST_RELEASED,
@@ -113,7 +113,7 @@ class StartUp:
         """Return what is there, awake and idle.
 
         Raises:
-            PreflightError: a puck or the safety module is missing, in E-stop, asleep
+            UnfitDeviceError: a puck or the safety module is missing, in E-stop, asleep
                 for good, or of another kind.
             DeviceFaultError: a device reports an error or nonsense.
             LinkTimeoutError: a device stopped answering on the way.
@@ -161,7 +161,7 @@ class StartUp:
         stats = {node: self._properties.get(node, _STAT) for node in asleep}
         dozing = [n for n in MOTOR_NODES if n in stats and stats[n] != PuckStatus.READY]
         if dozing:
-            raise PreflightError(
+            raise UnfitDeviceError(
                 f"{pucks_verb(dozing)} not wake up within {self._boot_ns / 1e9:.1f} s.",
                 hint="Switch the arm off and on, then start again.",
             )
@@ -171,7 +171,7 @@ class StartUp:
         vers = self._properties.require(node, _VERS, "VERS")
         role = self._properties.require(node, _ROLE, "ROLE")
         if device_of(role) is not Device.MOTOR:
-            raise PreflightError(
+            raise UnfitDeviceError(
                 f"Node {node} is not a motor puck (ROLE {role:#06x}).",
                 hint="Is this a seven-joint WAM?",
             )
@@ -230,7 +230,7 @@ class StartUp:
         poles = self._get(puck.node, "POLES", puck.vers)
         if poles != POLES_OF_WRIST:
             kind = "gimbals" if poles == POLES_OF_GIMBALS else "something unknown"
-            raise PreflightError(
+            raise UnfitDeviceError(
                 f"Puck 7 has {poles} poles: {kind}, a wrist has {POLES_OF_WRIST}.",
                 hint="Traction drives the seven-joint WAM with wrist only.",
             )
