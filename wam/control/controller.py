@@ -1,5 +1,7 @@
 """The control law: gravity, virtual mass, joint-7 lock, position hold, moves."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from acquisition.control_loop.law import ControlLaw, SoleGoal
@@ -21,8 +23,44 @@ from wam.model.arm_model import ArmModel
 from wam.model.gravity import VirtualMass, compensation
 
 TORQUE_SHARE = 0.9  # of the torque limits that a move or a hold may use, with gravity
-_STANDING = frozenset({ArmState.HOLD, ArmState.DAMP, ArmState.GUIDE})
-_POWERED = frozenset({ArmState.FLOAT, *_STANDING})
+_HELD = frozenset({ArmState.HOLD, ArmState.DAMP, ArmState.GUIDE})  # by springs
+_POWERED = frozenset({ArmState.FLOAT, *_HELD})
+
+
+@dataclass(slots=True, eq=False)
+class Moving:
+    """The mode of an arm in hold that moves by itself, or keeps the goal of a move.
+
+    Attributes:
+        path: of the joints.
+        begun_ns: when the move began [ns].
+        stuck_motor: the motor that it turns in vain, 1-7; 0 = none.
+    """
+
+    path: JointMove
+    begun_ns: int
+    stuck_motor: int = 0
+
+    def reference(self, now_ns: int) -> tuple[Vector, Vector]:
+        """Return (positions [rad], velocities [rad/s]) wanted now, shapes (7,)."""
+        return move_reference(self.path, (now_ns - self.begun_ns) * 1e-9)
+
+
+@dataclass(slots=True, eq=False)
+class Standing:
+    """The mode of an arm in hold whose foot stands by itself.
+
+    Attributes:
+        impedance: of the sole.
+        tau: what it asked for last, beyond gravity [N m], shape (7,).
+    """
+
+    impedance: SoleImpedance
+    tau: Vector
+
+
+# In hold an arm may move or stand by itself; every other mode is its bare state.
+Mode = ArmState | Moving | Standing
 
 
 class FootController(ControlLaw):
@@ -58,13 +96,9 @@ class FootController(ControlLaw):
         self._walls = walls
         limits = np.array(walls.limits) if walls else np.full(7, np.inf)
         self._largest = TORQUE_SHARE * limits
-        self._state = ArmState.IDLE
-        self._move: JointMove | None = None
-        self._move_ns = 0
+        self._mode: Mode = ArmState.IDLE
         self._watch = MotorWatch(model.constants)
-        self._stuck_motor = 0
         self.impedance: SoleImpedance | None = None
-        self._pushed: Vector | None = None  # of the impedance, while the foot stands
 
     def enter(self, state: ArmState, reading: ArmReading) -> None:
         """Begin `state`; torques change continuously except for the damping.
@@ -72,18 +106,15 @@ class FootController(ControlLaw):
         A move ends. An arm that stands still already goes on to, where it is.
         """
         now = reading.host_ns
-        if state not in _STANDING:
+        if state not in _HELD:
             self._hold.release()
-        elif state is self._state and not self.is_moving():
+        elif state is self._mode:
             return
         else:
-            begun = self._move_spring(reading) if self._pushed is None else self._pushed
-            self._hold.begin(reading.q, begun)
+            self._hold.begin(reading.q, self._own_torque(reading))
         if self._friction is not None and state is not ArmState.FLOAT:
             self._friction.rest(now)
-        self._move = self._pushed = None
-        self._stuck_motor = 0
-        self._state = state
+        self._mode = state
         self._mass.aim(self._target_mass if state is ArmState.FLOAT else 0.0, now)
         if state in _POWERED:
             self._lock.engage(float(reading.q[LOCKED_JOINT]), now)
@@ -100,8 +131,8 @@ class FootController(ControlLaw):
             ValueError: the arm does not hold, `goal` is beyond a stop or not finite, or
                 `speed` is not within 0..0.5 rad/s.
         """
-        constants = self._model.constants
-        if self._state is not ArmState.HOLD:
+        constants, mode = self._model.constants, self._mode
+        if isinstance(mode, ArmState) and mode is not ArmState.HOLD:
             raise ValueError("the arm moves in hold only")
         is_inside = goal.shape == (7,) and bool(
             ((goal >= constants.q_lower) & (goal <= constants.q_upper)).all()
@@ -112,17 +143,16 @@ class FootController(ControlLaw):
             raise ValueError(f"{speed} rad/s is not within 0..{TOP_SPEED}")
         now = reading.host_ns
         # From where the arm is held, or the torque would jump.
-        if self._move is not None:
-            start = move_reference(self._move, (now - self._move_ns) * 1e-9)[0]
+        if isinstance(mode, Moving):
+            start, _ = mode.reference(now)
         else:
             start = reading.q + self._hold.spring(reading) / constants.kp
         self._hold.release()
         self._lock.release(now)
-        self._pushed = None
-        self._move = JointMove(start, goal.copy(), speed)
-        self._move_ns = now
+        path = JointMove(start, goal.copy(), speed)
+        self._mode = Moving(path, now)
         self._watch.begin()
-        return self._move.duration
+        return path.duration
 
     def stand(self, goal: SoleGoal, reading: ArmReading) -> None:
         """Let the sole do what `goal` says; joint 7 stays locked. Only in hold.
@@ -133,14 +163,15 @@ class FootController(ControlLaw):
         """
         if self.impedance is None:
             raise ValueError("this arm does not stand by itself")
-        if self._state is not ArmState.HOLD or self._move is not None:
+        if isinstance(self._mode, Standing):
+            self.impedance.aim(goal, reading)
+            return
+        if self._mode is not ArmState.HOLD:
             raise ValueError("a foot stands by itself in hold only")
-        if self._pushed is None:
-            self.impedance.begin(reading)
+        self.impedance.begin(reading)
         self.impedance.aim(goal, reading)
-        if self._pushed is None:
-            self._hold.release()
-            self._pushed = np.zeros(7)
+        self._hold.release()
+        self._mode = Standing(self.impedance, np.zeros(7))
 
     def torque(self, reading: ArmReading) -> tuple[Vector, Vector]:
         """Return (tau, gravity part) [N m], shapes (7,).
@@ -149,27 +180,22 @@ class FootController(ControlLaw):
         joint: the weight alone is borne until positions are believed again.
         """
         now = reading.host_ns
-        q7 = float(reading.q[LOCKED_JOINT])
         gravity = compensation(self._model, reading.q, self._mass.at(now))
         if reading.jump is not None:
             return gravity.copy(), gravity
-        if self._state in _STANDING and self._pushed is None:
-            self._lock.follow(q7, now)
-        lock = self._lock.torque(q7, reading.qd7_raw, now)
-        if self._move is not None:
-            tau = gravity + self._move_torque(self._move, reading)
-            tau[LOCKED_JOINT] += lock  # fades from the moment of its release
-            # A move never asks for what the guard would stop it for.
-            tau = np.clip(tau, -self._largest, self._largest)
-            wanted, _ = move_reference(self._move, (now - self._move_ns) * 1e-9)
-            self._stuck_motor = self._watch.stuck_motor(wanted, tau - gravity, reading)
-        elif self._pushed is not None and self.impedance is not None:
-            self._pushed = self.impedance.torque(reading)
-            tau = np.clip(gravity + self._pushed, -self._largest, self._largest)
-            tau[LOCKED_JOINT] = gravity[LOCKED_JOINT] + lock
-        else:
-            tau = self._standing_torque(reading, gravity)
-            tau[LOCKED_JOINT] = gravity[LOCKED_JOINT] + lock
+        lock = self._lock_torque(reading)
+        match self._mode:
+            case Moving() as move:
+                tau = self._move_torque(move, reading, gravity, lock)
+            case Standing() as stance:
+                tau = self._stance_torque(stance, reading, gravity, lock)
+            case ArmState.FLOAT:
+                tau = gravity.copy()
+                tau[LOCKED_JOINT] += lock
+            case ArmState.GUIDE:
+                tau = self._hold_torque(reading, gravity, lock, is_guided=True)
+            case _:  # hold and damp; in idle the cycle asks for nothing
+                tau = self._hold_torque(reading, gravity, lock)
         if self._friction is not None:
             self._compensate(self._friction, tau, reading)
         if self._walls is not None:
@@ -178,15 +204,68 @@ class FootController(ControlLaw):
 
     def is_moving(self) -> bool:
         """Return whether a move or stance is made, or the goal of one is kept."""
-        return self._move is not None or self._pushed is not None
+        return not isinstance(self._mode, ArmState)
 
     def stuck_motor(self) -> int:
         """Return the motor that the move turns in vain, 1-7; 0 = none."""
-        return self._stuck_motor
+        return self._mode.stuck_motor if isinstance(self._mode, Moving) else 0
 
     def joint7_offset(self, reading: ArmReading) -> float:
         """Return how far joint 7 is from where it was locked [rad]."""
         return self._lock.offset(float(reading.q[LOCKED_JOINT]), reading.host_ns)
+
+    def _lock_torque(self, reading: ArmReading) -> float:
+        """Return the torque of joint 7's lock [N m]; 0 once it has faded."""
+        q7 = float(reading.q[LOCKED_JOINT])
+        if isinstance(self._mode, Moving) or self._mode in _HELD:
+            self._lock.follow(q7, reading.host_ns)
+        return self._lock.torque(q7, reading.qd7_raw, reading.host_ns)
+
+    def _move_torque(
+        self, move: Moving, reading: ArmReading, gravity: Vector, lock: float
+    ) -> Vector:
+        """Return `gravity` and the PD along a move [N m], shape (7,).
+
+        A move never asks for what the guard would stop it for.
+        """
+        constants = self._model.constants
+        q, qd = move.reference(reading.host_ns)
+        tau = gravity + joint_pd(
+            constants.kp, constants.kd, q - reading.q, qd - reading.qd
+        )
+        tau[LOCKED_JOINT] += lock  # fades from the moment of its release
+        tau = np.clip(tau, -self._largest, self._largest)
+        move.stuck_motor = self._watch.stuck_motor(q, tau - gravity, reading)
+        return tau
+
+    def _stance_torque(
+        self, stance: Standing, reading: ArmReading, gravity: Vector, lock: float
+    ) -> Vector:
+        """Return `gravity` and what the sole's impedance asks for [N m], (7,)."""
+        stance.tau = stance.impedance.torque(reading)
+        tau = np.clip(gravity + stance.tau, -self._largest, self._largest)
+        tau[LOCKED_JOINT] = gravity[LOCKED_JOINT] + lock
+        return tau
+
+    def _hold_torque(
+        self,
+        reading: ArmReading,
+        gravity: Vector,
+        lock: float,
+        *,
+        is_guided: bool = False,
+    ) -> Vector:
+        """Return `gravity`, springs and dampers [N m], shape (7,).
+
+        What is added never makes a torque larger than its share of the limit: a fast
+        arm that is to hold would be stopped for its torques instead.
+        """
+        tau = self._hold.torque(reading, is_guided=is_guided)
+        # Plain numbers: seven of them are bounded faster than numpy looks at an array.
+        rows = zip(tau.tolist(), gravity.tolist(), self._largest.tolist(), strict=True)
+        tau = gravity + np.array([_within(*row) for row in rows])
+        tau[LOCKED_JOINT] = gravity[LOCKED_JOINT] + lock
+        return tau
 
     def _compensate(
         self, friction: FrictionCompensation, tau: Vector, reading: ArmReading
@@ -195,41 +274,27 @@ class FootController(ControlLaw):
 
         Joint 7 is left to its lock.
         """
-        if self._state is ArmState.FLOAT:
+        if self._mode is ArmState.FLOAT:
             depth = None if self._walls is None else self._walls.depth(reading.q)
             tau[:LOCKED_JOINT] += friction.torque(reading, tau, depth)[:LOCKED_JOINT]
         elif (rest := friction.resting(reading.host_ns)) is not None:
             tau[:LOCKED_JOINT] += rest[:LOCKED_JOINT]
             np.clip(tau, -self._largest, self._largest, out=tau)
 
-    def _standing_torque(self, reading: ArmReading, gravity: Vector) -> Vector:
-        """Return `gravity` and what is added in a state without a move [N m], (7,).
+    def _own_torque(self, reading: ArmReading) -> Vector | None:
+        """Return what a move's spring or a stance gives beyond gravity [N m], (7,).
 
-        What is added never makes a torque larger than its share of the limit: a fast
-        arm that is to hold would be stopped for its torques instead.
+        The springs of hold begin with it. None where the arm does nothing by itself.
         """
-        if self._state is ArmState.FLOAT:
-            return gravity.copy()
-        is_guided = self._state is ArmState.GUIDE
-        tau = self._hold.torque(reading, is_guided=is_guided)
-        # Plain numbers: seven of them are bounded faster than numpy looks at an array.
-        rows = zip(tau.tolist(), gravity.tolist(), self._largest.tolist(), strict=True)
-        return gravity + np.array([_within(*row) for row in rows])
-
-    def _move_torque(self, move: JointMove, reading: ArmReading) -> Vector:
-        """Return what the PD of `move` adds to gravity [N m], shape (7,)."""
-        q, qd = move_reference(move, (reading.host_ns - self._move_ns) * 1e-9)
-        constants = self._model.constants
-        rate = qd - reading.qd
-        return joint_pd(constants.kp, constants.kd, q - reading.q, rate)
-
-    def _move_spring(self, reading: ArmReading) -> Vector | None:
-        """Return the spring's part of a move's torque [N m]; None without a move."""
-        if self._move is None:
-            return None
-        q, _ = move_reference(self._move, (reading.host_ns - self._move_ns) * 1e-9)
-        constants = self._model.constants
-        return joint_pd(constants.kp, constants.kd, q - reading.q, np.zeros(7))
+        match self._mode:
+            case Moving() as move:
+                q, _ = move.reference(reading.host_ns)
+                constants = self._model.constants
+                return joint_pd(constants.kp, constants.kd, q - reading.q, np.zeros(7))
+            case Standing() as stance:
+                return stance.tau
+            case _:
+                return None
 
 
 def _within(tau: float, gravity: float, most: float) -> float:
