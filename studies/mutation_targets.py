@@ -143,7 +143,8 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     ): _AT_REST,
     (
         f"{_CONTROL}/controller.py",
-        "self._pushed = np.zeros(7) -> self._pushed = np.zeros(8)",
+        "self._mode = Standing(self.impedance, np.zeros(7)) -> "
+        "self._mode = Standing(self.impedance, np.zeros(8))",
     ): _UNREAD,
     (
         f"{_DRIVER}/home.py",
@@ -424,18 +425,15 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     ): "the sides are the same on both sides",
 }
 # What is no number makes any sum of it none, whatever the signs.
-_VERDICTS = (
-    "verdicts = (_check_safety(limits, seen), _check_silence(limits, seen), "
-    "_check_master(seen.reading.foreign_id), _check_move(seen.stuck_motor), "
-    "_check_numbers({}, seen), "
-    "_check_position(limits, state, q), _check_speed(limits, seen, qd), "
-    "_check_torque(limits, tau), _check_rests(limits, state, seen.sole), "
-    "_check_trial(limits, seen), load, "
-    "_check_cadence(limits, state, now))"
-)
-for _sum in ("sum(q) - sum(qd) + sum(tau)", "sum(q) + sum(qd) - sum(tau)"):
-    _text = _VERDICTS.format("sum(q) + sum(qd) + sum(tau)")
-    EQUIVALENT[f"{_LOOP}/guard.py", f"{_text} -> {_VERDICTS.format(_sum)}"] = (
+_TOTAL = "total = sum(facts.q) + sum(facts.qd) + sum(facts.tau)"
+_FINITE = "if isfinite(total + seen.foot_speed + seen.joint7_offset):"
+for _text, _other in (
+    (_TOTAL, _TOTAL.replace("+ sum(facts.qd)", "- sum(facts.qd)")),
+    (_TOTAL, _TOTAL.replace("+ sum(facts.tau)", "- sum(facts.tau)")),
+    (_FINITE, _FINITE.replace("total +", "total -")),
+    (_FINITE, _FINITE.replace("+ seen.joint7", "- seen.joint7")),
+):
+    EQUIVALENT[f"{_LOOP}/guard.py", f"{_text} -> {_other}"] = (
         "of no number every sum and difference is none"
     )
 _BOUNDED = (

@@ -116,7 +116,9 @@ class Cycle:
         are there when the pendant activates the arm, or it would fall for a moment.
         """
         self._requested = REQUESTS[state]
-        self._move = self._stance = self.status.verdict = None
+        self._move = None
+        self._stance = None
+        self.status.verdict = None
 
     def move_to(self, goal: Sequence[float], speed: float) -> None:
         """Ask for a move to joint positions `goal` [rad], seven; only in hold.
@@ -190,9 +192,11 @@ class Cycle:
         self._handle(event, reading)
 
     def _begin_move(self, reading: ArmReading) -> None:
+        """Begin the move or stance that was asked for, or drop it if a fault stands."""
         if reading.missing_cycles:
             return
-        move, stance, self._move, self._stance = self._move, self._stance, None, None
+        move, self._move = self._move, None
+        stance, self._stance = self._stance, None
         if self.status.verdict is not None:
             return
         try:

@@ -1,8 +1,8 @@
 """The guard: limits and the state of the arm in, a verdict out. Pure."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import dist
+from math import dist, isfinite
 from typing import NamedTuple
 
 import numpy as np
@@ -29,6 +29,7 @@ from acquisition.devices import ArmReading, SafetyMode, Vector
 
 _BRAKED = frozenset({SafetyMode.E_STOP, SafetyMode.IDLE})
 _NO_LOAD = ContactState()
+_ALL_JOINTS = 0x7F  # one bit each, bit i of joint or motor i+1
 _TREMBLE = 1  # counts by which an encoder at rest flickers
 
 Point = tuple[float, float, float]
@@ -98,6 +99,29 @@ class Observation(NamedTuple):
     is_moving: bool = False
 
 
+class Facts(NamedTuple):
+    """All that a check may look at; a tuple, because it is made in each cycle.
+
+    Attributes:
+        limits: where the guard steps in.
+        state: what is remembered, this cycle included.
+        seen: the observation of this cycle.
+        load: the verdict on the load on the foot.
+        q: joint positions [rad], seven plain numbers, which are compared faster than
+            numpy looks at an array.
+        qd: joint velocities [rad/s], seven.
+        tau: joint torques about to be sent [N m], seven.
+    """
+
+    limits: GuardLimits
+    state: GuardState
+    seen: Observation
+    load: GuardVerdict
+    q: list[float]
+    qd: list[float]
+    tau: list[float]
+
+
 def check(
     limits: GuardLimits, state: GuardState, seen: Observation
 ) -> tuple[GuardState, GuardVerdict]:
@@ -105,66 +129,61 @@ def check(
 
     Torques that are commanded are judged unless the brakes are confirmed since before:
     a safety circuit of unknown state may drive the arm. E-stop is always reported.
-
-    Among equally severe ones: what takes the arm away (safety circuit, silence), then
-    motion, then what only ends the trial (sensor, cadence).
+    Among equally severe verdicts the first of `CHECKS` counts.
     """
-    now = seen.reading.host_ns
-    state = _remember(limits, state, seen, now)
+    state = _remember(limits, state, seen)
     is_stopped = seen.is_commanded and seen.safety is SafetyMode.E_STOP
     if not (state.may_drive or is_stopped):
         return state, OK
     contact, load = check_contact(
         limits,
         state.contact,
-        now,
+        seen.reading.host_ns,
         seen.contact,
         is_recording=seen.is_recording,
         is_moving=seen.is_moving,
     )
     if contact is not state.contact:
         state = replace(state, contact=contact)
-    # Plain numbers: seven of them are compared faster than numpy looks at an array.
     q, qd, tau = seen.reading.q.tolist(), seen.reading.qd.tolist(), seen.tau.tolist()
-    verdicts = (
-        _check_safety(limits, seen),
-        _check_silence(limits, seen),
-        _check_master(seen.reading.foreign_id),
-        _check_move(seen.stuck_motor),
-        _check_numbers(sum(q) + sum(qd) + sum(tau), seen),
-        _check_position(limits, state, q),
-        _check_speed(limits, seen, qd),
-        _check_torque(limits, tau),
-        _check_rests(limits, state, seen.sole),
-        _check_trial(limits, seen),
-        load,
-        _check_cadence(limits, state, now),
-    )
-    if verdicts.count(OK) == len(verdicts):
-        return state, OK
-    return state, max((OK, *verdicts), key=lambda verdict: verdict.severity)
+    facts = Facts(limits, state, seen, load, q, qd, tau)
+    worst = OK
+    for check_one in CHECKS:
+        verdict = check_one(facts)
+        if verdict is not OK and verdict.severity > worst.severity:
+            worst = verdict
+    return state, worst
 
 
-def _remember(
-    limits: GuardLimits, state: GuardState, seen: Observation, now: int
-) -> GuardState:
-    armed = state.armed
-    if armed != 0x7F and seen.reading.is_complete:
-        q = seen.reading.q
-        inside = (q > np.array(limits.q_lower) + limits.armed_inside) & (
-            q < np.array(limits.q_upper) - limits.armed_inside
-        )
-        armed |= int(np.packbits(inside, bitorder="little")[0])
-    late = state.late
-    if seen.is_late or (late and late[0] < now - NS_PER_S):
-        kept = tuple(t for t in late if t >= now - NS_PER_S)
-        late = (*kept, now) if seen.is_late else kept
+def _remember(limits: GuardLimits, state: GuardState, seen: Observation) -> GuardState:
+    """Return the next state but for the load; the same object if nothing changed."""
+    armed = _armed(limits, state.armed, seen.reading)
+    late = _late_cycles(state.late, seen)
     may_drive = seen.is_commanded and (state.may_drive or seen.safety not in _BRAKED)
     rests = _rests(state.rests, seen) if seen.is_recording else ()
     is_same = armed == state.armed and late is state.late and rests is state.rests
     if is_same and may_drive is state.may_drive:
         return state
     return GuardState(armed, late, may_drive, state.contact, rests)
+
+
+def _armed(limits: GuardLimits, armed: int, reading: ArmReading) -> int:
+    """Return the joints whose position limit counts, as bits; none is taken back."""
+    if armed == _ALL_JOINTS or not reading.is_complete:
+        return armed
+    is_inside = (reading.q > np.array(limits.q_lower) + limits.armed_inside) & (
+        reading.q < np.array(limits.q_upper) - limits.armed_inside
+    )
+    return armed | int(np.packbits(is_inside, bitorder="little")[0])
+
+
+def _late_cycles(late: tuple[int, ...], seen: Observation) -> tuple[int, ...]:
+    """Return the times of the late cycles of the last second [ns]."""
+    now = seen.reading.host_ns
+    since = now - NS_PER_S
+    if late and late[0] < since:
+        late = tuple(t for t in late if t >= since)
+    return (*late, now) if seen.is_late else late
 
 
 def _rests(rests: tuple[MotorRest, ...], seen: Observation) -> tuple[MotorRest, ...]:
@@ -186,10 +205,12 @@ def _rests(rests: tuple[MotorRest, ...], seen: Observation) -> tuple[MotorRest, 
     return tuple(newer)
 
 
-def _check_safety(limits: GuardLimits, seen: Observation) -> GuardVerdict:
+def _check_safety(facts: Facts) -> GuardVerdict:
+    """Brake with the safety circuit; a silent one is given time to answer first."""
+    seen = facts.seen
     if seen.safety is SafetyMode.UNKNOWN:
         age_ms = seen.safety_age_ns / NS_PER_MS
-        is_lasting = age_ms >= limits.idle_after_safety_ms
+        is_lasting = age_ms >= facts.limits.idle_after_safety_ms
         detail = SafetySilence(age_ms)
         return verdict_for(Fault.SAFETY_SILENT, detail, is_lasting=is_lasting)
     if seen.safety not in _BRAKED:
@@ -198,103 +219,144 @@ def _check_safety(limits: GuardLimits, seen: Observation) -> GuardVerdict:
     return verdict_for(fault, CircuitCauses())
 
 
-def _check_silence(limits: GuardLimits, seen: Observation) -> GuardVerdict:
-    missing = seen.reading.missing_cycles
+def _check_silence(facts: Facts) -> GuardVerdict:
+    """Hold, then brake, an arm whose positions are missing or cannot be true."""
+    limits, reading = facts.limits, facts.seen.reading
+    missing = reading.missing_cycles
     if missing < limits.hold_after_missing:
         return OK
     is_lasting = missing >= limits.idle_after_missing
-    jump = seen.reading.jump
-    if jump is not None:
-        return verdict_for(Fault.POSITION_JUMP, jump, is_lasting=is_lasting)
-    silent = ~seen.reading.fresh & 0x7F  # bit i set = motor i+1 did not answer
+    if reading.jump is not None:
+        return verdict_for(Fault.POSITION_JUMP, reading.jump, is_lasting=is_lasting)
+    silent = ~reading.fresh & _ALL_JOINTS  # bit i set = motor i+1 did not answer
     detail = ReplySilence(missing * PERIOD_NS / NS_PER_MS, silent)
     return verdict_for(Fault.CAN_SILENCE, detail, is_lasting=is_lasting)
 
 
-def _check_master(foreign_id: int | None) -> GuardVerdict:
+def _check_master(facts: Facts) -> GuardVerdict:
     """Give up an arm that takes torques of another program as well."""
+    foreign_id = facts.seen.reading.foreign_id
     if foreign_id is None:
         return OK
     return verdict_for(Fault.BUS_SHARED, ForeignFrame(foreign_id))
 
 
-def _check_move(stuck_motor: int) -> GuardVerdict:
+def _check_move(facts: Facts) -> GuardVerdict:
     """Brake a move that turns a motor in vain: it would be pulled on for ever."""
-    if not stuck_motor:
+    motor = facts.seen.stuck_motor
+    if not motor:
         return OK
-    return verdict_for(Fault.MOTOR_STUCK, StuckMotor(stuck_motor))
+    return verdict_for(Fault.MOTOR_STUCK, StuckMotor(motor))
 
 
-def _check_rests(limits: GuardLimits, state: GuardState, sole: Point) -> GuardVerdict:
-    """End a trial in which the sole goes on and a motor does not."""
-    for i, rest in enumerate(state.rests):
-        way, most = dist(rest.sole, sole), limits.still_ways[i]
-        if way > most:
-            detail = StillMotor(i + 1, 1e3 * way, 1e3 * most)
-            return verdict_for(Fault.MOTOR_STILL, detail)
+def _check_numbers(facts: Facts) -> GuardVerdict:
+    """Refuse what is no number: no limit is exceeded by NaN, as no comparison holds."""
+    seen = facts.seen
+    # One sum shows them all: infinities of both signs leave NaN.
+    total = sum(facts.q) + sum(facts.qd) + sum(facts.tau)
+    if isfinite(total + seen.foot_speed + seen.joint7_offset):
+        return OK
+    return verdict_for(Fault.NOT_A_NUMBER)
+
+
+def _check_position(facts: Facts) -> GuardVerdict:
+    """Damp an arm of which a joint left its range after it had been well within."""
+    lower, upper = facts.limits.q_lower, facts.limits.q_upper
+    if are_between(lower, facts.q, upper):
+        return OK
+    rows = zip(facts.q, lower, upper, strict=True)
+    for i, (value, low, high) in enumerate(rows):
+        is_armed = facts.state.armed >> i & 1
+        if is_armed and not low <= value <= high:
+            limit = low if value < low else high
+            return verdict_for(Fault.JOINT_LIMIT, JointExcess(i + 1, value, limit))
     return OK
 
 
-def _check_numbers(total: float, seen: Observation) -> GuardVerdict:
-    """Refuse what is no number; infinities that cancel in `total` leave NaN."""
-    total += seen.foot_speed + seen.joint7_offset
-    if total - total != 0.0:  # NaN or infinite
-        return verdict_for(Fault.NOT_A_NUMBER)
-    return OK
-
-
-def _check_position(
-    limits: GuardLimits, state: GuardState, q: list[float]
-) -> GuardVerdict:
-    lower, upper = limits.q_lower, limits.q_upper
-    if not are_between(lower, q, upper):
-        for i, (value, low, high) in enumerate(zip(q, lower, upper, strict=True)):
-            if not low <= value <= high and state.armed >> i & 1:
-                limit = low if value < low else high
-                return verdict_for(Fault.JOINT_LIMIT, JointExcess(i + 1, value, limit))
-    return OK
-
-
-def _check_speed(
-    limits: GuardLimits, seen: Observation, qd: list[float]
-) -> GuardVerdict:
-    excess = _first_excess(qd, limits.speed)
+def _check_speed(facts: Facts) -> GuardVerdict:
+    """Damp an arm of which a joint or the sole is too fast."""
+    limits, foot_speed = facts.limits, facts.seen.foot_speed
+    excess = _first_excess(facts.qd, limits.speed)
     if excess is not None:
         return verdict_for(Fault.OVERSPEED, excess)
-    if seen.foot_speed > limits.foot_speed:
-        detail = FootSpeedExcess(seen.foot_speed, limits.foot_speed)
+    if foot_speed > limits.foot_speed:
+        detail = FootSpeedExcess(foot_speed, limits.foot_speed)
         return verdict_for(Fault.FOOT_SPEED, detail)
     return OK
 
 
-def _check_torque(limits: GuardLimits, tau: list[float]) -> GuardVerdict:
-    excess = _first_excess(tau, limits.torque)
+def _check_torque(facts: Facts) -> GuardVerdict:
+    """Damp an arm whose law asks for too much, before it is sent."""
+    excess = _first_excess(facts.tau, facts.limits.torque)
     return OK if excess is None else verdict_for(Fault.TORQUE_LIMIT, excess)
 
 
 def _first_excess(values: list[float], limits: Sequence[float]) -> JointExcess | None:
     """Return the first joint beyond its limit; None if all are within."""
-    if not are_within(values, limits):
-        for i, (value, limit) in enumerate(zip(values, limits, strict=True)):
-            if not -limit <= value <= limit:
-                return JointExcess(i + 1, abs(value), limit)
+    if are_within(values, limits):
+        return None
+    for i, (value, limit) in enumerate(zip(values, limits, strict=True)):
+        if not -limit <= value <= limit:
+            return JointExcess(i + 1, abs(value), limit)
     return None
 
 
-def _check_trial(limits: GuardLimits, seen: Observation) -> GuardVerdict:
-    if not seen.is_recording:
-        return OK
-    mrad = abs(seen.joint7_offset) * 1e3
-    if mrad > limits.joint7_mrad:
-        return verdict_for(Fault.JOINT7_SLIP, Joint7Slip(mrad, limits.joint7_mrad))
-    age_ms = seen.ft_age_ns / NS_PER_MS
-    if age_ms > limits.ft_stop_ms:
-        return verdict_for(Fault.FT_STALE, ForceAge(age_ms, limits.ft_stop_ms))
+def _check_rests(facts: Facts) -> GuardVerdict:
+    """End a trial in which the sole goes on and a motor does not."""
+    sole = facts.seen.sole
+    for i, rest in enumerate(facts.state.rests):
+        way, most = dist(rest.sole, sole), facts.limits.still_ways[i]
+        if way > most:
+            detail = StillMotor(i + 1, 1e3 * way, 1e3 * most)  # mm
+            return verdict_for(Fault.MOTOR_STILL, detail)
     return OK
 
 
-def _check_cadence(limits: GuardLimits, state: GuardState, now: int) -> GuardVerdict:
-    late = len(state.late)
-    if late > limits.late_per_second and state.late[-1] == now:
-        return verdict_for(Fault.LOOP_LATE, LateCycles(late, limits.late_per_second))
+def _check_joint7(facts: Facts) -> GuardVerdict:
+    """End a trial whose foot has turned against the lock of joint 7."""
+    most = facts.limits.joint7_mrad
+    mrad = abs(facts.seen.joint7_offset) * 1e3
+    if facts.seen.is_recording and mrad > most:
+        return verdict_for(Fault.JOINT7_SLIP, Joint7Slip(mrad, most))
     return OK
+
+
+def _check_force_age(facts: Facts) -> GuardVerdict:
+    """End a trial whose force is not measured any more."""
+    most = facts.limits.ft_stop_ms
+    age_ms = facts.seen.ft_age_ns / NS_PER_MS
+    if facts.seen.is_recording and age_ms > most:
+        return verdict_for(Fault.FT_STALE, ForceAge(age_ms, most))
+    return OK
+
+
+def _check_load(facts: Facts) -> GuardVerdict:
+    """Stop for the load on the foot, which is judged in `contact`."""
+    return facts.load
+
+
+def _check_cadence(facts: Facts) -> GuardVerdict:
+    """Hold when too many cycles of a second were late, this one among them."""
+    late, most = facts.state.late, facts.limits.late_per_second
+    if len(late) > most and late[-1] == facts.seen.reading.host_ns:
+        return verdict_for(Fault.LOOP_LATE, LateCycles(len(late), most))
+    return OK
+
+
+# Of equally severe verdicts the first counts: what takes the arm away, then motion,
+# then what only ends the trial.
+CHECKS: tuple[Callable[[Facts], GuardVerdict], ...] = (
+    _check_safety,
+    _check_silence,
+    _check_master,
+    _check_move,
+    _check_numbers,
+    _check_position,
+    _check_speed,
+    _check_torque,
+    _check_rests,
+    _check_joint7,
+    _check_force_age,
+    _check_load,
+    _check_cadence,
+)

@@ -11,32 +11,21 @@ from acquisition.control_loop.faults import (
     ReplySilence,
     verdict_for,
 )
-from acquisition.control_loop.guard import GuardLimits
 from acquisition.control_loop.loop import Tick
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import ArmReading, SafetyMode, WrenchSample
 from acquisition.errors import LinkError
 from acquisition.sample import MOTOR_FRESH_SHIFT, SAFETY_MODE_MASK, Flag
 from acquisition.schema import CYCLE
+from tests.acquisition.control_loop.limits import guard_limits
 
 MS = 1_000_000
 START_NS = 1_000 * MS
-LIMITS = GuardLimits(
+LIMITS = guard_limits(
     q_lower=(-2.0,) * 7,
     q_upper=(2.0,) * 7,
     speed=(1.5,) * 7,
     torque=np.full(7, 30.0),
-    foot_speed=0.8,
-    joint7_mrad=50.0,
-    ft_stale_ms=6.0,
-    ft_stop_ms=20.0,
-    ft_saturated_ms=100.0,
-    contact_force=100.0,
-    contact_force_hold=150.0,
-    contact_moment=10.0,
-    contact_moment_hold=15.0,
-    contact_growth=40.0,
-    late_per_second=10,
 )
 TORQUE = {
     ArmState.FLOAT: 1.0,

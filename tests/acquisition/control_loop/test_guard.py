@@ -18,29 +18,14 @@ from acquisition.control_loop.faults import (
     StillMotor,
     StuckMotor,
 )
-from acquisition.control_loop.guard import GuardLimits, GuardState, Observation, check
+from acquisition.control_loop.guard import GuardState, Observation, check
 from acquisition.devices import ArmReading, PositionJump, SafetyMode
+from tests.acquisition.control_loop.limits import guard_limits
 
 MS = 1_000_000
 S = 1_000_000_000
 ARMED = GuardState(armed=0x7F, may_drive=True)
-LIMITS = GuardLimits(
-    q_lower=np.array([-2.6, -2.0, -2.8, -0.9, -4.76, -1.6, -3.0]),
-    q_upper=np.array([2.6, 2.0, 2.8, 3.1, 1.24, 1.6, 3.0]),
-    speed=np.array([1.5, 1.5, 2.0, 2.5, 4.0, 4.0, 4.0]),
-    torque=np.array([20.0, 45.0, 15.0, 15.0, 2.5, 2.5, 1.3]),
-    foot_speed=0.8,
-    joint7_mrad=50.0,
-    ft_stale_ms=6.0,
-    ft_stop_ms=20.0,
-    ft_saturated_ms=100.0,
-    contact_force=100.0,
-    contact_force_hold=150.0,
-    contact_moment=10.0,
-    contact_moment_hold=15.0,
-    contact_growth=40.0,
-    late_per_second=10,
-)
+LIMITS = guard_limits()
 
 
 def reading(**changes):

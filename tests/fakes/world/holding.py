@@ -6,12 +6,12 @@ from weakref import finalize
 import numpy as np
 
 from acquisition.control_loop.cycle import Cycle, CycleOutputs
-from acquisition.control_loop.guard import GuardLimits
 from acquisition.control_loop.loop import Loop
 from acquisition.control_loop.states import ArmState
 from fakes.clock import SteppedClock
 from fakes.plant.model import PlantOptions
 from fakes.world.rig import FakeRig, SimulatedScene
+from tests.acquisition.control_loop.limits import guard_limits
 from tests.fakes.scenes import CONSTANTS, FRAME, START_Q, TOOL
 from wam.bus.doors import PythonCanDoor
 from wam.bus.link import CanLink
@@ -24,22 +24,11 @@ from wam.model.constants import Body
 
 SPEED = ArmSettings().speed_limits
 TORQUE = (20.0, 45.0, 15.0, 15.0, 2.5, 2.5, 1.3)
-LIMITS = GuardLimits(
+LIMITS = guard_limits(
     q_lower=tuple(CONSTANTS.q_lower.tolist()),
     q_upper=tuple(CONSTANTS.q_upper.tolist()),
     speed=SPEED,
     torque=TORQUE,
-    foot_speed=0.8,
-    joint7_mrad=50.0,
-    ft_stale_ms=6.0,
-    ft_stop_ms=20.0,
-    ft_saturated_ms=100.0,
-    contact_force=100.0,
-    contact_force_hold=150.0,
-    contact_moment=10.0,
-    contact_moment_hold=15.0,
-    contact_growth=40.0,
-    late_per_second=10,
 )
 RATE = 500
 

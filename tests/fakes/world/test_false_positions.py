@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from acquisition.control_loop.cycle import Cycle, CycleOutputs
-from acquisition.control_loop.guard import GuardLimits
 from acquisition.control_loop.limits import TORQUE_STEP
 from acquisition.control_loop.loop import Loop
 from acquisition.control_loop.states import ArmState
+from tests.acquisition.control_loop.limits import guard_limits
 from tests.fakes.scenes import CONSTANTS, MODEL, make_rig
 from wam.bus.doors import PythonCanDoor
 from wam.bus.frames import decode_position, encode_position, position_reply_id
@@ -22,22 +22,11 @@ SPEED_BOUND = dict.fromkeys(range(1, 7), 0.5) | {7: 1.0}  # rad/s
 PERIOD = 0.002
 TORQUE = np.array([20.0, 45.0, 15.0, 15.0, 2.5, 2.5, 1.3])
 ROUNDING = 0.02  # N m, half a puck unit at the joint
-LIMITS = GuardLimits(
+LIMITS = guard_limits(
     q_lower=CONSTANTS.q_lower,
     q_upper=CONSTANTS.q_upper,
     speed=SETTINGS.speed_limits,
     torque=TORQUE,
-    foot_speed=0.8,
-    joint7_mrad=50.0,
-    ft_stale_ms=6.0,
-    ft_stop_ms=20.0,
-    ft_saturated_ms=100.0,
-    contact_force=100.0,
-    contact_force_hold=150.0,
-    contact_moment=10.0,
-    contact_moment_hold=15.0,
-    contact_growth=40.0,
-    late_per_second=10,
 )
 
 
