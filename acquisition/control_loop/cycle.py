@@ -156,7 +156,9 @@ class Cycle:
         verdict = self._judge(tick, reading, tau)
         if verdict.action is not _NONE:
             self._obey(verdict, reading)
+            # Of the state that was entered: what the guard refused is not sent.
             tau, tau_gravity = self._torque(reading)
+        # What the pucks have now: the last cycle's, from which no torque may jump.
         sent = sample.torque_command
         # Without all replies the motors keep their torques; a false one is taken back.
         is_known = reading.is_complete or reading.jump is not None

@@ -135,6 +135,8 @@ class SafetyModule:
             In words, which of them are read back otherwise; libbarrett does not look.
         """
         wanted = limits.words()
+        # An earlier program may have left others; DEF and LOAD of a property's number
+        # bring back its value of power-up.
         for name in wanted:
             number = property_number(Device.SAFETY, name, self._vers)
             self._set("DEF", number)

@@ -63,6 +63,7 @@ class StatusPoller:
         self._unanswered = 0
         self._hints_seen = 0
         self._has_asked = False
+        # In cycles; halves and thirds, so that the three seldom fall due together.
         self._until_mode = 0
         self._until_pendant = settings.safety_poll_cycles // 2
         self._until_health = settings.health_poll_cycles // 3
@@ -158,6 +159,7 @@ class StatusPoller:
             if self._unanswered >= _UNANSWERED_POLLS:
                 self.mode = SafetyMode.UNKNOWN
             self._unanswered += 1
+        # Until IDLE is confirmed the arm may still have torques: it is asked for again.
         if self.is_lowering:
             self._link.send(SAFETY_NODE, _SET_IDLE)
         self._link.send(SAFETY_NODE, _GET_MODE)

@@ -66,8 +66,10 @@ class Transmission:
         j2mp = np.array(self.j2mp, dtype=np.float64)
         _check(j2mp, (self.cts, self.ipnm, self.torque_limits))
         m2jp = np.linalg.inv(j2mp)
-        per_rad = np.array(self.cts) / (2 * pi)
-        ipnm = np.array(self.ipnm, dtype=np.float64)
+        per_rad = np.array(self.cts) / (2 * pi)  # counts per rad at the motor
+        ipnm = np.array(self.ipnm, dtype=np.float64)  # puck units per N m
+        # Power is the same on both sides, tau_m . qd_m = tau_q . qd_q, and with
+        # A = j2mp qd_m = A qd_q: so tau_q = A^T tau_m, and tau_m = A^-T tau_q.
         object.__setattr__(self, "j2mp", j2mp)
         object.__setattr__(self, "_joints_of_counts", m2jp / per_rad)
         object.__setattr__(self, "_counts_of_joints", per_rad[:, None] * j2mp)
