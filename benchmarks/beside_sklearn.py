@@ -85,7 +85,7 @@ def theirs(part: str, start: np.ndarray, sd: float) -> Kernel:
 
 def our_starts(part: str, X: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, ...]:
     """Return the three thetas that our search begins with."""
-    return posterior_search((KERNELS[part], ConstantNoise()), X, y).began
+    return posterior_search(KERNELS[part], ConstantNoise(), X, y).began
 
 
 def fit_theirs(

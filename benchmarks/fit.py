@@ -150,7 +150,7 @@ def parts(rounds: int) -> list[SpeedComparison]:
 def our_evaluation(X: np.ndarray, y: np.ndarray) -> Callable[[], float]:
     """Return what makes one likelihood with its gradient, as a search asks for it."""
     theta = our_starts("SE fit", X, y)[0]
-    likelihood = Likelihood((KERNELS["SE fit"], ConstantNoise()), X, y)
+    likelihood = Likelihood(KERNELS["SE fit"], ConstantNoise(), X, y)
     return lambda: likelihood(theta)[0]
 
 

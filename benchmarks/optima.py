@@ -58,7 +58,7 @@ def examine(task: FoldTask) -> list[RawRecord]:
     found = [RawRecord(place, TUSTIN, -sse, -best, sse <= (1.0 + _SQUARES) * best, 0)]
     for name, (part, _) in FITS.items():
         kernel, r = KERNELS[part], rows.outputs[name]
-        ours = posterior_search((kernel, ConstantNoise()), rows.X, r)
+        ours = posterior_search(kernel, ConstantNoise(), rows.X, r)
         best = twenty(kernel, rows.X, r, task.fold)
         is_as_good = ours.lml >= best - _LIKELIHOOD
         spent = sum(start.evaluations for start in ours.starts)
@@ -68,7 +68,7 @@ def examine(task: FoldTask) -> list[RawRecord]:
 
 def twenty(kernel: Kernel, X: Array, r: Array, seed: int) -> float:
     """Return the largest log likelihood that twenty starts reach."""
-    likelihood = Likelihood((kernel, ConstantNoise()), X, r)
+    likelihood = Likelihood(kernel, ConstantNoise(), X, r)
     sd = float(r.std())
     box = np.vstack([kernel.bounds(sd, np.ones(2)), ConstantNoise().bounds(sd)])
     middle = np.log([sd, *np.ones(box.shape[0] - 2), 0.5 * sd])

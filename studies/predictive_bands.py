@@ -94,14 +94,7 @@ def best_of(model: NewTrialModel, training: TrainingSet, starts: int) -> float:
     gp = model.process
     rows = training.rows.take(np.sort(training.chosen))
     outputs = warped(rows.F_t, model.c) - gp.offset
-    likelihood = Likelihood((gp.kernel, gp.noise), gp.X, outputs, gp.trials)
-
-    def objective(theta: np.ndarray) -> tuple[float, np.ndarray]:
-        value, slope = likelihood(theta)
-        count = len(gp.kernel.names)
-        prior, prior_slope = gp.noise.log_prior(theta[count:])
-        slope[count:] += prior_slope
-        return value + prior, slope
+    likelihood = Likelihood(gp.kernel, gp.noise, gp.X, outputs, gp.trials)
 
     sd = float(outputs.std())
     rng = np.random.default_rng(0)
@@ -111,17 +104,8 @@ def best_of(model: NewTrialModel, training: TrainingSet, starts: int) -> float:
             gp.noise.start(sd),
         ]
     )
-    tops = [
-        climb_from(
-            (gp.kernel, gp.noise),
-            objective,
-            gp.X,
-            sd,
-            [centre + rng.normal(0.0, 1.0, centre.size)],
-        ).lml
-        for _ in range(starts)
-    ]
-    return max(tops)
+    begun = centre + rng.normal(0.0, 1.0, (starts, centre.size))
+    return max(climb_from(likelihood, [start]).lml for start in begun)
 
 
 def load_study(path: Path) -> dict[str, list[TractionSeries]]:

@@ -11,6 +11,7 @@ very rough.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -28,6 +29,8 @@ Part = tuple[slice, slice]  # rows and columns of a matrix that are computed
 
 _ROOT_2 = np.sqrt(2.0)
 _BIASES = (20.0, 0.05)  # beta that a search may start with
+_SCALE_MOVES = (-2.5, -1.2, 0.0, 1.2)  # of log sf and all log l, to another top
+_BIAS_MOVES = (-4.0, 0.0, 4.0)  # of log beta, to another top
 
 
 class Augmented(NamedTuple):
@@ -98,8 +101,19 @@ class Arcsine(Composable):
         ]
 
     def moves(self, theta: Array) -> Sequence[Array]:
-        """Return nothing: the bias makes up for a single length that changes."""
-        return []
+        """Return theta with another scale, another bias, or both.
+
+        Where the arcsine is nearly linear, twice the size with twice the lengths is
+        nearly the same function: these change together. The bias makes up for a single
+        length that changes, so no such move leads far.
+        """
+        scale = np.append(np.ones(theta.size - 1), 0.0)
+        bias = 1.0 - scale
+        return [
+            theta + a * scale + b * bias
+            for a, b in product(_SCALE_MOVES, _BIAS_MOVES)
+            if a or b
+        ]
 
     def bounds(self, sd_y: float, sd_x: Array) -> Array:
         """Return log sf in log sd(y) + [-6, 4], log l_d in [-4, 6], log beta +-6."""

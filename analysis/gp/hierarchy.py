@@ -22,6 +22,7 @@ import numpy as np
 
 from acquisition.errors import SettingsError
 from analysis.data.series import Array
+from analysis.gp.climb import climb
 from analysis.gp.ground import Ground, GroundRows, Resemblance
 from analysis.gp.kernels import SquaredExponential
 from analysis.gp.likelihood import Factor, factorise
@@ -41,8 +42,8 @@ _PRIOR = np.array(
     ]
 )
 _IS_SIZE = np.array([n[4:].partition("_")[0] in {"s0", "A", "sc", "sn"} for n in NAMES])
-_REACH = 4.0  # prior standard deviations that the search goes
-_HOPELESS = 1e25  # objective where no jitter helps
+_SEARCHED_SD = 4.0  # prior standard deviations that the search goes
+_TOLERANCE = 1e-7  # share of the value that the last step of a climb gains less than
 _BLOCK = 500  # rows predicted at a time
 
 
@@ -233,25 +234,20 @@ class GroundPosterior:
         Args:
             start: theta to begin with; the priors' centre by default.
         """
-        from scipy.optimize import minimize
-
-        best = minimize(
-            self._downhill,
+        best = climb(
+            self,
             self._mean if start is None else start,
-            jac=True,
-            method="L-BFGS-B",
-            bounds=self._mean[:, None] + self._sd[:, None] * [-_REACH, _REACH],
-            options={"maxiter": 100, "ftol": 1e-7},
+            self._mean[:, None] + self._sd[:, None] * [-_SEARCHED_SD, _SEARCHED_SD],
+            tolerance=_TOLERANCE,
         )
-        standard = (self.centre, self.scale, self.offset)
-        return GroundProcess(best.x, self.rows, *standard, -float(best.fun))
-
-    def _downhill(self, theta: Array) -> tuple[float, Array]:
-        try:
-            value, slope = self(theta)
-        except SettingsError:
-            return _HOPELESS, np.zeros_like(theta)
-        return -value, -slope
+        return GroundProcess(
+            theta=best.theta,
+            rows=self.rows,
+            centre=self.centre,
+            scale=self.scale,
+            offset=self.offset,
+            objective=best.value,
+        )
 
 
 def in_unit(theta: Array, ratio: float) -> Array:

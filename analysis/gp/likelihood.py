@@ -107,25 +107,25 @@ class Likelihood:
     """The log marginal likelihood of outputs, called with theta as often as needed.
 
     Args:
-        model: kernel and noise; theta is the kernel's, then the noise's.
+        kernel: covariance function.
+        noise: of the measurements; theta is the kernel's, then the noise's.
         X: inputs, shape (n, d).
         r: outputs with the mean function taken off, shape (n,).
         trials: where the rows come from; None where they share nothing but the kernel.
-
-    Attributes:
-        covariance: what gives the kernel's part of C; memory of its own.
     """
 
     def __init__(
         self,
-        model: tuple[Kernel, Noise],
+        kernel: Kernel,
+        noise: Noise,
         X: Array,
         r: Array,
         trials: TrialRows | None = None,
     ) -> None:
-        self.model, self.X, self.r, self.trials = model, X, r, trials
-        self.covariance = model[0].over(X)
-        self._shared = shared_over(model[1], X, trials)
+        self.kernel, self.noise = kernel, noise
+        self.X, self.r, self.trials = X, r, trials
+        self._covariance = kernel.over(X)
+        self._shared = shared_over(noise, X, trials)
         shape = (r.size, r.size)
         self._C, self._inverse = (np.zeros(shape, order="F") for _ in range(2))
         self._last: tuple[bytes, Array, float] = b"", r, 0.0
@@ -172,13 +172,12 @@ class Likelihood:
         """Return the likelihood of every so many rows, at most so many."""
         thin = slice(None, None, -(-self.r.size // most))
         trials = None if self.trials is None else self.trials.take(thin)
-        return Likelihood(self.model, self.X[thin], self.r[thin], trials)
+        return Likelihood(self.kernel, self.noise, self.X[thin], self.r[thin], trials)
 
     def _solved(self, theta: Array) -> "_Solved":
-        kernel, noise = self.model
-        theta_kernel, theta_noise = split(kernel, theta)
-        K, contract = self.covariance(theta_kernel)
-        S, contract_noise = noise.evaluate(theta_noise, self.X)
+        theta_kernel, theta_noise = split(self.kernel, theta)
+        K, contract = self._covariance(theta_kernel)
+        S, contract_noise = self.noise.evaluate(theta_noise, self.X)
         shared = self._shared(theta_noise)
         factor = factorise(K, S, self._C, shared.blocks)
         alpha = factor.solve(self.r)

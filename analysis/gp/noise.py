@@ -9,7 +9,7 @@ import numpy as np
 from analysis.data.series import Array
 
 _START = 0.8  # sn / sd(y) that the search starts with
-_REACH = 2.0  # standard deviations beyond which the noise changes no more
+_LARGEST_INPUT = 2.0  # standard deviations beyond which the noise changes no more
 
 
 class Noise(Protocol):
@@ -123,4 +123,6 @@ class LogLinearNoise:
 
 
 def _features(X: Array) -> Array:
-    return np.column_stack([np.ones(X.shape[0]), np.clip(X, -_REACH, _REACH)])
+    return np.column_stack(
+        [np.ones(X.shape[0]), np.clip(X, -_LARGEST_INPUT, _LARGEST_INPUT)]
+    )

@@ -11,11 +11,10 @@ from scipy.linalg import solve_triangular
 
 from acquisition.errors import SettingsError
 from analysis.data.series import Array
-from analysis.gp.ascent import Start
 from analysis.gp.kernels import Kernel, SquaredExponential
 from analysis.gp.likelihood import Factor, Likelihood, factorise, lapack, split
 from analysis.gp.noise import ConstantNoise, Noise
-from analysis.gp.search import likeliest, spread
+from analysis.gp.search import Start, likeliest, spread
 from analysis.gp.trial_noise import TrialRows, shared_over
 
 MINIMUM_ROWS = 20
@@ -70,7 +69,7 @@ class GaussianProcess:
 
     def factor(self) -> Factor:
         """Return the factor of the covariance of the training rows."""
-        return _factor((self.kernel, self.noise), self.theta, self.X, self.trials)
+        return _factor(self.kernel, self.noise, self.theta, self.X, self.trials)
 
     def describe(self) -> dict[str, Any]:
         """Return hyperparameters, likelihood, starts, jitter and standardisation."""
@@ -99,7 +98,7 @@ class GaussianProcess:
         """
         _, theta_noise = split(self.kernel, self.theta)
         X, r = (inputs - self.centre) / self.scale, y - self.offset
-        factor = _factor((self.kernel, self.noise), self.theta, X, trials)
+        factor = _factor(self.kernel, self.noise, self.theta, X, trials)
         alpha = factor.solve(r)
         spread = float(np.log(np.diagonal(factor.L)).sum())
         prior = self.noise.log_prior(theta_noise)[0]
@@ -183,10 +182,9 @@ class LeaveOut:
 
 
 def _factor(
-    model: tuple[Kernel, Noise], theta: Array, X: Array, trials: TrialRows | None
+    kernel: Kernel, noise: Noise, theta: Array, X: Array, trials: TrialRows | None
 ) -> Factor:
     """Return the factor of the covariance of training rows."""
-    kernel, noise = model
     theta_kernel, theta_noise = split(kernel, theta)
     S, _ = noise.evaluate(theta_noise, X)
     blocks = shared_over(noise, X, trials)(theta_noise).blocks
@@ -221,7 +219,7 @@ def fit_gp(
     noise = noise or ConstantNoise()
     centre, scale = inputs.mean(axis=0), spread(inputs)
     X, offset = (inputs - centre) / scale, float(y.mean()) if is_centred else 0.0
-    likelihood = Likelihood((kernel, noise), X, y - offset, trials)
+    likelihood = Likelihood(kernel, noise, X, y - offset, trials)
     optimum = likeliest(likelihood)
     alpha, jitter = likelihood.weights(optimum.theta)
     return GaussianProcess(

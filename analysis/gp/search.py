@@ -1,54 +1,57 @@
-"""The search for hyperparameters: bounded quasi-Newton from three starts or four.
+"""The likeliest hyperparameters of a Gaussian process: a good start, and then moves.
 
-One start misses the best optimum of a Gaussian process in every fourth fit or so, and
-no three fixed ones suit all data. The first two are therefore chosen among the points
-that a kernel offers, by the likelihood of a part of the rows. The third is chosen when
-these have reached their tops: as the noise is known by then, the likelihood of all rows
-tells where another top may be. A fourth begins at the best top with an input switched
-off, where its length is long. A start that comes to stand just below a top that was
-reached before is left there, and of the tops that approximations have only those that
-may be the best are climbed to the end.
+Sought is the largest log marginal likelihood, noise prior included,
+
+    log p(y | X, theta) + log p(theta)
+
+(Rasmussen and Williams 2006, section 5.4.1). It has several tops, each another reading
+of the rows: a short length and little noise, or a long one and much. One climb misses
+the best of them in every fourth fit or so. The first begins at the best of the points
+that the kernel offers, by the likelihood of a part of the rows. From the best top
+reached, the search then moves to where another top may be, and climbs again: the
+likeliest of the kernel's moves is taken, by the likelihood of all rows, as the noise is
+known by then.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from acquisition.errors import SettingsError
 from analysis.data.series import Array
-from analysis.gp.approach import GOOD, objective_of
-from analysis.gp.ascent import Start, Top, climb, refined
+from analysis.gp.climb import Climbed, climb
 from analysis.gp.kernels import Kernel
 from analysis.gp.likelihood import Likelihood
-from analysis.gp.low_rank import near_over
 from analysis.gp.noise import Noise
-from analysis.gp.quasi_newton import Objective, SearchBox
 from analysis.gp.trial_noise import TrialRows
 
-Score = Callable[[Array], float]
+MOVES = 2  # moves of a search: more find more of the best tops, and cost more
 
-_AT_BOUND = 1e-3
-_NOISE_STEP = 0.1  # the likelihood bends most along the noise: its steps are shorter
-_APART = 1.5  # of starts in one of the shape: two steps of the lengths offered
-_ELSEWHERE = 1.0  # a start nearer to a known top leads back to it
-_LONG = 1.0  # logarithm of a length from which on an input may be idle
-_ROUGH = 150  # rows by which the first starts are chosen
-_RIVAL = 5.0  # log likelihood below the best one at which a top may still become it
-_NEIGHBOURS = 0.5  # tops nearer to each other in the shape are one
-_FLAT = 3.0  # logarithm from which on a length or bias makes no difference
+_DESIGN_ROWS = 150  # rows by whose likelihood the first start is chosen
+_SAME_TOP = (
+    0.2,
+    0.1,
+)  # in theta and likelihood: a climb as near to a top is left there
+_LEAST_MOVE = 1.0  # in theta: a move that ends nearer to a known top leads back to it
+_NEIGHBOURS = 0.5  # in theta: of two tops that are nearer, one is enough to begin with
+_LOSING = 5.0  # log likelihood below the best top at which another will not become it
+_UNUSED = 3.0  # logarithm of a length or bias beyond which it makes no difference
+_AT_BOUND = 1e-3  # in theta: a hyperparameter as near to a bound lies on it
 
 
-class StartScores(NamedTuple):
-    """What tells a search where to start; either may raise SettingsError.
+class Start(NamedTuple):
+    """One start of a search and what it reached.
 
     Attributes:
-        rough: theta -> likelihood of a part of the rows.
-        exact: theta -> likelihood of all rows.
+        theta: hyperparameters at its end: a top, or beside the top of another.
+        lml: log marginal likelihood there, priors included.
+        evaluations: how often the likelihood was evaluated.
     """
 
-    rough: Score
-    exact: Score
+    theta: tuple[float, ...]
+    lml: float
+    evaluations: int
 
 
 class Optimum(NamedTuple):
@@ -69,74 +72,146 @@ class Optimum(NamedTuple):
     at_bound: tuple[str, ...]
 
 
-def maximise(
-    model: tuple[Kernel, Noise],
-    objective: Objective,
-    X: Array,
-    sd_y: float,
-    scores: StartScores,
-) -> Optimum:
-    """Return the hyperparameters of largest likelihood.
+class Posterior:
+    """The log likelihood with the log prior of the noise: what a search climbs.
 
     Args:
-        model: kernel and noise; theta is the kernel's, then the noise's.
-        objective: theta -> likelihood and its slope; may raise SettingsError.
-        X: inputs, shape (n, d); they set the scale of starts and bounds.
-        sd_y: standard deviation of the outputs.
-        scores: what starts are chosen by.
+        likelihood: of the rows.
     """
-    kernel, noise = model
-    box = _box(model, X, sd_y)
-    rough, exact = scores
-    offered = [
-        np.concatenate([point, noise.start(sd_y)])
-        for point in kernel.design(sd_y, spread(X))
-    ]
-    began = _first_starts(kernel, offered, rough)
-    reached: list[Top] = []
-    for start in began:
-        reached.append(climb(objective, start, box, reached))
-    began.append(_last_start(kernel, offered, exact, (began, reached), box))
-    reached.append(climb(objective, began[-1], box, reached))
-    best = max(reached, key=lambda start: start.lml)
-    for start in _idle_starts(model, best, exact, box):
-        began.append(start)
-        reached.append(climb(objective, start, box, reached))
-    return _optimum(model, box, (began, refined(objective, box, reached)))
+
+    def __init__(self, likelihood: Likelihood) -> None:
+        self.likelihood = likelihood
+        self._count = len(likelihood.kernel.names)
+
+    def __call__(self, theta: Array) -> tuple[float, Array]:
+        """Return it and its slope in theta.
+
+        Raises:
+            SettingsError: the covariance cannot be factorised.
+        """
+        lml, slope = self.likelihood(theta)
+        prior, prior_slope = self.likelihood.noise.log_prior(theta[self._count :])
+        slope[self._count :] += prior_slope
+        return lml + prior, slope
+
+    def value(self, theta: Array) -> float:
+        """Return it alone, for a third of the cost; -inf where there is none."""
+        prior, _ = self.likelihood.noise.log_prior(theta[self._count :])
+        try:
+            return self.likelihood.value(theta) + prior
+        except SettingsError:
+            return -np.inf
+
+
+class Search:
+    """A search of the best top: where it has been, and where to go next.
+
+    Args:
+        likelihood: of the rows.
+    """
+
+    def __init__(self, likelihood: Likelihood) -> None:
+        self._kernel, self._noise = likelihood.kernel, likelihood.noise
+        self._likelihood, self._posterior = likelihood, Posterior(likelihood)
+        self._sd_y, sd_x = float(np.std(likelihood.r)), spread(likelihood.X)
+        self._design = [
+            np.concatenate([point, self._noise.start(self._sd_y)])
+            for point in self._kernel.design(self._sd_y, sd_x)
+        ]
+        self._bounds = np.vstack(
+            [self._kernel.bounds(self._sd_y, sd_x), self._noise.bounds(self._sd_y)]
+        )
+        self._began: list[Array] = []
+        self._reached: list[Climbed] = []
+        self._moved_from: Array | None = None
+        self._moves: list[tuple[float, Array]] = []
+
+    def designed_start(self) -> Array:
+        """Return the likeliest of the kernel's points, by a part of the rows."""
+        rough = Posterior(self._likelihood.thinned(_DESIGN_ROWS))
+        return max(self._design, key=rough.value)
+
+    def climb(self, start: Array) -> None:
+        """Climb from a start to its top, or beside one that is known."""
+        self._began.append(start)
+        reached = climb(self._posterior, start, self._bounds, self._is_known)
+        self._reached.append(reached)
+
+    def move(self) -> Array | None:
+        """Return the likeliest move from the best top; None where all lead back."""
+        best = self._best.theta
+        if self._moved_from is None or not np.array_equal(best, self._moved_from):
+            self._moved_from, self._moves = best, self._rated_moves(best)
+        known = [*self._began, *(top.theta for top in self._reached)]
+        far = [
+            (value, k)
+            for k, (value, theta) in enumerate(self._moves)
+            if _distance(self._kernel, theta, known) >= _LEAST_MOVE
+        ]
+        return self._moves[max(far)[1]][1] if far else None
+
+    def optimum(self) -> Optimum:
+        """Return the best of what was reached."""
+        best = self._best
+        is_edge = np.abs(self._bounds - best.theta[:, None]).min(axis=1) < _AT_BOUND
+        names = (*self._kernel.names, *self._noise.names)
+        return Optimum(
+            best.theta,
+            best.value,
+            tuple(Start(tuple(x.tolist()), f, n) for x, f, n in self._reached),
+            tuple(self._began),
+            tuple(name for name, at in zip(names, is_edge, strict=True) if at),
+        )
+
+    @property
+    def _best(self) -> Climbed:
+        return max(self._reached, key=lambda top: top.value)
+
+    def _rated_moves(self, theta: Array) -> list[tuple[float, Array]]:
+        """Return the kernel's moves from a top, with its noise, each with its value."""
+        count = len(self._kernel.names)
+        points = [
+            np.clip(np.concatenate([point, theta[count:]]), *self._bounds.T)
+            for point in self._kernel.moves(theta[:count])
+        ]
+        return [(self._posterior.value(point), point) for point in points]
+
+    def _is_known(self, theta: Array, value: float) -> bool:
+        near, low = _SAME_TOP
+        return any(
+            abs(top.value - value) < low and np.abs(top.theta - theta).max() < near
+            for top in self._reached
+        )
+
+
+def likeliest(likelihood: Likelihood, moves: int = MOVES) -> Optimum:
+    """Return the hyperparameters of largest likelihood times the noise's prior."""
+    search = Search(likelihood)
+    return _searched(search, [search.designed_start()], moves)
 
 
 def climb_from(
-    model: tuple[Kernel, Noise],
-    objective: Objective,
-    X: Array,
-    sd_y: float,
-    starts: Sequence[Array],
-    exact: Score | None = None,
+    likelihood: Likelihood, starts: Sequence[Array], moves: int = 0
 ) -> Optimum:
     """Return the best top that starts lead to: for where tops are nearly known.
 
     Args:
-        model: kernel and noise; theta is the kernel's, then the noise's.
-        objective: theta -> likelihood and its slope; may raise SettingsError.
-        X: inputs, shape (n, d).
-        sd_y: standard deviation of the outputs.
+        likelihood: of the rows.
         starts: thetas to begin with.
-        exact: theta -> likelihood of all rows: one more start is chosen by it, where
-            the best top may be another one than those known.
+        moves: from there, where the best top may be another one than those known.
     """
-    box, reached = _box(model, X, sd_y), list[Top]()
-    began = list(starts)
-    for start in began:
-        reached.append(climb(objective, start, box, reached))
-    if exact is not None:
-        last = _last_start(model[0], began, exact, (began, reached), box)
-        began.append(last)
-        reached.append(climb(objective, last, box, reached))
-        best = max(reached, key=lambda start: start.lml)
-        for start in _idle_starts(model, best, exact, box):
-            began.append(start)
-            reached.append(climb(objective, start, box, reached))
-    return _optimum(model, box, (began, refined(objective, box, reached)))
+    return _searched(Search(likelihood), starts, moves)
+
+
+def posterior_search(
+    kernel: Kernel,
+    noise: Noise,
+    X: Array,
+    r: Array,
+    trials: TrialRows | None = None,
+) -> Optimum:
+    """Return the hyperparameters of largest likelihood times the noise's prior."""
+    return likeliest(Likelihood(kernel, noise, X, r, trials))
 
 
 def distinct_tops(kernel: Kernel, reached: Sequence[Start]) -> list[Array]:
@@ -148,34 +223,11 @@ def distinct_tops(kernel: Kernel, reached: Sequence[Start]) -> list[Array]:
     ranked = sorted(reached, key=lambda start: -start.lml)
     for start in ranked:
         theta = np.array(start.theta)
-        if ranked[0].lml - start.lml > _RIVAL:
+        if ranked[0].lml - start.lml > _LOSING:
             break
-        if not tops or _gap(kernel, theta, tops) >= _NEIGHBOURS:
+        if not tops or _distance(kernel, theta, tops) >= _NEIGHBOURS:
             tops.append(theta)
     return tops
-
-
-def _box(model: tuple[Kernel, Noise], X: Array, sd_y: float) -> SearchBox:
-    """Return where theta is sought."""
-    kernel, noise = model
-    bounds = np.vstack([kernel.bounds(sd_y, spread(X)), noise.bounds(sd_y)])
-    steps = np.repeat([1.0, _NOISE_STEP], [len(kernel.names), len(noise.names)])
-    return SearchBox(bounds, steps)
-
-
-def _optimum(
-    model: tuple[Kernel, Noise],
-    box: SearchBox,
-    climbed: tuple[Sequence[Array], list[Top]],
-) -> Optimum:
-    """Return the best of what the starts reached."""
-    kernel, noise = model
-    began, reached = climbed
-    best = max(reached, key=lambda start: start.lml)
-    is_edge = np.abs(box.bounds - best.theta[:, None]).min(axis=1) < _AT_BOUND
-    edges = np.array([*kernel.names, *noise.names])[is_edge]
-    starts = tuple(top.start for top in reached)
-    return Optimum(best.theta, best.lml, starts, tuple(began), tuple(map(str, edges)))
 
 
 def spread(X: Array) -> Array:
@@ -184,115 +236,19 @@ def spread(X: Array) -> Array:
     return np.where(np.ptp(X, axis=0) > 0, sd, 1.0)
 
 
-def _first_starts(
-    kernel: Kernel, offered: Sequence[Array], rough: Score
-) -> list[Array]:
-    """Return two of the points offered: the best, and the best that is far from it."""
-    ranked = sorted(offered, key=lambda theta: -_scored(rough, theta))
-    first, *others = ranked
-    far = (theta for theta in others if _gap(kernel, theta, [first]) >= _APART)
-    return [first, next(far, others[0])]
+def _searched(search: Search, starts: Sequence[Array], moves: int) -> Optimum:
+    for start in starts:
+        search.climb(start)
+    for _ in range(moves):
+        start = search.move()
+        if start is None:
+            break
+        search.climb(start)
+    return search.optimum()
 
 
-def _last_start(
-    kernel: Kernel,
-    offered: Sequence[Array],
-    exact: Score,
-    known: tuple[Sequence[Array], Sequence[Top]],
-    box: SearchBox,
-) -> Array:
-    """Return the likeliest point that may belong to another top.
-
-    That is a move from the best top that the kernel knows, or where it knows none, one
-    of the points offered; with the noise of that top.
-
-    Args:
-        kernel: its moves.
-        offered: points that a search may start with.
-        exact: theta -> likelihood of all rows.
-        known: where other starts began, and what they reached.
-        box: where theta is sought.
-    """
-    began, reached = known
-    count = len(kernel.names)
-    tops = [top.theta for top in reached]
-    top = max(reached, key=lambda top: top.lml)
-    best, score = top.theta, _score_near(top, exact)
-    others = kernel.moves(best[:count]) or [
-        theta[:count] for theta in offered if _gap(kernel, theta, began) >= _APART
-    ]
-    points = [
-        np.clip(np.concatenate([point, best[count:]]), *box.bounds.T)
-        for point in others
-    ]
-    far = [point for point in points if _gap(kernel, point, tops) >= _ELSEWHERE]
-    return max(far or offered, key=lambda theta: _scored(score, theta))
-
-
-def _idle_starts(
-    model: tuple[Kernel, Noise], best: Top, exact: Score, box: SearchBox
-) -> list[Array]:
-    """Return the best top without a long length, where that costs next to nothing.
-
-    On a straight trend a long length and an endless one are two tops. Of several inputs
-    the likeliest one to be idle is chosen.
-    """
-    (kernel, _), score = model, _score_near(best, exact)
-    starts = []
-    for k, name in enumerate(kernel.names):
-        theta = best.theta.copy()
-        is_length = name.rpartition("_")[2].startswith("l")
-        if is_length and _LONG < theta[k] < box.bounds[k, 1] - _NEIGHBOURS:
-            theta[k] = box.bounds[k, 1]
-            starts.append((_scored(score, theta), k, theta))
-    if not starts or max(starts)[0] < best.lml - _RIVAL:
-        return []
-    return [max(starts)[2]]
-
-
-def _gap(kernel: Kernel, theta: Array, others: Sequence[Array]) -> float:
-    """Return how far theta is from the nearest of others in one of the shape."""
+def _distance(kernel: Kernel, theta: Array, others: Sequence[Array]) -> float:
+    """Return how far theta is from the nearest of others, in lengths and biases."""
     shape = [k for k, name in enumerate(kernel.names) if not name.endswith("log_sf")]
-    flat = np.minimum(np.vstack([theta, *others])[:, shape], _FLAT)
-    return float(np.abs(flat[1:] - flat[0]).max(axis=1).min())
-
-
-def _score_near(top: Top, exact: Score) -> Score:
-    """Return the likelihood of all rows, by the approximation of a top where good.
-
-    Args:
-        top: how it was approached.
-        exact: theta -> likelihood of all rows.
-    """
-
-    def score(theta: Array) -> float:
-        if top.approach is not None:
-            value, error = top.approach.near.value(theta)
-            if error < GOOD[1]:
-                return value
-        return exact(theta)
-
-    return score
-
-
-def _scored(score: Score, theta: Array) -> float:
-    try:
-        return score(theta)
-    except SettingsError:
-        return -np.inf
-
-
-def posterior_search(
-    model: tuple[Kernel, Noise], X: Array, r: Array, trials: TrialRows | None = None
-) -> Optimum:
-    """Return the hyperparameters of largest likelihood times the noise's prior."""
-    return likeliest(Likelihood(model, X, r, trials))
-
-
-def likeliest(likelihood: Likelihood) -> Optimum:
-    """Return the hyperparameters of largest likelihood times the noise's prior."""
-    model, X, r = likelihood.model, likelihood.X, likelihood.r
-    objective = objective_of(likelihood, near_over(likelihood))
-    rough = likelihood.thinned(_ROUGH)
-    scores = StartScores(rough.value, objective.value)
-    return maximise(model, objective, X, float(np.std(r)), scores)
+    held = np.minimum(np.vstack([theta, *others])[:, shape], _UNUSED)
+    return float(np.abs(held[1:] - held[0]).max(axis=1).min())

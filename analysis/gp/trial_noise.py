@@ -65,19 +65,6 @@ class SharedAt(NamedTuple):
     contract: Callable[[Array], Array]
 
 
-class ColumnsAt(NamedTuple):
-    """What rows of a trial share, as columns: their covariance is Phi'Phi.
-
-    Attributes:
-        Phi: shape (q, n).
-        contract: d -> 1/2 sum_ij W_ij dC_ij/dtheta_k of the diagonal d of Phi W Phi',
-            shape (q,); shape (p,).
-    """
-
-    Phi: Array
-    contract: Callable[[Array], Array]
-
-
 @dataclass(frozen=True, slots=True)
 class TrialNoise:
     """Noise within a trial, and what its rows share.
@@ -141,35 +128,6 @@ class TrialNoise:
             for rows in trials.blocks()
         ]
         return lambda theta: self._shared_at(theta, parts)
-
-    def columns(self, X: Array, trials: TrialRows) -> Callable[[Array], ColumnsAt]:
-        """Return what gives the levels of the trials as columns for any theta.
-
-        Args:
-            X: standardised inputs, shape (n, d).
-            trials: where these rows come from.
-        """
-        blocks = trials.blocks()
-        q = len(blocks)
-        is_in = np.zeros((q, X.shape[0]))
-        for row, rows in zip(is_in, blocks, strict=True):
-            row[rows] = 1.0
-        in_load = is_in * self._relative_load(X)
-        unit = np.concatenate(
-            [is_in[: q * self.has_level], in_load[: q * self.has_ratio]]
-        )
-        first = len(self.within.names)
-
-        def at(theta: Array) -> ColumnsAt:
-            sizes = np.exp(np.repeat(theta[first:], q))
-
-            def contract(d: Array) -> Array:
-                sums = d.reshape(-1, q).sum(axis=1)
-                return np.concatenate([np.zeros(first), sums])
-
-            return ColumnsAt(unit * sizes[:, None], contract)
-
-        return at
 
     def log_prior(self, theta: Array) -> tuple[float, Array]:
         """Return the prior of the noise within; the shared components have none."""
@@ -250,16 +208,3 @@ def shared_over(
     if isinstance(noise, TrialNoise) and trials is not None:
         return noise.shared(X, trials)
     return lambda theta: SharedAt((), lambda W: np.zeros(theta.size))
-
-
-def columns_over(
-    noise: Noise, X: Array, trials: TrialRows | None
-) -> Callable[[Array], ColumnsAt] | None:
-    """Return what gives, for any theta, what rows of one trial share as columns.
-
-    None where a residual drifts along the trials: that has as many columns as rows.
-    """
-    if not isinstance(noise, TrialNoise) or trials is None:
-        none = np.zeros((0, X.shape[0]))
-        return lambda theta: ColumnsAt(none, lambda d: np.zeros(theta.size))
-    return None if noise.has_drift else noise.columns(X, trials)

@@ -168,7 +168,7 @@ def _likeliest(records: Sequence[PushRecord], r: Array, kind: str) -> Array:
 
     mean, sd = _prior(kind)
     X = _standard(_inputs(records))
-    likelihood = Likelihood((_KERNEL, _NOISE), X, r, _places(records))
+    likelihood = Likelihood(_KERNEL, _NOISE, X, r, _places(records))
 
     def downhill(theta: Array) -> tuple[float, Array]:
         try:

@@ -33,10 +33,10 @@ from analysis.breakaway.censored import Family
 from analysis.breakaway.model import BreakAwayModel, PushLaw
 from analysis.data.samples import SampleTable
 from analysis.gp import noise, trial_noise
-from analysis.gp.ascent import Start
 from analysis.gp.ground import Ground
 from analysis.gp.kernels import KERNELS
 from analysis.gp.regression import GaussianProcess
+from analysis.gp.search import Start
 from analysis.study.all_ground import Dissipation, TerrainRows
 from analysis.study.crossval import FoldResult, ModelFold
 from analysis.study.digests import code_digest, value_digest

@@ -60,8 +60,8 @@ def process(X, y, theta, noise, kernel=SE):
 def test_likelihood_and_gradient_have_the_reference_values(vectors, name, case):
     X, y, _, _ = load(vectors, name)
     expected = vectors["sets"][name]["cases"][case]
-    model = (KERNELS[case], ConstantNoise())
-    lml, slope = Likelihood(model, X, y)(np.array(expected["th"]))
+    likelihood = Likelihood(KERNELS[case], ConstantNoise(), X, y)
+    lml, slope = likelihood(np.array(expected["th"]))
     assert lml == pytest.approx(expected["lml"], rel=1e-10)
     np.testing.assert_allclose(slope, expected["grad"], rtol=1e-10, atol=1e-10)
 
@@ -81,7 +81,7 @@ def test_prediction_has_the_reference_values(vectors, name, case):
 def test_another_noise_can_be_put_in_place(vectors, name):
     X, y, _, g = load(vectors, name)
     expected = vectors["sets"][name]["cases"]["se_noise_g"]
-    lml, slope = Likelihood((SE, ScaledNoise(g)), X, y)(np.array(expected["th"]))
+    lml, slope = Likelihood(SE, ScaledNoise(g), X, y)(np.array(expected["th"]))
     assert lml == pytest.approx(expected["lml"], rel=1e-10)
     np.testing.assert_allclose(slope, expected["grad"], rtol=1e-8, atol=1e-8)
 
@@ -112,7 +112,7 @@ def test_gradient_agrees_with_differences_for_any_weights(vectors):
 def test_search_reaches_the_reference_optimum(vectors, kernel, case):
     data = vectors["optimised_n100"]
     X, y = np.array(data["X"]), np.array(data["y"])
-    found = posterior_search((kernel, ConstantNoise()), X, y)
+    found = posterior_search(kernel, ConstantNoise(), X, y)
     best = data[case].get("polished_lml", data[case].get("lml"))
     assert found.lml == pytest.approx(best, abs=1e-4)
     theta = data[case].get("polished_theta", data[case].get("theta"))
@@ -133,7 +133,7 @@ def test_likelihood_and_prediction_agree_with_scikit_learn(vectors):
         optimizer=None,
     ).fit(X, y)
     theta = np.log([sf, *lengths, sn])
-    lml, slope = Likelihood((SE, ConstantNoise()), X, y)(theta)
+    lml, slope = Likelihood(SE, ConstantNoise(), X, y)(theta)
     value, gradient = theirs.log_marginal_likelihood(
         theirs.kernel_.theta, eval_gradient=True
     )
@@ -149,7 +149,7 @@ def test_likelihood_and_prediction_agree_with_scikit_learn(vectors):
 @pytest.mark.parametrize("kernel", [SE, Arcsine(2)])
 def test_gradient_of_many_rows_agrees_with_differences(kernel):
     X, y = draw(np.random.default_rng(2), 190)  # inverted block by block
-    likelihood = Likelihood((kernel, ConstantNoise()), X, y)
+    likelihood = Likelihood(kernel, ConstantNoise(), X, y)
     theta = np.random.default_rng(5).normal(0, 0.3, len(kernel.names) + 1)
     _, slope = likelihood(theta)
     for k, step in enumerate(1e-5 * np.eye(theta.size)):
@@ -163,11 +163,11 @@ def test_an_evaluation_leaves_nothing_behind(kernel):
     X, y = draw(np.random.default_rng(2), 100)
     rng = np.random.default_rng(6)
     here, there = rng.normal(0, 0.3, (2, len(kernel.names) + 1))
-    kept = Likelihood((kernel, ConstantNoise()), X, y)
+    kept = Likelihood(kernel, ConstantNoise(), X, y)
     kept(there)
     lml, slope = kept(here)
     kept(there)
-    expected, fresh = Likelihood((kernel, ConstantNoise()), X, y)(here)
+    expected, fresh = Likelihood(kernel, ConstantNoise(), X, y)(here)
     assert lml == expected
     np.testing.assert_array_equal(slope, fresh)
 
@@ -175,14 +175,14 @@ def test_an_evaluation_leaves_nothing_behind(kernel):
 @pytest.mark.parametrize("kernel", [SE, Arcsine(2)])
 def test_value_alone_is_that_of_the_likelihood_with_its_gradient(kernel):
     X, y = draw(np.random.default_rng(2), 100)
-    likelihood = Likelihood((kernel, ConstantNoise()), X, y)
+    likelihood = Likelihood(kernel, ConstantNoise(), X, y)
     theta = np.random.default_rng(5).normal(0, 0.3, len(kernel.names) + 1)
     assert likelihood.value(theta) == likelihood(theta)[0]
 
 
 def test_a_start_is_left_just_below_a_known_top():
     X, y = draw(np.random.default_rng(4), 100)
-    starts = posterior_search((SE, ConstantNoise()), X, y - y.mean()).starts
+    starts = posterior_search(SE, ConstantNoise(), X, y - y.mean()).starts
     best, *others = sorted(starts, key=lambda start: -start.lml)
     for start in others:
         # this likelihood has one top, which a start has reached
@@ -230,8 +230,8 @@ def test_likelihood_does_not_depend_on_the_order_of_rows():
     X, y = draw(np.random.default_rng(3), 50)
     theta = np.log([2.0, 0.8, 1.5, 0.5])
     order = np.random.default_rng(1).permutation(50)
-    straight = Likelihood((SE, ConstantNoise()), X, y)(theta)[0]
-    mixed = Likelihood((SE, ConstantNoise()), X[order], y[order])(theta)[0]
+    straight = Likelihood(SE, ConstantNoise(), X, y)(theta)[0]
+    mixed = Likelihood(SE, ConstantNoise(), X[order], y[order])(theta)[0]
     assert mixed == pytest.approx(straight, rel=1e-12)
 
 

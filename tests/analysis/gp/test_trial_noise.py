@@ -28,7 +28,7 @@ def drawn(trials, rows, seed=0):
 @pytest.mark.parametrize("rows", [6, 38])  # the larger is inverted block by block
 def test_gradient_agrees_with_differences(kernel, rows):
     X, y, places = drawn(5, rows)
-    likelihood = Likelihood((kernel, EVERYTHING), X, y, places)
+    likelihood = Likelihood(kernel, EVERYTHING, X, y, places)
     shape = np.linspace(0.3, -0.2, len(kernel.names))
     theta = np.concatenate([shape, [-0.5, 0.2, -0.1, -0.3, -0.6, -0.2, 0.1]])
     slope = likelihood(theta)[1]
@@ -51,7 +51,7 @@ def test_likelihood_has_the_closed_form_of_a_mixed_model():
     C = SE.matrix(theta[:3], X, X) + 0.6**2 * np.eye(y.size)
     C += same * (sc**2 + sp**2 * np.outer(f, f) + so**2 * np.exp(-gap / tau))
     expected = multivariate_normal(np.zeros(y.size), C).logpdf(y)
-    found = Likelihood((SE, noise), X, y, places).value(theta)
+    found = Likelihood(SE, noise, X, y, places).value(theta)
     assert found == pytest.approx(expected, rel=1e-10)
 
 
@@ -75,7 +75,7 @@ def test_likelihood_gradient_and_prediction_agree_with_scikit_learn():
     )
     noise = TrialNoise(ConstantNoise(), has_drift=True)
     theta = np.log([1.3, 0.9, 1.7, 0.4, 0.6, 0.5, 0.8])
-    lml, slope = Likelihood((SE, noise), X, y, places)(theta)
+    lml, slope = Likelihood(SE, noise, X, y, places)(theta)
     assert lml == pytest.approx(value, rel=1e-10)
     # theirs: sf^2, l1, l2, -, -, sc^2, 4 of E, so^2, 4 of E, -, -, -, tau, sn^2
     places_of_ours = [0, 1, 2, 19, 5, 10, 18]
@@ -121,9 +121,9 @@ def test_a_new_trial_is_as_uncertain_as_trials_differ():
 def test_trials_that_are_not_named_share_nothing():
     X, y, _ = drawn(5, 8)
     theta = np.array([0.1, 0.2, 0.3, -0.4])
-    alone = Likelihood((SE, ConstantNoise()), X, y).value(theta)
+    alone = Likelihood(SE, ConstantNoise(), X, y).value(theta)
     named = np.append(theta, 0.5)
-    assert Likelihood((SE, LEVEL), X, y).value(named) == pytest.approx(alone)
+    assert Likelihood(SE, LEVEL, X, y).value(named) == pytest.approx(alone)
 
 
 def test_other_outputs_are_fitted_from_where_the_first_ended():

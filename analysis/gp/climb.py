@@ -1,0 +1,82 @@
+"""One climb to a top of a log density, by L-BFGS-B in a box.
+
+The method of Byrd, Lu, Nocedal and Zhu (1995), SIAM J. Sci. Comput. 16, as SciPy has
+it: a quasi-Newton method with bounds, for few parameters and an expensive slope.
+"""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from acquisition.errors import SettingsError
+from analysis.data.series import Array
+
+# theta -> value and slope; may raise SettingsError where there is no value
+Objective = Callable[[Array], tuple[float, Array]]
+
+# a climb ends where a step gains less than this share of the value
+TOLERANCE = 2e-9
+# where there is no value a climb meets one that is so much below the lowest it has met:
+# low enough to be turned down, and not so low that the next step would be next to none
+_DROP = 100.0
+
+
+class Climbed(NamedTuple):
+    """Where a climb ended.
+
+    Attributes:
+        theta: parameters, shape (p,).
+        value: the log density there.
+        evaluations: how often it was evaluated.
+    """
+
+    theta: Array
+    value: float
+    evaluations: int
+
+
+def climb(
+    objective: Objective,
+    start: Array,
+    bounds: Array,
+    is_known: Callable[[Array, float], bool] = lambda theta, value: False,
+    tolerance: float = TOLERANCE,
+) -> Climbed:
+    """Return the top that a start leads to.
+
+    Args:
+        objective: theta -> value and slope.
+        start: theta to begin with, shape (p,); clipped into the box. One without a
+            value is where the climb ends.
+        bounds: of theta, shape (p, 2).
+        is_known: theta, value -> whether the climb is left there.
+        tolerance: share of the value that the last step gains less than.
+    """
+    from scipy.optimize import minimize
+
+    lowest = 0.0
+
+    def downhill(theta: Array) -> tuple[float, Array]:
+        nonlocal lowest
+        try:
+            value, slope = objective(theta)
+        except SettingsError:
+            return _DROP - lowest, np.zeros_like(theta)
+        lowest = min(lowest, value)
+        return -value, -slope
+
+    def watch(intermediate_result: Any) -> None:  # noqa: ANN401
+        if is_known(intermediate_result.x, -float(intermediate_result.fun)):
+            raise StopIteration
+
+    found = minimize(
+        downhill,
+        np.clip(start, *bounds.T),
+        jac=True,
+        method="L-BFGS-B",
+        bounds=bounds,
+        callback=watch,
+        options={"ftol": tolerance},
+    )
+    return Climbed(np.asarray(found.x), -float(found.fun), int(found.nfev))

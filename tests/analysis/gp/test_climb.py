@@ -1,0 +1,49 @@
+import numpy as np
+import pytest
+
+from acquisition.errors import SettingsError
+from analysis.gp.climb import climb
+
+BOX = np.array([[-4.0, 4.0]] * 3)
+TOP = np.array([0.7, -1.1, 0.4])
+BEND = np.array([[3.0, 0.5, 0.0], [0.5, 1.0, 0.2], [0.0, 0.2, 20.0]])
+START = np.array([-2.0, 2.0, 1.0])
+
+
+def hill(theta, top=TOP):
+    far = theta - top
+    return -50.0 - 0.5 * far @ BEND @ far, -BEND @ far
+
+
+def test_the_top_is_reached():
+    found = climb(hill, START, BOX)
+    np.testing.assert_allclose(found.theta, TOP, atol=1e-3)
+    assert found.value == pytest.approx(-50.0, abs=1e-6)
+    assert found.evaluations < 30
+
+
+def test_a_top_outside_the_box_ends_on_its_edge():
+    found = climb(lambda theta: hill(theta, np.add(TOP, [9.0, 0.0, 0.0])), START, BOX)
+    assert found.theta[0] == 4.0
+
+
+def test_a_start_outside_the_box_is_taken_into_it():
+    found = climb(hill, START - 9.0, BOX)
+    np.testing.assert_allclose(found.theta, TOP, atol=1e-3)
+
+
+def test_places_without_a_value_are_gone_round():
+    def objective(theta):
+        if theta[0] > 1.0:
+            raise SettingsError("none")
+        return hill(theta)
+
+    found = climb(objective, START, BOX)
+    np.testing.assert_allclose(found.theta, TOP, atol=1e-2)
+
+
+def test_a_climb_is_left_where_it_is_told_to():
+    found = climb(hill, START, BOX, lambda theta, value: value > -60.0)
+    assert -60.0 < found.value < -50.01
+    assert found.value == pytest.approx(hill(found.theta)[0])
+    assert found.evaluations < climb(hill, START, BOX).evaluations
