@@ -19,8 +19,8 @@ from acquisition.sample import Record
 from acquisition.schema import FORESIGHT, MOST_TERRAINS
 from analysis.breakaway.model import BreakAwayModel
 from analysis.foresight.engine import Foresight, ForesightState
-from analysis.foresight.model import ForesightModel, RigIdentity
 from analysis.foresight.foot_record import FootRecord
+from analysis.foresight.model import ForesightModel, RigIdentity
 
 NICE = 10
 PERIOD_S = 0.01  # s between two looks at the samples
