@@ -99,8 +99,9 @@ class Observation(NamedTuple):
     is_moving: bool = False
 
 
-class Facts(NamedTuple):
-    """All that a check may look at; a tuple, because it is made in each cycle.
+@dataclass(slots=True)
+class Facts:
+    """All that a check may look at; not frozen, which would cost time in each cycle.
 
     Attributes:
         limits: where the guard steps in.
