@@ -1,30 +1,59 @@
 """Calibration and terrain as TOML: what a recording needs to be read years later."""
 
-import json
 from collections.abc import Mapping
-from typing import Any, cast
+from typing import Any, TypeVar
 
 import numpy as np
+from pydantic import Field
 
 from acquisition.errors import SettingsError
-from acquisition.settings import parse_toml
+from acquisition.settings import Number, Six
+from acquisition.toml_files import TomlFile, TomlTable
 from ft_sensor.payload import Payload, TerrainFrame
 from wam.model.constants import Array
+
+_F = TypeVar("_F", bound=TomlFile)
+_Vector = tuple[Number, Number, Number]
+
+
+class _PayloadTable(TomlTable):
+    mass: Number
+    com: _Vector
+    rotation: tuple[_Vector, _Vector, _Vector]
+    sign: Number
+    bias: Six
+
+
+class _FootTable(TomlTable):
+    sole: _Vector
+
+
+class _PayloadFile(TomlFile):
+    payload: _PayloadTable
+    foot: _FootTable
+
+
+class _TerrainFile(TomlFile):
+    name: str
+    incline: Number
+    heading: Number
+    far_end: _Vector
+    travel: Number
+    facts: dict[str, Any] = Field(default_factory=dict[str, Any])
 
 
 def payload_to_toml(payload: Payload, sole: Array) -> str:
     """Return `ft_calibration.toml`: payload, mounting, bias, and the sole's centre."""
-    return (
-        "# SI units. sole and rotation refer to frame 7 (tool plate).\n"
-        "[payload]\n"
-        f"mass = {float(payload.mass)!r}\n"
-        f"com = {payload.com.tolist()}\n"
-        f"rotation = {payload.rotation.tolist()}\n"
-        f"sign = {float(payload.sign)!r}\n"
-        f"bias = {payload.bias.tolist()}\n"
-        "\n[foot]\n"
-        f"sole = {sole.tolist()}\n"
+    table = _PayloadTable.model_construct(
+        mass=float(payload.mass),
+        com=payload.com.tolist(),
+        rotation=payload.rotation.tolist(),
+        sign=float(payload.sign),
+        bias=payload.bias.tolist(),
     )
+    foot = _FootTable.model_construct(sole=sole.tolist())
+    file = _PayloadFile.model_construct(payload=table, foot=foot)
+    return file.text("SI units. sole and rotation refer to frame 7 (tool plate).")
 
 
 def payload_from_toml(text: str) -> tuple[Payload, Array]:
@@ -33,33 +62,28 @@ def payload_from_toml(text: str) -> tuple[Payload, Array]:
     Raises:
         SettingsError: the text is not of that form.
     """
-    table = _parse(text, "ft_calibration.toml")
-    try:
-        section = table["payload"]
-        payload = Payload(
-            mass=_number(section["mass"]),
-            com=_array(section["com"], (3,)),
-            rotation=_array(section["rotation"], (3, 3)),
-            sign=_number(section["sign"]),
-            bias=_array(section["bias"], (6,)),
-        )
-        return payload, _array(table["foot"]["sole"], (3,))
-    except (KeyError, TypeError, ValueError, OverflowError) as error:
-        raise SettingsError(f"ft_calibration.toml is incomplete: {error}.") from error
+    file = _parse(_PayloadFile, text, "ft_calibration.toml")
+    payload = Payload(
+        mass=file.payload.mass,
+        com=np.array(file.payload.com),
+        rotation=np.array(file.payload.rotation),
+        sign=file.payload.sign,
+        bias=np.array(file.payload.bias),
+    )
+    return payload, np.array(file.foot.sole)
 
 
 def terrain_to_toml(name: str, frame: TerrainFrame, fields: Mapping[str, str]) -> str:
     """Return `terrain.toml`: where the container stood and what was in it."""
-    extra = "".join(f"{key} = {_quoted(value)}\n" for key, value in fields.items())
-    return (
-        "# SI units, angles in rad, base frame of the arm.\n"
-        f"name = {_quoted(name)}\n"
-        f"incline = {float(frame.incline)!r}\n"
-        f"heading = {float(frame.heading)!r}\n"
-        f"far_end = {[float(value) for value in frame.far_end]}\n"
-        f"travel = {float(frame.travel)!r}\n"
-        "\n[facts]\n" + extra
+    file = _TerrainFile.model_construct(
+        name=name,
+        incline=float(frame.incline),
+        heading=float(frame.heading),
+        far_end=[float(value) for value in frame.far_end],
+        travel=float(frame.travel),
+        facts=fields,
     )
+    return file.text("SI units, angles in rad, base frame of the arm.")
 
 
 def terrain_from_toml(text: str) -> tuple[str, TerrainFrame]:
@@ -68,51 +92,23 @@ def terrain_from_toml(text: str) -> tuple[str, TerrainFrame]:
     Raises:
         SettingsError: the text is not of that form.
     """
-    table = _parse(text, "terrain.toml")
-    try:
-        x, y, z = _array(table["far_end"], (3,)).tolist()
-        frame = TerrainFrame(
-            incline=_number(table["incline"]),
-            heading=_number(table["heading"]),
-            far_end=(x, y, z),
-            travel=_number(table["travel"]),
-        )
-        return str(table["name"]), frame
-    except (KeyError, TypeError, ValueError, OverflowError) as error:
-        raise SettingsError(f"terrain.toml is incomplete: {error}.") from error
+    file = _parse(_TerrainFile, text, "terrain.toml")
+    frame = TerrainFrame(file.incline, file.heading, file.far_end, file.travel)
+    return file.name, frame
 
 
 def terrain_metadata(text: str) -> dict[str, str]:
     """Return what else `terrain.toml` says, empty where it says nothing.
 
     Raises:
-        SettingsError: the text is no TOML, or says it in another form.
+        SettingsError: the text is not of that form.
     """
-    table: object = _parse(text, "terrain.toml").get("facts", {})
-    if not isinstance(table, dict):
-        raise SettingsError("terrain.toml is incomplete: facts is not a table.")
-    fields = cast("dict[str, object]", table)
-    return {str(key): str(value) for key, value in fields.items()}
+    facts = _parse(_TerrainFile, text, "terrain.toml").facts
+    return {key: str(value) for key, value in facts.items()}
 
 
-def _parse(text: str, name: str) -> dict[str, Any]:
+def _parse(kind: type[_F], text: str, name: str) -> _F:
     try:
-        return parse_toml(text)
+        return kind.parse(text)
     except ValueError as error:
-        raise SettingsError(f"{name}: {error}.") from error
-
-
-def _number(value: object) -> float:
-    return float(_array(value, ()))
-
-
-def _array(value: object, shape: tuple[int, ...]) -> Array:
-    array = np.array(value, dtype=float)
-    if array.shape != shape or not bool(np.isfinite(array).all()):
-        raise ValueError(f"expected {shape} finite numbers, got {value!r:.80}")
-    return array
-
-
-def _quoted(text: str) -> str:
-    # JSON escapes what TOML does, but for one character.
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+        raise SettingsError(f"{name} is incomplete: {error}.") from error

@@ -1,16 +1,20 @@
 """A calibration of the wrist sensor as TOML: payload, mounting, bias, what was read."""
 
 from dataclasses import dataclass
+from typing import Annotated, Self
 
 import numpy as np
+from pydantic import Field, model_validator
 
 from acquisition.errors import SettingsError
-from acquisition.settings import parse_toml
+from acquisition.settings import Number, Six
+from acquisition.toml_files import TomlFile
 from ft_sensor.calibration.fit import Floats, SensorFit
 from wam.model.constants import Array
 
-_HEAVIEST = 5.0  # kg; what a wrist sensor carries
 _MOST = 200  # orientations
+_Residual = Annotated[Number, Field(ge=0, le=1e6)]
+_Nine = Annotated[tuple[Number, ...], Field(min_length=9, max_length=9)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,25 +50,51 @@ class SensorCalibration:
         return np.array([c * x - s * y, s * x + c * y, z + height])
 
 
+class _SensorFile(TomlFile):
+    """The fields of `SensorCalibration`, in the order of the file."""
+
+    foot: str
+    measured_utc: str
+    is_simulated: bool = Field(strict=True)
+    mass: Number = Field(ge=0, le=5)  # kg; what a wrist sensor carries
+    com: tuple[Number, Number, Number]
+    angle: Number = Field(ge=-2 * np.pi, le=2 * np.pi)
+    sign: Number = Field(ge=-1, le=1)
+    bias: Six
+    residual: _Residual
+    torque_residual: _Residual
+    drift: _Residual
+    rotations: tuple[_Nine, ...] = Field(min_length=1, max_length=_MOST)
+    readings: tuple[Six, ...] = Field(max_length=_MOST)
+
+    @model_validator(mode="after")
+    def _has_a_reading_for_each_rotation(self) -> Self:
+        if len(self.readings) != len(self.rotations):
+            counts = f"{len(self.rotations)} rotations, {len(self.readings)} readings"
+            raise ValueError(counts)
+        return self
+
+
 def sensor_to_toml(calibration: SensorCalibration) -> str:
     """Return the text of a calibration file."""
     fit = calibration.fit
-    rotations = calibration.rotations.reshape(-1, 9).tolist()
-    return (
-        "# Wrist sensor and foot. SI units, sensor frame; angle: about z of frame 7.\n"
-        f'foot = "{calibration.foot}"\n'
-        f'measured_utc = "{calibration.measured_utc}"\n'
-        f"is_simulated = {str(calibration.is_simulated).lower()}\n"
-        f"mass = {fit.mass!r}\n"
-        f"com = {fit.com.tolist()}\n"
-        f"angle = {fit.angle!r}\n"
-        f"sign = {fit.sign!r}\n"
-        f"bias = {fit.bias.tolist()}\n"
-        f"residual = {fit.residual!r}\n"
-        f"torque_residual = {fit.torque_residual!r}\n"
-        f"drift = {calibration.drift!r}\n"
-        f"rotations = {_rows(rotations)}\n"
-        f"readings = {_rows(calibration.readings.tolist())}\n"
+    file = _SensorFile.model_construct(
+        foot=calibration.foot,
+        measured_utc=calibration.measured_utc,
+        is_simulated=calibration.is_simulated,
+        mass=fit.mass,
+        com=fit.com.tolist(),
+        angle=fit.angle,
+        sign=fit.sign,
+        bias=fit.bias.tolist(),
+        residual=fit.residual,
+        torque_residual=fit.torque_residual,
+        drift=calibration.drift,
+        rotations=calibration.rotations.reshape(-1, 9).tolist(),
+        readings=calibration.readings.tolist(),
+    )
+    return file.text(
+        "Wrist sensor and foot. SI units, sensor frame; angle: about z of frame 7."
     )
 
 
@@ -75,56 +105,27 @@ def sensor_from_toml(text: str, name: str) -> SensorCalibration:
         SettingsError: the text is not a calibration of a wrist sensor.
     """
     try:
-        table = parse_toml(text)
-        if not isinstance(table["is_simulated"], bool):
-            raise TypeError("is_simulated is neither true nor false")
-        count = len(table["rotations"])
-        if count > _MOST:
-            raise ValueError(f"more than {_MOST} orientations")
-        fit = SensorFit(
-            mass=_number(table["mass"], 0.0, _HEAVIEST),
-            com=_array(table["com"], (3,)),
-            bias=_array(table["bias"], (6,)),
-            angle=_number(table["angle"], -2 * np.pi, 2 * np.pi),
-            sign=1.0 if _number(table["sign"], -1.0, 1.0) > 0 else -1.0,
-            residual=_number(table["residual"], 0.0, 1e6),
-            torque_residual=_number(table["torque_residual"], 0.0, 1e6),
-        )
-        return SensorCalibration(
-            fit=fit,
-            foot=str(table["foot"]),
-            drift=_number(table["drift"], 0.0, 1e6),
-            measured_utc=str(table["measured_utc"]),
-            is_simulated=table["is_simulated"],
-            rotations=_array(table["rotations"], (count, 9)).reshape(count, 3, 3),
-            readings=_array(table["readings"], (count, 6)),
-        )
-    except KeyError as error:
-        raise _wrong(name, f"{error.args[0]} is missing") from error
-    except (TypeError, ValueError, OverflowError, RecursionError) as error:
-        raise _wrong(name, str(error)) from error
-
-
-def _number(value: object, least: float, most: float) -> float:
-    number = float(_array(value, ()))
-    if not least <= number <= most:
-        raise ValueError(f"{number} is not within {least:g}..{most:g}")
-    return number
-
-
-def _array(value: object, shape: tuple[int, ...]) -> Array:
-    array = np.array(value, dtype=np.float64)
-    if array.shape != shape or not bool(np.isfinite(array).all()):
-        raise ValueError(f"expected finite numbers of shape {shape}")
-    return array
-
-
-def _rows(values: list[list[float]]) -> str:
-    return "[\n" + "".join(f"  {row},\n" for row in values) + "]"
-
-
-def _wrong(name: str, what: str) -> SettingsError:
-    return SettingsError(
-        f"{name} is not a calibration of a wrist sensor: {what}.",
-        hint="Make one with: traction calibrate sensor. Nothing was started.",
+        file = _SensorFile.parse(text)
+    except ValueError as error:
+        raise SettingsError(
+            f"{name} is not a calibration of a wrist sensor: {error}.",
+            hint="Make one with: traction calibrate sensor. Nothing was started.",
+        ) from error
+    fit = SensorFit(
+        mass=file.mass,
+        com=np.array(file.com),
+        bias=np.array(file.bias),
+        angle=file.angle,
+        sign=1.0 if file.sign > 0 else -1.0,
+        residual=file.residual,
+        torque_residual=file.torque_residual,
+    )
+    return SensorCalibration(
+        fit=fit,
+        foot=file.foot,
+        drift=file.drift,
+        measured_utc=file.measured_utc,
+        is_simulated=file.is_simulated,
+        rotations=np.array(file.rotations).reshape(-1, 3, 3),
+        readings=np.array(file.readings),
     )

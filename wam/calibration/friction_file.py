@@ -1,12 +1,14 @@
 """A calibration of friction as TOML: what was identified, and how well."""
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import Field, field_validator
 
 from acquisition.errors import SettingsError
-from acquisition.settings import parse_toml
+from acquisition.settings import Number, Whole
+from acquisition.toml_files import TomlFile, TomlTable
 from wam.calibration.friction_fit import FrictionFit
 from wam.calibration.joint_friction import (
     joint_asymmetry,
@@ -16,8 +18,9 @@ from wam.calibration.joint_friction import (
 from wam.model.constants import ArmConstants, Array
 from wam.model.friction import MotorFriction, friction_of, joint_coulomb
 
-_LARGEST_MOMENT = 10.0  # kg m
-_LARGEST = 1e4  # of any number in the file
+_Moment = Annotated[Number, Field(gt=-10, lt=10)]  # kg m
+_Number = Annotated[Number, Field(gt=-1e4, lt=1e4)]
+_Seven = tuple[_Number, _Number, _Number, _Number, _Number, _Number, _Number]
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,31 +42,72 @@ class FrictionCalibration:
     is_simulated: bool
 
 
+class _FitTable(TomlTable):
+    """How well the motors are known; files of before 0.2 have no moments."""
+
+    deviation: _Seven
+    asymmetry_deviation: _Seven
+    residual: _Seven
+    rows: Annotated[tuple[Whole, ...], Field(min_length=7, max_length=7)]
+    moments: Annotated[
+        tuple[tuple[_Moment, _Moment, _Moment], ...], Field(min_length=7, max_length=7)
+    ] = Field(
+        default=((0.0, 0.0, 0.0),) * 7,
+        description="To be added to the first moments whose weight was subtracted "
+        "[kg m].",
+    )
+
+    @field_validator("deviation", "asymmetry_deviation")
+    @classmethod
+    def _is_not_negative(cls, deviation: tuple[float, ...]) -> tuple[float, ...]:
+        if min(deviation) < 0.0:
+            raise ValueError("a deviation is below 0")
+        return deviation
+
+
+class _FrictionFile(TomlFile):
+    """A calibration in the order of its file; figures of joints are for people."""
+
+    foot: str
+    gravity: str
+    measured_utc: str
+    is_simulated: bool = Field(strict=True)
+    coulomb: Any = Field(
+        default=None,
+        description="At the joints 1 to 7, each turning alone [N m].",
+    )
+    asymmetry: Any = None
+    breakaway: Any = None
+    coulomb_deviation: Any = None
+    coulomb_lower_bound: Any = None
+    motors: dict[str, _Seven] = Field(description="At the motors 1 to 7.")
+    fit: _FitTable = Field(
+        description="How well the motors are known; residuals are shares of Coulomb "
+        "friction."
+    )
+
+
 def friction_to_toml(calibration: FrictionCalibration, constants: ArmConstants) -> str:
     """Return the text of a calibration file."""
     fit = calibration.fit
-    deviation = joint_deviation(constants, fit.deviation)
-    bound = joint_coulomb(constants, fit.lower_bound)
-    return (
-        "# Friction of this arm as identified. SI units.\n"
-        f'foot = "{calibration.foot}"\n'
-        f'gravity = "{calibration.gravity}"\n'
-        f'measured_utc = "{calibration.measured_utc}"\n'
-        f"is_simulated = {str(calibration.is_simulated).lower()}\n"
-        f"{_joint_lines(constants, fit.friction)}"
-        f"{_line('coulomb_deviation', deviation)}"
-        f"{_line('coulomb_lower_bound', bound)}"
-        "\n# At the motors 1 to 7.\n[motors]\n"
-        f"{_motor_lines(fit.friction)}"
-        "\n# How well the motors are known; residuals are shares of Coulomb friction.\n"
-        "[fit]\n"
-        f"{_line('deviation', fit.deviation)}"
-        f"{_line('asymmetry_deviation', fit.asymmetry_deviation)}"
-        f"{_line('residual', fit.residual)}"
-        f"rows = {list(fit.rows)}\n"
-        "# To be added to the first moments whose weight was subtracted [kg m].\n"
-        f"moments = {fit.moments.tolist()}\n"
+    file = _FrictionFile.model_construct(
+        foot=calibration.foot,
+        gravity=calibration.gravity,
+        measured_utc=calibration.measured_utc,
+        is_simulated=calibration.is_simulated,
+        **_of_joints(constants, fit.friction),
+        coulomb_deviation=joint_deviation(constants, fit.deviation).tolist(),
+        coulomb_lower_bound=joint_coulomb(constants, fit.lower_bound).tolist(),
+        motors=fit.friction.metadata(),
+        fit=_FitTable.model_construct(
+            deviation=fit.deviation.tolist(),
+            asymmetry_deviation=fit.asymmetry_deviation.tolist(),
+            residual=fit.residual.tolist(),
+            rows=fit.rows,
+            moments=fit.moments.tolist(),
+        ),
     )
+    return file.text("Friction of this arm as identified. SI units.")
 
 
 def truth_to_toml(
@@ -79,13 +123,10 @@ def truth_to_toml(
     coulomb = friction.coulomb + friction.load * (load_at - friction.load_at)
     presliding = friction.presliding * coulomb / friction.coulomb  # as stiff as it is
     there = replace(friction, coulomb=coulomb, load_at=load_at, presliding=presliding)
-    return (
-        "# Friction that the simulated arm really has. SI units.\n"
-        "is_simulated = true\n"
-        f"{_joint_lines(constants, there)}"
-        "\n# At the motors 1 to 7.\n[motors]\n"
-        f"{_motor_lines(there)}"
+    file = _FrictionFile.model_construct(
+        is_simulated=True, **_of_joints(constants, there), motors=there.metadata()
     )
+    return file.text("Friction that the simulated arm really has. SI units.")
 
 
 def friction_from_toml(text: str, name: str) -> FrictionCalibration:
@@ -95,75 +136,36 @@ def friction_from_toml(text: str, name: str) -> FrictionCalibration:
         SettingsError: the text is not a calibration of friction.
     """
     try:
-        table = parse_toml(text)
-        if not isinstance(table["is_simulated"], bool):
-            raise TypeError("is_simulated is neither true nor false")
-        return FrictionCalibration(
-            fit=_fit(table["motors"], table["fit"]),
-            foot=str(table["foot"]),
-            gravity=str(table["gravity"]),
-            measured_utc=str(table["measured_utc"]),
-            is_simulated=table["is_simulated"],
-        )
-    except KeyError as error:
-        raise _wrong(name, f"{error.args[0]} is missing") from error
-    except (TypeError, ValueError, OverflowError, RecursionError) as error:
-        raise _wrong(name, str(error)) from error
-
-
-def _fit(motors: dict[str, Any], quality: dict[str, Any]) -> FrictionFit:
-    friction = friction_of(motors)
-    names = ("deviation", "asymmetry_deviation", "residual", "rows")
-    deviation, asymmetry, residual, rows = (_seven(quality[name]) for name in names)
-    if min(float(column.min()) for column in (deviation, asymmetry)) < 0.0:
-        raise ValueError("a deviation is below 0")
-    return FrictionFit(
+        file = _FrictionFile.parse(text)
+        friction = friction_of(file.motors)
+    except (KeyError, ValueError) as error:
+        is_key = isinstance(error, KeyError)
+        what = f"motors.{error.args[0]} is missing" if is_key else error
+        raise SettingsError(
+            f"{name} is not a calibration of friction: {what}.",
+            hint="Make one with: traction calibrate friction. Nothing was started.",
+        ) from error
+    fit = FrictionFit(
         friction=friction,
-        deviation=deviation,
-        asymmetry_deviation=asymmetry,
-        residual=residual,
-        rows=tuple(int(count) for count in rows.tolist()),
-        moments=_moments(quality.get("moments")),
+        deviation=np.array(file.fit.deviation),
+        asymmetry_deviation=np.array(file.fit.asymmetry_deviation),
+        residual=np.array(file.fit.residual),
+        rows=file.fit.rows,
+        moments=np.array(file.fit.moments),
+    )
+    return FrictionCalibration(
+        fit=fit,
+        foot=file.foot,
+        gravity=file.gravity,
+        measured_utc=file.measured_utc,
+        is_simulated=file.is_simulated,
     )
 
 
-def _moments(value: object) -> Array:
-    """Return the change of first moments; files of before 0.2 have none."""
-    array = np.zeros((7, 3)) if value is None else np.array(value, dtype=np.float64)
-    if array.shape != (7, 3) or not bool((np.abs(array) < _LARGEST_MOMENT).all()):
-        raise ValueError("moments: expected seven times three numbers below 10 kg m")
-    return array
-
-
-def _joint_lines(constants: ArmConstants, friction: MotorFriction) -> str:
+def _of_joints(constants: ArmConstants, friction: MotorFriction) -> dict[str, Any]:
     """Return what a joint that turns alone meets [N m], joints 1 to 7."""
-    lines = {
-        "coulomb": joint_coulomb(constants, friction.coulomb),
-        "asymmetry": joint_asymmetry(constants, friction.asymmetry),
-        "breakaway": joint_breakaway(constants, friction),
+    return {
+        "coulomb": joint_coulomb(constants, friction.coulomb).tolist(),
+        "asymmetry": joint_asymmetry(constants, friction.asymmetry).tolist(),
+        "breakaway": joint_breakaway(constants, friction).tolist(),
     }
-    text = "".join(_line(name, values) for name, values in lines.items())
-    return f"# At the joints 1 to 7, each turning alone [N m].\n{text}"
-
-
-def _motor_lines(friction: MotorFriction) -> str:
-    values = friction.metadata()
-    return "".join(f"{name} = {numbers}\n" for name, numbers in values.items())
-
-
-def _line(name: str, values: Array) -> str:
-    return f"{name} = {values.tolist()}\n"
-
-
-def _seven(value: object) -> Array:
-    array = np.array(value, dtype=np.float64)
-    if array.shape != (7,) or not bool((np.abs(array) < _LARGEST).all()):
-        raise ValueError("expected seven finite numbers")
-    return array
-
-
-def _wrong(name: str, what: str) -> SettingsError:
-    return SettingsError(
-        f"{name} is not a calibration of friction: {what}.",
-        hint="Make one with: traction calibrate friction. Nothing was started.",
-    )

@@ -1,17 +1,21 @@
 """A gravity calibration as TOML: first moments, how well they fit, what was fitted."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Self
 
 import numpy as np
+from pydantic import Field, model_validator
 
 from acquisition.errors import SettingsError
-from acquisition.settings import parse_toml
+from acquisition.settings import Number, Whole
+from acquisition.toml_files import TomlFile, TomlTable
 from wam.model.constants import Array, Body
 from wam.model.tool import Tool, tool_metadata, tool_of
 
 _SAME = 1e-9  # kg and m: the tool of a calibration and of a session
-_LARGEST_MOMENT = 10.0  # kg m; a Barrett arm's largest is 3
+_Moment = Annotated[Number, Field(ge=-10, le=10)]  # kg m; a Barrett arm's largest is 3
+_Vector = tuple[Number, Number, Number]
+_Seven = tuple[Number, Number, Number, Number, Number, Number, Number]
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,34 +45,59 @@ class GravityCalibration:
     torques: Array
 
 
+class _BodyTable(TomlTable):
+    mass: Number
+    com: _Vector
+    inertia: tuple[_Vector, _Vector, _Vector]
+
+
+class _ToolTable(TomlTable):
+    """What `tool_metadata` gives."""
+
+    sole: _Vector
+    sensor_height: Number
+    sensor_angle: Number
+    sensor_sign: Number
+    sensor: _BodyTable
+    foot: _BodyTable
+
+
+class _GravityFile(TomlFile):
+    """The fields of `GravityCalibration`, in the order of the file."""
+
+    foot: str
+    measured_utc: str
+    is_simulated: bool = Field(strict=True)
+    residual: Number
+    rank: Whole
+    mus: Annotated[
+        tuple[tuple[_Moment, _Moment, _Moment], ...], Field(min_length=7, max_length=7)
+    ]
+    poses: tuple[_Seven, ...] = Field(min_length=1)
+    torques: tuple[_Seven, ...]
+    tool: _ToolTable
+
+    @model_validator(mode="after")
+    def _has_a_torque_for_each_pose(self) -> Self:
+        if len(self.torques) != len(self.poses):
+            raise ValueError(f"{len(self.poses)} poses, {len(self.torques)} torques")
+        return self
+
+
 def gravity_to_toml(calibration: GravityCalibration) -> str:
     """Return the text of a calibration file."""
-    fields = tool_metadata(calibration.tool)
-    sections = "".join(
-        f"\n[tool.{name}]\n"
-        f"mass = {float(body['mass'])!r}\n"
-        f"com = {body['com']}\n"
-        f"inertia = {body['inertia']}\n"
-        for name in ("sensor", "foot")
-        for body in (fields[name],)
+    file = _GravityFile.model_construct(
+        foot=calibration.foot,
+        measured_utc=calibration.measured_utc,
+        is_simulated=calibration.is_simulated,
+        residual=calibration.residual,
+        rank=calibration.rank,
+        mus=calibration.mus.tolist(),
+        poses=calibration.poses.tolist(),
+        torques=calibration.torques.tolist(),
+        tool=_ToolTable.model_validate(tool_metadata(calibration.tool)),
     )
-    plain = "".join(
-        f"{name} = {value}\n"
-        for name, value in fields.items()
-        if not isinstance(value, dict)
-    )
-    return (
-        "# Gravity of this arm with this tool. SI units, frames 1..7.\n"
-        f'foot = "{calibration.foot}"\n'
-        f'measured_utc = "{calibration.measured_utc}"\n'
-        f"is_simulated = {str(calibration.is_simulated).lower()}\n"
-        f"residual = {calibration.residual!r}\n"
-        f"rank = {calibration.rank}\n"
-        f"mus = {_rows(calibration.mus)}\n"
-        f"poses = {_rows(calibration.poses)}\n"
-        f"torques = {_rows(calibration.torques)}\n"
-        f"\n[tool]\n{plain}{sections}"
-    )
+    return file.text("Gravity of this arm with this tool. SI units, frames 1..7.")
 
 
 def gravity_from_toml(text: str, name: str) -> GravityCalibration:
@@ -78,28 +107,23 @@ def gravity_from_toml(text: str, name: str) -> GravityCalibration:
         SettingsError: the text is not a gravity calibration.
     """
     try:
-        table = parse_toml(text)
-        if not isinstance(table["is_simulated"], bool):
-            raise TypeError("is_simulated is neither true nor false")
-        poses = _numbers(table["poses"], (len(table["poses"]), 7))
-        mus = _numbers(table["mus"], (7, 3))
-        if np.abs(mus).max() > _LARGEST_MOMENT:
-            raise ValueError(f"a moment exceeds {_LARGEST_MOMENT} kg m")
-        return GravityCalibration(
-            mus=mus,
-            residual=float(_numbers(table["residual"], ())),
-            rank=int(table["rank"]),
-            foot=str(table["foot"]),
-            tool=_tool(table["tool"]),
-            measured_utc=str(table["measured_utc"]),
-            is_simulated=table["is_simulated"],
-            poses=poses,
-            torques=_numbers(table["torques"], poses.shape),
-        )
-    except KeyError as error:
-        raise _wrong(name, f"{error.args[0]} is missing") from error
-    except (TypeError, ValueError, OverflowError, RecursionError) as error:
-        raise _wrong(name, str(error)) from error
+        file = _GravityFile.parse(text)
+    except ValueError as error:
+        raise SettingsError(
+            f"{name} is not a gravity calibration: {error}.",
+            hint="Make one with: traction calibrate gravity. Nothing was started.",
+        ) from error
+    return GravityCalibration(
+        mus=np.array(file.mus),
+        residual=file.residual,
+        rank=file.rank,
+        foot=file.foot,
+        tool=tool_of(file.tool.model_dump()),
+        measured_utc=file.measured_utc,
+        is_simulated=file.is_simulated,
+        poses=np.array(file.poses),
+        torques=np.array(file.torques),
+    )
 
 
 def fits_tool(calibration: GravityCalibration, tool: Tool) -> bool:
@@ -114,33 +138,3 @@ def fits_tool(calibration: GravityCalibration, tool: Tool) -> bool:
 def _weighs_the_same(one: Body, other: Body) -> bool:
     is_near = np.abs(one.com - other.com) <= _SAME
     return abs(one.mass - other.mass) <= _SAME and bool(is_near.all())
-
-
-def _tool(fields: dict[str, Any]) -> Tool:
-    """Return the tool of a file; its numbers are checked, it may say anything."""
-    for body in (fields["sensor"], fields["foot"]):
-        _numbers(body["mass"], ())
-        _numbers(body["com"], (3,))
-        _numbers(body["inertia"], (3, 3))
-    _numbers(fields["sole"], (3,))
-    for name in ("sensor_height", "sensor_angle", "sensor_sign"):
-        _numbers(fields[name], ())
-    return tool_of(fields)
-
-
-def _numbers(value: object, shape: tuple[int, ...]) -> Array:
-    array = np.array(value, dtype=np.float64)
-    if array.shape != shape or not bool(np.isfinite(array).all()):
-        raise ValueError(f"expected finite numbers of shape {shape}")
-    return array
-
-
-def _rows(values: Array) -> str:
-    return "[\n" + "".join(f"  {row},\n" for row in values.tolist()) + "]"
-
-
-def _wrong(name: str, what: str) -> SettingsError:
-    return SettingsError(
-        f"{name} is not a gravity calibration: {what}.",
-        hint="Make one with: traction calibrate gravity. Nothing was started.",
-    )
