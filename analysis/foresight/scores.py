@@ -254,9 +254,9 @@ def _changes(model: GroundModel, trials: Sequence[WatchedTrial]) -> list[float]:
     for k, before in enumerate(trials):
         others = rocky if before.surface == FLAT_SURFACE else flat
         after = others[k % len(others)]
-        met = slid[trials.index(after)]
-        if len(slid[k]) >= _BEFORE and len(met) >= _BEFORE + MOMENTS[-1]:
-            ends = slid[k][:_BEFORE], met[_BEFORE : _BEFORE + _AFTER]
+        following = slid[trials.index(after)]
+        if len(slid[k]) >= _BEFORE and len(following) >= _BEFORE + MOMENTS[-1]:
+            ends = slid[k][:_BEFORE], following[_BEFORE : _BEFORE + _AFTER]
             times.append(_time_back(model, *ends, after.surface))
     return times
 
