@@ -137,18 +137,18 @@ class _Column:
         centred: the factor less its mean, by the name of the terrain.
         size: its spread times that of the places in the sequence.
         places: those that are still to be filled, less the mean of all.
-        begun: products of place and factor at the beginning, exactly: their sum.
+        begun: sum of the products of place and factor at the beginning.
     """
 
     centred: Mapping[str, float]
     size: float
     places: Sequence[float]
-    begun: Sequence[float]
+    begun: float
 
     def of(self, order: Sequence[str]) -> float:
         """Return |correlation| with the place if the rest comes in this order."""
         own = [p * self.centred[n] for p, n in zip(self.places, order, strict=True)]
-        return abs(math.fsum((*self.begun, *own))) / self.size
+        return abs(math.fsum((self.begun, *own))) / self.size
 
 
 def _columns(
@@ -165,25 +165,10 @@ def _columns(
         size = math.sqrt(math.fsum(c * c for c in centred) * squares)
         if size > 0.0:
             pairs = zip(places[:begun], centred[:begun], strict=True)
-            first = _parts([p * c for p, c in pairs])
+            first = math.fsum(p * c for p, c in pairs)
             named = dict(zip(order, centred, strict=True))
             columns.append(_Column(named, size, places[begun:], first))
     return columns
-
-
-def _parts(values: Sequence[float]) -> list[float]:
-    """Return a few numbers whose exact sum is that of `values` (Shewchuk, 1997)."""
-    parts: list[float] = []
-    for value in values:
-        rest, kept = value, list[float]()
-        for part in parts:
-            large, small = (rest, part) if abs(rest) > abs(part) else (part, rest)
-            rest = large + small
-            error = small - (rest - large)
-            if error:
-                kept.append(error)
-        parts = [*kept, rest]
-    return parts
 
 
 def _factors(row: BoardRow) -> tuple[float, ...]:
