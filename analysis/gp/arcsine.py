@@ -18,6 +18,7 @@ import numpy as np
 
 from analysis.data.series import Array
 from analysis.gp.kernels import (
+    ENDLESS,
     Composable,
     Contraction,
     Evaluator,
@@ -29,8 +30,9 @@ Part = tuple[slice, slice]  # rows and columns of a matrix that are computed
 
 _ROOT_2 = np.sqrt(2.0)
 _BIASES = (20.0, 0.05)  # beta that a search may start with
-_SCALE_MOVES = (-2.5, -1.2, 0.0, 1.2)  # of log sf and all log l, to another top
-_BIAS_MOVES = (-4.0, 0.0, 4.0)  # of log beta, to another top
+_SCALES = (-2.5, -1.2, 0.0, 1.2, 2.5)  # moves of log sf and all log l
+_BIAS_STEPS = (-4.0, 0.0, 4.0)  # moves of log beta that go with them
+_BIAS_TO_LENGTH = 2.5  # move of all log l that makes up for the bias from end to end
 
 
 class Augmented(NamedTuple):
@@ -100,20 +102,32 @@ class Arcsine(Composable):
             for lengths in length_pairs(sd_x)
         ]
 
-    def moves(self, theta: Array) -> Sequence[Array]:
-        """Return theta with another scale, another bias, or both.
+    def moves(self, theta: Array) -> Sequence[Sequence[Array]]:
+        """Return theta with another scale, the other end of bias, an input not used.
 
         Where the arcsine is nearly linear, twice the size with twice the lengths is
-        nearly the same function: these change together. The bias makes up for a single
-        length that changes, so no such move leads far.
+        nearly the same function: these change together, and with the bias. The bias
+        makes up for a single length that changes, so no such move leads far. Much bias
+        goes with short lengths, none of it with long ones.
         """
-        scale = np.append(np.ones(theta.size - 1), 0.0)
-        bias = 1.0 - scale
-        return [
-            theta + a * scale + b * bias
-            for a, b in product(_SCALE_MOVES, _BIAS_MOVES)
+        size, *lengths, bias = np.eye(theta.size)
+        every = np.sum(lengths, axis=0)
+        scaled = [
+            theta + a * (size + every) + b * bias
+            for a, b in product(_SCALES, _BIAS_STEPS)
             if a or b
         ]
+        turned = [
+            theta + sign * (ENDLESS * bias - shift * every)
+            for sign in (-1.0, 1.0)
+            for shift in (0.0, _BIAS_TO_LENGTH)
+        ]
+        unused = [
+            theta + ENDLESS * length - without * bias
+            for length in lengths
+            for without in (0.0, ENDLESS)
+        ]
+        return [scaled, turned, unused]
 
     def bounds(self, sd_y: float, sd_x: Array) -> Array:
         """Return log sf in log sd(y) + [-6, 4], log l_d in [-4, 6], log beta +-6."""

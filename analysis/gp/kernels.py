@@ -27,7 +27,8 @@ Evaluator = Callable[[Array], tuple[Array, Contraction]]
 _STRIP = 40  # rows of a triangle computed at a time
 _LONGER = 3.0  # are the lengths of a second part, or equal parts would stay equal
 _STRETCHES = (0.1, 0.35, 1.0, 3.5)  # l / sd(x) that a search may start with
-_MOVES = (-2.5, -1.2, 1.2, 2.5, 10.0)  # of log l, to another top; the last: not used
+ENDLESS = 10.0  # more in a logarithm than a search goes: to its bound
+_LENGTHS = (-2.5, -1.2, 1.2, 2.5, ENDLESS)  # moves of log l; the last: not used
 
 
 KERNELS: dict[str, type] = {}  # by name: results that are kept name their kernel
@@ -64,8 +65,12 @@ class Kernel(Protocol):
         """Return points that a search may start with, each of shape (p,)."""
         ...
 
-    def moves(self, theta: Array) -> Sequence[Array]:
-        """Return points that may belong to another top than theta, each (p,)."""
+    def moves(self, theta: Array) -> Sequence[Sequence[Array]]:
+        """Return points that may belong to another top than theta, each (p,).
+
+        They come in kinds. A search climbs from the likeliest of every kind in turn, of
+        those that are not near to what it has reached by then.
+        """
         ...
 
     def bounds(self, sd_y: float, sd_x: Array) -> Array:
@@ -125,10 +130,11 @@ class SquaredExponential(Composable):
             for lengths in length_pairs(sd_x)
         ]
 
-    def moves(self, theta: Array) -> Sequence[Array]:
-        """Return theta with one length changed: shorter, longer, or not used."""
-        steps = np.eye(theta.size)[1:]
-        return [theta + size * step for step in steps for size in _MOVES]
+    def moves(self, theta: Array) -> Sequence[Sequence[Array]]:
+        """Return theta with one length changed, twice: the two likeliest are climbed."""
+        lengths = np.eye(theta.size)[1:]
+        changed = [theta + size * length for length in lengths for size in _LENGTHS]
+        return [changed, changed]
 
     def bounds(self, sd_y: float, sd_x: Array) -> Array:
         """Return log sf in log sd(y) + [-6, 4], log l_d in log sd(x_d) + [-4, 6]."""
@@ -196,11 +202,16 @@ class _Pair(Composable):
         left = (f"a.{name}" for name in self.left.names)
         return (*left, *(f"b.{name}" for name in self.right.names))
 
-    def moves(self, theta: Array) -> Sequence[Array]:
+    def moves(self, theta: Array) -> Sequence[Sequence[Array]]:
         """Return the moves of one part while the other stays."""
         a, b = self._split(theta)
-        of_left = [np.concatenate([move, b]) for move in self.left.moves(a)]
-        return of_left + [np.concatenate([a, move]) for move in self.right.moves(b)]
+        of_left = [
+            [np.concatenate([move, b]) for move in kind] for kind in self.left.moves(a)
+        ]
+        of_right = [
+            [np.concatenate([a, move]) for move in kind] for kind in self.right.moves(b)
+        ]
+        return [*of_left, *of_right]
 
     def _split(self, theta: Array) -> tuple[Array, Array]:
         count = len(self.left.names)

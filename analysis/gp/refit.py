@@ -11,7 +11,7 @@ from analysis.data.series import Array
 from analysis.gp.likelihood import Likelihood
 from analysis.gp.noise import Noise
 from analysis.gp.regression import GaussianProcess
-from analysis.gp.search import MOVES, climb_from, distinct_tops
+from analysis.gp.search import climb_from, distinct_tops
 
 _SIZES = frozenset({"sf", "sn", "sc", "sp", "so"})  # in the unit of the outputs
 _VANISHED = 2.0  # below where a search begins: a spread there has no slope to leave by
@@ -53,7 +53,7 @@ def refit_gp(
         process.kernel, wanted, process.X, y - offset, process.trials
     )
     # another noise may have its best top elsewhere
-    optimum = climb_from(likelihood, starts, MOVES if noise else 0)
+    optimum = climb_from(likelihood, starts, is_searched=noise is not None)
     alpha, jitter = likelihood.weights(optimum.theta)
     return replace(
         process,

@@ -26,8 +26,6 @@ from analysis.gp.likelihood import Likelihood
 from analysis.gp.noise import Noise
 from analysis.gp.trial_noise import TrialRows
 
-MOVES = 2  # moves of a search: more find more of the best tops, and cost more
-
 _DESIGN_ROWS = 150  # rows by whose likelihood the first start is chosen
 _SAME_TOP = (
     0.2,
@@ -36,7 +34,7 @@ _SAME_TOP = (
 _LEAST_MOVE = 1.0  # in theta: a move that ends nearer to a known top leads back to it
 _NEIGHBOURS = 0.5  # in theta: of two tops that are nearer, one is enough to begin with
 _LOSING = 5.0  # log likelihood below the best top at which another will not become it
-_UNUSED = 3.0  # logarithm of a length or bias beyond which it makes no difference
+_UNUSED = 4.0  # logarithm of a length or bias beyond which it makes no difference
 _AT_BOUND = 1e-3  # in theta: a hyperparameter as near to a bound lies on it
 
 
@@ -123,8 +121,6 @@ class Search:
         )
         self._began: list[Array] = []
         self._reached: list[Climbed] = []
-        self._moved_from: Array | None = None
-        self._moves: list[tuple[float, Array]] = []
 
     def designed_start(self) -> Array:
         """Return the likeliest of the kernel's points, by a part of the rows."""
@@ -137,18 +133,19 @@ class Search:
         reached = climb(self._posterior, start, self._bounds, self._is_known)
         self._reached.append(reached)
 
-    def move(self) -> Array | None:
-        """Return the likeliest move from the best top; None where all lead back."""
-        best = self._best.theta
-        if self._moved_from is None or not np.array_equal(best, self._moved_from):
-            self._moved_from, self._moves = best, self._rated_moves(best)
-        known = [*self._began, *(top.theta for top in self._reached)]
-        far = [
-            (value, k)
-            for k, (value, theta) in enumerate(self._moves)
-            if _distance(self._kernel, theta, known) >= _LEAST_MOVE
-        ]
-        return self._moves[max(far)[1]][1] if far else None
+    def move(self) -> None:
+        """Climb from the likeliest move of every kind, each from the best top so far.
+
+        The likelihood is that of all rows, with the noise of that top. Moves that end
+        near what is known lead back to it, and are left out.
+        """
+        kinds = range(len(self._moves_of(self._best.theta)))
+        for kind in kinds:
+            moves = self._moves_of(self._best.theta)[kind]
+            known = [*self._began, *(top.theta for top in self._reached)]
+            far = [x for x in moves if _distance(self._kernel, x, known) >= _LEAST_MOVE]
+            if far:
+                self.climb(max(far, key=self._posterior.value))
 
     def optimum(self) -> Optimum:
         """Return the best of what was reached."""
@@ -167,14 +164,16 @@ class Search:
     def _best(self) -> Climbed:
         return max(self._reached, key=lambda top: top.value)
 
-    def _rated_moves(self, theta: Array) -> list[tuple[float, Array]]:
-        """Return the kernel's moves from a top, with its noise, each with its value."""
+    def _moves_of(self, theta: Array) -> list[list[Array]]:
+        """Return the kernel's moves from theta in the box, kind by kind."""
         count = len(self._kernel.names)
-        points = [
-            np.clip(np.concatenate([point, theta[count:]]), *self._bounds.T)
-            for point in self._kernel.moves(theta[:count])
+        return [
+            [
+                np.clip(np.concatenate([move, theta[count:]]), *self._bounds.T)
+                for move in kind
+            ]
+            for kind in self._kernel.moves(theta[:count])
         ]
-        return [(self._posterior.value(point), point) for point in points]
 
     def _is_known(self, theta: Array, value: float) -> bool:
         near, low = _SAME_TOP
@@ -184,23 +183,30 @@ class Search:
         )
 
 
-def likeliest(likelihood: Likelihood, moves: int = MOVES) -> Optimum:
+def likeliest(likelihood: Likelihood) -> Optimum:
     """Return the hyperparameters of largest likelihood times the noise's prior."""
     search = Search(likelihood)
-    return _searched(search, [search.designed_start()], moves)
+    search.climb(search.designed_start())
+    search.move()
+    return search.optimum()
 
 
 def climb_from(
-    likelihood: Likelihood, starts: Sequence[Array], moves: int = 0
+    likelihood: Likelihood, starts: Sequence[Array], *, is_searched: bool = False
 ) -> Optimum:
     """Return the best top that starts lead to: for where tops are nearly known.
 
     Args:
         likelihood: of the rows.
         starts: thetas to begin with.
-        moves: from there, where the best top may be another one than those known.
+        is_searched: make moves, too: the best top may be none of those known.
     """
-    return _searched(Search(likelihood), starts, moves)
+    search = Search(likelihood)
+    for start in starts:
+        search.climb(start)
+    if is_searched:
+        search.move()
+    return search.optimum()
 
 
 def posterior_search(
@@ -234,17 +240,6 @@ def spread(X: Array) -> Array:
     """Return the standard deviation of every column, 1 where it does not vary."""
     sd = X.std(axis=0)
     return np.where(np.ptp(X, axis=0) > 0, sd, 1.0)
-
-
-def _searched(search: Search, starts: Sequence[Array], moves: int) -> Optimum:
-    for start in starts:
-        search.climb(start)
-    for _ in range(moves):
-        start = search.move()
-        if start is None:
-            break
-        search.climb(start)
-    return search.optimum()
 
 
 def _distance(kernel: Kernel, theta: Array, others: Sequence[Array]) -> float:
