@@ -45,8 +45,41 @@ class GivenVerdict:
 
 
 @dataclass(slots=True)
-class RunContext:
-    """One opening of a session, from activation to the arm at rest.
+class FlowState:
+    """What changes while the session is open, and which step of the flow changes it.
+
+    Attributes:
+        fault_context: where in the session a fault would occur now; every step that
+            waits for a person sets it.
+        page: the newest review, line by line; of `say_page`.
+        last_recorded: the newest trial that no tare has followed yet; set by `record`,
+            taken by `tare`.
+        trial_began_utc_ns: when the newest trial began [UTC ns], by this computer; of
+            `record`.
+        is_last: no trial begins after this one; of `ready` and `verdicts`.
+        estimate: expected duration, as of the first kept trial [s]; of
+            `update_estimate`.
+        aim: of the push that was suggested last, None where there was none; of `ready`.
+        ticked: numbers of the steps of the reset that were ticked; of `ready`, cleared
+            by `record`.
+        given: the newest verdict, None before the first or after it was taken back; of
+            `open_undo` and `close_undo`.
+    """
+
+    fault_context: FaultContext = field(default_factory=FaultContext)
+    page: tuple[str, ...] = ()
+    last_recorded: TrialName | None = None
+    trial_began_utc_ns: int = 0
+    is_last: bool = False
+    estimate: float | None = None
+    aim: Aim | None = None
+    ticked: set[int] = field(default_factory=set[int])
+    given: GivenVerdict | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class RunServices:
+    """What the steps of one opening of a session act with; none of it is replaced.
 
     Attributes:
         console_loop: lets time pass.
@@ -58,18 +91,9 @@ class RunContext:
         journal: events and state.
         archive: the trials' files.
         feedback: bells and speech.
+        camera: where photos of the bed come from.
         opened_ns: when it was opened [ns].
         kept_before: how many trials were kept until then.
-        fault_context: where in the session a fault would occur now.
-        page: the newest review, line by line.
-        last_recorded: the newest trial that no tare has followed yet.
-        is_last: no trial begins after this one.
-        estimate: expected duration, as of the first kept trial [s].
-        aim: of the push that was suggested last; None where there was none.
-        given: the newest verdict; None before the first, or after it was taken back.
-        ticked: numbers of the steps of the reset that were ticked.
-        camera: where photos of the bed come from.
-        trial_began_utc_ns: when the newest trial began [UTC ns], by this computer.
         stance: what the foot is to do by itself; None = it is pushed.
     """
 
@@ -82,19 +106,10 @@ class RunContext:
     journal: Journal
     archive: TrialArchive
     feedback: OperatorFeedback
+    camera: Camera
     opened_ns: int
     kept_before: int
-    fault_context: FaultContext = field(default_factory=FaultContext)
-    page: tuple[str, ...] = ()
-    last_recorded: TrialName | None = None
-    is_last: bool = False
-    estimate: float | None = None
-    aim: Aim | None = None
-    given: GivenVerdict | None = None
-    ticked: set[int] = field(default_factory=set[int])
-    camera: Camera = field(default_factory=lambda: Camera("", None, 0.0))
-    trial_began_utc_ns: int = 0
-    stance: StanceTask | None = None
+    stance: StanceTask | None
 
     @property
     def loop_client(self) -> LoopClient:
@@ -129,54 +144,14 @@ class RunContext:
         """Print the keys of `prompt`, none of them broken."""
         self.say(packed(screen_keys(prompt), self.console.width))
 
-    def say_page(self, lines: Iterable[str]) -> None:
-        """Print lines that can be viewed again."""
-        self.page = tuple(lines)
-        for line in self.page:
-            self.say(line)
-
     def report_error(self, error: TractionError) -> None:
         """Print an error, and what is safe."""
         self.console.problem(f"{error} {self.journal.saved()}")
-
-    def report_fault(self, verdict: GuardVerdict) -> None:
-        """Print why the guard stopped the arm, and what is safe."""
-        self.console.problem(self.fault_text(verdict))
 
     def watch_foot(self) -> FootKeys:
         """Return the double tap of the foot as a key, if rig.toml wants it."""
         is_wanted = self.rig.settings.rig.operator.double_tap
         return FootKeys(self.loop_client, is_wanted=is_wanted)
-
-    def fault_text(self, verdict: GuardVerdict) -> str:
-        """Return why the guard stopped the arm, and what is safe."""
-        bus = self.loop_client.loop.bus_condition
-        faults = self.console_loop.faults
-        is_rehearsed = faults is not None and faults.are_any
-        load = busy_load(self.rig, is_rehearsed=is_rehearsed)
-        context = replace(self.fault_context, bus=bus, load=load)
-        if self.journal.state.is_complete:  # neither a trial nor `resume` follows
-            prompt = None if context.prompt is Prompt.READY else context.prompt
-            context = replace(context, prompt=prompt, command=REPORT)
-        return fault_text(verdict, context, self.journal.saved())
-
-    def clear_faults(self, fault: ArmFaultError) -> None:
-        """Report a fault after which the arm holds, and go on.
-
-        Raises:
-            ArmFaultError: no trial can follow: the arm is not under control.
-        """
-        verdict = self.console_loop.worst_verdict(fault.verdict)
-        if verdict.ends_session:
-            raise ArmFaultError(verdict) from fault
-        self.report_fault(verdict)
-        self.console_loop.clear_faults()
-
-    def update_estimate(self) -> None:
-        """Estimate the duration once, when the first trial is kept."""
-        left = self.time_left
-        if self.estimate is None and left is not None:
-            self.estimate = self.elapsed + left
 
     def append(self, event: Event, **details: object) -> None:
         """Append an event to the journal while the console's heartbeat goes on.
@@ -202,14 +177,65 @@ class RunContext:
         """Reject a trial."""
         self.record_verdict(Event.TRIAL_REJECTED, name, reason)
 
+
+@dataclass(frozen=True, slots=True)
+class RunContext(RunServices):
+    """One opening of a session, from activation to the arm at rest.
+
+    Attributes:
+        state: what changes meanwhile.
+    """
+
+    state: FlowState = field(default_factory=FlowState)
+
+    def say_page(self, lines: Iterable[str]) -> None:
+        """Print lines that can be viewed again."""
+        self.state.page = tuple(lines)
+        for line in self.state.page:
+            self.say(line)
+
+    def report_fault(self, verdict: GuardVerdict) -> None:
+        """Print why the guard stopped the arm, and what is safe."""
+        self.console.problem(self.fault_text(verdict))
+
+    def fault_text(self, verdict: GuardVerdict) -> str:
+        """Return why the guard stopped the arm, and what is safe."""
+        bus = self.loop_client.loop.bus_condition
+        faults = self.console_loop.faults
+        is_rehearsed = faults is not None and faults.are_any
+        load = busy_load(self.rig, is_rehearsed=is_rehearsed)
+        context = replace(self.state.fault_context, bus=bus, load=load)
+        if self.journal.state.is_complete:  # neither a trial nor `resume` follows
+            prompt = None if context.prompt is Prompt.READY else context.prompt
+            context = replace(context, prompt=prompt, command=REPORT)
+        return fault_text(verdict, context, self.journal.saved())
+
+    def clear_faults(self, fault: ArmFaultError) -> None:
+        """Report a fault after which the arm holds, and go on.
+
+        Raises:
+            ArmFaultError: no trial can follow: the arm is not under control.
+        """
+        verdict = self.console_loop.worst_verdict(fault.verdict)
+        if verdict.ends_session:
+            raise ArmFaultError(verdict) from fault
+        self.report_fault(verdict)
+        self.console_loop.clear_faults()
+
+    def update_estimate(self) -> None:
+        """Estimate the duration once, when the first trial is kept."""
+        left = self.time_left
+        if self.state.estimate is None and left is not None:
+            self.state.estimate = self.elapsed + left
+
     def open_undo(self, name: TrialName, reason: str, *, is_kept: bool) -> None:
         """Say which verdict was given; from now on it can be taken back for 10 s."""
         text = f"{name.kept} kept" if is_kept else f"{name.kept} rejected: {reason}"
-        if self.is_last:  # the session ends now
-            self.given = None
+        if self.state.is_last:  # the session ends now
+            self.state.given = None
             self.say(f"{text}.")
             return
-        self.given = GivenVerdict(name, is_kept, text)
+        self.state.given = GivenVerdict(name, is_kept, text)
         self.console_loop.undo_until_ns = self.rig.clock.now_ns() + UNDO_NS
         self.say(f"{text}. [u] within {UNDO_NS * 1e-9:.0f} s takes this back.")
 
@@ -237,7 +263,7 @@ class RunContext:
 
     def close_undo(self) -> GivenVerdict | None:
         """Return the newest verdict; it cannot be taken back any more."""
-        given, self.given = self.given, None
+        given, self.state.given = self.state.given, None
         self.console_loop.undo_until_ns = 0
         return given
 

@@ -12,7 +12,7 @@ from experiments.operator.keys import KeyAction, key_action, screen_keys
 from experiments.operator.prompts import Prompt
 from experiments.operator.screens import ReadyView, ready_lines
 from experiments.run.console_loop import ConsoleLoop
-from experiments.run.context import RunContext
+from experiments.run.context import RunContext, RunServices
 from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.run.verdicts import take_note
 from experiments.session.sidecar import TrialName
@@ -84,7 +84,7 @@ def wait_ready(context: RunContext, name: TrialName) -> None:
         if action is KeyAction.RECORD:
             return
         if action is KeyAction.TICK:
-            context.ticked ^= {int(key)}
+            context.state.ticked ^= {int(key)}
             continue
         _ACTIONS[action](context, name)
 
@@ -95,7 +95,7 @@ def ready_view(context: RunContext) -> ReadyView:
     folder = context.metadata.folder
     is_pushed = context.stance is None
     push = context.console_loop.run_aside(lambda: next_push(folder, row))
-    context.aim = push.aim if is_pushed else None
+    context.state.aim = push.aim if is_pushed else None
     return ReadyView(
         session=folder.id,
         terrain=row.name,
@@ -108,9 +108,9 @@ def ready_view(context: RunContext) -> ReadyView:
         reset=row.reset,
         suggestion=push.text if is_pushed else "",
         enough=push.enough if is_pushed else "",
-        ticked=frozenset(context.ticked),
+        ticked=frozenset(context.state.ticked),
         table=kept_rows(folder),
-        given=context.given.text if context.given is not None else "",
+        given=context.state.given.text if context.state.given is not None else "",
         undo_left=context.console_loop.undo_left,
         arm="floating" if is_pushed else "holding; keep clear of it",
     )
@@ -137,18 +137,18 @@ def _show(context: RunContext) -> None:
     context.console_loop.show(now)
 
 
-def _note(context: RunContext, name: TrialName) -> None:
+def _note(services: RunServices, name: TrialName) -> None:
     """Take a note on the session, the arm holding meanwhile."""
-    context.loop_client.request(ArmState.HOLD)
-    take_note(context, name, is_on_trial=False)
-    context.loop_client.request(ArmState.FLOAT)
+    services.loop_client.request(ArmState.HOLD)
+    take_note(services, name, is_on_trial=False)
+    services.loop_client.request(ArmState.FLOAT)
 
 
 def _pause(context: RunContext, name: TrialName) -> None:
     context.loop_client.request(ArmState.HOLD)
     context.append(Event.PAUSED)
-    before = context.fault_context
-    context.fault_context = replace(before, prompt=Prompt.PAUSED)
+    before = context.state.fault_context
+    context.state.fault_context = replace(before, prompt=Prompt.PAUSED)
     is_over = False
     while not is_over:
         context.say("Paused. ARM: holding. [space] to go on.")
@@ -158,7 +158,7 @@ def _pause(context: RunContext, name: TrialName) -> None:
             is_over = True
         except ArmFaultError as fault:
             context.clear_faults(fault)  # and there is no answer: the pause goes on
-    context.fault_context = before
+    context.state.fault_context = before
     context.append(Event.CONTINUED)
     context.await_trial()
 
@@ -166,7 +166,7 @@ def _pause(context: RunContext, name: TrialName) -> None:
 def _view_last(context: RunContext, name: TrialName) -> None:
     """Say the newest review again, or that of the last kept trial on the disk."""
     del name
-    if not context.page:
+    if not context.state.page:
         kept = list_folder(context.metadata.folder.trials, "T??.mcap")
         if not kept:
             context.say("There is no trial to look at yet.")
@@ -175,7 +175,7 @@ def _view_last(context: RunContext, name: TrialName) -> None:
         lines = [f" {mark} {text}" for mark, text in review.lines()]
         context.say_page([f"{kept[-1].stem}, recorded before:", *lines])
         return
-    context.say_page(context.page)
+    context.say_page(context.state.page)
 
 
 def _quit_after(context: RunContext, name: TrialName) -> None:
@@ -184,9 +184,9 @@ def _quit_after(context: RunContext, name: TrialName) -> None:
     Raises:
         StopRequestedError: it was asked for twice.
     """
-    if context.is_last:
+    if context.state.is_last:
         raise StopRequestedError
-    context.is_last = True
+    context.state.is_last = True
     context.say(f"{name.kept} will be the last one for now. [q] again: quit at once.")
 
 

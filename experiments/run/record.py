@@ -27,7 +27,7 @@ from experiments.operator.screens import (
 from experiments.rig.foresight_view import foresight_view
 from experiments.rig.rig import Rig
 from experiments.run.console_loop import TICK
-from experiments.run.context import RunContext
+from experiments.run.context import RunContext, RunServices
 from experiments.run.photo import take_photo
 from experiments.run.stances import follow_stances, stance_lines
 from experiments.run.stop import ArmFaultError, StopRequestedError
@@ -139,12 +139,12 @@ def _record(
     recorder, console_loop = context.rig.backend.recorder, context.console_loop
     _set_aside(context, name.number)
     details: dict[str, object] = {"trial": name.number, "attempt": name.attempt}
-    if context.ticked:
+    if context.state.ticked:
         steps = enumerate(context.rig.row.reset, 1)
-        details["reset"] = [step for n, step in steps if n in context.ticked]
-        context.ticked.clear()
+        details["reset"] = [step for n, step in steps if n in context.state.ticked]
+        context.state.ticked.clear()
     context.append(Event.TRIAL_STARTED, **details)
-    context.trial_began_utc_ns = SystemClock().utc_ns()
+    context.state.trial_began_utc_ns = SystemClock().utc_ns()
     recorder.start(path, header)
     recorder.event(20, "operator", "trial started")
     context.loop_client.watch_trial(is_recording=True)
@@ -160,11 +160,11 @@ def _record(
         context.feedback.give(FeedbackSignal.DONE)
 
 
-def _set_aside(context: RunContext, number: int) -> None:
+def _set_aside(services: RunServices, number: int) -> None:
     """Make room for the repetition of a kept trial."""
-    attempt = context.journal.state.kept_attempt(number)
+    attempt = services.journal.state.kept_attempt(number)
     if attempt:
-        context.record_verdict(Event.SET_ASIDE, TrialName(number, attempt), "redone")
+        services.record_verdict(Event.SET_ASIDE, TrialName(number, attempt), "redone")
 
 
 def _follow(context: RunContext, name: TrialName, outcome: TrialOutcome) -> None:
@@ -175,7 +175,7 @@ def _follow(context: RunContext, name: TrialName, outcome: TrialOutcome) -> None
     reported_at = 0.0
     while True:
         outcome.seconds = (rig.clock.now_ns() - start) * 1e-9
-        context.fault_context = FaultContext(name.kept, outcome.seconds)
+        context.state.fault_context = FaultContext(name.kept, outcome.seconds)
         key = console_loop.tick(Prompt.RECORDING, name)
         record = context.loop_client.latest()[0]
         outcome.displacement = float(rig.frame.displacement(record["foot_position"]))
@@ -215,7 +215,7 @@ def _end(
     except TrialFileError as error:
         raise _lost("write-failed", context, name, error) from error
     archive.write_sidecar(name, verified, outcome)
-    context.last_recorded = name
+    context.state.last_recorded = name
     details = {"trial": name.number, "attempt": name.attempt}
     context.append(Event.TRIAL_RECORDED, **details)
     written = (
@@ -228,7 +228,9 @@ def _end(
         return
     if outcome.status == "complete":
         path = context.metadata.folder.trials / f"{name.kept}.mcap"
-        review = context.console_loop.run_aside(lambda: review_trial(path, context.aim))
+        review = context.console_loop.run_aside(
+            lambda: review_trial(path, context.state.aim)
+        )
         lines = [f" {m} {text}" for m, text in review.lines(archive.kept_ratios())]
         warnings = [f" {WARNING} {line}" for line in rubbing]
         kept = kept_traces(context.metadata.folder)
@@ -260,7 +262,7 @@ def _lost(
 ) -> TrialLostError:
     """Let the arm hold and return the message of a trial that the disk did not take."""
     context.loop_client.request(ArmState.HOLD)
-    seconds = context.fault_context.seconds
+    seconds = context.state.fault_context.seconds
     details = {
         "trial": name.kept,
         "when": "" if seconds is None else f" at {seconds:.2f} s",

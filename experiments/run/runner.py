@@ -61,7 +61,9 @@ class SessionRunner:
             context.say(CATALOGUE["interrupted"].text({}, context.journal.saved()))
         except ArmFaultError as fault:
             code, reason = 4, fault.verdict.reason
-            context.fault_context = replace(context.fault_context, prompt=None)
+            context.state.fault_context = replace(
+                context.state.fault_context, prompt=None
+            )
             context.report_fault(fault.verdict)
         except TractionError as error:
             code, reason = error.exit_code, "error"
@@ -87,7 +89,7 @@ class SessionRunner:
             while not context.journal.state.is_over:
                 self._try(self._run_trial)
                 context.update_estimate()
-                if context.is_last and not context.journal.state.is_over:
+                if context.state.is_last and not context.journal.state.is_over:
                     raise StopRequestedError
             self._try(self._close_session)
             is_over = context.journal.state.is_over
@@ -103,7 +105,7 @@ class SessionRunner:
         Nor does a verdict that is taken back in it: the trial is judged again.
         """
         context = self._context
-        context.fault_context = FaultContext()
+        context.state.fault_context = FaultContext()
         try:
             try:
                 step()
@@ -159,7 +161,7 @@ class SessionRunner:
             wanted=state.wanted,
             rejected=state.rejected,
             elapsed=context.elapsed,
-            estimate=context.estimate,
+            estimate=context.state.estimate,
             drift=state.drift,
         )
         for line in end_lines(view):

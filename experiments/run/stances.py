@@ -23,7 +23,7 @@ from experiments.operator.console import GOOD, WARNING
 from experiments.operator.prompts import Prompt
 from experiments.rig.rig import Rig
 from experiments.run.console_loop import TICK
-from experiments.run.context import RunContext
+from experiments.run.context import RunContext, RunServices
 from experiments.session.sidecar import STANCES, TrialName, TrialOutcome
 from experiments.session.stance_task import StanceTask, adapted_scale, stance_pushes
 from experiments.session.store import SessionFolder
@@ -100,9 +100,9 @@ def check_stances(rig: Rig, task: StanceTask, data: Path) -> None:
         )
 
 
-def stance_plan(context: RunContext, task: StanceTask, name: TrialName) -> StancePlan:
+def stance_plan(services: RunServices, task: StanceTask, name: TrialName) -> StancePlan:
     """Return the plan of a recording; what kept stances have taught goes on."""
-    rig, folder = context.rig, context.metadata.folder
+    rig, folder = services.rig, services.metadata.folder
     models, first = dict[str, BreakAwayModel](), 1.0
     if task.is_foreseen:
         fresh = fresh_models(rig, folder.path.parent.parent, but=folder)
@@ -135,7 +135,7 @@ def follow_stances(
     start = rig.clock.now_ns()
     while not sequence.is_over:
         outcome.seconds = (rig.clock.now_ns() - start) * 1e-9
-        context.fault_context = FaultContext(name.kept, outcome.seconds)
+        context.state.fault_context = FaultContext(name.kept, outcome.seconds)
         key = console_loop.tick(Prompt.RECORDING, name)
         console_loop.inject_faults(FaultTrigger.RECORDING, name.number, outcome.seconds)
         view = _view(rig, task)
@@ -185,7 +185,7 @@ def _shares(rig: Rig) -> Mapping[str, float]:
 
 
 def _tell(
-    context: RunContext,
+    services: RunServices,
     name: TrialName,
     sequence: StanceSequence,
     outcome: TrialOutcome,
@@ -199,9 +199,9 @@ def _tell(
         f"{newest.force:.1f} N, {newest.delivered:.2f} N s in {newest.seconds:.2f} s, "
         f"moved {1e3 * newest.moved:.1f} mm"
     )
-    context.rig.backend.recorder.event(20, "stance", text)
-    if not context.console.is_live:
-        context.say(f"{name.kept}  {text}")
+    services.rig.backend.recorder.event(20, "stance", text)
+    if not services.console.is_live:
+        services.say(f"{name.kept}  {text}")
 
 
 def stance_lines(task: StanceTask, outcome: TrialOutcome) -> list[str]:

@@ -18,7 +18,7 @@ from experiments.operator.console import GOOD
 from experiments.operator.prompts import Prompt
 from experiments.rig.rig import Rig
 from experiments.run.console_loop import TICK
-from experiments.run.context import RunContext
+from experiments.run.context import RunContext, RunServices
 from experiments.run.pose_walk import PoseWalk
 from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.session.sidecar import TrialName
@@ -78,7 +78,7 @@ def take_end_tare(context: RunContext) -> None:
     context.say(f"▲ {CATALOGUE['no-end-tare'].text({'detail': detail})}")
 
 
-def prove_mounting(context: RunContext) -> None:
+def prove_mounting(services: RunServices) -> None:
     """Turn the activated arm's wrist once, if the sensor is a calibrated one.
 
     Raises:
@@ -87,10 +87,10 @@ def prove_mounting(context: RunContext) -> None:
         SettingsError: the arm cannot rise or turn its wrist.
         ArmFaultError, StopRequestedError: as `ConsoleLoop.tick`.
     """
-    rig = context.rig
+    rig = services.rig
     if _calibration_of(rig.settings.calibrations, rig.row.foot) is None:
         return
-    walk = PoseWalk(context.console_loop)
+    walk = PoseWalk(services.console_loop)
 
     def plan(start: Array, space: FreeSpace) -> list[MeasurementPose]:
         pair = tilted_pair(rig.model, space)
@@ -102,7 +102,7 @@ def prove_mounting(context: RunContext) -> None:
         walk.go_to(halt)
         if halt.pose is None:
             continue
-        reader = context.loop_client.wrenches()
+        reader = services.loop_client.wrenches()
         q, _ = walk.rest(TARE_SECONDS)
         mean = _mean(
             unpack_wrenches(reader.read()), rig.settings.rig.limits.tare_spread
@@ -116,7 +116,7 @@ def prove_mounting(context: RunContext) -> None:
         raise preflight_error(
             "mounting", error=change.error, limit=limit, turned=turned
         )
-    context.say(
+    services.say(
         f"{GOOD} mounting verified: {change.error:.1f} N off (limit {limit:.1f})"
     )
     walk.ask("Take the arm again. [space]", Prompt.SUPPORT)
@@ -158,17 +158,17 @@ def _calibration_of(
     return None
 
 
-def _measure(context: RunContext, name: TrialName) -> TareResult:
+def _measure(services: RunServices, name: TrialName) -> TareResult:
     """Return the tare of one second, in which the arm stands by itself.
 
     Raises:
         PreflightError: the force varied, or samples were lost or flagged.
     """
-    context.loop_client.request(ArmState.GUIDE)
-    _wait_still(context, name)
-    context.loop_client.request(ArmState.HOLD)
-    console_loop, rig = context.console_loop, context.rig
-    reader = context.loop_client.wrenches()
+    services.loop_client.request(ArmState.GUIDE)
+    _wait_still(services, name)
+    services.loop_client.request(ArmState.HOLD)
+    console_loop, rig = services.console_loop, services.rig
+    reader = services.loop_client.wrenches()
     for tick in range(round(TARE_SECONDS / TICK) + 1):
         console_loop.tick(Prompt.LIFT, name)
         console_loop.inject_faults(FaultTrigger.TARE, name.number, tick * TICK)
@@ -215,10 +215,10 @@ def _accept(context: RunContext, name: TrialName, result: TareResult) -> None:
 
 def _close_bracket(context: RunContext) -> None:
     """Write the tare into the sidecar of the trial before it."""
-    name, rig = context.last_recorded, context.rig
+    name, rig = context.state.last_recorded, context.rig
     if name is None:
         return
-    context.last_recorded = None
+    context.state.last_recorded = None
     tare = {"t_ns": rig.tared_ns, "bias": rig.tared.bias.tolist()}
     folder = context.metadata.folder
     context.console_loop.run_aside(lambda: write_next_tare(folder, name, tare))
@@ -234,12 +234,12 @@ def _check_residual(rig: Rig, tared: Payload) -> None:
         raise preflight_error("residual", residual=residual, limit=limit, **fields)
 
 
-def _wait_still(context: RunContext, name: TrialName) -> None:
+def _wait_still(services: RunServices, name: TrialName) -> None:
     still = 0.0
     while still < STILL_SECONDS:
-        context.console_loop.tick(Prompt.LIFT, name)
-        record = context.loop_client.latest()[0]
-        height = float(context.rig.frame.height(record["foot_position"]))
+        services.console_loop.tick(Prompt.LIFT, name)
+        record = services.loop_client.latest()[0]
+        height = float(services.rig.frame.height(record["foot_position"]))
         speed = float(abs(record["foot_velocity"][:3]).max())
         is_still = height > LIFTED and speed < STILL_SPEED
         still = still + TICK if is_still else 0.0

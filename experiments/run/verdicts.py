@@ -9,7 +9,7 @@ from experiments.operator.console import WARNING
 from experiments.operator.keys import NOTE_KEYS, REJECT_REASONS, KeyAction, key_action
 from experiments.operator.prompts import Prompt
 from experiments.operator.scripted import NO_PERSONS
-from experiments.run.context import RunContext
+from experiments.run.context import RunContext, RunServices
 from experiments.run.photo import collect_photo
 from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.session.annotations import LONGEST_TEXT, clean_text
@@ -32,7 +32,7 @@ def ask_verdict(context: RunContext, name: TrialName, outcome: TrialOutcome) -> 
         StopRequestedError: the session is to end; the trial is rejected.
     """
     context.say_keys(Prompt.REVIEW)
-    context.fault_context = FaultContext(name.kept, prompt=Prompt.REVIEW)
+    context.state.fault_context = FaultContext(name.kept, prompt=Prompt.REVIEW)
     least = MINIMUM_TRAVEL_SHARE * context.rig.frame.travel
     is_whole = outcome.displacement >= least or outcome.reason == STANCES
     is_asked = not is_whole  # one that is not whole is rejected by [q] at once
@@ -52,7 +52,7 @@ def ask_verdict(context: RunContext, name: TrialName, outcome: TrialOutcome) -> 
                 raise
             continue
         if key_action(Prompt.REVIEW, key) is KeyAction.QUIT and not is_asked:
-            is_asked = context.is_last = True
+            is_asked = context.state.is_last = True
             context.say(_NO_VERDICT.format(trial=name.kept))
         elif _apply_key(context, name, key or feet.key("k")):
             return
@@ -91,7 +91,7 @@ def await_undo(context: RunContext) -> None:
     Raises:
         UndoRequestedError: the verdict is taken back.
     """
-    if context.given is None or context.operator.who in NO_PERSONS:
+    if context.state.given is None or context.operator.who in NO_PERSONS:
         return
     context.say("[space] to end the session  [u]ndo the verdict")
     while context.console_loop.undo_left:
@@ -119,8 +119,8 @@ def judge_again(context: RunContext) -> None:
         return
     context.console_loop.show(None)
     context.loop_client.request(ArmState.HOLD)
-    context.fault_context = FaultContext(given.name.kept, prompt=Prompt.REVIEW)
-    context.say_page(context.page)
+    context.state.fault_context = FaultContext(given.name.kept, prompt=Prompt.REVIEW)
+    context.say_page(context.state.page)
     context.say(f"{given.text}: this stands until you give another verdict.")
     context.say_keys(Prompt.REVIEW)
     action, key = None, ""
@@ -140,20 +140,20 @@ def judge_again(context: RunContext) -> None:
     )
 
 
-def take_note(context: RunContext, name: TrialName, *, is_on_trial: bool) -> None:
+def take_note(services: RunServices, name: TrialName, *, is_on_trial: bool) -> None:
     """Let a remark be typed and write it into the journal.
 
     Args:
-        context: what the session shares.
+        services: what the session shares.
         name: the trial it is about.
         is_on_trial: it goes into the trial's sidecar too.
 
     Raises:
         ArmFaultError: as `ConsoleLoop.line`.
     """
-    console_loop = context.console_loop
-    context.say(NOTE_KEYS)
-    console_loop.show(lambda _: [f"Note: {context.operator.draft}▏", NOTE_KEYS])
+    console_loop = services.console_loop
+    services.say(NOTE_KEYS)
+    console_loop.show(lambda _: [f"Note: {services.operator.draft}▏", NOTE_KEYS])
     try:
         while (text := console_loop.line(name)) is None:
             pass
@@ -162,27 +162,27 @@ def take_note(context: RunContext, name: TrialName, *, is_on_trial: bool) -> Non
     try:
         text = clean_text(text[:LONGEST_TEXT])
     except SessionError:  # nothing but spaces
-        context.say("Nothing noted.")
+        services.say("Nothing noted.")
         return
-    _write_note(context, name if is_on_trial else None, text)
+    _write_note(services, name if is_on_trial else None, text)
 
 
-def _write_note(context: RunContext, name: TrialName | None, text: str) -> None:
-    who = context.metadata.operator
+def _write_note(services: RunServices, name: TrialName | None, text: str) -> None:
+    who = services.metadata.operator
     if name is None:
-        context.append(Event.NOTED, text=text, who=who)
-        context.say(f"Noted on {context.metadata.folder.id}: {text}")
+        services.append(Event.NOTED, text=text, who=who)
+        services.say(f"Noted on {services.metadata.folder.id}: {text}")
         return
-    context.append(
+    services.append(
         Event.NOTED, trial=name.number, attempt=name.attempt, text=text, who=who
     )
-    place = add_remark(context.metadata.folder, name, text, who)
-    context.say(f"Noted on {place}: {text}")
+    place = add_remark(services.metadata.folder, name, text, who)
+    services.say(f"Noted on {place}: {text}")
 
 
-def _later(context: RunContext, name: TrialName) -> str:
+def _later(services: RunServices, name: TrialName) -> str:
     """Return where a trial without a verdict went, and how it is kept after all."""
-    session = context.metadata.folder
+    session = services.metadata.folder
     command = f"traction verdict {session.id} {name.rejected} keep REASON"
     command += data_option(session.path.parent.parent)
     what = f"{name.kept} was not judged: rejected/{name.rejected}.mcap."

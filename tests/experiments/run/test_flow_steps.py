@@ -1,6 +1,7 @@
 """The steps of the flow that ask the operator: ready, note, verdict, estimates."""
 
 import time
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -42,7 +43,7 @@ def test_a_trial_begins_with_space_and_not_with_a_key_that_means_nothing(tmp_pat
 def test_quit_lets_the_next_trial_be_the_last(tmp_path):
     context = make_context(tmp_path, Keys("q", " "))
     wait_ready(context, FIRST)
-    assert context.is_last
+    assert context.state.is_last
 
 
 def test_quit_twice_ends_at_once(tmp_path):
@@ -57,10 +58,10 @@ def test_the_aim_that_was_shown_is_the_trials(tmp_path, monkeypatch):
     monkeypatch.setattr(ready, "next_push", lambda folder, row: told)
     context = make_context(tmp_path, Keys())
     assert ready_view(context).suggestion == "slowly"
-    assert context.aim is aim
-    context.stance = object()  # a stance is not pushed by a person
+    assert context.state.aim is aim
+    context = replace(context, stance=object())  # a stance is not pushed by a person
     assert ready_view(context).suggestion == ""
-    assert context.aim is None
+    assert context.state.aim is None
 
 
 def test_a_pause_holds_the_arm_and_is_in_the_journal(tmp_path):
@@ -118,7 +119,7 @@ def test_quit_at_the_review_asks_for_the_verdict_that_is_missing(tmp_path, capsy
     ask_verdict(context, FIRST, reviewed(context))
     assert "T01 has no verdict yet" in capsys.readouterr().out
     assert context.journal.state.kept == (1,)
-    assert context.is_last
+    assert context.state.is_last
 
 
 def test_quit_twice_at_the_review_says_how_the_trial_is_kept_after_all(
@@ -154,15 +155,15 @@ def test_a_fault_that_takes_the_arm_away_rejects_the_trial(tmp_path):
 def test_the_duration_is_estimated_once_with_the_first_kept_trial(tmp_path):
     context = make_context(tmp_path, Keys("k"), trials=3)
     context.update_estimate()
-    assert context.estimate is None
+    assert context.state.estimate is None
     context.loop_client.advance(10.0)
     ask_verdict(context, FIRST, reviewed(context))
     context.update_estimate()
-    estimate = context.estimate
+    estimate = context.state.estimate
     assert estimate == pytest.approx(3 * context.elapsed)
     context.loop_client.advance(10.0)
     context.update_estimate()
-    assert context.estimate == estimate
+    assert context.state.estimate == estimate
 
 
 def test_the_heartbeat_goes_on_while_a_slow_disk_takes_the_journal(tmp_path):
@@ -178,7 +179,7 @@ def test_the_heartbeat_goes_on_while_a_slow_disk_takes_the_journal(tmp_path):
                 pass
             journal.append(event, **details)
 
-    context.journal = SlowJournal()
+    context = replace(context, journal=SlowJournal())
     context.append(Event.PAUSED)
     assert client.advanced >= 3 * TICK
     assert names(context)[-1] == Event.PAUSED

@@ -5,6 +5,7 @@ import io
 import json
 import os
 import sys
+from dataclasses import replace
 
 import pytest
 from PIL import Image
@@ -213,8 +214,7 @@ def test_a_damaged_photo_is_no_picture():
 
 
 def recorded(tmp_path, camera):
-    context = make_context(tmp_path, Keys())
-    context.camera = camera
+    context = replace(make_context(tmp_path, Keys()), camera=camera)
     fields = {"trial": "T01", "attempt": 1}
     (context.metadata.folder.trials / "T01.json").write_text(json.dumps(fields))
     return context
