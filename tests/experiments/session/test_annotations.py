@@ -203,7 +203,7 @@ class Jumping(SystemClock):
 
 def test_a_trial_is_shown_again_at_the_speed_asked_for(recorded, monkeypatch):
     clock = Jumping()
-    monkeypatch.setattr("acquisition.SystemClock", lambda: clock)
+    monkeypatch.setattr("acquisition.clock.SystemClock", lambda: clock)
     options = ("--speed", "2", "--data", recorded.data)
     done = traction("replay", "S001", "T01", *options)
     lasted = load_trial(recorded.folder / "trials" / "T01.mcap").t[-1]
@@ -273,7 +273,7 @@ def test_the_board_is_followed_until_ctrl_c(recorded, config, monkeypatch):
             if self.looks == 3:
                 raise KeyboardInterrupt
 
-    monkeypatch.setattr("acquisition.SystemClock", Looked)
+    monkeypatch.setattr("acquisition.clock.SystemClock", Looked)
     options = ("--data", recorded.data, "--config", config)
     done = traction("status", "--follow", *options)
     assert done.code == 0
