@@ -84,14 +84,14 @@ def theirs(part: str, start: np.ndarray, sd: float) -> Kernel:
 
 
 def our_starts(part: str, X: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return the three thetas that our search begins with."""
+    """Return the thetas that our search begins with."""
     return posterior_search(KERNELS[part], ConstantNoise(), X, y).began
 
 
 def fit_theirs(
     part: str, X: np.ndarray, y: np.ndarray, starts: Sequence[np.ndarray]
 ) -> GaussianProcessRegressor:
-    """Return the likeliest of scikit-learn's models from the same three starts.
+    """Return the likeliest of scikit-learn's models from the same starts.
 
     They are given: what their choice costs is ours to bear.
     """

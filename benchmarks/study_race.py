@@ -1,6 +1,6 @@
 """Folds of a study beside scikit-learn: four Gaussian processes each, and predictions.
 
-Both get the same chosen rows and the same Tustin curve; scikit-learn is given the three
+Both get the same chosen rows and the same Tustin curve; scikit-learn is given the
 starts that ours chooses in its own time. Both predict the same rows: means for the
 training rows and the trials of all other terrains, mean and spread for the trial left
 out. The two take turns, fold by fold; what counts is processor time, one thread each,

@@ -131,7 +131,7 @@ class SquaredExponential(Composable):
         ]
 
     def moves(self, theta: Array) -> Sequence[Sequence[Array]]:
-        """Return theta with one length changed, twice: the two likeliest are climbed."""
+        """Return theta with one length changed, twice: the two likeliest are taken."""
         lengths = np.eye(theta.size)[1:]
         changed = [theta + size * length for length in lengths for size in _LENGTHS]
         return [changed, changed]

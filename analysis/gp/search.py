@@ -8,9 +8,9 @@ Sought is the largest log marginal likelihood, noise prior included,
 of the rows: a short length and little noise, or a long one and much. One climb misses
 the best of them in every fourth fit or so. The first begins at the best of the points
 that the kernel offers, by the likelihood of a part of the rows. From the best top
-reached, the search then moves to where another top may be, and climbs again: the
-likeliest of the kernel's moves is taken, by the likelihood of all rows, as the noise is
-known by then.
+reached, the search then moves to where another top may be, and climbs again, a few
+times: the likeliest of the kernel's moves is taken, by the likelihood of all rows, as
+the noise is known by then. A climb that comes beside a known top is left there.
 """
 
 from collections.abc import Sequence
@@ -27,10 +27,7 @@ from analysis.gp.noise import Noise
 from analysis.gp.trial_noise import TrialRows
 
 _DESIGN_ROWS = 150  # rows by whose likelihood the first start is chosen
-_SAME_TOP = (
-    0.2,
-    0.1,
-)  # in theta and likelihood: a climb as near to a top is left there
+_SAME_TOP = (0.2, 0.1)  # in theta and likelihood: a climb so near to a top is left
 _LEAST_MOVE = 1.0  # in theta: a move that ends nearer to a known top leads back to it
 _NEIGHBOURS = 0.5  # in theta: of two tops that are nearer, one is enough to begin with
 _LOSING = 5.0  # log likelihood below the best top at which another will not become it
