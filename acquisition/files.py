@@ -11,8 +11,8 @@ import secrets
 import stat
 from collections.abc import Generator
 from contextlib import contextmanager, suppress
+from io import BufferedReader
 from pathlib import Path
-from typing import BinaryIO
 
 # follows no link at the last name, waits for no pipe, takes no terminal
 UNFOLLOWED = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC | os.O_NOCTTY
@@ -28,7 +28,7 @@ class NotRegularError(UnfitFileError):
     """It is a folder, a pipe, a device or a socket."""
 
 
-def open_regular(path: Path, *, is_link_followed: bool = False) -> BinaryIO:
+def open_regular(path: Path, *, is_link_followed: bool = False) -> BufferedReader:
     """Return the regular file `path`, open for reading; nothing is waited for.
 
     Args:

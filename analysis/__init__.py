@@ -2,5 +2,5 @@
 
 `data` loads and prepares samples, `tustin` and `gp` are the two families of models,
 `study` fits and cross-validates them, `findings` computes what the report shows,
-`figures` and `report` draw and print it. Begin with `api`.
+`figures` and `report` draw and print it. Begin with `data`, then `study`.
 """

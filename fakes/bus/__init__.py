@@ -1,5 +1,5 @@
-"""The simulated bus: in this process, on a socket, on any python-can adapter.
+"""The simulated bus: in this process, or on a socket for other programs.
 
-`in_process` is a `can.BusABC` on stepped time and a door to it, `hub` and `client` the
-two ends of a socket, `adapter` any other bus.
+`in_process` is a `can.BusABC` on stepped time, `hub` and `client` the two ends of a
+socket.
 """
