@@ -20,6 +20,13 @@ PACKAGES = (
     "traction",
     "wam",
 )
+TRIED_BY = {  # what is printed when a recipe works
+    "A terrain": r"M5 +simulated +1/1",
+    "A sensor": r"Complete\.",
+    "A kernel or model": r"index\.html",
+    "A command": r"\blab\n(.|\n)*where +print the folder",
+    "A limit of the guard": r"The sole is 0\.\d+ m above the base > 0\.10",
+}
 BLOCK = r"\n\n```\w*\n(?P<text>.*?)```"
 CHANGE = re.compile(
     r"^(?:New file|At the end of|In) `(?P<file>[^`]+)`"
@@ -97,15 +104,7 @@ def counted(title):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("title", "word"),
-    [
-        ("A terrain", r"M5 +simulated +1/1"),
-        ("A sensor", r"Complete\."),
-        ("A kernel or model", r"index\.html"),
-        ("A command", r"\blab\n(.|\n)*where +print the folder"),
-    ],
-)
+@pytest.mark.parametrize(("title", "word"), TRIED_BY.items())
 def test_a_recipe_of_the_guide_works_with_the_files_that_it_names(tree, title, word):
     files = make(tree, title)
     assert len(set(files)) == counted(title)
@@ -113,14 +112,10 @@ def test_a_recipe_of_the_guide_works_with_the_files_that_it_names(tree, title, w
     if title == "A kernel or model":
         assert "GP (SE + NN)" in (tree / "fit/report/index.html").read_text()
     if title == "A sensor":
-        (record,) = tree.glob("data/sessions/*/session.json")
-        assert '"acme"' in record.read_text()
+        (record,) = tree.glob("data/sessions/*/conditions.json")
+        assert '"rig.ft_sensor.kind": "acme"' in record.read_text()
 
 
 def test_every_recipe_of_the_guide_is_followed():
     titles = re.findall(r"^## (.*)$", GUIDE, re.MULTILINE)
-    followed = test_a_recipe_of_the_guide_works_with_the_files_that_it_names
-    (mark,) = [m for m in followed.pytestmark if m.name == "parametrize"]
-    assert [t for t, _ in mark.args[1]] == [
-        t for t in titles if t != "Before it is done"
-    ]
+    assert [*TRIED_BY, "Before it is done"] == titles
