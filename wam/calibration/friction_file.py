@@ -140,7 +140,7 @@ def friction_from_toml(text: str, name: str) -> FrictionCalibration:
         friction = friction_of(file.motors)
     except (KeyError, ValueError) as error:
         is_key = isinstance(error, KeyError)
-        what = f"motors.{error.args[0]} is missing" if is_key else error
+        what = f"motors.{error.args[0]} is missing" if is_key else str(error)
         raise SettingsError(
             f"{name} is not a calibration of friction: {what}.",
             hint="Make one with: traction calibrate friction. Nothing was started.",

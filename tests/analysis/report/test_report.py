@@ -158,7 +158,7 @@ def test_a_report_without_pdfs_leaves_none_of_an_earlier_one(
     def drawn(key, *_, with_pdf, **__):
         return Picture(key, b"png", b"pdf" if with_pdf else b"")
 
-    monkeypatch.setattr("analysis.figures.render", drawn)
+    monkeypatch.setattr("analysis.figures.style.render", drawn)
     write_report(small_study, tmp_path, context(with_pdf=True))
     figures = tmp_path / "figures"
     assert {file.suffix for file in figures.iterdir()} == {".pdf", ".png"}
@@ -178,7 +178,7 @@ def test_a_further_figure_stands_on_the_page_until_a_report_has_none(
     small_study, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(
-        "analysis.figures.render", lambda key, *_, **__: Picture(key, b"png")
+        "analysis.figures.style.render", lambda key, *_, **__: Picture(key, b"png")
     )
     further = ReportFigure(
         ReportSection.BEYOND, "Foresight", "Four panels.", "Seen.", FORESIGHT

@@ -130,7 +130,7 @@ class DeafBus(can.BusABC):
 def served_by(monkeypatch):
     def serve(bus):
         door = PythonCanDoor(bus, SystemClock())
-        monkeypatch.setattr("wam.bus.open_door", lambda *_: door)
+        monkeypatch.setattr("wam.bus.doors.open_door", lambda *_: door)
 
     return serve
 
