@@ -29,6 +29,7 @@ from analysis.gp.trial_noise import TrialRows
 _DESIGN_ROWS = 150  # rows by whose likelihood the first start is chosen
 _SAME_TOP = (0.2, 0.1)  # in theta and likelihood: a climb so near to a top is left
 _LEAST_MOVE = 1.0  # in theta: a move that ends nearer to a known top leads back to it
+_PROMISING = 5.0  # log likelihood that a move may be below the best top it leaves
 _NEIGHBOURS = 0.5  # in theta: of two tops that are nearer, one is enough to begin with
 _LOSING = 5.0  # log likelihood below the best top at which another will not become it
 _UNUSED = 4.0  # logarithm of a length or bias beyond which it makes no difference
@@ -133,16 +134,20 @@ class Search:
     def move(self) -> None:
         """Climb from the likeliest move of every kind, each from the best top so far.
 
-        The likelihood is that of all rows, with the noise of that top. Moves that end
-        near what is known lead back to it, and are left out.
+        The points of the design are the last kind. The likelihood is that of all rows,
+        with the noise of that top. Moves that end near what is known lead back to it,
+        and are left out; so is a kind that promises too little.
         """
-        kinds = range(len(self._moves_of(self._best.theta)))
-        for kind in kinds:
-            moves = self._moves_of(self._best.theta)[kind]
+        for kind in range(len(self._moves_of(self._best.theta))):
+            best = self._best
             known = [*self._began, *(top.theta for top in self._reached)]
-            far = [x for x in moves if _distance(self._kernel, x, known) >= _LEAST_MOVE]
-            if far:
-                self.climb(max(far, key=self._posterior.value))
+            rated = [
+                (self._posterior.value(theta), k, theta)
+                for k, theta in enumerate(self._moves_of(best.theta)[kind])
+                if _distance(self._kernel, theta, known) >= _LEAST_MOVE
+            ]
+            if rated and max(rated)[0] > best.value - _PROMISING:
+                self.climb(max(rated)[2])
 
     def optimum(self) -> Optimum:
         """Return the best of what was reached."""
@@ -162,14 +167,18 @@ class Search:
         return max(self._reached, key=lambda top: top.value)
 
     def _moves_of(self, theta: Array) -> list[list[Array]]:
-        """Return the kernel's moves from theta in the box, kind by kind."""
+        """Return moves from theta in the box, kind by kind, with its noise."""
         count = len(self._kernel.names)
+        kinds = [
+            *self._kernel.moves(theta[:count]),
+            [point[:count] for point in self._design],
+        ]
         return [
             [
                 np.clip(np.concatenate([move, theta[count:]]), *self._bounds.T)
                 for move in kind
             ]
-            for kind in self._kernel.moves(theta[:count])
+            for kind in kinds
         ]
 
     def _is_known(self, theta: Array, value: float) -> bool:
