@@ -18,6 +18,7 @@ from analysis.gp.kernels import SquaredExponential
 from analysis.gp.noise import ConstantNoise
 from analysis.gp.search import posterior_search
 
+_STARTS = 3
 KERNELS = {"SE fit": SquaredExponential(), "NN fit": Arcsine()}
 
 
@@ -83,9 +84,16 @@ def theirs(part: str, start: np.ndarray, sd: float) -> Kernel:
     return size * shape + WhiteKernel(sn**2, span)
 
 
-def our_starts(part: str, X: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return the thetas that our search begins with."""
-    return posterior_search(KERNELS[part], ConstantNoise(), X, y).began
+def three_starts(part: str, X: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return three thetas to begin with: where our search begins, then its design."""
+    kernel, noise = KERNELS[part], ConstantNoise()
+    begun = posterior_search(kernel, noise, X, y).began
+    sd = float(y.std())
+    design = [
+        np.concatenate([point, noise.start(sd)])
+        for point in kernel.design(sd, np.ones(X.shape[1]))
+    ]
+    return (*begun, *design)[:_STARTS]
 
 
 def fit_theirs(

@@ -1,6 +1,6 @@
 """What fits cost, beside scikit-learn and 20-start least squares in the same run.
 
-Equal numbers of starts, one linear-algebra thread each, parts alternating, so that
+The others get three starts, one linear-algebra thread each, parts alternating, so that
 whatever else the machine does meets all of them. Medians over rounds.
 """
 
@@ -27,7 +27,7 @@ from analysis.gp.noise import ConstantNoise
 from analysis.gp.regression import fit_gp
 from analysis.tustin.model import TustinBounds, TustinParameters, fit_tustin, predict
 from benchmarks import beside_gpy, beside_tinygp
-from benchmarks.beside_sklearn import KERNELS, fit_theirs, our_starts, theirs
+from benchmarks.beside_sklearn import KERNELS, fit_theirs, theirs, three_starts
 from benchmarks.rows import BenchRow, not_installed
 from benchmarks.study_race import SLICE, race
 
@@ -118,7 +118,7 @@ def parts(rounds: int) -> list[SpeedComparison]:
     """Return what is measured of single fits."""
     rows = load_rows()
     X, y = chosen(rows)
-    starts = {part: our_starts(part, X, y) for part in KERNELS}
+    starts = {part: three_starts(part, X, y) for part in KERNELS}
 
     def likelihood_of_theirs(part: str) -> float:
         model = fit_theirs(part, X, y, starts[part])
@@ -149,14 +149,14 @@ def parts(rounds: int) -> list[SpeedComparison]:
 
 def our_evaluation(X: np.ndarray, y: np.ndarray) -> Callable[[], float]:
     """Return what makes one likelihood with its gradient, as a search asks for it."""
-    theta = our_starts("SE fit", X, y)[0]
+    theta = three_starts("SE fit", X, y)[0]
     likelihood = Likelihood(KERNELS["SE fit"], ConstantNoise(), X, y)
     return lambda: likelihood(theta)[0]
 
 
 def evaluation(X: np.ndarray, y: np.ndarray, rounds: int) -> SpeedComparison:
     """Return one likelihood with its gradient beside that of scikit-learn."""
-    theta = our_starts("SE fit", X, y)[0]
+    theta = three_starts("SE fit", X, y)[0]
     model = GaussianProcessRegressor(
         theirs("SE fit", theta, float(y.std())), alpha=1e-10, optimizer=None
     ).fit(X, y)
@@ -185,7 +185,7 @@ def rows() -> list[BenchRow]:
     ratio = {name: float(str(part["ratio"])) for name, part in found.items()}
     spent = {name: float(str(part["ours_ms"])) for name, part in found.items()}
     least_squares_of = "Tustin fit against 20-start least squares"
-    equal = "against scikit-learn, equal starts"
+    equal = "against scikit-learn, three starts"
     return [
         BenchRow(f"SE fit, n = 300, {equal}", ratio["SE fit"], "times", 15, True),
         *rivals,
@@ -209,7 +209,7 @@ def beside(what: str, goal: float, maker: Fitter) -> BenchRow:
         fit = maker(X, y)
     except ImportError:
         return not_installed(what, goal)
-    starts = our_starts("SE fit", X, y)
+    starts = three_starts("SE fit", X, y)
     reached = fit(starts)  # compiles, where it does
     ours, other = duel(lambda: fit_gp(X, y), lambda: fit(starts), 3)
     gap = fit_gp(X, y).lml - reached

@@ -30,7 +30,7 @@ from analysis.study.models import (
     ModelFitter,
 )
 from analysis.tustin.model import TustinFit
-from benchmarks.beside_sklearn import fit_theirs, our_starts
+from benchmarks.beside_sklearn import fit_theirs, three_starts
 
 SLICE = Path(__file__).parents[1] / "tests" / "data" / "rehearsal_slice.npz"
 _GOAL = 4.0
@@ -187,7 +187,7 @@ def likelihoods_of(laps: list[Lap]) -> tuple[np.ndarray, np.ndarray]:
 def starts_of(task: FoldTask) -> dict[str, tuple[Array, ...]]:
     """Return where the searches of one fold begin, by the name of the model."""
     rows = given(task)
-    return {n: our_starts(FITS[n][0], rows.X, r) for n, r in rows.outputs.items()}
+    return {n: three_starts(FITS[n][0], rows.X, r) for n, r in rows.outputs.items()}
 
 
 def run_theirs(

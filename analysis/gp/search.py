@@ -78,6 +78,7 @@ class Posterior:
     def __init__(self, likelihood: Likelihood) -> None:
         self.likelihood = likelihood
         self._count = len(likelihood.kernel.names)
+        self._values: dict[bytes, float] = {}
 
     def __call__(self, theta: Array) -> tuple[float, Array]:
         """Return it and its slope in theta.
@@ -91,12 +92,18 @@ class Posterior:
         return lml + prior, slope
 
     def value(self, theta: Array) -> float:
-        """Return it alone, for a third of the cost; -inf where there is none."""
-        prior, _ = self.likelihood.noise.log_prior(theta[self._count :])
-        try:
-            return self.likelihood.value(theta) + prior
-        except SettingsError:
-            return -np.inf
+        """Return it alone, for a third of the cost; -inf where there is none.
+
+        Values are kept: moves from one top are asked for again.
+        """
+        key = theta.tobytes()
+        if key not in self._values:
+            prior, _ = self.likelihood.noise.log_prior(theta[self._count :])
+            try:
+                self._values[key] = self.likelihood.value(theta) + prior
+            except SettingsError:
+                self._values[key] = -np.inf
+        return self._values[key]
 
 
 class Search:

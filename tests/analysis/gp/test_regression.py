@@ -180,17 +180,6 @@ def test_value_alone_is_that_of_the_likelihood_with_its_gradient(kernel):
     assert likelihood.value(theta) == likelihood(theta)[0]
 
 
-def test_a_start_is_left_just_below_a_known_top():
-    X, y = draw(np.random.default_rng(4), 100)
-    starts = posterior_search(SE, ConstantNoise(), X, y - y.mean()).starts
-    best, *others = sorted(starts, key=lambda start: -start.lml)
-    for start in others:
-        # this likelihood has one top, which a start has reached
-        assert best.lml - 0.1 < start.lml
-        assert np.abs(np.subtract(start.theta, best.theta)).max() < 0.2
-    assert others[-1].lml < best.lml - 1e-5
-
-
 def draw(rng, n):
     X = rng.uniform(-2, 2, (n, 2))
     K = SE.matrix(np.log([2.0, 0.8, 1.5]), X, X)
