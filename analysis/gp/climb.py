@@ -27,7 +27,7 @@ class Climbed(NamedTuple):
 
     Attributes:
         theta: parameters, shape (p,).
-        value: the log density there.
+        value: the log density there; -inf where the start has none.
         evaluations: how often it was evaluated.
     """
 
@@ -55,15 +55,15 @@ def climb(
     """
     from scipy.optimize import minimize
 
-    lowest = 0.0
+    lowest, has_value = 0.0, False
 
     def downhill(theta: Array) -> tuple[float, Array]:
-        nonlocal lowest
+        nonlocal lowest, has_value
         try:
             value, slope = objective(theta)
         except SettingsError:
             return _DROP - lowest, np.zeros_like(theta)
-        lowest = min(lowest, value)
+        lowest, has_value = min(lowest, value), True
         return -value, -slope
 
     def watch(intermediate_result: Any) -> None:  # noqa: ANN401
@@ -79,4 +79,5 @@ def climb(
         callback=watch,
         options={"ftol": tolerance},
     )
-    return Climbed(np.asarray(found.x), -float(found.fun), int(found.nfev))
+    value = -float(found.fun) if has_value else -np.inf
+    return Climbed(np.asarray(found.x), value, int(found.nfev))

@@ -47,3 +47,12 @@ def test_a_climb_is_left_where_it_is_told_to():
     assert -60.0 < found.value < -50.01
     assert found.value == pytest.approx(hill(found.theta)[0])
     assert found.evaluations < climb(hill, START, BOX).evaluations
+
+
+def test_a_start_without_a_value_is_below_every_top():
+    def objective(theta):
+        raise SettingsError("none")
+
+    found = climb(objective, START, BOX)
+    np.testing.assert_array_equal(found.theta, START)
+    assert found.value == -np.inf
