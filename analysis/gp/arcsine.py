@@ -88,7 +88,7 @@ class Arcsine(Composable):
         other = X if X_other is None else X_other
         parts = computed_parts(len(X), len(other), is_upper=X_other is None)
         over = _PrintedOver if self.as_printed else _NetworkOver
-        return over(self, (X, other), parts)
+        return over(self, X, other, parts)
 
     def design(self, sd_y: float, sd_x: Array) -> Sequence[Array]:
         """Return sf = sd(y)/2 and a large or small bias with every pair of lengths.
@@ -144,10 +144,10 @@ class _NetworkOver:
     """
 
     def __init__(
-        self, kernel: Arcsine, rows: tuple[Array, Array], parts: Sequence[Part]
+        self, kernel: Arcsine, X: Array, X_other: Array, parts: Sequence[Part]
     ) -> None:
-        self._kernel, self._rows, self._parts = kernel, rows, parts
-        shape = len(rows[0]), len(rows[1])
+        self._kernel, self._rows, self._parts = kernel, (X, X_other), parts
+        shape = len(X), len(X_other)
         self._K, self._u = np.zeros(shape), np.empty(shape)
 
     def __call__(self, theta: Array) -> tuple[Array, Contraction]:
@@ -193,9 +193,9 @@ class _PrintedOver:
     """
 
     def __init__(
-        self, kernel: Arcsine, rows: tuple[Array, Array], parts: Sequence[Part]
+        self, kernel: Arcsine, X: Array, X_other: Array, parts: Sequence[Part]
     ) -> None:
-        self._kernel, (X, X_other) = kernel, rows
+        self._kernel = kernel
         self._X, self._X_other, self._parts = X, X_other, parts
         shape, d = (X.shape[0], X_other.shape[0]), X.shape[1]
         self._pairs = [(a, b) for a in range(d) for b in range(a + 1, d)]

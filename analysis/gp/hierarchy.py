@@ -16,6 +16,7 @@ alone do not fix a spread between plates. (Rasmussen and Williams 2006, section 
 eq. 5.9; Gelman et al. 2013, section 5, for hierarchies.)
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -77,7 +78,7 @@ class GroundLikelihood:
         unit, of_added = self._added(np.concatenate([[0.0], theta[5:7]]))
         B, slopes = self._of.at(theta)
         wide = B[np.ix_(self._place, self._place)]
-        factor = _factor(K0 + wide * unit, theta, (self._is_plate, self._trials))
+        factor = _factor(K0 + wide * unit, theta, self._is_plate, self._trials)
         a = factor.solve(self._y)
         lml = -0.5 * float(self._y @ a + a.size * np.log(2.0 * np.pi))
         lml -= float(np.log(np.diagonal(factor.L)).sum())
@@ -167,8 +168,8 @@ class PredictiveProcess:
         self._X = (rows.inputs - process.centre) / process.scale
         theta = process.theta
         B = Resemblance(rows.grounds, rows.grounds).at(theta)[0]
-        K = _covariance(theta, (self._X, self._X), B[np.ix_(rows.ground, rows.ground)])
-        self._factor = _factor(K, theta, (rows.is_plate, rows.blocks()))
+        K = _covariance(theta, self._X, self._X, B[np.ix_(rows.ground, rows.ground)])
+        self._factor = _factor(K, theta, rows.is_plate, rows.blocks())
         self._alpha = self._factor.solve(rows.y - process.offset)
 
     def predict(self, ground: Ground, inputs: Array) -> GroundPrediction:
@@ -181,7 +182,7 @@ class PredictiveProcess:
         mean, latent = np.empty(len(Z)), np.full(len(Z), prior)
         for i in range(0, len(Z), _BLOCK):
             part = slice(i, i + _BLOCK)
-            cross = _covariance(theta, (self._X, Z[part]), B)
+            cross = _covariance(theta, self._X, Z[part], B)
             mean[part] = process.offset + self._alpha @ cross
             half = self._factor.half(cross)
             latent[part] -= np.einsum("nm,nm->m", half, half)
@@ -272,15 +273,15 @@ def _by_surface(theta: Array, is_plate: Array) -> tuple[Array, Array]:
     return variances[:2][of], variances[2:][of]
 
 
-def _factor(K: Array, theta: Array, places: tuple[Array, list[slice]]) -> Factor:
+def _factor(K: Array, theta: Array, is_plate: Array, trials: Sequence[slice]) -> Factor:
     """Return the factor of K with trial effects and noise.
 
     Args:
         K: covariance of f_0 + d_g, shape (n, n).
         theta: hyperparameters.
-        places: 1 for a row on a plate, shape (n,), and the rows of every trial.
+        is_plate: 1 for a row on a plate, shape (n,).
+        trials: the rows of every trial.
     """
-    is_plate, trials = places
     sc2, sn2 = _by_surface(theta, is_plate)
     shared = [
         (rows, np.full((rows.stop - rows.start,) * 2, sc2[rows.start]))
@@ -289,8 +290,8 @@ def _factor(K: Array, theta: Array, places: tuple[Array, list[slice]]) -> Factor
     return factorise(K, sn2, blocks=shared)
 
 
-def _covariance(theta: Array, inputs: tuple[Array, Array], B: Array) -> Array:
+def _covariance(theta: Array, X: Array, X_other: Array, B: Array) -> Array:
     """Return the covariance of f_0 + d_g between two sets of rows, shape (n, m)."""
     se = SquaredExponential()
-    added = se.matrix(np.concatenate([[0.0], theta[5:7]]), *inputs)
-    return se.matrix(theta[:3], *inputs) + B * added
+    added = se.matrix(np.concatenate([[0.0], theta[5:7]]), X, X_other)
+    return se.matrix(theta[:3], X, X_other) + B * added

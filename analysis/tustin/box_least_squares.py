@@ -40,7 +40,7 @@ def solve_in_box(G: Array, c: Array, lower: Array, upper: Array) -> Array:
     if is_outside.any():
         held = np.minimum(np.maximum(p[is_outside], lower), upper)
         p[is_outside] = _on_a_bound(
-            ridged[is_outside], c[is_outside], held, (lower, upper)
+            ridged[is_outside], c[is_outside], held, lower, upper
         )
     return p
 
@@ -61,17 +61,17 @@ def _stationary(G: Array, c: Array) -> Array:
     return p
 
 
-def _on_a_bound(G: Array, c: Array, held: Array, box: tuple[Array, Array]) -> Array:
+def _on_a_bound(G: Array, c: Array, held: Array, low: Array, high: Array) -> Array:
     """Return the minimum where the stationary point is outside, shape (m, 3).
 
     Args:
         G: Gram matrices, shape (m, 3, 3).
         c: right-hand sides, shape (m, 3).
         held: stationary points clipped into the box, shape (m, 3).
-        box: lower and upper bounds.
+        low: lower bounds, shape (3,).
+        high: upper bounds, shape (3,).
     """
     i, j, k = _ORDERS.T
-    low, high = box
     G_jj, G_jk, G_kk = G[:, j, j], G[:, j, k], G[:, k, k]
     p_i = held[:, i]
     c_j, c_k = c[:, j] - G[:, i, j] * p_i, c[:, k] - G[:, i, k] * p_i

@@ -151,7 +151,7 @@ def profiles(moments: Moments, box: Box, point: Point, residual: Array) -> Profi
     """
     limit = point.sse * (1.0 + _CHI2_95 / independent_samples(residual))
     sums = moments.sums.sum(axis=0)
-    ends = [_profile(sums, moments.v, box, point, (k, limit)) for k in (0, 1)]
+    ends = [_profile(sums, moments.v, box, point, k, limit) for k in (0, 1)]
     touches = any(
         abs(end - edge) < 1e-9
         for pair, edges in zip(ends, box.logarithmic, strict=True)
@@ -162,10 +162,9 @@ def profiles(moments: Moments, box: Box, point: Point, residual: Array) -> Profi
 
 
 def _profile(
-    sums: Array, v: Array, box: Box, point: Point, choice: tuple[int, float]
+    sums: Array, v: Array, box: Box, point: Point, held: int, limit: float
 ) -> tuple[float, float]:
     """Return the ends, in logarithms, of where the profile is below the limit."""
-    held, limit = choice
     (low, high), (bottom, top) = box.logarithmic[[held, 1 - held]]
     along = np.linspace(low, high, _POINTS)
     across = np.linspace(bottom, top, _ACROSS)
