@@ -68,13 +68,13 @@ class SlidingHand:
 
 def loads(found: str, true: str, share: float) -> SlidLoad:
     """Return the loads of the arm `true` while `share` of what was `found` is off."""
-    rubbing = friction_of(tomllib.loads(true)["motors"])
+    motors = friction_of(tomllib.loads(true)["motors"])
     fit = friction_from_toml(found, "friction.toml").fit
     rest, sliding = [], []
     for speed in SPEEDS:
         known = known_friction(fit.friction, fit.deviation, fit.asymmetry_deviation)
         compensation = FrictionCompensation(CONSTANTS, known, share)
-        bench = HoldBench(compensation=compensation, rubbing=rubbing, mass=MASS)
+        bench = HoldBench(compensation=compensation, motors=motors, mass=MASS)
         stood, slid = put_down_and_slide(bench, speed)
         rest.append(stood)
         sliding.append(slid)

@@ -65,8 +65,8 @@ def twin_of(folder: Path):
     known = read_law_calibrations(settings, is_twin=True)
     row = settings.matrix.terrains[0]
     world = SimulatedRig(settings.rig, row, 1, 0.02, "steady", twin=known)
-    constants, rubbing = arm_of(world.metadata()["body"], CONSTANTS)
-    return free_arm(constants, PlantOptions(rubbing=rubbing))
+    constants, motors = arm_of(world.metadata()["body"], CONSTANTS)
+    return free_arm(constants, PlantOptions(motors=motors))
 
 
 def wanted(seconds: float, start: np.ndarray) -> np.ndarray:
@@ -150,7 +150,7 @@ def calibrate(folder: Path, share: float, seed: int) -> None:
 def compare(folder: Path, seconds: float):
     """Return (torque errors, shape (7,), errors of the windows, shape (n, 7))."""
     truth = tomllib.loads((folder / "friction.truth.toml").read_text())
-    options = PlantOptions(rubbing=friction_of(truth["motors"]))
+    options = PlantOptions(motors=friction_of(truth["motors"]))
     real = free_arm(CONSTANTS, options)
     way = wanted(seconds, real.q.copy())
     arm = follow(real, way)

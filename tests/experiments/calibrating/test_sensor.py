@@ -10,7 +10,7 @@ import fakes.world.rig
 from acquisition.errors import SettingsError
 from acquisition.trial_file.reader import TrialReader
 from experiments.calibrating import sensor
-from experiments.operator import prompts as operator
+from experiments.operator import auto_operator as operator
 from experiments.run import pose_walk as walk
 from experiments.settings.calibrations import with_calibrations
 from experiments.settings.load import load_settings
@@ -79,7 +79,7 @@ def _drifting(scale, factor):
 def calibrate(what, folder, *options, rig=OtherRig, errors=SensorErrors):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(plain_world, "FakeRig", rig)
-        patch.setattr(fakes.world.rig, "draw_errors", lambda rng, *_, **__: errors(rng))
+        patch.setattr(fakes.world.rig, "SensorErrors", lambda rng, *_: errors(rng))
         patch.setattr(walk, "SETTLE", 0.2)
         patch.setattr(sensor, "AVERAGE", 0.4)
         patch.setattr(calibration_poses, "POINT_SPEED", 0.8)

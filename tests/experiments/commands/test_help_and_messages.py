@@ -374,7 +374,7 @@ def _failing_status(scene, error):
     def fail(_):
         raise error
 
-    scene.patch.setattr(settings, "load_settings", fail)
+    scene.patch.setattr(load, "load_settings", fail)
     return traction("status", "--data", scene.data)
 
 

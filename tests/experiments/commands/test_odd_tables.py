@@ -65,7 +65,7 @@ def odd(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         # what is said is tested here; pictures cost seconds, see the long test
         patch.setattr(
-            "analysis.figures.render",
+            "analysis.figures.style.render",
             lambda key, *_, **__: Picture(key, b"png", b"pdf"),
         )
         patch.setattr("analysis.study.jobs.available_cores", lambda: 1)

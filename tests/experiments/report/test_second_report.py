@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from functools import wraps
 
 import pytest
 
@@ -43,6 +44,7 @@ def computed(monkeypatch):
     for module, name in COMPUTED:
         function = getattr(module, name)
 
+        @wraps(function)  # results are kept by the function's own module and name
         def seen(*arguments, name=name, function=function, **named):
             names.append(name)
             return function(*arguments, **named)
