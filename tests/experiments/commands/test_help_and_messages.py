@@ -15,7 +15,6 @@ import pytest
 from acquisition.control_loop import contact
 from acquisition.devices import SafetyMode
 from acquisition.ipc.child import ProcessLostError
-from experiments import settings
 from experiments.fault_injection.host_faults import COMPUTER_FAULTS
 from experiments.fault_injection.plan import FaultPlan
 from experiments.messages import CATALOGUE
@@ -30,6 +29,7 @@ from experiments.run import tare as taring
 from experiments.session.lock import session_lock
 from experiments.session.reducer import replay
 from experiments.session.store import list_sessions
+from experiments.settings import load
 from experiments.settings.load import load_settings
 from ft_sensor import tare
 from ft_sensor.calibration.fit import SensorFit
