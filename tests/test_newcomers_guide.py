@@ -104,6 +104,7 @@ def counted(title):
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(300)  # each copies the program and runs it
 @pytest.mark.parametrize(("title", "word"), TRIED_BY.items())
 def test_a_recipe_of_the_guide_works_with_the_files_that_it_names(tree, title, word):
     files = make(tree, title)
