@@ -131,7 +131,7 @@ def _run(cycles: int, notes: Notes | None) -> Iterator[float]:
     model = ArmModel(load_constants(), _tool())
     plant = _plant(model)
     plant.terrain = _ground() if notes is None else _NotedGround(notes)
-    plant.set_braking(is_braked=False, is_powered=True)
+    plant.short_windings([False] * 7)
     plant.hand.put_down(plant.terrain.surface(0.0))
     for _ in range(_SETTLING):
         _cycle(plant, model)

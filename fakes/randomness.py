@@ -36,6 +36,11 @@ def friction_generator(seed: int) -> np.random.Generator:
     return trial_generator(seed, "friction", 0)
 
 
+def winding_generator(seed: int) -> np.random.Generator:
+    """Return the generator of the arm's motor windings, as `friction_generator`."""
+    return trial_generator(seed, "windings", 0)
+
+
 class NormalStream:
     """Standard normal numbers one by one, drawn in blocks."""
 

@@ -126,7 +126,7 @@ class Soak:
         for line in done.err.splitlines():
             assert is_known(line), line
         rig = self.built.rig
-        is_braked = rig.plant.is_held or rig.network.safety_mode is SafetyMode.E_STOP
+        is_braked = rig.plant.is_idle or rig.network.safety_mode is SafetyMode.E_STOP
         assert is_braked, (rig.network.safety_mode, done.err)
         assert not children(), children()
 

@@ -41,6 +41,7 @@ class HandLoad(NamedTuple):
     grip: tuple[float, float]
 
 
+_LIFTED = [1, 3]  # joints 2 and 4
 _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 _NOTHING = (0.0,) * 6
 
@@ -104,7 +105,7 @@ class ArmBody:
         self._joints.move(q)
 
     def hold(self, *, is_held: bool) -> None:
-        """Let the brakes hold the joints, or let go of them."""
+        """Let a stand or a person bear the arm where it is, or let go of it."""
         self._is_held = is_held
         if is_held:
             self._joints.rest(self.q)
@@ -114,6 +115,16 @@ class ArmBody:
     def drive(self, units: Sequence[float]) -> None:
         """Apply torques [puck units] to motors 1 to 7 from now on."""
         self.drives.drive(units)
+
+    def burden(self) -> Vector3:
+        """Return the force at the hand that bears the arm's weight [N].
+
+        A person lifts in the plane of joints 2 and 4; what turns the others is little.
+        """
+        weight = pin.computeGeneralizedGravity(self._model, self._data, self.q)
+        lifted = self._loads.A[6:9:2, _LIFTED]  # along x and z
+        x, z = np.linalg.lstsq(lifted.T, weight[_LIFTED], rcond=0.05)[0].tolist()
+        return x, 0.0, z
 
     def counts(self) -> list[float]:
         """Return what the encoders of the motors count, seven."""

@@ -38,6 +38,7 @@ class CableDrives(JointDrives):
         inertia: Array,
         swinging: Array,
         dt: float,
+        windings: Array,
         resonance: float,
     ) -> None:
         """Take the drives of an arm that stands without torque.
@@ -48,6 +49,7 @@ class CableDrives(JointDrives):
             inertia: that a motor moves when it turns [kg m^2], shape (7,).
             swinging: what swings on the cable of each motor [kg m^2], shape (7,).
             dt: length of a step [s].
+            windings: damping of each motor when shorted [N m s/rad], shape (7,).
             resonance: of a joint on its cable while motor and other joints are held
                 [Hz].
 
@@ -61,7 +63,7 @@ class CableDrives(JointDrives):
         self._cable_damping = 2.0 * _DAMPING * rate * swinging
         self._rotor = np.array(constants.drive_inertia)
         self.twist, self._speeds = np.zeros(7), np.zeros(7)
-        super().__init__(constants, friction, inertia, dt)
+        super().__init__(constants, friction, inertia, dt, windings)
 
     def counts(self, q: Array) -> Array:
         """Return what the encoders at the motors count, shape (7,)."""
@@ -94,7 +96,8 @@ class CableDrives(JointDrives):
         bent = np.array(bristles.torques([0.0] * 7))
         stiffness, damping = self._stiffness, self._cable_damping
         held = damping + dt * stiffness
-        inertia = self._rotor + dt * (np.array(bristles.damping) + held)
+        damping = np.array(bristles.damping) + self._shorted
+        inertia = self._rotor + dt * (damping + held)
         against = np.array(speeds)
         push = np.array(self.sent()) + bent - stiffness * self.twist + held * against
         self._speeds = motor = (self._rotor * self._speeds + dt * push) / inertia

@@ -65,6 +65,8 @@ _CLEAR = StopForces([0.0] * 7, [0.0] * 7, is_near=False)
 class JointDrives:
     """What acts at the joints beside gravity, ground and hand.
 
+    A motor whose windings are shorted has their damping beside that of its friction.
+
     Attributes:
         disturbance: joint torques from outside [N m], shape (7,).
         driving: torques that drive the joints whatever they do in a step [N m], seven.
@@ -78,16 +80,19 @@ class JointDrives:
         friction: MotorFriction,
         inertia: Array,
         dt: float,
+        windings: Array,
     ) -> None:
-        """Take the drives of an arm that stands without torque.
+        """Take the drives of an arm that stands without torque, windings shorted.
 
         Args:
             constants: of the arm.
             friction: of the motors.
             inertia: that a motor moves when it turns [kg m^2], shape (7,).
             dt: length of a step [s].
+            windings: damping of each motor when shorted [N m s/rad], shape (7,).
         """
         self._dt = dt
+        self._windings = windings
         self._turns = np.array(constants.cts) / (2.0 * np.pi)  # counts per radian
         self._to_counts = self._turns[:, None] * constants.j2mp
         self._j2mp, self._ipnm = constants.j2mp, constants.ipnm
@@ -96,6 +101,7 @@ class JointDrives:
         self._inertia = np.diag(drive_inertia_matrix(constants))
         self._bristles = MotorBristles(friction, inertia, dt)
         self._is_lively = False
+        self.short([True] * 7)
         self.disturbance = np.zeros(7)
         self.stops = JointStops(constants)
         self._stopping = _CLEAR
@@ -111,6 +117,12 @@ class JointDrives:
         self._tau = self._from_units.dot(np.array(units, dtype=float))
         self._units = tuple(units)
         self._add_up()
+
+    def short(self, shorted: Sequence[bool]) -> None:
+        """Short the windings of motors 1 to 7, or open them, from now on."""
+        self._shorted = np.where(shorted, self._windings, 0.0)
+        self._is_damped = any(shorted)
+        self._is_other = True  # than what the armature was made for
 
     def sent(self) -> list[float]:
         """Return the torques applied to motors 1 to 7 [N m]."""
@@ -142,9 +154,12 @@ class JointDrives:
         if self._stopping.is_near:
             self._stop(rows)
             self._resist(speeds)
-        elif self._is_lively:
+        elif self._is_lively or self._is_other:
             self._resist(speeds)
-        return self._bristles.torques(speeds)
+        against = self._bristles.torques(speeds)
+        if not self._is_damped:
+            return against
+        return (np.array(against) - self._shorted * speeds).tolist()
 
     def follow(self, speeds: Sequence[float]) -> None:
         """Go on by a step at `speeds` of the motors [rad/s]."""
@@ -163,11 +178,15 @@ class JointDrives:
     def _resist(self, speeds: Sequence[float]) -> None:
         bristles = self._bristles
         bristles.take(speeds)
-        armature = self._dampings.dot(np.array(bristles.damping))
+        damping = np.array(bristles.damping)
+        if self._is_damped:
+            damping += self._shorted
+        armature = self._dampings.dot(damping)
         if self._stopping.is_near:
             armature += self._stopping.damping
         armature *= self._dt
         armature += self._inertia
+        self._is_other = False
         self.armature = armature
 
     def _add_up(self) -> None:

@@ -2,6 +2,7 @@
 """The body that the simulated arm is: links, sensor, foot and a person's forearm."""
 
 from dataclasses import dataclass
+from enum import Enum, auto
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +18,18 @@ FOREARM_MASS = 1.0  # of the person's arm, carried by the person [kg]
 _HAND_ABOVE_PLATE = 0.030  # on the axis of joint 7 [m]
 
 
+class Support(Enum):
+    """What bears an arm that no motor drives, apart from a hand that is on it.
+
+    STAND: a stand, where the arm begins. PERSON: a person, wherever the arm is, as long
+    as no motor pulls. NONE: nothing; it sinks on its shorted windings.
+    """
+
+    STAND = auto()
+    PERSON = auto()
+    NONE = auto()
+
+
 @dataclass(frozen=True, slots=True)
 class PlantOptions:
     """How the simulated arm differs from an ideal one.
@@ -29,6 +42,9 @@ class PlantOptions:
         motors: friction of the motors, given instead of drawn; None = drawn.
         cables: resonance of the joints on their cables [Hz]; None = stiff cables.
         has_hand: a person holds the arm by its forearm, from the beginning.
+        windings: share of the damping that shorted windings have by the motors' data;
+            it is drawn anew with `seed`.
+        support: what bears the arm while no motor drives it.
     """
 
     friction: float = 0.02
@@ -37,6 +53,8 @@ class PlantOptions:
     motors: MotorFriction | None = None
     cables: float | None = None
     has_hand: bool = True
+    windings: float = 1.0
+    support: Support = Support.STAND
 
 
 class ArmAndHand(NamedTuple):

@@ -6,7 +6,7 @@ the force of the hand, of 10 Hz at most.
 """
 
 from collections.abc import Sequence
-from math import floor
+from math import floor, hypot
 
 import numpy as np
 
@@ -21,17 +21,23 @@ from fakes.plant.joints import JointDrives
 from fakes.plant.model import (
     FOREARM_MASS,
     PlantOptions,
+    Support,
     arm_and_hand,
     cable_inertia,
     motor_inertia,
     motor_weights,
 )
+from fakes.plant.windings import shorted_damping
 from fakes.truth import Truth
 from ft_sensor.payload import TerrainFrame
 from wam.model.constants import GRAVITY, ArmConstants, Array
 from wam.model.tool import Tool
 
 _NO_TORQUE = (0.0,) * 7
+_ON_STAND = 0.02  # rad, of each joint: the foot has not left the stand
+# A person notices that the arm grows heavy, and then bears it [s].
+_NOTICED, _BORNE = 0.2, 0.5
+_STRONGEST = 150.0  # of a person [N]
 
 
 class ArmPlant:
@@ -65,7 +71,11 @@ class ArmPlant:
         self.friction = drawn if options.motors is None else options.motors
         up = frame.axes()[:, 2]
         self._up: list[float] = (up * forearm * GRAVITY).tolist()
-        self._is_held = True
+        self._support = options.support
+        self._stand = q.copy()
+        self._is_held = self._support is not Support.NONE
+        self._is_idle, self._is_pulled = True, False
+        self._heavy_since_ns = -round(1e9 * _BORNE)
         self.terrain: Terrain | None = None
         self.hand = Hand(PERIOD_NS * 1e-9, is_there=options.has_hand)
         self.finger = (0.0, 0.0, 0.0)
@@ -76,8 +86,9 @@ class ArmPlant:
         self._push = (0.0, 0.0, 0.0)  # force of the hand
         inertia = motor_inertia(parts.model, constants, q)
         dt = self._substep_ns * 1e-9
+        windings = shorted_damping(options.windings, options.seed)
         if options.cables is None:
-            drives = JointDrives(constants, self.friction, inertia, dt)
+            drives = JointDrives(constants, self.friction, inertia, dt, windings)
         else:
             drives = CableDrives(
                 constants,
@@ -85,12 +96,14 @@ class ArmPlant:
                 inertia,
                 cable_inertia(parts.model, constants, q),
                 dt,
+                windings,
                 options.cables,
             )
         self._body = ArmBody(parts, drives, constants.j2mp, q, self._substep_ns)
         self.disturbance = self._body.disturbance
         self._wrist = WristGauges(tool, up, PERIOD_NS * 1e-9)
         self._wrist.end_cycle(self._body.rotation, self._ground, [0.0] * 6)
+        self._body.hold(is_held=self._is_held)
 
     @property
     def q(self) -> Array:
@@ -128,18 +141,30 @@ class ArmPlant:
     def set_torques(self, units: Sequence[int]) -> None:
         """Apply torques [puck units] to motors 1 to 7 from now on."""
         self._body.drive(units)
+        is_pulled = any(units)
+        if is_pulled is not self._is_pulled:
+            self._is_pulled = is_pulled
+            self._lay_down()
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether all windings are shorted: the arm is damped, and sinks."""
+        return self._is_idle
 
     @property
     def is_held(self) -> bool:
-        """Whether the brakes hold the joints."""
+        """Whether a stand or a person bears an arm without torque: it stands still."""
         return self._is_held
 
-    def set_braking(self, is_braked: bool, is_powered: bool) -> None:
-        """Hold the joints (braked), or let them follow torque or fall."""
-        self._is_held = is_braked and is_powered
-        self._body.hold(is_held=self._is_held)
-        if is_braked or not is_powered:
+    def short_windings(self, shorted: Sequence[bool]) -> None:
+        """Short the windings of motors 1 to 7, which damps them, or open them."""
+        if all(shorted) and not self._is_idle:
+            self._heavy_since_ns = self.t_ns
+        self._is_idle = all(shorted)
+        self._body.drives.short(shorted)
+        if self._is_idle:
             self._body.drive(_NO_TORQUE)
+        self._lay_down()
 
     # --- what the sensor feels ----------------------------------------------------
 
@@ -183,13 +208,45 @@ class ArmPlant:
         taken, self.truth = self.truth or Truth(), None
         return taken
 
+    def _lay_down(self) -> None:
+        """Find out whether something bears the arm."""
+        if self._support is Support.PERSON:
+            is_held = self._is_idle or not self._is_pulled
+        else:
+            is_held = (
+                self._support is Support.STAND
+                and self._is_idle
+                and float(np.abs(self.q - self._stand).max()) < _ON_STAND
+            )
+        if is_held is not self._is_held:
+            self._is_held = is_held
+            self._body.hold(is_held=is_held)
+
     def _begin_cycle(self) -> None:
         """Take anew what stays as it is for 2 ms."""
+        if self._is_idle and not self._is_held:
+            self._lay_down()
         body = self._body
-        self._push = x, y, z = self.hand.step(body.linearise())
-        ux, uy, uz = self._up
+        self._push = self.hand.step(body.linearise())
+        x, y, z = self._lift()
         grip = GRIP if self.hand.is_holding else NO_GRIP
-        body.begin_cycle(HandLoad((x + ux, y + uy, z + uz), grip), self.t_ns)
+        body.begin_cycle(HandLoad((x, y, z), grip), self.t_ns)
+
+    def _lift(self) -> tuple[float, float, float]:
+        """Return the force of the hand with what the person carries [N].
+
+        That is the own forearm, and soon after it went idle the arm.
+        """
+        (x, y, z), (ux, uy, uz) = self._push, self._up
+        if self._is_idle and self.hand.is_holding and not self._is_held:
+            heavy = 1e-9 * (self.t_ns - self._heavy_since_ns)
+            share = min(max((heavy - _NOTICED) / (_BORNE - _NOTICED), 0.0), 1.0)
+            bx, by, bz = self._body.burden()
+            share *= min(1.0, _STRONGEST / max(hypot(bx, by, bz), _STRONGEST))
+            ux += share * (bx - ux)
+            uy += share * (by - uy)
+            uz += share * (bz - uz)
+        return x + ux, y + uy, z + uz
 
     def _end_cycle(self) -> None:
         (x, y, z, tx, ty, tz), motion = self._body.end_cycle()

@@ -33,8 +33,8 @@ class MotorSide(Protocol):
         """Apply these torques [puck units] to motors 1 to 7 from now on."""
         ...
 
-    def set_braking(self, is_braked: bool, is_powered: bool) -> None:
-        """Short the windings or not; without power the arm falls freely."""
+    def short_windings(self, shorted: Sequence[bool]) -> None:
+        """Short the windings of motors 1 to 7, which damps them, or open them."""
         ...
 
 
@@ -197,11 +197,18 @@ class PuckBank:
         self._apply()
 
     def _apply(self) -> None:
-        """Hand the torques and brakes as they are now to the motors."""
+        """Hand the torques and windings as they are now to the motors.
+
+        The motor of a puck that restarts under an active module turns freely.
+        """
         self._motors.advance(self._schedule.now_ns)
-        is_driven = any(puck.is_driven for puck in self._pucks)
-        is_powered = self._mode is not SafetyMode.E_STOP
-        self._motors.set_braking(is_powered and not is_driven, is_powered)
+        is_active = self._mode is SafetyMode.ACTIVE
+        self._motors.short_windings(
+            [
+                not (puck.is_driven or (is_active and not puck.is_awake))
+                for puck in self._pucks
+            ]
+        )
         self._motors.set_torques([puck.torque for puck in self._pucks])
 
     def _encoder_counts(self) -> Sequence[int]:

@@ -152,7 +152,7 @@ class BodyFaults:
         self._plant.disturbance[_JOINT_7] = 0.0
 
     def _hit(self) -> None:
-        if not self._plant.is_held:  # brakes do not give way to a blow
+        if not self._plant.is_idle:  # a blow to damped joints does nothing
             self._plant.qd[_JOINT_6] = _BLOW
 
     def _touch(self) -> None:

@@ -22,17 +22,17 @@ CYCLE_NS = 2_000_000
 
 
 def make_plant(
-    height=0.05, *, friction=0.0, substeps=4, constants=CONSTANTS, seed=None
+    height=0.05, *, friction=0.0, substeps=4, constants=CONSTANTS, seed=None, **more
 ):
-    """Return a braked arm with the sole `height` [m] above the far end."""
+    """Return an idle arm on its stand, the sole `height` [m] above the far end."""
     q = solve_start(MODEL, FRAME, START_Q, height)
-    options = PlantOptions(friction, substeps, seed)
+    options = PlantOptions(friction, substeps, seed, **more)
     return ArmPlant(constants, TOOL, FRAME, q, options)
 
 
 def release(plant):
     """Let the joints follow torque."""
-    plant.set_braking(is_braked=False, is_powered=True)
+    plant.short_windings([False] * 7)
 
 
 def send(plant, tau):

@@ -45,8 +45,7 @@ class Motors:
     def __init__(self, counts: Sequence[int] = (0,) * 7) -> None:
         self.position = list(counts)
         self.units = [0] * 7
-        self.is_braked = False
-        self.is_powered = False
+        self.shorted = [True] * 7
         self.t_ns = 0
 
     def advance(self, t_ns: int) -> None:
@@ -59,8 +58,12 @@ class Motors:
     def set_torques(self, units: Sequence[int]) -> None:
         self.units = list(units)
 
-    def set_braking(self, is_braked: bool, is_powered: bool) -> None:
-        self.is_braked, self.is_powered = is_braked, is_powered
+    @property
+    def is_idle(self) -> bool:
+        return all(self.shorted)
+
+    def short_windings(self, shorted: Sequence[bool]) -> None:
+        self.shorted = list(shorted)
 
 
 class Rig:

@@ -37,7 +37,7 @@ class Arm:
 
     Attributes:
         limit_ms: the limit that the fault reaches; 20 ms are added to it.
-        seen: by the pucks: "driven", "last torques", "braked", "without power".
+        seen: by the pucks: "driven", "last torques", "idle", "without power".
         state: of the loop; None = whatever it was.
         text: what the message says of it.
     """
@@ -65,7 +65,7 @@ class Cell:
     text: str = ""
     rejected: tuple[str, ...] = ()
     arm: Arm | None = None
-    at_rest: str = "braked"
+    at_rest: str = "idle"
     why: str = ""
 
 
@@ -93,7 +93,7 @@ def _refused(text: str) -> Cell:
 def _ending(text: str, arm: Arm, why: str, **others: Cell) -> Row:
     """Return the row of a fault that takes the arm away and ends the session."""
     ended = Cell(End.ENDED, text, arm=arm)
-    ended = replace(ended, at_rest=arm.seen if arm.seen == NO_POWER else "braked")
+    ended = replace(ended, at_rest=arm.seen if arm.seen == NO_POWER else "idle")
     phases = {
         "recording": replace(ended, rejected=(f"interrupted: {why}",)),
         "review": replace(ended, rejected=AT_REVIEW),
@@ -105,7 +105,7 @@ def _ending(text: str, arm: Arm, why: str, **others: Cell) -> Row:
 NO_POWER = "without power"
 _SILENT = Arm(10, "last torques", HOLD, "held by its last torques")
 _UNKNOWN = Arm(10, "last torques", HOLD, "UNKNOWN - support it")
-_IDLE = Arm(5, "braked", ArmState.IDLE, "idle, braked")
+_IDLE = Arm(5, "idle", ArmState.IDLE, "idle")
 _BEAT = replace(_IDLE, limit_ms=100)
 _STOPPED = Arm(2, NO_POWER, ArmState.IDLE, "stopped by its hardware")
 _HELD = Arm(20, "driven", HOLD, "holding")
@@ -384,7 +384,7 @@ TABLE: dict[str, Row] = {
     "ft-clock-jump": _lost_sensor(_FLAGGED, replace(OK, why="the fit begins then")),
     "not-a-number": _ending(
         _NAN,
-        Arm(2, "braked", ArmState.IDLE, "idle"),
+        Arm(2, "idle", ArmState.IDLE, "idle"),
         "not-a-number",
         preflight=NO_LOOP,
         idle=_CANNOT_COUNT,

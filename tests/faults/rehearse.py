@@ -67,8 +67,8 @@ class SimulatedScene:
         network = self.rig.network
         if network.safety_mode is SafetyMode.E_STOP:
             return "without power"
-        if self.rig.plant.is_held:
-            return "braked"
+        if self.rig.plant.is_idle:
+            return "idle"
         is_fresh = network.schedule.now_ns - self.heard_ns < _FRESH_NS
         return "driven" if is_fresh else "last torques"
 

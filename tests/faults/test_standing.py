@@ -153,7 +153,7 @@ def test_a_fault_that_a_pressed_foot_feels_stops_the_stance(tmp_path, fault):
     reached = seen.scene.reached_ms("driven", state)
     assert reached is not None, seen.scene.seen_since()
     assert reached <= SLOWEST_MS
-    assert seen.scene.arm == "braked"
+    assert seen.scene.arm == "idle"
     motion = seen.truth.since(seen.scene.struck_ns, fault)
     assert is_within(motion, PRESSED), motion
 

@@ -37,7 +37,7 @@ def test_a_frozen_motor_ends_a_trial_before_the_arm_is_fast(
     assert seen.rejected == ["interrupted: motor-still"]
     motion = seen.truth.since(seen.scene.struck_ns, "")
     assert is_within(motion, Promise()), motion
-    assert seen.scene.reached_ms("braked", ArmState.IDLE) < 3000.0
+    assert seen.scene.reached_ms("idle", ArmState.IDLE) < 3000.0
 
 
 @pytest.mark.parametrize("friction", [0.02, 0.3, 1.0])

@@ -81,7 +81,7 @@ LIMP = Promise(
     speed=1.5,
     travel=0.1,
     why="a motor whose puck restarted has no torque: its joints sink until the arm is "
-    "braked",
+    "idle",
 )
 STUCK = Promise(
     speed=1.75,
@@ -139,7 +139,7 @@ class TruthLog:
         if self.t_ns and plant.t_ns < self.t_ns[-1] + _PERIOD_NS:
             return
         self.t_ns.append(plant.t_ns)
-        is_free = 0.0 if plant.is_held else 1.0
+        is_free = 0.0 if plant.is_idle else 1.0
         parts = (plant.q, plant.qd, self.drive, (is_free,), self.hand)
         self.rows.append(np.concatenate(parts))
 
@@ -186,9 +186,9 @@ def watch_truth(patch: pytest.MonkeyPatch) -> list[TruthLog]:
             super().set_torques(units)
             self.log.drive = self.of_units.dot(units)
 
-        def set_braking(self, is_braked, is_powered):
-            super().set_braking(is_braked, is_powered)
-            if is_braked or not is_powered:
+        def short_windings(self, shorted):
+            super().short_windings(shorted)
+            if self.is_idle:
                 self.log.drive = np.zeros(7)
 
         def advance(self, t_ns):

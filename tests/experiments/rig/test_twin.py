@@ -75,7 +75,7 @@ def test_without_the_option_the_simulated_arm_is_one_of_its_own(folder):
 def test_joints_swing_on_their_cables_where_that_is_asked_for(tmp_path):
     write_config(tmp_path)
     plant, _ = plant_of(tmp_path, FakeOptions(is_fast=True, seed=1, cables=15.0))
-    plant.set_braking(is_braked=False, is_powered=True)
+    plant.short_windings([False] * 7)
     plant.advance(plant.t_ns + 100_000_000)
     turns = np.array(plant.counts()) / np.array(load_constants().cts)
     motors = np.linalg.solve(load_constants().j2mp, 2.0 * np.pi * turns)
@@ -89,7 +89,7 @@ def test_a_twin_falls_under_gravity_that_the_drawings_do_not_have(folder):
     for plant in (heavier, drawn):
         plant.hand.let_go()
         plant.terrain = None
-        plant.set_braking(is_braked=False, is_powered=True)
+        plant.short_windings([False] * 7)
         motor = np.linalg.solve(
             rig.model.constants.j2mp.T, ArmModel.gravity(rig.model, plant.q)
         )

@@ -9,6 +9,7 @@ from fakes.plant.friction import (
     MotorBristles,
     draw_friction,
 )
+from fakes.plant.model import Support
 from tests.fakes.scenes import (
     CONSTANTS,
     CYCLE_NS,
@@ -190,14 +191,14 @@ def test_a_sliding_motor_is_resisted_by_the_steady_torque_of_its_friction(way):
     assert np.mean(found, axis=0) == pytest.approx(np.mean(wanted, axis=0), rel=0.01)
 
 
-def test_a_braked_arm_forgets_what_bent_its_bristles():
-    plant = make_plant(friction=1.0)
+def test_an_arm_that_is_borne_forgets_what_bent_its_bristles():
+    plant = make_plant(friction=1.0, support=Support.PERSON)
     plant.hand.let_go()
     for _ in range(2):
         release(plant)
         send(plant, MODEL.gravity(plant.q) + 0.9 * CONSTANTS.coulomb)
         plant.advance(plant.t_ns + 50 * CYCLE_NS)
-        plant.set_braking(is_braked=True, is_powered=True)
+        plant.short_windings([True] * 7)
     before = plant.q.copy()
     release(plant)
     send(plant, MODEL.gravity(plant.q))

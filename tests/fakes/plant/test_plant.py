@@ -5,6 +5,7 @@ import pinocchio as pin  # noqa: TID253 - the arm cannot be simulated without it
 import pytest
 
 from fakes.plant.joints import JointLoads, JointState, JointStops
+from fakes.plant.model import Support
 from tests.fakes.scenes import (
     CONSTANTS,
     CYCLE_NS,
@@ -51,23 +52,62 @@ def hand_point(q):
     return position - 0.030 * rotation[:, 2]
 
 
-def test_a_braked_arm_stays_where_it_is():
+def test_an_idle_arm_stays_on_its_stand():
     plant = make_plant()
     q = plant.q.copy()
-    plant.set_braking(is_braked=True, is_powered=True)
-    plant.set_torques([4000] * 7)
+    plant.short_windings([True] * 7)
     plant.advance(S // 2)
     assert plant.q.tolist() == q.tolist()
 
 
-@pytest.mark.parametrize("is_braked", [True, False])
-def test_an_arm_without_power_falls(is_braked):
+def sunk(seconds, windings=1.0, **options):
+    """Return how far an idle arm has sunk that nothing bears [m]."""
+    plant = make_plant(
+        height=0.15, windings=windings, support=Support.NONE, has_hand=False, **options
+    )
+    plant.terrain = None
+    before = sole(plant)
+    plant.advance(round(seconds * S))
+    return float(np.linalg.norm(sole(plant) - before))
+
+
+def test_an_idle_arm_sinks_on_its_shorted_windings():
+    assert 0.12 < sunk(0.5) < 0.16
+    assert sunk(1.0) > 1.8 * sunk(0.5)  # it goes on: nothing holds it
+
+
+def test_an_arm_sinks_faster_the_less_its_windings_damp():
+    assert sunk(0.5, windings=0.5) > 1.5 * sunk(0.5) > 2.0 * sunk(0.5, windings=2.0)
+
+
+def test_friction_of_another_arm_slows_it_down_and_does_not_stop_it():
+    assert 0.02 < sunk(0.5, friction=1.0) < sunk(0.5)
+
+
+def test_an_arm_with_open_windings_falls():
     plant = make_plant(height=0.15)
     plant.hand.let_go()
-    plant.set_braking(is_braked=is_braked, is_powered=False)
+    release(plant)
     plant.advance(S // 5)
     # 0.2 s of free fall would be 0.2 m; drives and links hold it back
     assert sole(plant)[2] < 0.15 - 0.03
+
+
+def test_a_person_who_holds_an_arm_soon_bears_it():
+    plant = make_plant(height=0.15)
+    release(plant)
+    for _ in float_for(plant, 0.5):
+        pass
+    plant.hand.rest()
+    for _ in float_for(plant, 0.2):
+        pass
+    before = sole(plant)[2]
+    plant.short_windings([True] * 7)
+    plant.advance(plant.t_ns + S // 2)
+    noticed = sole(plant)[2]
+    plant.advance(plant.t_ns + 2 * S)
+    assert 0.01 < before - noticed < 0.10
+    assert noticed - 0.01 < sole(plant)[2] < before  # it is lifted slowly
 
 
 def test_a_compensated_arm_without_friction_floats():
@@ -154,7 +194,6 @@ def test_a_torque_moves_the_joint_that_it_acts_on_by_its_inertia():
 
 def test_the_sensor_feels_the_weight_of_the_foot():
     plant = make_plant()
-    plant.set_braking(is_braked=True, is_powered=True)
     load = plant.sensor_load(10 * CYCLE_NS)
     # the foot points down: the sensor's z axis too, so the weight pulls along it
     assert load[2] == pytest.approx(TOOL.foot.mass * GRAVITY, rel=1e-6)

@@ -216,10 +216,10 @@ def test_a_torque_frame_of_other_firmware_moves_nothing():
 
 def test_activation_is_broadcast_and_takes_the_brakes_off():
     host = Host()
-    assert host.motors.is_braked
+    assert host.motors.is_idle
     host.network.pendant("activate")
     assert host.hear(MS) == ["540 88 00 02 00"]
-    assert not host.motors.is_braked
+    assert not host.motors.is_idle
     assert host.say(0x404, "08")[0] == "426 88 00 02 00"
 
 
@@ -227,7 +227,7 @@ def test_pucks_that_are_idled_brake_though_the_module_is_active():
     host = Host()
     host.activate()
     host.say(0x404, "88 00 00 00 00 00")
-    assert host.motors.is_braked
+    assert host.motors.is_idle
 
 
 @pytest.mark.parametrize(
@@ -258,7 +258,7 @@ def test_an_e_stop_takes_power_positions_and_zero():
     host = Host()
     host.network.pendant("estop")
     host.hear(MS)
-    assert not host.motors.is_powered
+    assert host.motors.is_idle
     assert host.say(1, "05") == []
     assert host.say(0x00A, "2a") == ["546 aa 00 00 00"]
     assert host.say(0x00A, "2b") == ["546 ab 00 49 42 79 00"]
@@ -292,7 +292,7 @@ def test_without_polling_the_heartbeat_faults_and_brakes():
     assert host.hear(98 * MS) == []
     assert host.hear(3 * MS) == ["540 88 00 00 00"]
     assert host.network.safety_mode is SafetyMode.IDLE
-    assert host.motors.is_braked
+    assert host.motors.is_idle
     assert host.say(0x00A, "2b") == ["546 ab 00 49 18 3f 0d"]
 
 

@@ -148,7 +148,7 @@ def test_half_a_second_above_the_limit_takes_the_power_away():
     cycles = host.move(joint(1, 2.2), 300)
     assert host.mode is SafetyMode.E_STOP
     assert 240 <= cycles <= 252  # 0.5 s less what the first movement took
-    assert not host.motors.is_powered
+    assert host.motors.is_idle
 
 
 def test_a_speed_that_falls_in_time_keeps_the_power():

@@ -7,10 +7,9 @@ import pytest
 
 from fakes.bus.client import SocketBus
 from fakes.bus.hub import SocketHub
-from fakes.serving.home_arm import HomePose, StandingMotors, build_home_server
+from fakes.serving.home_arm import HomePose, build_home_server
 from tests.fakes.buses import LimitedClock
 from tests.fakes.scenes import CONSTANTS, FRAME, TOOL
-from tests.fakes.stepped import Motors
 from tests.fakes.strict_client import (
     HOME,
     HOME_Q,
@@ -98,15 +97,14 @@ def test_a_bare_arm_stands_at_home_until_it_is_activated(serve):
     assert arm.client.read_joints() == pytest.approx(HOME_Q, abs=1e-3)
 
 
-def test_an_arm_that_nobody_carries_is_let_go_by_its_first_activation():
-    motors = Motors()
-    arm = StandingMotors(motors)
-    arm.set_braking(is_braked=False, is_powered=False)
-    assert (motors.is_braked, motors.is_powered) == (True, True)
-    arm.set_braking(is_braked=False, is_powered=True)
-    assert not motors.is_braked
-    arm.set_braking(is_braked=False, is_powered=False)
-    assert (motors.is_braked, motors.is_powered) == (False, False)
+def test_a_bare_arm_that_was_active_sinks_when_it_is_idle_again(serve):
+    arm = serve()
+    arm.activate()
+    held = arm.client.move(WANTED, MOVE)
+    arm.server.press("idle")
+    arm.client.run(cycles=250)
+    found = arm.client.read_joints()
+    assert np.abs(np.subtract(found, held)).max() > 0.02
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -7,11 +7,13 @@ import pytest
 from acquisition.devices import SafetyMode
 from acquisition.errors import LinkError
 from fakes.bus.hub import CanPort
+from fakes.plant.model import PlantOptions, Support
+from fakes.plant.plant import ArmPlant
 from fakes.pucks.network import PuckNetwork
 from fakes.pucks.options import NetworkOptions
-from fakes.serving.home_arm import HomePose, SupportedMotors, build_home_server
+from fakes.serving.home_arm import HomePose, build_home_server
 from fakes.serving.puck_server import PuckServer
-from tests.fakes.scenes import CONSTANTS, FRAME, TOOL
+from tests.fakes.scenes import CONSTANTS, FRAME, START_Q, TOOL
 from tests.fakes.stepped import Motors, SteppedClock
 
 MS = 1_000_000
@@ -141,24 +143,27 @@ def test_what_was_not_carried_is_told(hosts, clock):
     assert "3 frames were lost" in server.losses
 
 
+def carried_arm():
+    """Return an arm that a person carries wherever it is."""
+    options = PlantOptions(support=Support.PERSON)
+    arm = ArmPlant(CONSTANTS, TOOL, FRAME, START_Q, options)
+    arm.short_windings([False] * 7)
+    return arm
+
+
 def test_an_arm_under_no_torque_is_carried():
-    motors = Motors()
-    arm = SupportedMotors(motors)
-    arm.set_braking(is_braked=False, is_powered=True)
+    arm = carried_arm()
     arm.set_torques([0] * 7)
-    assert motors.is_braked
+    assert arm.is_held
     arm.set_torques([0, 0, 0, 1, 0, 0, 0])
-    assert not motors.is_braked
-    assert motors.units[3] == 1
+    assert not arm.is_held
 
 
 def test_an_arm_without_power_is_carried():
-    motors = Motors()
-    arm = SupportedMotors(motors)
-    arm.set_braking(is_braked=False, is_powered=False)
+    arm = carried_arm()
     arm.set_torques([5] * 7)
-    assert motors.is_braked
-    assert motors.is_powered
+    arm.short_windings([True] * 7)
+    assert arm.is_held
 
 
 @pytest.mark.parametrize(

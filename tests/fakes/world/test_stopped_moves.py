@@ -110,7 +110,7 @@ def test_a_fault_that_takes_the_arm_away_stops_a_move(name):
     inject(name)(bench)
     # 0.4 s until a silent safety module is a silent one; holding since 0.25 s.
     check_stopped(bench, begin, travel=0.2 if name == "safety-silent" else TRAVEL)
-    assert bench.plant.is_held or bench.cycle.status.state is ArmState.HOLD
+    assert bench.plant.is_idle or bench.cycle.status.state is ArmState.HOLD
 
 
 def test_the_stop_button_ends_a_move_for_good():
@@ -210,7 +210,7 @@ def test_a_motor_whose_encoder_freezes_in_a_move_is_noticed(friction, motor):
     freeze(bench, motor)
     assert worst_speed(bench, 0.5) < FASTEST[friction]
     assert bench.cycle.status.verdict.detail == StuckMotor(motor)
-    assert bench.plant.is_held
+    assert bench.plant.is_idle
 
 
 @pytest.mark.parametrize(("friction", "motor"), [*FROZEN, (0.02, 7), (1.0, 7)])
