@@ -100,7 +100,7 @@ class Cycle:
         self._sample = Sample()
         self._contact: Contact | None = None
         self._is_tared = False
-        self._speed = 0.0
+        self._speed = self._energy = 0.0
         self._requested: ArmEvent | None = None
         self._move: tuple[Vector, float] | None = None
         self._stance: SoleGoal | None = None
@@ -181,6 +181,7 @@ class Cycle:
         """See what the foot does; without a tare its load is not known."""
         sample = self._sample
         self._speed = self._observer.observe(reading, wrench, sample)
+        self._energy = self.law.kinetic_energy(reading)
         self._contact = None
         if wrench is not None and self._is_tared:
             self._contact = contact_of(sample, wrench.saturated)
@@ -217,6 +218,7 @@ class Cycle:
         transition = TRANSITIONS[self.status.state, event]
         if transition.brakes:
             is_confirmed = self._arm.idle()
+            self.status.safety = self._arm.safety_mode()
             followed_by = (
                 ArmEvent.IDLE_CONFIRMED if is_confirmed else ArmEvent.IDLE_UNCONFIRMED
             )
@@ -254,6 +256,8 @@ class Cycle:
             stuck_motor=self.law.stuck_motor(),
             is_moving=self.law.is_moving(),
             sole=tuple(self._sample.foot_position.tolist()),
+            state=status.state,
+            energy=self._energy,
         )
         self._guard, verdict = check(self.limits, self._guard, seen)
         reported, self._reported = self._reported, None

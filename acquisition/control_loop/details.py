@@ -67,6 +67,23 @@ class ForeignFrame:
 
 
 @dataclass(frozen=True, slots=True)
+class MotionExcess:
+    """Motion that no sound arm makes in what it is asked for.
+
+    Attributes:
+        quantity: what went beyond its limit, in words.
+        value: of it.
+        limit: of it.
+        unit: of both.
+    """
+
+    quantity: str
+    value: float
+    limit: float
+    unit: str
+
+
+@dataclass(frozen=True, slots=True)
 class JointExcess:
     """A joint beyond its limit.
 
@@ -146,6 +163,7 @@ FaultDetail = (
     | StuckMotor
     | StillMotor
     | ForeignFrame
+    | MotionExcess
     | JointExcess
     | FootSpeedExcess
     | Joint7Slip

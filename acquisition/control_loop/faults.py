@@ -20,6 +20,7 @@ from acquisition.control_loop.details import (
     Joint7Slip,
     JointExcess,
     LateCycles,
+    MotionExcess,
     NoDetail,
     ReplySilence,
     SafetySilence,
@@ -57,6 +58,11 @@ class Fault(StrEnum):
     MOTOR_STUCK = "motor-stuck"
     MOTOR_STILL = "motor-still"
     BUS_SHARED = "bus-shared"
+    NOT_ASKED_ACTIVE = "not-asked-active"
+    ACTIVATION_MOTION = "activation-motion"
+    HOLD_MOTION = "hold-motion"
+    DAMP_MOTION = "damp-motion"
+    KINETIC_ENERGY = "kinetic-energy"
     NOT_A_NUMBER = "not-a-number"
     JOINT_LIMIT = "joint-limit"
     OVERSPEED = "overspeed"
@@ -113,6 +119,11 @@ FAULTS: Mapping[Fault, FaultSpec] = {
         _IDLE, StillMotor, needs_trial=True, ends_session=True
     ),
     Fault.BUS_SHARED: FaultSpec(_IDLE, ForeignFrame, ends_session=True),
+    Fault.NOT_ASKED_ACTIVE: FaultSpec(_IDLE, ends_session=True),
+    Fault.ACTIVATION_MOTION: FaultSpec(_IDLE, MotionExcess, ends_session=True),
+    Fault.HOLD_MOTION: FaultSpec(_IDLE, MotionExcess, ends_session=True),
+    Fault.DAMP_MOTION: FaultSpec(_IDLE, MotionExcess, ends_session=True),
+    Fault.KINETIC_ENERGY: FaultSpec(_IDLE, MotionExcess, ends_session=True),
     Fault.NOT_A_NUMBER: FaultSpec(_IDLE, ends_session=True),
     Fault.JOINT_LIMIT: FaultSpec(_DAMP, JointExcess),
     Fault.OVERSPEED: FaultSpec(_DAMP, JointExcess),

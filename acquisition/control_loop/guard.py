@@ -25,14 +25,20 @@ from acquisition.control_loop.details import (
 )
 from acquisition.control_loop.faults import OK, Fault, GuardVerdict, verdict_for
 from acquisition.control_loop.limits import GuardLimits
+from acquisition.control_loop.motion import (
+    DrivenMotion,
+    MotionMemory,
+    Point,
+    check_motion,
+    follow,
+)
+from acquisition.control_loop.states import ArmState
 from acquisition.devices import ArmReading, SafetyMode, Vector
 
 _BRAKED = frozenset({SafetyMode.E_STOP, SafetyMode.IDLE})
 _NO_LOAD = ContactState()
 _ALL_JOINTS = 0x7F  # one bit each, bit i of joint or motor i+1
 _TREMBLE = 1  # counts by which an encoder at rest flickers
-
-Point = tuple[float, float, float]
 
 
 class MotorRest(NamedTuple):
@@ -54,6 +60,7 @@ class GuardState:
             activation.
         contact: what is remembered of the load on the foot.
         rests: in a trial, where each motor turned last.
+        motion: how what is asked of a driven arm began; None = it is not driven.
     """
 
     armed: int = 0
@@ -61,6 +68,7 @@ class GuardState:
     may_drive: bool = False
     contact: ContactState = _NO_LOAD
     rests: tuple[MotorRest, ...] = ()
+    motion: MotionMemory | None = None
 
 
 class Observation(NamedTuple):
@@ -81,6 +89,8 @@ class Observation(NamedTuple):
         stuck_motor: the motor that a move turns in vain, 1-7; 0 = none.
         sole: centre of the sole in the base frame [m].
         is_moving: the arm moves by itself, or keeps the goal of a move.
+        state: what is asked of the arm.
+        energy: its kinetic energy [J].
     """
 
     reading: ArmReading
@@ -97,6 +107,8 @@ class Observation(NamedTuple):
     stuck_motor: int = 0
     sole: Point = (0.0, 0.0, 0.0)
     is_moving: bool = False
+    state: ArmState = ArmState.FLOAT
+    energy: float = 0.0
 
 
 @dataclass(slots=True)
@@ -108,6 +120,7 @@ class Facts:
         state: what is remembered, this cycle included.
         seen: the observation of this cycle.
         load: the verdict on the load on the foot.
+        motion: of an arm that is driven; None = it is not.
         q: joint positions [rad], seven plain numbers, which are compared faster than
             numpy looks at an array.
         qd: joint velocities [rad/s], seven.
@@ -118,6 +131,7 @@ class Facts:
     state: GuardState
     seen: Observation
     load: GuardVerdict
+    motion: DrivenMotion | None
     q: list[float]
     qd: list[float]
     tau: list[float]
@@ -128,14 +142,18 @@ def check(
 ) -> tuple[GuardState, GuardVerdict]:
     """Return the next state and the most severe verdict of this cycle.
 
-    Torques that are commanded are judged unless the brakes are confirmed since before:
-    a safety circuit of unknown state may drive the arm. E-stop is always reported.
-    Among equally severe verdicts the first of `CHECKS` counts.
+    Torques that are commanded are judged unless idle is confirmed since before: a
+    safety circuit of unknown state may drive the arm. E-stop is always reported. An
+    arm without torques must not be active, and no other master may be there. Among
+    equally severe verdicts the first of `CHECKS` counts.
     """
-    state = _remember(limits, state, seen)
+    may_drive = seen.is_commanded and (state.may_drive or seen.safety not in _BRAKED)
+    is_live = may_drive and seen.safety not in _BRAKED
+    motion = _driven(seen) if is_live else None
+    state = _remember(limits, state, seen, motion, may_drive=may_drive)
     is_stopped = seen.is_commanded and seen.safety is SafetyMode.E_STOP
-    if not (state.may_drive or is_stopped):
-        return state, OK
+    if not (may_drive or is_stopped):
+        return state, _check_idle(seen)
     contact, load = check_contact(
         limits,
         state.contact,
@@ -147,7 +165,7 @@ def check(
     if contact is not state.contact:
         state = replace(state, contact=contact)
     q, qd, tau = seen.reading.q.tolist(), seen.reading.qd.tolist(), seen.tau.tolist()
-    facts = Facts(limits, state, seen, load, q, qd, tau)
+    facts = Facts(limits, state, seen, load, motion, q, qd, tau)
     worst = OK
     for check_one in CHECKS:
         verdict = check_one(facts)
@@ -156,16 +174,49 @@ def check(
     return state, worst
 
 
-def _remember(limits: GuardLimits, state: GuardState, seen: Observation) -> GuardState:
+def _check_idle(seen: Observation) -> GuardVerdict:
+    """Look at an arm to which no torques are sent, but questions.
+
+    Its questions keep the safety circuit content: once active, the arm would fall.
+    """
+    if seen.state is not ArmState.IDLE:
+        return OK
+    if seen.reading.foreign_id is not None:
+        return verdict_for(Fault.BUS_SHARED, ForeignFrame(seen.reading.foreign_id))
+    if seen.safety is SafetyMode.ACTIVE:
+        return verdict_for(Fault.NOT_ASKED_ACTIVE)
+    return OK
+
+
+def _remember(
+    limits: GuardLimits,
+    state: GuardState,
+    seen: Observation,
+    now: DrivenMotion | None,
+    *,
+    may_drive: bool,
+) -> GuardState:
     """Return the next state but for the load; the same object if nothing changed."""
     armed = _armed(limits, state.armed, seen.reading)
     late = _late_cycles(state.late, seen)
-    may_drive = seen.is_commanded and (state.may_drive or seen.safety not in _BRAKED)
     rests = _rests(state.rests, seen) if seen.is_recording else ()
+    motion = None if now is None else follow(state.motion, now)
     is_same = armed == state.armed and late is state.late and rests is state.rests
-    if is_same and may_drive is state.may_drive:
+    if is_same and may_drive is state.may_drive and motion is state.motion:
         return state
-    return GuardState(armed, late, may_drive, state.contact, rests)
+    return GuardState(armed, late, may_drive, state.contact, rests, motion)
+
+
+def _driven(seen: Observation) -> DrivenMotion:
+    return DrivenMotion(
+        seen.reading.host_ns,
+        seen.state,
+        seen.is_moving,
+        seen.energy,
+        seen.foot_speed,
+        seen.sole,
+        seen.reading.qd.tolist(),
+    )
 
 
 def _armed(limits: GuardLimits, armed: int, reading: ArmReading) -> int:
@@ -292,6 +343,14 @@ def _check_torque(facts: Facts) -> GuardVerdict:
     return OK if excess is None else verdict_for(Fault.TORQUE_LIMIT, excess)
 
 
+def _check_motion(facts: Facts) -> GuardVerdict:
+    """Idle an arm that does not do what it is asked for, by its energy and way."""
+    now, memory, limits = facts.motion, facts.state.motion, facts.limits
+    if now is None or memory is None:
+        return OK
+    return check_motion(limits.motion, memory, now, limits.speed)
+
+
 def _first_excess(values: list[float], limits: Sequence[float]) -> JointExcess | None:
     """Return the first joint beyond its limit; None if all are within."""
     if are_within(values, limits):
@@ -355,6 +414,7 @@ CHECKS: tuple[Callable[[Facts], GuardVerdict], ...] = (
     _check_position,
     _check_speed,
     _check_torque,
+    _check_motion,
     _check_rests,
     _check_joint7,
     _check_force_age,

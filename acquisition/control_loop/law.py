@@ -70,6 +70,10 @@ class ControlLaw(Protocol):
         """Return the motor that a move turns in vain, 1-7; 0 = none."""
         ...
 
+    def kinetic_energy(self, reading: ArmReading) -> float:
+        """Return the kinetic energy of the arm with its foot [J]."""
+        ...
+
     def joint7_offset(self, reading: ArmReading) -> float:
         """Return how far joint 7 is from where it was locked [rad]."""
         ...

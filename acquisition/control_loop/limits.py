@@ -12,9 +12,13 @@ from operator import mul, sub
 import numpy as np
 
 from acquisition.bounds import are_within
+from acquisition.control_loop.motion import MotionLimits
 from acquisition.devices import Vector
 
 _JOINTS = 7
+
+
+_MOTION = MotionLimits()
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +58,7 @@ class GuardLimits:
             [ms]; its questions leave every 50 ms, so the mode is unknown after 250.
         armed_inside: a joint's position limit counts after it was this far inside
             [rad]: the home position lies on two stops.
+        motion: where a driven arm is taken for one that moves by itself.
     """
 
     q_lower: Sequence[float]
@@ -77,6 +82,7 @@ class GuardLimits:
     idle_after_missing: int = 25
     idle_after_safety_ms: float = 400.0
     armed_inside: float = 0.1
+    motion: MotionLimits = _MOTION
 
     def __post_init__(self) -> None:
         """Refuse a row that is too short: joints behind its end would have no limit."""

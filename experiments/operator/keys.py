@@ -118,6 +118,10 @@ KEYS: Mapping[Prompt, tuple[OperatorKey, ...]] = {
         *(OperatorKey(str(n), KeyAction.TICK) for n in range(2, MOST_STEPS + 1)),
     ),
     Prompt.PAUSED: (_CONFIRM, _QUIT),
+    Prompt.DAMPED: (
+        OperatorKey(" ", KeyAction.CONFIRM, "once you hold it: the arm holds again"),
+        _QUIT,
+    ),
     Prompt.RECORDING: (
         OperatorKey(" ", KeyAction.STOP, "stop early", "[space] stop early"),
         _QUIT,
@@ -152,6 +156,7 @@ STOP_KEYS = "Ctrl-C finish safely, twice = stop now"
 # Prompts whose keys docs/sessions.md explains, with its words for them.
 _EXPLAINED = {
     Prompt.SUPPORT: "the arm is to be activated",
+    Prompt.DAMPED: "the arm was too fast, and is damped",
     Prompt.READY: "between two trials",
     Prompt.RECORDING: "while recording",
     Prompt.REVIEW: "at the review",

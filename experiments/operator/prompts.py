@@ -18,6 +18,7 @@ class Prompt(Enum):
     LIFT = "lift"
     READY = "ready"
     PAUSED = "paused"
+    DAMPED = "damped"
     RECORDING = "recording"
     REVIEW = "review"
     NOTE = "note"

@@ -22,7 +22,9 @@ def connect_simulation(child: Child) -> SimulationControl:
     return make_proxy(SimulationControl, child.call, {"take_truth": take_truth})
 
 
-_ASIDE = frozenset({Prompt.PAUSED, Prompt.NOTE})  # the hand stays where it is
+_ASIDE = frozenset(
+    {Prompt.PAUSED, Prompt.DAMPED, Prompt.NOTE}
+)  # the hand stays where it is
 
 
 class SimulatedHand:

@@ -5,7 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import TypeVar
 
-from acquisition.control_loop.faults import GuardVerdict
+from acquisition.control_loop.faults import OK, Action, GuardVerdict
 from acquisition.control_loop.states import ArmState
 from acquisition.ipc.loop_client import LoopClient
 from experiments.fault_injection.plan import FaultTrigger, PlannedFaults
@@ -27,7 +27,8 @@ REFRESH_NS = 125_000_000  # between two pictures of the live screen
 DAMP_SECONDS = 0.2  # between an urgent stop and the brakes
 _OWN_QUIT = frozenset({Prompt.REVIEW, Prompt.READY})  # [q] has a meaning of its own
 # Nothing is wanted of the arm.
-_AT_REST = frozenset({Prompt.REVIEW, Prompt.PAUSED, Prompt.UNDO})
+_AT_REST = frozenset({Prompt.REVIEW, Prompt.PAUSED, Prompt.DAMPED, Prompt.UNDO})
+_DAMPED = "ARM: damped where it is. [space] once you hold it: then it holds again."
 _TOO_LATE = "No verdict to take back. Any trial, any time: traction verdict --help"
 _T = TypeVar("_T")
 View = Callable[[int], list[str]]
@@ -169,10 +170,23 @@ class ConsoleLoop:
         is_worse = newest is not None and newest.severity > verdict.severity
         return newest if newest is not None and is_worse else verdict
 
-    def clear_faults(self) -> None:
-        """Clear rehearsed faults, and the guard's verdict with them; the arm holds."""
+    def clear_faults(self, verdict: GuardVerdict = OK) -> None:
+        """Clear rehearsed faults, and the guard's `verdict` with them; the arm holds.
+
+        An arm that is damped after a fault of motion stays so until the operator has
+        it: only a person knows whether somebody pushed, and whether it is safe.
+
+        Raises:
+            ArmFaultError: damping did not help; the arm is idle.
+            StopRequestedError: as `tick`.
+        """
         if self.rig.simulation is not None:
             self.rig.simulation.clear_faults()
+        if verdict.action is Action.DAMP:
+            self._reported = verdict.reason
+            self.console.say(_DAMPED)
+            while self.tick(Prompt.DAMPED) != " ":
+                pass
         self.loop_client.request(ArmState.HOLD)
         self.loop_client.advance(0.1)
 

@@ -220,7 +220,7 @@ class RunContext(RunServices):
         if verdict.ends_session:
             raise ArmFaultError(verdict) from fault
         self.report_fault(verdict)
-        self.console_loop.clear_faults()
+        self.console_loop.clear_faults(verdict)
 
     def update_estimate(self) -> None:
         """Estimate the duration once, when the first trial is kept."""

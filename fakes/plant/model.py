@@ -45,6 +45,7 @@ class PlantOptions:
         windings: share of the damping that shorted windings have by the motors' data;
             it is drawn anew with `seed`.
         support: what bears the arm while no motor drives it.
+        down: where its base is mounted, the direction of gravity in the base frame.
     """
 
     friction: float = 0.02
@@ -55,6 +56,7 @@ class PlantOptions:
     has_hand: bool = True
     windings: float = 1.0
     support: Support = Support.STAND
+    down: tuple[float, float, float] = (0.0, 0.0, -1.0)
 
 
 class ArmAndHand(NamedTuple):
@@ -76,14 +78,15 @@ def arm_and_hand(
     tool: Tool,
     frame: TerrainFrame,
     forearm: float = FOREARM_MASS,
+    down: tuple[float, float, float] = (0.0, 0.0, -1.0),
 ) -> ArmAndHand:
     """Return a model of the arm that stands before the terrain.
 
     The hand is on link 6, where a person holds the forearm, and has the mass of one:
-    `forearm` [kg], 0 where there is no person.
+    `forearm` [kg], 0 where there is no person. Gravity points `down` in the base frame.
     """
     model = build_pinocchio(constants, (tool.sensor, tool.foot))
-    _stand_in(model, frame)
+    _stand_in(model, frame, down)
     hand = _add_forearm(model, constants, forearm)
     sole = add_point(model, constants, "sole", tool.sole)
     return ArmAndHand(model, sole, hand)
@@ -127,12 +130,15 @@ def motor_weights(model: "pin.Model", constants: ArmConstants, q: Array) -> Arra
     return np.abs(np.linalg.solve(constants.j2mp.T, weight))
 
 
-def _stand_in(model: "pin.Model", frame: TerrainFrame) -> None:
+def _stand_in(
+    model: "pin.Model", frame: TerrainFrame, down: tuple[float, float, float]
+) -> None:
     """Let the terrain frame be the world of the model: nothing is to be turned."""
     axes = frame.axes()
     base = pin.SE3(axes, -axes.dot(frame.far_end))
     model.jointPlacements[1] = base * model.jointPlacements[1]
-    model.gravity.linear = axes.dot(model.gravity.linear)
+    gravity = np.linalg.norm(model.gravity.linear)
+    model.gravity.linear = axes.dot(np.array(down) / np.linalg.norm(down)) * gravity
 
 
 def _add_forearm(model: "pin.Model", constants: ArmConstants, mass: float) -> int:

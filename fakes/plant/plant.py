@@ -51,6 +51,7 @@ class ArmPlant:
         t_ns: how far the world has gone on [ns].
         truth: what really happened; None = not written down.
         friction: of the motors.
+        support: what bears the arm while no motor drives it.
     """
 
     def __init__(
@@ -63,17 +64,17 @@ class ArmPlant:
     ) -> None:
         options = options or PlantOptions()
         forearm = FOREARM_MASS if options.has_hand else 0.0
-        parts = arm_and_hand(constants, tool, frame, forearm)
+        parts = arm_and_hand(constants, tool, frame, forearm, options.down)
         self._substeps = options.substeps
         self._substep_ns = PERIOD_NS // options.substeps
         borne = motor_weights(parts.model, constants, q)
         drawn = draw_friction(constants, options.friction, options.seed, borne)
         self.friction = drawn if options.motors is None else options.motors
-        up = frame.axes()[:, 2]
+        up = -frame.axes().dot(options.down)
         self._up: list[float] = (up * forearm * GRAVITY).tolist()
-        self._support = options.support
+        self.support = options.support
         self._stand = q.copy()
-        self._is_held = self._support is not Support.NONE
+        self._is_held = self.support is not Support.NONE
         self._is_idle, self._is_pulled = True, False
         self._heavy_since_ns = -round(1e9 * _BORNE)
         self.terrain: Terrain | None = None
@@ -210,11 +211,11 @@ class ArmPlant:
 
     def _lay_down(self) -> None:
         """Find out whether something bears the arm."""
-        if self._support is Support.PERSON:
+        if self.support is Support.PERSON:
             is_held = self._is_idle or not self._is_pulled
         else:
             is_held = (
-                self._support is Support.STAND
+                self.support is Support.STAND
                 and self._is_idle
                 and float(np.abs(self.q - self._stand).max()) < _ON_STAND
             )

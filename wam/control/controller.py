@@ -210,6 +210,10 @@ class FootController(ControlLaw):
         """Return the motor that the move turns in vain, 1-7; 0 = none."""
         return self._mode.stuck_motor if isinstance(self._mode, Moving) else 0
 
+    def kinetic_energy(self, reading: ArmReading) -> float:
+        """Return the kinetic energy of the arm with its foot [J]."""
+        return self._model.kinetic_energy(reading.q, reading.qd)
+
     def joint7_offset(self, reading: ArmReading) -> float:
         """Return how far joint 7 is from where it was locked [rad]."""
         return self._lock.offset(float(reading.q[LOCKED_JOINT]), reading.host_ns)

@@ -163,6 +163,11 @@ class ArmModel:
         matrix = upper + np.triu(upper, 1).T
         return matrix + self._drive if with_drive else matrix
 
+    def kinetic_energy(self, q: Array, qd: Array) -> float:
+        """Return E = 1/2 qd^T M(q) qd with the drive inertia [J]."""
+        links = pin.computeKineticEnergy(self._model, self._data, q, qd)
+        return float(links + 0.5 * qd.dot(self._drive.dot(qd)))
+
     def coriolis(self, q: Array, qd: Array) -> Array:
         """Return C(q, qd) qd of the links [N m], shape (7,)."""
         bias = pin.nonLinearEffects(self._model, self._data, q, qd)

@@ -19,6 +19,7 @@ from acquisition.control_loop.faults import (
     StuckMotor,
 )
 from acquisition.control_loop.guard import GuardState, Observation, check
+from acquisition.control_loop.states import ArmState
 from acquisition.devices import ArmReading, PositionJump, SafetyMode
 from tests.acquisition.control_loop.limits import guard_limits
 
@@ -57,6 +58,8 @@ OBSERVED = {
     "stuck_motor": 0,
     "sole": (0.0, 0.0, 0.0),
     "is_moving": False,
+    "state": ArmState.FLOAT,
+    "energy": 0.0,
 }
 QUIET = Observation(**OBSERVED)
 
@@ -171,7 +174,7 @@ def test_a_joint_may_be_at_its_limit_of(joint, sign, field, limits, fault):
 def test_a_quiet_cycle_passes():
     state, verdict = check(LIMITS, ARMED, QUIET)
     assert verdict is OK
-    assert replace(state, rests=()) == ARMED
+    assert replace(state, rests=(), motion=None) == ARMED
 
 
 @pytest.mark.parametrize("field", ["q", "qd", "tau"])
@@ -496,3 +499,42 @@ def test_positions_that_are_never_believed_are_a_fault_of_their_own(cycles, acti
 def test_limits_of_fewer_joints_than_the_arm_has_are_refused(name):
     with pytest.raises(ValueError, match="limits of 7 joints"):
         replace(LIMITS, **{name: getattr(LIMITS, name)[:6]})
+
+
+IDLE = {"is_commanded": False, "state": ArmState.IDLE}
+
+
+@pytest.mark.parametrize("before", [GuardState(), ARMED])
+def test_an_arm_that_nobody_asked_to_be_active_is_idled(before):
+    verdict = check(LIMITS, before, seen(safety=SafetyMode.ACTIVE, **IDLE))[1]
+    assert (verdict.fault, verdict.action) == (Fault.NOT_ASKED_ACTIVE, Action.IDLE)
+
+
+@pytest.mark.parametrize("safety", set(SafetyMode) - {SafetyMode.ACTIVE})
+def test_an_idle_arm_that_is_not_active_is_well(safety):
+    assert judge(safety=safety, **IDLE) is OK
+
+
+def test_an_arm_whose_idle_is_not_confirmed_is_not_idled_in_every_cycle():
+    unknown = {"is_commanded": False, "state": ArmState.UNKNOWN}
+    assert judge(safety=SafetyMode.ACTIVE, **unknown) is OK
+
+
+def test_another_master_is_told_before_the_arm_is_driven():
+    verdict = judge(safety=SafetyMode.IDLE, foreign_id=0x404, **IDLE)
+    assert verdict.fault is Fault.BUS_SHARED
+
+
+def test_an_arm_that_runs_away_in_hold_is_idled():
+    state = check(LIMITS, ARMED, seen(state=ArmState.HOLD))[0]
+    later = seen(host_ns=11 * S, state=ArmState.HOLD, energy=0.5)
+    verdict = check(LIMITS, state, later)[1]
+    assert verdict.fault is Fault.HOLD_MOTION
+
+
+def test_a_braked_arm_begins_anew_when_it_gets_power():
+    moved = {"sole": (1.0, 0.0, 0.0), "state": ArmState.HOLD, "is_recording": False}
+    state = check(LIMITS, ARMED, seen(state=ArmState.HOLD))[0]
+    state = check(LIMITS, state, seen(safety=SafetyMode.IDLE, **moved))[0]
+    assert state.motion is None
+    assert check(LIMITS, state, seen(host_ns=11 * S, **moved))[1] is OK

@@ -1,0 +1,131 @@
+import pytest
+
+from acquisition.control_loop.faults import OK, Action, Fault
+from acquisition.control_loop.motion import (
+    DrivenMotion,
+    MotionLimits,
+    check_motion,
+    follow,
+)
+from acquisition.control_loop.states import ArmState
+
+MS = 1_000_000
+S = 1_000_000_000
+LIMITS = MotionLimits()
+SPEEDS = (1.5, 1.5, 2.0, 2.5, 4.0, 4.0, 4.0)
+E = 1e-9
+STILL = (0.0,) * 7
+
+
+def motion(at_ms, state, **changes):
+    fields = {
+        "is_moving": False,
+        "energy": 0.0,
+        "foot_speed": 0.0,
+        "sole": (0.0, 0.0, 0.0),
+        "qd": STILL,
+    }
+    return DrivenMotion(at_ms * MS, state, **(fields | changes))
+
+
+def judge(*cycles):
+    """Return the verdict on the last of `cycles`, all of one arm."""
+    memory = None
+    for now in cycles:
+        memory = follow(memory, now)
+    return check_motion(LIMITS, memory, cycles[-1], SPEEDS)
+
+
+def fast(joint, speed):
+    return tuple(speed if i == joint - 1 else 0.0 for i in range(7))
+
+
+LATER = 600  # ms: the activation is over
+HOLD, DAMP, FLOAT, GUIDE = (
+    ArmState.HOLD,
+    ArmState.DAMP,
+    ArmState.FLOAT,
+    ArmState.GUIDE,
+)
+TABLE = [
+    # state, ms since power and state, what just may be, what may not, fault
+    (HOLD, 499, {"foot_speed": 0.45}, {"foot_speed": 0.451}, Fault.ACTIVATION_MOTION),
+    (HOLD, 499, {"energy": 0.20}, {"energy": 0.20 + E}, Fault.ACTIVATION_MOTION),
+    (
+        HOLD,
+        499,
+        {"sole": (0.12, 0, 0)},
+        {"sole": (0, 0.121, 0)},
+        Fault.ACTIVATION_MOTION,
+    ),
+    (HOLD, LATER, {"energy": 0.35}, {"energy": 0.35 + E}, Fault.HOLD_MOTION),
+    (HOLD, LATER, {"foot_speed": 0.9}, {"energy": 0.4}, Fault.HOLD_MOTION),
+    (HOLD, LATER, {"sole": (0, 0, 0.2)}, {"sole": (0, 0, -0.201)}, Fault.HOLD_MOTION),
+    (HOLD, LATER, {"qd": fast(4, -1.4)}, {"qd": fast(4, -1.41)}, Fault.HOLD_MOTION),
+    (HOLD, LATER, {"qd": fast(7, 2.5)}, {"qd": fast(7, 2.51)}, Fault.HOLD_MOTION),
+    (DAMP, 400, {"foot_speed": 0.03}, {"foot_speed": 0.031}, Fault.DAMP_MOTION),
+    (DAMP, 60, {"qd": fast(6, 4.0)}, {"qd": fast(6, 4.01)}, Fault.DAMP_MOTION),
+    (DAMP, 60, {"energy": 0.02}, {"energy": 0.02 + E}, Fault.DAMP_MOTION),
+    (DAMP, 8, {"energy": 0.10}, {"energy": 0.10 + E}, Fault.DAMP_MOTION),
+    (DAMP, 2, {"energy": 9.0}, {"sole": (0.101, 0, 0)}, Fault.DAMP_MOTION),
+    (FLOAT, 9, {"energy": 0.9}, {"energy": 0.9 + E}, Fault.KINETIC_ENERGY),
+    (GUIDE, 9, {"energy": 1.0}, {"energy": 1.0 + E}, Fault.KINETIC_ENERGY),
+]
+
+
+@pytest.mark.parametrize(("state", "at", "good", "bad", "fault"), TABLE)
+def test_each_limit_of_motion_counts_from_its_value_on(state, at, good, bad, fault):
+    begin = motion(0, state)
+    assert judge(begin, motion(at, state, **good)) is OK
+    verdict = judge(begin, motion(at, state, **bad))
+    assert (verdict.fault, verdict.action) == (fault, Action.IDLE)
+    assert verdict.detail.value > verdict.detail.limit
+    assert verdict.ends_session
+
+
+def test_an_arm_may_come_into_hold_with_what_it_had():
+    come = motion(LATER, HOLD, energy=0.6, qd=fast(6, 3.0))
+    begin = motion(0, FLOAT)
+    assert judge(begin, come) is OK
+    assert judge(begin, come, motion(LATER + 149, HOLD, energy=0.94)) is OK
+    late = motion(LATER + 150, HOLD, energy=0.36)
+    assert judge(begin, come, late).fault is Fault.HOLD_MOTION
+
+
+def test_a_damped_arm_may_have_half_of_what_it_came_with():
+    come = motion(LATER, DAMP, energy=1.0)
+    begin = motion(0, FLOAT)
+    half = motion(LATER + 60, DAMP, energy=0.51)
+    assert judge(begin, come, half) is OK
+    more = motion(LATER + 60, DAMP, energy=0.53)
+    assert judge(begin, come, more).fault is Fault.DAMP_MOTION
+
+
+def test_a_damped_arm_wins_no_energy_back():
+    begin = motion(0, FLOAT)
+    come = motion(LATER, DAMP, energy=1.0)
+    least = motion(LATER + 20, DAMP, energy=0.2)
+    again = motion(LATER + 40, DAMP, energy=0.46)
+    assert judge(begin, come, least, again).fault is Fault.DAMP_MOTION
+    assert judge(begin, come, again) is OK
+
+
+def test_a_move_is_no_dragged_hold():
+    begin = motion(0, HOLD)
+    ahead = {"sole": (0.5, 0.0, 0.0), "energy": 0.5, "is_moving": True}
+    assert judge(begin, motion(LATER, HOLD, **ahead)) is OK
+    too_much = ahead | {"energy": 1.01}
+    verdict = judge(begin, motion(LATER, HOLD, **too_much))
+    assert verdict.fault is Fault.KINETIC_ENERGY
+
+
+def test_hold_counts_its_way_from_where_it_began():
+    begin = motion(0, FLOAT)
+    hold = motion(LATER, HOLD, sole=(0.3, 0.0, 0.0))
+    assert judge(begin, hold, motion(LATER + 9, HOLD, sole=(0.45, 0.0, 0.0))) is OK
+
+
+def test_power_that_came_long_ago_is_no_activation():
+    begin = motion(0, HOLD)
+    again = motion(LATER, HOLD, foot_speed=0.5)
+    assert judge(begin, again) is OK
