@@ -154,7 +154,7 @@ class Arm(Protocol):
         ...
 
     def idle(self) -> bool:
-        """Brake the arm, then send zero torque; return whether it is confirmed."""
+        """Idle the arm, then send zero torque; return whether it is confirmed."""
         ...
 
     def close(self) -> None:

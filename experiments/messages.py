@@ -234,8 +234,8 @@ def rest_text(mode: SafetyMode, *, is_confirmed: bool) -> str:
     if not is_confirmed:
         return "ARM: UNKNOWN - support it."
     if mode is SafetyMode.E_STOP:
-        return "ARM: stopped by its hardware, without power."
-    return "ARM: idle, braked."
+        return "ARM: stopped by its hardware, without power; it sinks, support it."
+    return "ARM: idle; it sinks slowly, support it."
 
 
 def pucks_have(silent: int) -> str:

@@ -240,7 +240,7 @@ def press(asked) -> str:
     """Press the keys of short trials; keep all that are not interrupted."""
     waits = {Prompt.READY: (0.1, " "), Prompt.RECORDING: (1.0, " ")}
     wait, key = waits.get(asked.prompt, (0.05, "k"))
-    if asked.prompt in {Prompt.SUPPORT, Prompt.PAUSED, Prompt.DAMPED}:
+    if asked.prompt in {Prompt.SUPPORT, Prompt.PAUSED, Prompt.DAMPED, Prompt.LAY_DOWN}:
         return " "
     if asked.prompt is Prompt.LIFT:
         return "q" if asked.since > 30.0 else ""
@@ -301,7 +301,7 @@ PAGE = """# Soak
 
 Simulated sessions with random faults, one after the other in one process. After every
 session journal, session.json and verified files have to agree; exit code and messages
-have to be known; the arm has to be braked; no child, shared memory or descriptor may be
+have to be known; the arm has to be idle; no child, shared memory or descriptor may be
 left, and the process must not grow by more than {growth} MB after its first sessions. A
 run ends at the first of these that does not hold. {hours:.1f} simulated hours in {runs}
 processes:

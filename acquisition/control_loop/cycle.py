@@ -187,7 +187,7 @@ class Cycle:
             self._contact = contact_of(sample, wrench.saturated)
 
     def _enter_requested(self, reading: ArmReading) -> None:
-        """Obey a request: torques need all seven positions, the brakes need none."""
+        """Obey a request: torques need all seven positions, idle needs none."""
         event = self._requested
         if event is None or (reading.missing_cycles and event is not _REQUEST_IDLE):
             return
@@ -213,7 +213,7 @@ class Cycle:
     def _handle(self, event: ArmEvent, reading: ArmReading) -> None:
         """Do what the table of states says of `event` in the present state.
 
-        Unless the brakes are confirmed no zero torque follows: the arm would fall.
+        Unless idle is confirmed no zero torque follows: the arm would fall.
         """
         transition = TRANSITIONS[self.status.state, event]
         if transition.brakes:

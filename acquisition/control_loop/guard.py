@@ -55,8 +55,8 @@ class GuardState:
     Attributes:
         armed: bit i set = the position limit of joint i+1 counts.
         late: times of the late cycles of the last second [ns].
-        may_drive: since torques are commanded the brakes were not confirmed once:
-            from then on a braked arm is a stop, and no longer the state before
+        may_drive: since torques are commanded idle was not confirmed once:
+            from then on an idle arm is a stop, and no longer the state before
             activation.
         contact: what is remembered of the load on the foot.
         rests: in a trial, where each motor turned last.
@@ -258,7 +258,7 @@ def _rests(rests: tuple[MotorRest, ...], seen: Observation) -> tuple[MotorRest, 
 
 
 def _check_safety(facts: Facts) -> GuardVerdict:
-    """Brake with the safety circuit; a silent one is given time to answer first."""
+    """Idle with the safety circuit; a silent one is given time to answer first."""
     seen = facts.seen
     if seen.safety is SafetyMode.UNKNOWN:
         age_ms = seen.safety_age_ns / NS_PER_MS
@@ -272,7 +272,7 @@ def _check_safety(facts: Facts) -> GuardVerdict:
 
 
 def _check_silence(facts: Facts) -> GuardVerdict:
-    """Hold, then brake, an arm whose positions are missing or cannot be true."""
+    """Hold, then idle, an arm whose positions are missing or cannot be true."""
     limits, reading = facts.limits, facts.seen.reading
     missing = reading.missing_cycles
     if missing < limits.hold_after_missing:
@@ -294,7 +294,7 @@ def _check_master(facts: Facts) -> GuardVerdict:
 
 
 def _check_move(facts: Facts) -> GuardVerdict:
-    """Brake a move that turns a motor in vain: it would be pulled on for ever."""
+    """Idle a move that turns a motor in vain: it would be pulled on for ever."""
     motor = facts.seen.stuck_motor
     if not motor:
         return OK

@@ -96,7 +96,7 @@ class GuardLimits:
 # limit takes 20 ms. In simulated sessions the largest change of a driven arm is 0.041
 # of it (1.8 N m at joint 2, when a trial begins to float), that of the locked joint 7
 # 0.018. The start of torques, a step of 26 N m at joint 2, is spread over 12 ms
-# behind the brakes; the pendant cannot activate the arm so soon after. Joint 7 is
+# behind idle; the pendant cannot activate the arm so soon after. Joint 7 is
 # light and its lock stiff: held back as much, the lock throws the joint that it is to
 # hold (17 rad/s after a twist of 1.2 N m); at 0.3 it does not, and one false position
 # makes 0.8 rad/s.

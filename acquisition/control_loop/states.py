@@ -11,10 +11,11 @@ from acquisition.devices import SafetyMode
 class ArmState(IntEnum):
     """What the arm is doing.
 
-    IDLE: pucks off and braked, confirmed. FLOAT: gravity compensation and the virtual
-    mass, as in a trial. HOLD: it stands still where it is. DAMP: the same after a
-    fault of motion. UNKNOWN: idle was asked for and is not confirmed. GUIDE: it
-    stands still with half the torque, for a hand that carries it to the next trial.
+    IDLE: windings shorted, confirmed; the arm is damped and sinks. FLOAT: gravity
+    compensation and the virtual mass, as in a trial. HOLD: it stands still where it is.
+    DAMP: the same after a fault of motion. UNKNOWN: idle was asked for and is not
+    confirmed. GUIDE: it stands still with half the torque, for a hand that carries it
+    to the next trial.
     """
 
     IDLE = 0
@@ -39,7 +40,7 @@ class ArmEvent(Enum):
     VERDICT_IDLE = "verdict: idle"
     IDLE_CONFIRMED = "idle confirmed"
     IDLE_UNCONFIRMED = "idle not confirmed"
-    CIRCUIT_BRAKED = "safety circuit is braked"
+    CIRCUIT_BRAKED = "safety circuit is idle"
 
 
 REQUESTS: Mapping[ArmState, ArmEvent] = {
@@ -93,7 +94,7 @@ _ROWS: Mapping[ArmEvent, Mapping[ArmState, Transition]] = {
     ArmEvent.REQUEST_DAMP: _always(Transition(ArmState.DAMP)),
     ArmEvent.REQUEST_GUIDE: _always(Transition(ArmState.GUIDE)),
     ArmEvent.VERDICT_END_TRIAL: _always(_STAY),
-    # No verdict makes an earlier fault milder, and none gives a braked arm torques.
+    # No verdict makes an earlier fault milder, and none gives an idle arm torques.
     # Hold is entered from hold too: the arm may be moving by itself in it.
     ArmEvent.VERDICT_HOLD: _only(ArmState.HOLD, *_MOVABLE),
     ArmEvent.VERDICT_DAMP: _only(ArmState.DAMP, *_MOVABLE),
@@ -101,7 +102,7 @@ _ROWS: Mapping[ArmEvent, Mapping[ArmState, Transition]] = {
     ArmEvent.IDLE_CONFIRMED: _always(Transition(ArmState.IDLE)),
     ArmEvent.IDLE_UNCONFIRMED: _always(Transition(ArmState.UNKNOWN)),
     # A late confirmation. While the arm is powered the guard judges the circuit.
-    # It brakes anew: only then does zero torque replace what the pucks still have.
+    # It idles anew: only then does zero torque replace what the pucks still have.
     ArmEvent.CIRCUIT_BRAKED: {
         state: _BRAKE if state is ArmState.UNKNOWN else _STAY for state in ArmState
     },
@@ -117,7 +118,7 @@ def transition_lines() -> list[str]:
     for (state, event), transition in TRANSITIONS.items():
         result = "-"
         if transition.brakes:
-            result = "brakes, then idle confirmed or idle not confirmed"
+            result = "idle is asked for, then idle confirmed or idle not confirmed"
         elif transition.to is not None:
             result = f"-> {transition.to.name.lower()}"
         lines.append(f"{state.name.lower():<8} {event.value:<25} {result}")

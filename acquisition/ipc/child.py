@@ -175,7 +175,7 @@ def main(arguments: list[str]) -> None:
         settings = link.receive()
         run(ChildContext(layout, link, settings))
     except ChannelClosedError:
-        return  # the console has gone; the process with the arm has braked it
+        return  # the console has gone; the process with the arm has idled it
 
 
 def name_process(name: str) -> None:

@@ -84,7 +84,7 @@ class LoopClient:
         self._asked = self._commands.post(CommandKind.ENTER, state)
 
     def idle(self, seconds: float = 1.0) -> bool:
-        """Ask for the brakes and wait; return whether the arm is confirmed idle."""
+        """Ask for idle and wait; return whether the arm is confirmed idle."""
         self.request(ArmState.IDLE)
         end_ns = self._clock.now_ns() + int(seconds * NS_PER_S)
         while self._clock.now_ns() < end_ns and self.loop.is_running:

@@ -24,7 +24,7 @@ from acquisition.ipc.layout import ProcessRole, SharedLayout
 MS = 1_000_000
 SILENT_NS = 500 * MS  # of console or recorder: the arm holds
 LONELY_NS = 60_000 * MS  # of the console: the arm rings for help
-ORPHAN_NS = 1_000 * MS  # an arm whose console has died holds this long, then brakes
+ORPHAN_NS = 1_000 * MS  # an arm whose console has died holds this long, then goes idle
 _FACTS_EVERY = _BELL_EVERY = RATE_HZ  # cycles, once a second
 
 # Named once: to look a member of an Enum up takes longer than to compare it.
@@ -117,7 +117,7 @@ class LoopServer:
         self._shared.health.write(json.dumps(dict(self._hooks.metadata())).encode())
 
     def orphan(self) -> None:
-        """The console's process has died: hold, brake and end by itself."""
+        """The console's process has died: hold, idle and end by itself."""
         self._is_orphaned = True
 
     def _watch(self, now_ns: int) -> None:
@@ -137,7 +137,7 @@ class LoopServer:
             self._brake_alone(now_ns)
 
     def _brake_alone(self, now_ns: int) -> None:
-        """Nobody will ever ask for anything again: hold, then brake, then end."""
+        """Nobody will ever ask for anything again: hold, then idle, then end."""
         if not self._orphaned_ns:
             self._orphaned_ns = now_ns
             self._cycle.report(verdict_for(Fault.CONSOLE_LOST))

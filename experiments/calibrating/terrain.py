@@ -39,9 +39,7 @@ class TerrainGuide:
         self._console_loop.loop_client.request(ArmState.FLOAT)
         points = self._touch()
         self._console_loop.loop_client.request(ArmState.HOLD)
-        self._console.say("Support the arm, it goes idle. [space]")
-        while self._console_loop.tick(Prompt.SUPPORT) != " ":
-            pass
+        self._console_loop.lay_down()
         self._console_loop.make_safe()
         fit = fit_terrain(np.array(points))
         self._say(fit, len(points))

@@ -47,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
         angles = "  ".join(f"J{i + 1} {angle:.2f}" for i, angle in enumerate(home))
         console.say(f"Home position, rad: {angles}")
         if not args.yes and not _is_confirmed(console):
-            console.say("Nothing was changed. ARM: idle, braked.")
+            console.say("Nothing was changed. ARM: idle; it sinks slowly, support it.")
             return 5
         _check_encoders(rig, _start(rig), console)  # it was moved until now
         rig.backend.arm.define_position(home.tolist())

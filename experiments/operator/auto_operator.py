@@ -7,6 +7,7 @@ from collections.abc import Callable
 from experiments.operator.prompts import Prompt, PromptState
 
 DAMPED_SECONDS = 0.5  # after a fault of motion, until it lets the arm hold again [s]
+LAID_DOWN_SECONDS = 1.0  # until it has the arm, before that goes idle [s]
 TOUCHES = 12  # points that are touched
 TOUCH_SECONDS = 9.0  # until the foot is at rest on a point [s]
 READY_SECONDS = 2.2  # until it is at rest before a trial [s]
@@ -61,6 +62,7 @@ _AUTOMATIC: dict[Prompt, Callable[[PromptState], str]] = {
     Prompt.LIFT: _lift_key,
     Prompt.READY: _ready_key,
     Prompt.PAUSED: lambda _: " ",
+    Prompt.LAY_DOWN: lambda state: " " if state.since > LAID_DOWN_SECONDS else "",
     Prompt.DAMPED: lambda state: " " if state.since > DAMPED_SECONDS else "",
     Prompt.TOUCH: _touch_key,
     Prompt.REVIEW: _review_key,

@@ -97,6 +97,9 @@ KEYS: Mapping[Prompt, tuple[OperatorKey, ...]] = {
     Prompt.TOUCH: (_CONFIRM, OperatorKey("d", KeyAction.FINISH), _QUIT),
     Prompt.LIFT: (replace(_UNDO, word="undo"), _QUIT),
     Prompt.UNDO: (_CONFIRM, _UNDO, _QUIT),
+    Prompt.LAY_DOWN: (
+        OperatorKey(" ", KeyAction.CONFIRM, "once it is supported: it goes idle"),
+    ),
     Prompt.READY: (
         OperatorKey(" ", KeyAction.RECORD, "record", "[space] record"),
         OperatorKey("n", KeyAction.NOTE, "note", "[n]ote", "note", Operand.TEXT),
@@ -157,6 +160,7 @@ STOP_KEYS = "Ctrl-C finish safely, twice = stop now"
 _EXPLAINED = {
     Prompt.SUPPORT: "the arm is to be activated",
     Prompt.DAMPED: "the arm was too fast, and is damped",
+    Prompt.LAY_DOWN: "the arm is to go idle",
     Prompt.READY: "between two trials",
     Prompt.RECORDING: "while recording",
     Prompt.REVIEW: "at the review",

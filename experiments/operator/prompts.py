@@ -19,6 +19,7 @@ class Prompt(Enum):
     READY = "ready"
     PAUSED = "paused"
     DAMPED = "damped"
+    LAY_DOWN = "lay down"
     RECORDING = "recording"
     REVIEW = "review"
     NOTE = "note"

@@ -66,7 +66,7 @@ class ArmOperations:
         self._opened().define_position(np.array(q))
 
     def idle(self) -> bool:
-        """Brake the arm; return whether that is confirmed."""
+        """Idle the arm; return whether that is confirmed."""
         return self._opened().idle()
 
     def safety_mode(self) -> SafetyMode:

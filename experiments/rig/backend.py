@@ -79,7 +79,7 @@ class RigBackend(Protocol):
         ...
 
     def idle(self) -> bool:
-        """Brake the arm whatever has happened; return whether that is confirmed."""
+        """Idle the arm whatever has happened; return whether that is confirmed."""
         ...
 
     def safety_mode(self) -> SafetyMode:
@@ -87,7 +87,7 @@ class RigBackend(Protocol):
         ...
 
     def close(self) -> None:
-        """Brake the arm if it got torques, and end everything; safe to repeat."""
+        """Idle the arm if it got torques, and end everything; safe to repeat."""
         ...
 
 
@@ -181,7 +181,7 @@ class InProcessBackend:
         return {}
 
     def idle(self) -> bool:
-        """Brake the arm; return whether that is confirmed."""
+        """Idle the arm; return whether that is confirmed."""
         return self.arm.idle()
 
     def safety_mode(self) -> SafetyMode:
@@ -189,7 +189,7 @@ class InProcessBackend:
         return self.arm.safety_mode()
 
     def close(self) -> None:
-        """Brake the arm if it got torques, give bus and port back; safe to repeat."""
+        """Idle the arm if it got torques, give bus and port back; safe to repeat."""
         self.recorder.abandon()
         release(self._arm, self._link)
         if self._sensor is not None:

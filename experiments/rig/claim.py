@@ -56,7 +56,7 @@ def check_inactive(arm: WamArm) -> None:
 
 
 def release(arm: WamArm, link: CanLink) -> None:
-    """Brake an arm that got torques from here, and give the bus back.
+    """Idle an arm that got torques from here, and give the bus back.
 
     Any other arm is left as it is: another program may hold it.
     """

@@ -47,7 +47,7 @@ class MultiProcessBackend:
     """A process for the loop, one for the recorder, one for a serial sensor.
 
     The simulated devices have a process of their own too. All die with the console;
-    the one with the arm brakes it first.
+    the one with the arm idles it first.
     """
 
     def __init__(
@@ -172,7 +172,7 @@ class MultiProcessBackend:
         return {name: child.pid for name, child in self._children.items()}
 
     def idle(self) -> bool:
-        """Brake the arm; when its process has died, a new one does it.
+        """Idle the arm; when its process has died, a new one does it.
 
         An arm that `start_arm` has refused is left as it is.
         """
@@ -191,7 +191,7 @@ class MultiProcessBackend:
         return self.arm.safety_mode()
 
     def close(self) -> None:
-        """Brake the arm if it got torques and end all processes; safe to repeat."""
+        """Idle the arm if it got torques and end all processes; safe to repeat."""
         if not self._children:
             return
         try:
@@ -200,7 +200,7 @@ class MultiProcessBackend:
             if self._control.is_alive and self.loop_client.loop.is_running:
                 self.loop_client.leave()
         except TractionError:
-            pass  # without questions for positions the safety module brakes the arm
+            pass  # without questions for positions the safety module idles the arm
         finally:
             for child in reversed(self._children.values()):
                 child.stop()
@@ -256,7 +256,7 @@ class MultiProcessBackend:
         self.recorder.check()
 
     def _rescue(self) -> bool:
-        """Brake the arm of a dead process through a new one."""
+        """Idle the arm of a dead process through a new one."""
         self._children.pop(_CONTROL).stop()
         self._control = self._spawn_control()
         self.arm, self._service = self._proxies()

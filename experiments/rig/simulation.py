@@ -52,7 +52,7 @@ class SimulatedHand:
         if state.prompt is Prompt.SUPPORT:
             self._simulation.lift()
             self._simulation.pendant("activate")
-        elif state.prompt is Prompt.LIFT:
+        elif state.prompt in (Prompt.LIFT, Prompt.LAY_DOWN):
             self._simulation.lift()
         elif state.prompt is Prompt.CLEAR:
             self._simulation.let_go()

@@ -77,7 +77,7 @@ class ControlWorker:
         self._grants = request(wish)
 
     def serve(self) -> None:
-        """Answer until the console hangs up; an arm that got torques is braked then."""
+        """Answer until the console hangs up; an arm that got torques is idled then."""
         server = RpcServer(
             bind(ArmOperations, ArmOperations(self._opened, self._clock)),
             bind(ControlService, self),
@@ -151,7 +151,7 @@ class ControlWorker:
         self._loop_server = build_loop_server(parts)
 
     def _run(self, loop_server: LoopServer) -> None:
-        """Run the loop; whatever ends it, an arm that got torques is braked."""
+        """Run the loop; whatever ends it, an arm that got torques is idled."""
         loop = Loop(loop_server, self._clock, stats=loop_server.stats)
         try:
             while not loop_server.is_over:
@@ -165,7 +165,7 @@ class ControlWorker:
             loop_server.leave()
 
     def _release(self) -> None:
-        """Brake the arm if it got torques from here, and give the bus back."""
+        """Idle the arm if it got torques from here, and give the bus back."""
         if self._arm is not None and self._link is not None:
             release(self._arm, self._link)
         self._arm = self._link = None

@@ -1,12 +1,15 @@
 """The console loop: time passes, keys and stops are read, rehearsed faults injected."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import TypeVar
 
+import numpy as np
+
 from acquisition.control_loop.faults import OK, Action, GuardVerdict
 from acquisition.control_loop.states import ArmState
+from acquisition.errors import TractionError
 from acquisition.ipc.loop_client import LoopClient
 from experiments.fault_injection.plan import FaultTrigger, PlannedFaults
 from experiments.operator.console import Console
@@ -24,11 +27,18 @@ from experiments.session.sidecar import TrialName
 
 TICK = 0.02  # period of the console [s]
 REFRESH_NS = 125_000_000  # between two pictures of the live screen
-DAMP_SECONDS = 0.2  # between an urgent stop and the brakes
+DAMP_SECONDS = 0.2  # between an urgent stop and idle
 _OWN_QUIT = frozenset({Prompt.REVIEW, Prompt.READY})  # [q] has a meaning of its own
 # Nothing is wanted of the arm.
 _AT_REST = frozenset({Prompt.REVIEW, Prompt.PAUSED, Prompt.DAMPED, Prompt.UNDO})
 _DAMPED = "ARM: damped where it is. [space] once you hold it: then it holds again."
+# Of an arm whose motors work.
+_DRIVEN = frozenset({ArmState.FLOAT, ArmState.HOLD, ArmState.DAMP, ArmState.GUIDE})
+LAY_DOWN_SECONDS = 60.0  # the arm waits so long for a hand before it goes idle
+_ON_STAND = 0.1  # rad
+_SUPPORT = "Support the arm: it goes idle and sinks slowly. [space]"
+_LAY_DOWN = "Lay the foot onto its stand: the arm goes idle and sinks slowly. [space]"
+_NOBODY = f"No answer for {LAY_DOWN_SECONDS:.0f} s: the arm goes idle. Support it."
 _TOO_LATE = "No verdict to take back. Any trial, any time: traction verdict --help"
 _T = TypeVar("_T")
 View = Callable[[int], list[str]]
@@ -207,7 +217,7 @@ class ConsoleLoop:
             return future.result()
 
     def stop_arm(self) -> None:
-        """Hold; after an urgent request, damp for a moment and brake, once."""
+        """Hold; after an urgent request, damp for a moment and idle, once."""
         if not self.stop.is_urgent:
             self.loop_client.request(ArmState.HOLD)
         elif not self._is_stopped:
@@ -216,6 +226,47 @@ class ConsoleLoop:
             self.loop_client.advance(DAMP_SECONDS)
             self.loop_client.request(ArmState.IDLE)
             self.loop_client.advance(TICK)
+
+    def lay_down(self) -> None:
+        """Have the arm supported before it goes idle, for then it sinks.
+
+        It stands still, weakly enough for a hand that carries the foot onto its stand.
+        Without an answer, or at a request to stop, it goes idle all the same.
+        """
+        loop_client, requests = self.loop_client, self.stop.count
+        if loop_client.status.state not in _DRIVEN or self.console.is_lost:
+            return
+        self.show(None)
+        rest = self.rig.settings.rig.arm.rest
+        self.console.say(_SUPPORT if rest is None else _LAY_DOWN)
+        try:
+            loop_client.request(ArmState.GUIDE)
+            for _ in range(round(LAY_DOWN_SECONDS / TICK)):
+                state = self._advance(Prompt.LAY_DOWN, None)
+                is_wanted = self.operator.answer(state) == " "
+                if is_wanted and self._lies(rest):
+                    return
+                if self.stop.count > requests or self.console.is_lost:
+                    return
+            self.console.say(_NOBODY)
+        except (ArmFaultError, TractionError):
+            return  # the arm is not under control: it is idled at once
+
+    def _lies(self, rest: Sequence[float] | None) -> bool:
+        """Return whether the foot is on its stand, as far as that is known."""
+        if rest is None:
+            return True
+        q = self.loop_client.latest()["position"][0]
+        apart = np.abs(q - np.array(rest))
+        joint = int(apart.argmax())
+        if apart[joint] <= _ON_STAND:
+            return True
+        self.console.say(
+            f"Joint {joint + 1} is {apart[joint]:.2f} rad from where the foot lies on "
+            "its stand (arm.rest). Lay it there, then [space]; Ctrl-C: idle all the "
+            "same."
+        )
+        return False
 
     def make_safe(self) -> bool:
         """Idle the arm and abandon an open file; return whether idle is confirmed."""

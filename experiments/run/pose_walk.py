@@ -19,7 +19,7 @@ from wam.model.constants import Array
 INTERRUPTED = 130
 _NOTHING = "Nothing was written."
 _STOPPED = "The move was stopped; it goes on when it is asked for anew only."
-_HOLD = 0.2  # s between a stop and the brakes
+_HOLD = 0.2  # s between a stop and idle
 
 
 class MoveStoppedError(ArmFaultError):
@@ -38,6 +38,7 @@ def guided(console_loop: ConsoleLoop, work: Callable[[], None], command: str) ->
     except StopRequestedError:
         console_loop.stop_arm()
         console_loop.loop_client.advance(_HOLD)
+        console_loop.lay_down()
         console.say(f"Stopped as asked. {_NOTHING}")
         return INTERRUPTED
     except ArmFaultError as fault:
@@ -138,7 +139,7 @@ class PoseWalk:
 
         Raises:
             MoveStoppedError: the guard stopped the move.
-            PreflightError: a joint is not where it was sent; the arm is braked then.
+            PreflightError: a joint is not where it was sent; the arm is idled then.
             StopRequestedError: as `ConsoleLoop.tick`.
         """
         move = JointMove(self._here, halt.q, halt.speed)
@@ -153,7 +154,7 @@ class PoseWalk:
         self._here = halt.q
 
     def _check_on_the_way(self, move: JointMove, sent_ns: int) -> None:
-        """Brake an arm that something holds up, or whose encoder stands still.
+        """Idle an arm that something holds up, or whose encoder stands still.
 
         A joint with a dead encoder is pulled on for ever and seems to stand.
         """
@@ -171,12 +172,12 @@ class PoseWalk:
             f"Joint {joint + 1} is {apart[joint]:.3f} rad from where it was sent "
             f"(limit {ASTRAY[joint]:g}).",
             hint="Is something in the way, or has an encoder failed?",
-            arm_state="idle, braked",
+            arm_state="idle: it sinks slowly, support it",
         )
 
     def end(self) -> None:
-        """Ask for support and idle the arm; it needs no support afterwards."""
-        self.ask("Support the arm, it goes idle. [space]", Prompt.SUPPORT)
+        """Have the arm supported and idle it: it sinks then."""
+        self.console_loop.lay_down()
         self.console_loop.make_safe()
 
     def rest(self, seconds: float) -> tuple[Array, Array]:

@@ -72,6 +72,7 @@ class SessionRunner:
             self._report_bug(self._make_safe(), traceback.format_exc())
         finally:
             context.feedback.close()
+            context.console_loop.lay_down()
             context.say(self._make_safe())
             # The arm is idle: the disk may take its time.
             context.journal.append(Event.ENDED, reason=reason)

@@ -19,6 +19,7 @@ from acquisition.settings import (
 from ft_sensor.vendors.registry import AnySensor
 
 _Turn = Annotated[Whole, Field(ge=0, lt=65536)]  # counts of one motor turn
+_Angle = Annotated[Number, Field(ge=-6.3, le=6.3)]  # rad
 _SevenPositive = tuple[
     Positive, Positive, Positive, Positive, Positive, Positive, Positive
 ]
@@ -38,10 +39,15 @@ class ArmSection(SettingsSection):
     Attributes:
         mech_at_home: absolute angles of the motors at the home position [counts], as
             "traction zero" tells them; left out: the next zeroing is not checked.
+        rest: joint positions of the arm whose foot lies on its stand [rad]; left out:
+            a person supports the arm before it goes idle.
     """
 
     mech_at_home: tuple[_Turn, _Turn, _Turn, _Turn, _Turn, _Turn, _Turn] | None = Field(
         default=None, examples=[[1012, 340, 2761, 95, 4001, 1200, 2048]]
+    )
+    rest: tuple[_Angle, _Angle, _Angle, _Angle, _Angle, _Angle, _Angle] | None = Field(
+        default=None, examples=[[0.0, 0.77, 0.0, 1.19, 0.0, 1.19, 0.0]]
     )
 
 

@@ -70,7 +70,7 @@ class CableDrives(JointDrives):
         return super().counts(q) + self._turns * self.twist
 
     def rest(self) -> None:
-        """Unbend bristles and cables, as brakes at the joints do."""
+        """Unbend bristles and cables of an arm that something bears."""
         super().rest()
         self.twist, self._speeds = np.zeros(7), np.zeros(7)
 

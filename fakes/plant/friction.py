@@ -154,7 +154,7 @@ class MotorBristles:
         self.rest()
 
     def rest(self) -> None:
-        """Let go of what bends the bristles, as in an arm that is braked."""
+        """Let go of what bends the bristles, as in an arm that something bears."""
         self._z = [0.0] * 7
         self._keep = [1.0] * 7
         self.take([0.0] * 7)

@@ -129,7 +129,7 @@ class JointDrives:
         return [u / ipnm for u, ipnm in zip(self._units, self._ipnm, strict=True)]
 
     def rest(self) -> None:
-        """Unbend the bristles, as brakes do."""
+        """Unbend the bristles of an arm that something bears."""
         self._bristles.rest()
 
     def begin_cycle(self, rows: Array, speeds: Sequence[float], t_ns: int) -> None:

@@ -29,7 +29,7 @@ from wam.model.constants import load_constants
 
 PRIORITY = 70
 TRUTH_ROWS = 50  # in one answer; the bus waits meanwhile
-LINGER_NS = 5_000_000_000  # an arm whose console has died is braked within this
+LINGER_NS = 5_000_000_000  # an arm whose console has died is idled within this
 
 
 class PtyCable:
@@ -139,7 +139,7 @@ class PlantTruth:
 def main(station: ChildContext) -> None:
     """Serve a simulated rig until the console hangs up."""
     name_process("traction-fake")
-    # When the console dies, the driver still has to brake the arm.
+    # When the console dies, the driver still has to idle the arm.
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     request(RealtimeRequest(PRIORITY, station.settings.get("core")))
     with temporary_folder("traction", Path(tempfile.gettempdir())) as folder:

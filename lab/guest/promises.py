@@ -13,7 +13,7 @@ _CODES = {
     "not activated, resumed": {3, 4},
     "trial interrupted and redone": {0},
     "session ends, resumed": {4},
-    "ends; the arm is braked without it, resumed": {-9},
+    "ends; the arm is idle without it, resumed": {-9},
     "the arm stops, nothing is written": {4},
 }
 

@@ -26,7 +26,7 @@ class End(Enum):
     UNWRITTEN = "session ends, what is on the disk stays"
     STOPPED = "unfinished on purpose, resumed"
     INTERRUPTED = "ends at once"
-    KILLED = "ends; the arm is braked without it, resumed"
+    KILLED = "ends; the arm is idle without it, resumed"
     LOST_EARLY = "ends, nothing recorded"
     ABSENT = "-"
 
@@ -199,8 +199,8 @@ _NO_FRAME = _refused("No whole F/T frame")
 _FEW = "are too few for a tare"
 _FLAGGED = "F/T samples were flagged during tare"
 _ASKED = "Joint 7 was asked for "
-_STAYS = replace(OK, why="the arm is braked, and stays so")
-_BRAKED = Cell(End.ABSENT, why="joint 7 is braked like the others")
+_STAYS = replace(OK, why="the arm is idle, and stays so")
+_BRAKED = Cell(End.ABSENT, why="joint 7 is damped like the others")
 _SLIP = Cell(
     End.REDONE,
     "Joint 7 moved",

@@ -215,7 +215,7 @@ def _press(asked) -> str:
     waits = {Prompt.READY: (0.3, " "), Prompt.RECORDING: (0.5, " ")}
     waits[Prompt.UNDO] = (0.3, " ")
     wait, key = waits.get(asked.prompt, (0.3, "k"))
-    if asked.prompt in {Prompt.SUPPORT, Prompt.PAUSED, Prompt.DAMPED}:
+    if asked.prompt in {Prompt.SUPPORT, Prompt.PAUSED, Prompt.DAMPED, Prompt.LAY_DOWN}:
         return " "
     if asked.prompt is Prompt.LIFT:
         return "q" if asked.since > 15.0 else ""

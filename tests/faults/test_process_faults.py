@@ -33,7 +33,7 @@ from tests.processes.watching import (
 
 pytestmark = [pytest.mark.wall_clock, pytest.mark.timeout(400)]
 TRIES = 5  # a session may stop because the machine stood still
-REACTION = 0.6  # s, from the fault to an arm that holds or is braked
+REACTION = 0.6  # s, from the fault to an arm that holds or is idle
 SAFE = {ArmState.HOLD, ArmState.DAMP, ArmState.IDLE}
 BRAKED = {SafetyMode.IDLE, SafetyMode.E_STOP}
 CODES = {
@@ -212,7 +212,7 @@ def is_safe(seen):
     if is_running(seen.pids["control"]) and seen.status().is_running:
         return seen.status().control.state in SAFE
     if not is_running(seen.pids["fake rig"]):
-        return True  # it goes last, when the arm is braked
+        return True  # it goes last, when the arm is idle
     return seen.pucks_mode() in BRAKED
 
 

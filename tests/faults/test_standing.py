@@ -86,7 +86,7 @@ PRESSED = Promise(
     hand=np.inf,
     why="a position that lies drives a pressed foot against the ground until the guard "
     "sees it, and joint 7 is light; nobody holds the foot, a real arm refuses to "
-    "stand, and the hand comes when the arm is braked",
+    "stand, and the hand comes when the arm is idle",
 )
 # Reasons of which one ends the stance.
 STOPPED = {

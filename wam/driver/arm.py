@@ -125,7 +125,7 @@ class WamArm:
         return self._reading(now_ns)
 
     def listen(self, now_ns: int) -> ArmReading:
-        """Ask for no position, or the module would not brake; does not wait."""
+        """Ask for no position, or the module would not idle; does not wait."""
         self._traffic.listen(now_ns)
         return self._reading(now_ns)
 
@@ -199,7 +199,7 @@ class WamArm:
         return tuple(self._poller.health.pucks)
 
     def idle(self) -> bool:
-        """Brake the arm: module to IDLE, confirmed, then zero torque.
+        """Idle the arm: module to IDLE, confirmed, then zero torque.
 
         Zero torque while ACTIVE would be free fall, so without the confirmation none
         is sent; the heartbeat then stops the arm within 0.1 s of the last reading.
@@ -217,7 +217,7 @@ class WamArm:
         return True
 
     def close(self) -> None:
-        """Brake the arm and give the bus back; a second call does nothing."""
+        """Idle the arm and give the bus back; a second call does nothing."""
         if not self._is_closed:
             self.idle()
             self._is_closed = True
