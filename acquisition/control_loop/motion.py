@@ -18,6 +18,7 @@ from acquisition.control_loop.details import MotionExcess
 from acquisition.control_loop.faults import OK, Fault, GuardVerdict, verdict_for
 from acquisition.control_loop.states import ArmState
 
+_LAG_NS = 10_000_000  # of the filter of velocities
 Point = tuple[float, float, float]
 
 
@@ -100,7 +101,7 @@ class MotionMemory(NamedTuple):
         state: that.
         is_moving: in hold, a move or stance.
         sole: where it was then [m].
-        energy: that it had then [J].
+        energy: that it had then [J]; filtered velocities show it a little later.
         least: the least since [J].
     """
 
@@ -130,6 +131,8 @@ def follow(memory: MotionMemory | None, now: DrivenMotion) -> MotionMemory:
             now.energy,
             now.energy,
         )
+    if now.energy > memory.energy and now.now_ns - memory.since_ns <= _LAG_NS:
+        return memory._replace(energy=now.energy)
     if now.energy < memory.least:
         return memory._replace(least=now.energy)
     return memory

@@ -53,7 +53,7 @@ def _weak(scene: SimulatedScene) -> dict[str, object]:
 
 def _swing(scene: SimulatedScene) -> dict[str, object]:
     if not scene.rig.plant.is_idle:
-        scene.rig.plant.qd[_J6] = 8.0
+        scene.rig.plant.qd[_J6] = 5.0
     return {"foot_speed": 0.2}
 
 

@@ -20,7 +20,7 @@ MS = 1_000_000
 WINDOW_NS = 500 * MS  # travel is counted so long after a fault
 BLOW_NS = 150 * MS  # a blow to a joint is over after this
 SPEED_LIMITS = np.array([1.5, 1.5, 2.0, 2.5, 4.0, 4.0, 4.0])  # rad/s, of rig.toml
-BLOWS = {"overspeed": 12.0, "foot-speed": 8.0}  # rad/s that the fault itself gives
+BLOWS = {"overspeed": 6.0, "foot-speed": 5.0}  # rad/s that the fault itself gives
 _PERIOD_NS = 2 * MS
 
 

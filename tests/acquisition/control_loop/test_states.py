@@ -24,7 +24,7 @@ verdict: damp             . D D . . D
 verdict: idle             b b b b b b
 idle confirmed            I I I I I I
 idle not confirmed        U U U U U U
-safety circuit is braked  . . . . b .
+safety circuit is idle    . . . . b .
 """
 LETTERS = {state: state.name[0] for state in ArmState}
 

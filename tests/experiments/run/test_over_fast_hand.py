@@ -16,7 +16,7 @@ PULL = 8.0  # N m of the hand at joint 1
 # Low limits, so that the safety module has nothing to say yet.
 LIMITS = {
     "overspeed": {"speed": (0.4, *[9.0] * 6)},
-    "foot-speed": {"foot_speed": 0.15, "speed": (9.0,) * 7},
+    "foot-speed": {"foot_speed": 0.06, "speed": (9.0,) * 7},
 }
 
 
