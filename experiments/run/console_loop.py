@@ -142,6 +142,16 @@ class ConsoleLoop:
             self.hand.follow(state)
         return state
 
+    def require_no_fault(self) -> None:
+        """Raise what the guard found while nothing was asked of the arm.
+
+        Raises:
+            ArmFaultError: it did.
+        """
+        verdict = self.loop_client.status.verdict
+        if verdict is not None:
+            raise ArmFaultError(verdict)
+
     def _raise_fault(self, prompt: Prompt) -> None:
         """Raise the guard's verdict, unless it was reported and only persists."""
         verdict = self.loop_client.status.verdict

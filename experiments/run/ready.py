@@ -33,6 +33,7 @@ def activate(console_loop: ConsoleLoop) -> None:
         StopRequestedError, ArmFaultError: as `ConsoleLoop.tick`.
     """
     control, clock = console_loop.loop_client, console_loop.rig.clock
+    console_loop.require_no_fault()
     control.request(ArmState.HOLD)
     control.advance(_READY_SECONDS)
     _require_torques(console_loop)

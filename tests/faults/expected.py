@@ -109,7 +109,7 @@ _IDLE = Arm(5, "idle", ArmState.IDLE, "idle")
 _BEAT = replace(_IDLE, limit_ms=100)
 _STOPPED = Arm(2, NO_POWER, ArmState.IDLE, "stopped by its hardware")
 _HELD = Arm(20, "driven", HOLD, "holding")
-_DAMPED = Arm(4, "driven", DAMP, "damping, then holding")
+_DAMPED = Arm(4, "driven", DAMP, "damped where it is")
 _PUCK = "Puck 3 has not answered for "
 _MODULE = "The safety module put the arm to idle: "
 
@@ -221,6 +221,7 @@ _LOADED = Cell(
     Arm(30, "driven", HOLD, "holding"),
 )
 _SHARED = "Another program sends to the arm: frame "
+_EARLY = "The arm was activated before it was asked for."
 _NAN = "A position or torque was not a number."
 _CANNOT_COUNT = Cell(End.ENDED, "Joint torques are not numbers")
 _HEARTBEAT = f"{_MODULE}heartbeat fault."
@@ -293,8 +294,13 @@ TABLE: dict[str, Row] = {
         _SHARED,
         _IDLE,
         "bus-shared",
-        preflight=Cell(End.ENDED, _SHARED, why="found when the arm becomes active"),
-        idle=Cell(End.ENDED, _SHARED, why="found when the arm becomes active"),
+        preflight=Cell(End.ENDED, _SHARED, why="found as soon as the loop runs"),
+        idle=Cell(End.ENDED, _SHARED),
+    ),
+    "early-activation": _row(
+        replace(OK, why="the arm is active already"),
+        preflight=Cell(End.ENDED, _EARLY, why="found as soon as the loop runs"),
+        idle=Cell(End.ENDED, _EARLY, arm=replace(_IDLE, limit_ms=10)),
     ),
     "estop": _ending(
         "Stop pressed", _STOPPED, "estop", preflight=_IN_STOP, idle=_UNPOWERED

@@ -173,6 +173,7 @@ _BY_HAND: dict[str, Strike] = {
     "joint-limit": _tighten(_behind_a_stop),
     "torque-limit": _tighten(_weak),
     "foot-speed": _tighten(_swing),
+    "early-activation": lambda scene: scene.rig.network.pendant("activate"),
     "not-a-number": _nonsense,
     "stall-3-ms": _stall(3),
     "stall-20-ms": _stall(20),
