@@ -3,6 +3,7 @@
 import io
 import re
 import tomllib
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, cast
 
@@ -13,12 +14,27 @@ from acquisition.files import NotRegularError, UnfitFileError, read_regular
 # strict: a number in quotes, or `true`, is a mistake and no number
 Number = Annotated[float, Field(strict=True)]
 Whole = Annotated[int, Field(strict=True)]
-Positive = Annotated[Number, Field(gt=0, allow_inf_nan=False)]
-Mass = Annotated[Number, Field(gt=0, le=20)]
 Near = Annotated[Number, Field(ge=-10, le=10)]  # metres and radians of this room
-Vector3 = tuple[Near, Near, Near]
 Six = tuple[Number, Number, Number, Number, Number, Number]
 File = Annotated[str, Field(min_length=1, max_length=4096)]  # beside rig.toml
+
+
+@dataclass(frozen=True, slots=True)
+class Usual:
+    """Beside the bounds of a number: its unit, and where it lies on a sound rig.
+
+    Attributes:
+        low: smallest that is not warned of.
+        high: largest that is not warned of.
+        unit: of the number; "" = none.
+        real: largest on a real arm; None = that of the field. A busy computer makes
+            simulated devices late.
+    """
+
+    low: float
+    high: float
+    unit: str = ""
+    real: float | None = None
 
 
 _DEEPEST = 20  # tables in tables; a settings file has four

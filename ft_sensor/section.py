@@ -1,10 +1,10 @@
 """[ft_sensor] of rig.toml: what every make of sensor has."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
-from acquisition.settings import File, Mass, Number, SettingsSection, Whole
+from acquisition.settings import File, Number, SettingsSection, Usual, Whole
 from ft_sensor.serial_line.link import PortSettings
 from ft_sensor.serial_line.sensor import SerialDevice
 
@@ -16,10 +16,16 @@ class SensorSection(SettingsSection):
     """
 
     port: str = Field(examples=["/dev/ttyUSB0"])
-    baudrate: Whole = Field(gt=0, examples=[460800])
-    mass: Mass = Field(examples=[0.136])
-    height: Number = Field(ge=0, le=0.2, examples=[0.012])
-    angle_deg: Number = Field(ge=-360, le=360, examples=[0.0])
+    baudrate: Whole = Field(gt=0, le=4_000_000, examples=[460800])
+    mass: Annotated[Number, Usual(0.03, 0.4, "kg")] = Field(
+        ge=0.01, le=1.0, examples=[0.136]
+    )
+    height: Annotated[Number, Usual(0.0, 0.06, "m")] = Field(
+        ge=0, le=0.1, examples=[0.012]
+    )
+    angle_deg: Annotated[Number, Usual(-180.0, 180.0, "degrees")] = Field(
+        ge=-360, le=360, examples=[0.0]
+    )
     sign: Literal[1, -1] = Field(examples=[1])
     calibration: File | None = Field(default=None, examples=["ft_sensor.toml"])
 

@@ -59,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the page and return the exit code."""
     from acquisition.errors import SettingsError
-    from experiments.operator.console import GOOD, Console
+    from experiments.operator.console import GOOD, WARNING, Console
     from experiments.rig.law_calibrations import read_law_calibrations
     from experiments.settings.load import load_settings
     from experiments.settings.origins import origin_lines
@@ -76,6 +76,8 @@ def run(args: argparse.Namespace) -> int:
     if args.config_only:
         read_law_calibrations(settings)
         console.check(GOOD, "config", f"{settings.origin}")
+        for text in settings.unusual():
+            console.check(WARNING, "settings", text)
         for line in origin_lines(settings):
             console.say(f"   {line}")
         return 0

@@ -102,6 +102,8 @@ def _check_host(rig: Rig, data: Path, page: ChecksPage, probe: DiskProbe) -> Non
     settings = rig.settings.rig
     law = law_words(settings, rig.calibrations, rig.row.foot)
     page.add(GOOD, "config", f"{rig.settings.origin}, {rig.row.name}, {law}")
+    for text in rig.settings.unusual():
+        page.add(WARNING, "settings", text)
     page.add_result(check_masses(rig))
     page.add_result(check_code(provenance.collect()))
     if not rig.is_stepped:

@@ -119,10 +119,12 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
     """Return the rig for one session: on stepped time in this thread, else processes.
 
     Raises:
-        SettingsError: a calibration cannot be used.
+        SettingsError: a calibration cannot be used, or a number is none of a real arm.
         LinkError: a process cannot open its bus or port.
         PreflightError: another program has the arm.
     """
+    if fake is None:
+        settings.check_real()
     is_twin = fake is not None and fake.is_twin
     kind = None if is_twin else fake is not None
     written, settings = settings, with_calibrations(settings, is_simulated=kind)

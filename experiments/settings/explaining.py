@@ -10,13 +10,11 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from experiments.arguments import nearest
+from experiments.settings.numbers import number_at, number_words
 
 _MOST = 8  # errors in one message
 _HEADER = re.compile(r"^\s*(\[\[|\[)\s*([\w.\" -]+?)\s*\]")
 _KEY = re.compile(r"""^\s*["']?([\w-]+)["']?\s*[=.]""")
-
-_NUMBERS: dict[object, str] = {int: "a whole number", float: "a number"}
-_BOUNDS = (("gt", ">"), ("ge", ">="), ("lt", "<"), ("le", "<="))
 
 
 def line_of(text: str, place: str) -> int | None:
@@ -103,8 +101,15 @@ def _reason(location: "_Location", error: ErrorDetails) -> str:
         return f'{place}.kind = "{got}" - expected {_kinds(location.kinds)}'
     got = error["input"]
     shown = f'"{got:.80}"' if isinstance(got, str) else f"{got!r:.80}"
-    expected = _expected(location.field, error["msg"])
-    return f"{place} = {shown} - expected {expected}{location.example}"
+    what = error["msg"].removeprefix("Value error, ")
+    if isinstance(got, Mapping) and error["type"] == "value_error":
+        return f"{place}: {what}"
+    number = number_at(location.field, location.item)
+    if number is None:
+        expected = what.removeprefix("Input should be ")
+        return f"{place} = {shown} - expected {expected}{location.example}"
+    expected, meant = number_words(number, got)
+    return f"{place} = {shown} - expected {expected}{location.example}{meant}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,6 +122,7 @@ class _Location:
         kinds: the sections that a `kind` chooses between, on the way to it; or none.
         kind: the chosen one.
         siblings: the keys that may stand beside it.
+        item: which one of the field's numbers; None = the field is no list.
     """
 
     place: str
@@ -124,6 +130,7 @@ class _Location:
     kinds: Mapping[str, type[BaseModel]]
     kind: str
     siblings: Sequence[str]
+    item: int | None = None
 
     @property
     def example(self) -> str:
@@ -139,20 +146,23 @@ def _locate(model: type[BaseModel], location: tuple[int | str, ...]) -> _Locatio
     kinds: Mapping[str, type[BaseModel]] = {}
     place = kind = ""
     siblings: Sequence[str] = ()
+    item: int | None = None
     for part in location:
         siblings = tuple(current.model_fields) if current else siblings
         if isinstance(part, int):
             place += f"[{part}]"
+            item = part
         elif current is None and part in kinds and not kind:
             kind, current = part, kinds[part]
         else:
             place += f".{part}"
+            item = None
             field = current.model_fields.get(part) if current else None
             sections = _sections_of(field.annotation) if field else []
             current = sections[0] if len(sections) == 1 else None
             if len(sections) > 1:
                 kinds = {_kind_of(section): section for section in sections}
-    return _Location(place.lstrip("."), field, kinds, kind, siblings)
+    return _Location(place.lstrip("."), field, kinds, kind, siblings, item)
 
 
 def _sections_of(annotation: Any) -> list[type[BaseModel]]:  # noqa: ANN401
@@ -179,17 +189,3 @@ def _refusal(location: _Location, option: str) -> str:
         return "is not a setting Traction knows"
     names = " and ".join(f'"{kind}"' for kind in others)
     return f'belongs to kind {names}, this is a "{location.kind}"'
-
-
-def _expected(field: FieldInfo | None, otherwise: str) -> str:
-    """Return what a number should be, with its bounds; else what pydantic says."""
-    kind = _NUMBERS.get(field.annotation) if field else None
-    if field is None or kind is None:
-        return otherwise.removeprefix("Input should be ")
-    bounds = [
-        f"{sign} {getattr(constraint, name)}"
-        for constraint in field.metadata
-        for name, sign in _BOUNDS
-        if hasattr(constraint, name)
-    ]
-    return f"{kind} {' and '.join(bounds)}".rstrip()

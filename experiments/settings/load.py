@@ -13,10 +13,12 @@ from acquisition.settings import parse_toml, read_text
 from experiments.arguments import did_you_mean
 from experiments.settings.explaining import explain
 from experiments.settings.matrix import MatrixSettings, TerrainRow
+from experiments.settings.numbers import beyond_real, unusual_numbers
 from experiments.settings.rig import FootSection, RigSettings
 from experiments.settings.sensor import build_device
 
 _M = TypeVar("_M", bound=BaseModel)
+SHIPPED = "shipped default"
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +42,29 @@ class Settings:
     origin: str
     folder: Path
     calibrations: Mapping[str, str] = field(default_factory=dict[str, str])
+
+    def unusual(self) -> list[str]:
+        """Return a sentence for each number that no sound rig has."""
+        files = (("rig.toml", self.rig), ("matrix.toml", self.matrix))
+        return [
+            f"{file}: {words}"
+            for file, section in files
+            for words in unusual_numbers(section)
+        ]
+
+    def check_real(self) -> None:
+        """Refuse what only a simulated rig may have.
+
+        Raises:
+            SettingsError: a number is beyond what a real arm may have.
+        """
+        beyond = beyond_real(self.rig)
+        if beyond:
+            raise SettingsError(
+                f"rig.toml: {beyond} on a real arm.",
+                hint="Only a simulated one, on a busy computer, may have more. "
+                "Nothing was started.",
+            )
 
     def by_cad(self) -> "Settings":
         """Return the same with the gravity of the drawings, for a calibration."""
@@ -102,7 +127,7 @@ def load_settings(config: Path | None) -> Settings:
     shipped = resources.files("experiments.data")
     rig_text = (shipped / "rig.toml").read_text()
     matrix_text = (shipped / "matrix.toml").read_text()
-    origin = "shipped default"
+    origin = SHIPPED
     if config is not None:
         rig_text = _read(config)
         origin = str(config)

@@ -5,9 +5,7 @@ from typing import Any, cast
 
 from acquisition.settings import parse_toml
 from experiments.settings.explaining import line_of
-from experiments.settings.load import Settings
-
-_SHIPPED = "shipped default"
+from experiments.settings.load import SHIPPED, Settings
 
 
 def flatten(value: object, place: str = "") -> dict[str, object]:
@@ -51,10 +49,10 @@ def origin_lines(settings: Settings) -> list[str]:
 
 def _origin(settings: Settings, file: str) -> str:
     path = settings.folder / file
-    is_shipped = settings.origin == _SHIPPED
+    is_shipped = settings.origin == SHIPPED
     if file == "rig.toml" and not is_shipped:
         return settings.origin
-    return _SHIPPED if is_shipped or not path.is_file() else str(path)
+    return SHIPPED if is_shipped or not path.is_file() else str(path)
 
 
 def _shown(value: object) -> str:

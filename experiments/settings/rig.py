@@ -9,19 +9,45 @@ from acquisition.clock import RATE_HZ
 from acquisition.control_loop.limits import GuardLimits
 from acquisition.settings import (
     File,
-    Mass,
     Number,
-    Positive,
     SettingsSection,
-    Vector3,
+    Usual,
     Whole,
 )
 from ft_sensor.vendors.registry import AnySensor
 
+LOCK_DAMPING = 0.0075  # s, least lock_kd over lock_kp: see `ControlSection`
 _Turn = Annotated[Whole, Field(ge=0, lt=65536)]  # counts of one motor turn
-_Angle = Annotated[Number, Field(ge=-6.3, le=6.3)]  # rad
-_SevenPositive = tuple[
-    Positive, Positive, Positive, Positive, Positive, Positive, Positive
+_Angle = Annotated[Number, Field(ge=-6.3, le=6.3), Usual(-4.0, 4.0, "rad")]
+_Aside = Annotated[Number, Field(ge=-0.1, le=0.1), Usual(-0.05, 0.05, "m")]
+_Below = Annotated[Number, Field(ge=0.02, le=0.25), Usual(0.03, 0.2, "m")]
+_OnPlate = tuple[_Aside, _Aside, _Below]  # in frame 7
+_Inertia = Annotated[Number, Field(ge=1e-6, le=0.05), Usual(1e-5, 2e-3, "kg m^2")]
+# Speeds up to twice the shipped limits, torques up to the shipped ones: more the motors
+# give, but no trial needs, and less than its weight lets the arm sink.
+_ShoulderSpeed = Annotated[Number, Field(gt=0, le=3.0), Usual(0.3, 2.2, "rad/s")]
+_UpperArmSpeed = Annotated[Number, Field(gt=0, le=4.0), Usual(0.4, 3.0, "rad/s")]
+_ElbowSpeed = Annotated[Number, Field(gt=0, le=5.0), Usual(0.5, 3.7, "rad/s")]
+_WristSpeed = Annotated[Number, Field(gt=0, le=8.0), Usual(0.8, 6.0, "rad/s")]
+_Speeds = tuple[
+    _ShoulderSpeed,
+    _ShoulderSpeed,
+    _UpperArmSpeed,
+    _ElbowSpeed,
+    _WristSpeed,
+    _WristSpeed,
+    _WristSpeed,
+]
+_ElbowTorque = Annotated[Number, Field(gt=0, le=15.0), Usual(7.5, 15.0, "N m")]
+_WristTorque = Annotated[Number, Field(gt=0, le=2.5), Usual(1.2, 2.5, "N m")]
+_Torques = tuple[
+    Annotated[Number, Field(gt=0, le=20.0), Usual(10.0, 20.0, "N m")],
+    Annotated[Number, Field(gt=0, le=45.0), Usual(25.0, 45.0, "N m")],
+    _ElbowTorque,
+    _ElbowTorque,
+    _WristTorque,
+    _WristTorque,
+    Annotated[Number, Field(gt=0, le=1.3), Usual(0.6, 1.3, "N m")],
 ]
 
 
@@ -30,7 +56,9 @@ class CanSettings(SettingsSection):
 
     interface: str = Field(examples=["socketcan"])
     channel: str = Field(examples=["can0"])
-    bitrate: Whole = Field(gt=0, examples=[1000000])
+    bitrate: Annotated[Whole, Usual(1_000_000, 1_000_000, "bit/s")] = Field(
+        ge=10_000, le=1_000_000, examples=[1000000]
+    )
 
 
 class ArmSection(SettingsSection):
@@ -54,12 +82,14 @@ class ArmSection(SettingsSection):
 class FootSection(SettingsSection):
     """A foot with its adapter, in frame 7."""
 
-    mass: Mass = Field(examples=[0.45])
-    com: Vector3 = Field(examples=[[0.01, 0.0, 0.062]])
-    inertia: tuple[Positive, Positive, Positive] = Field(
+    mass: Annotated[Number, Usual(0.1, 1.5, "kg")] = Field(
+        ge=0.05, le=2.0, examples=[0.45]
+    )
+    com: _OnPlate = Field(examples=[[0.01, 0.0, 0.062]])
+    inertia: tuple[_Inertia, _Inertia, _Inertia] = Field(
         examples=[[4e-4, 5.5e-4, 4.5e-4]]
     )
-    sole: Vector3 = Field(examples=[[0.01, 0.0, 0.112]])
+    sole: _OnPlate = Field(examples=[[0.01, 0.0, 0.112]])
     calibration: File | None = Field(default=None, examples=["foot_tread.toml"])
 
 
@@ -71,11 +101,31 @@ class Feet(SettingsSection):
 
 
 class ControlSection(SettingsSection):
-    """The control law's numbers."""
+    """The control law's numbers.
 
-    virtual_mass: Number = Field(ge=0, le=2, examples=[0.30])
-    lock_kp: Number = Field(ge=0, le=30, examples=[20.0])
-    lock_kd: Number = Field(ge=0, le=0.25, examples=[0.2])
+    Within these bounds the lock is stable with the shipped foot where torques come a
+    whole cycle after the positions that they follow from, in every pose.
+    """
+
+    virtual_mass: Annotated[Number, Usual(0.0, 1.0, "kg")] = Field(
+        ge=0, le=2, examples=[0.30]
+    )
+    lock_kp: Annotated[Number, Usual(10.0, 22.0, "N m/rad")] = Field(
+        ge=0, le=22, examples=[20.0]
+    )
+    lock_kd: Annotated[Number, Usual(0.1, 0.23, "N m s/rad")] = Field(
+        ge=0, le=0.25, examples=[0.2]
+    )
+
+    @model_validator(mode="after")
+    def _is_damped(self) -> Self:
+        least = LOCK_DAMPING * self.lock_kp
+        if self.lock_kd < least:
+            raise ValueError(
+                f"lock_kd = {self.lock_kd:g} N m s/rad lets the lock of joint 7 "
+                f"oscillate - expected >= {least:.3g} at lock_kp = {self.lock_kp:g}"
+            )
+        return self
 
 
 class GravitySection(SettingsSection):
@@ -100,7 +150,9 @@ class FrictionSettings(SettingsSection):
 
     model: Literal["none", "calibrated"] = Field(default="none", examples=["none"])
     file: File = Field(default="friction.toml", examples=["friction.toml"])
-    compensation: Number = Field(default=0.7, ge=0, le=0.8, examples=[0.7])
+    compensation: Annotated[Number, Usual(0.0, 0.75)] = Field(
+        default=0.7, ge=0, le=0.8, examples=[0.7]
+    )
 
     @property
     def share(self) -> float:
@@ -117,22 +169,50 @@ class LimitSection(SettingsSection):
     sole and sensor; forces that are left out have these values.
     """
 
-    speed: _SevenPositive = Field(examples=[[1.5, 1.5, 2.0, 2.5, 4.0, 4.0, 4.0]])
-    torque: _SevenPositive = Field(examples=[[20, 45, 15, 15, 2.5, 2.5, 1.3]])
-    foot_speed: Positive = Field(examples=[0.8])
-    joint7_mrad: Positive = Field(examples=[50.0])
-    ft_stale_ms: Positive = Field(examples=[6.0])
-    ft_stop_ms: Positive = Field(examples=[20.0])
-    ft_saturated_ms: Positive = Field(default=100.0, examples=[100.0])
-    contact_force: Positive = Field(default=100.0, examples=[100.0])
-    contact_force_hold: Positive = Field(default=150.0, examples=[150.0])
-    contact_moment: Positive = Field(default=10.0, examples=[10.0])
-    contact_moment_hold: Positive = Field(default=15.0, examples=[15.0])
-    contact_growth: Positive = Field(default=40.0, examples=[40.0])
-    late_per_second: Whole = Field(ge=1, le=RATE_HZ, examples=[10])
-    tare_spread: Positive = Field(examples=[0.5])
-    residual: Positive = Field(default=1.0, examples=[1.0])
-    free_disk_gb: Number = Field(ge=0, examples=[5.0])
+    speed: _Speeds = Field(examples=[[1.5, 1.5, 2.0, 2.5, 4.0, 4.0, 4.0]])
+    torque: _Torques = Field(examples=[[20, 45, 15, 15, 2.5, 2.5, 1.3]])
+    foot_speed: Annotated[Number, Usual(0.3, 0.9, "m/s")] = Field(
+        ge=0.05, le=1.0, examples=[0.8]
+    )
+    joint7_mrad: Annotated[Number, Usual(10.0, 80.0, "mrad")] = Field(
+        ge=2, le=100, examples=[50.0]
+    )
+    ft_stale_ms: Annotated[Number, Usual(3.0, 12.0, "ms")] = Field(
+        ge=2, le=20, examples=[6.0]
+    )
+    ft_stop_ms: Annotated[Number, Usual(10.0, 40.0, "ms")] = Field(
+        ge=5, le=50, examples=[20.0]
+    )
+    ft_saturated_ms: Annotated[Number, Usual(10.0, 200.0, "ms")] = Field(
+        default=100.0, ge=2, le=500, examples=[100.0]
+    )
+    contact_force: Annotated[Number, Usual(30.0, 120.0, "N")] = Field(
+        default=100.0, ge=5, le=200, examples=[100.0]
+    )
+    contact_force_hold: Annotated[Number, Usual(40.0, 180.0, "N")] = Field(
+        default=150.0, ge=5, le=250, examples=[150.0]
+    )
+    contact_moment: Annotated[Number, Usual(1.0, 12.0, "N m")] = Field(
+        default=10.0, ge=0.5, le=20, examples=[10.0]
+    )
+    contact_moment_hold: Annotated[Number, Usual(1.5, 18.0, "N m")] = Field(
+        default=15.0, ge=0.5, le=25, examples=[15.0]
+    )
+    contact_growth: Annotated[Number, Usual(15.0, 80.0, "N")] = Field(
+        default=40.0, ge=5, le=150, examples=[40.0]
+    )
+    late_per_second: Annotated[Whole, Usual(1, 20, "cycles/s", real=20)] = Field(
+        ge=1, le=RATE_HZ, examples=[10]
+    )
+    tare_spread: Annotated[Number, Usual(0.1, 1.5, "N")] = Field(
+        ge=0.05, le=3, examples=[0.5]
+    )
+    residual: Annotated[Number, Usual(0.3, 2.0, "N")] = Field(
+        default=1.0, ge=0.1, le=5, examples=[1.0]
+    )
+    free_disk_gb: Annotated[Number, Usual(1.0, 30.0, "GB")] = Field(
+        ge=0, le=100000, examples=[5.0]
+    )
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
@@ -150,17 +230,17 @@ class LimitSection(SettingsSection):
         return {name: getattr(self, name) for name in names}
 
 
+_ModuleSpeed = Annotated[Number, Field(gt=0, le=1.5), Usual(0.1, 1.2, "m/s")]
+_ModuleTorque = Annotated[Whole, Field(gt=0, le=8100), Usual(500, 7000, "puck units")]
+
+
 class SafetySection(SettingsSection):
     """What the safety module tolerates; a warning left out is 0.9 of its fault."""
 
-    speed_warning: Annotated[Number, Field(gt=0, le=2)] | None = Field(
-        default=None, examples=[0.5]
-    )
-    speed_fault: Number = Field(gt=0, le=2, examples=[1.0])
-    torque_warning_units: Annotated[Whole, Field(gt=0, le=8191)] | None = Field(
-        default=None, examples=[4731]
-    )
-    torque_fault_units: Whole = Field(gt=0, le=8191, examples=[5204])
+    speed_warning: _ModuleSpeed | None = Field(default=None, examples=[0.5])
+    speed_fault: _ModuleSpeed = Field(examples=[1.0])
+    torque_warning_units: _ModuleTorque | None = Field(default=None, examples=[4731])
+    torque_fault_units: _ModuleTorque = Field(examples=[5204])
 
 
 # What the module does by itself after power-up.
@@ -181,8 +261,12 @@ class LoopSection(SettingsSection):
         test_time: the preflight measures the loop for so long.
     """
 
-    spin_us: Number = Field(default=0.0, ge=0, le=500, examples=[0])
-    test_time: Number = Field(default=5.0, ge=0.5, le=3600, examples=[5])
+    spin_us: Annotated[Number, Usual(0.0, 300.0, "us")] = Field(
+        default=0.0, ge=0, le=500, examples=[0]
+    )
+    test_time: Annotated[Number, Usual(1.0, 30.0, "s")] = Field(
+        default=5.0, ge=0.5, le=3600, examples=[5]
+    )
 
 
 class OperatorSection(SettingsSection):
@@ -212,7 +296,9 @@ class CameraSection(SettingsSection):
 
     command: str = Field(default="", examples=["fswebcam --no-banner {path}"])
     folder: str = Field(default="", max_length=4096, examples=["photos"])
-    seconds: Number = Field(default=10.0, gt=0, le=60, examples=[10])
+    seconds: Annotated[Number, Usual(0.0, 30.0, "s")] = Field(
+        default=10.0, gt=0, le=60, examples=[10]
+    )
 
     @field_validator("command")
     @classmethod

@@ -194,7 +194,7 @@ class BarrettSection(SensorSection):
 
     kind: Literal["barrett"] = Field(examples=["barrett"])
     port: str = Field(default="none", examples=["none"])
-    baudrate: Whole = Field(default=1_000_000, gt=0, examples=[1_000_000])
+    baudrate: Whole = Field(default=1_000_000, gt=0, le=4_000_000, examples=[1_000_000])
 
     @property
     def is_on_bus(self) -> bool:

@@ -1,13 +1,13 @@
 """A Bota sensor of generation 1: from any mode to a stream to be trusted."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from acquisition.clock import NS_PER_S
 from acquisition.errors import DeviceFaultError, LinkTimeoutError, SettingsError
-from acquisition.settings import Positive, Whole
+from acquisition.settings import Number, Usual, Whole
 from ft_sensor.reading import Reading, StreamTiming, Wrench
 from ft_sensor.section import SensorSection
 from ft_sensor.serial_line.framing import FrameScanner, wire_time_ns
@@ -205,6 +205,11 @@ def _is_plausible(readings: list[Reading]) -> bool:
     return sum(good) >= _PLAUSIBLE_OF_TEN
 
 
+_Force = Annotated[Number, Field(ge=10, le=5000), Usual(50.0, 2500.0, "N")]
+_Moment = Annotated[Number, Field(ge=0.5, le=200), Usual(1.0, 50.0, "N m")]
+_Ranges = tuple[_Force, _Force, _Force, _Moment, _Moment, _Moment]
+
+
 class BotaSection(SensorSection):
     """[ft_sensor] of a Bota sensor.
 
@@ -214,11 +219,9 @@ class BotaSection(SensorSection):
     """
 
     kind: Literal["bota"] = Field(examples=["bota"])
-    baudrate: Whole = Field(default=BAUDRATE, gt=0, examples=[BAUDRATE])
+    baudrate: Whole = Field(default=BAUDRATE, gt=0, le=4_000_000, examples=[BAUDRATE])
     sinc: Whole = Field(default=64, ge=51, le=512, examples=[64])
-    ranges: tuple[Positive, Positive, Positive, Positive, Positive, Positive] | None = (
-        Field(default=None, examples=[[*RANGES]])
-    )
+    ranges: _Ranges | None = Field(default=None, examples=[[*RANGES]])
 
     def build(self, line: PortSettings) -> BotaDevice:
         """Return the sensor at the end of `line`."""

@@ -1,13 +1,13 @@
 """An OptoForce / OnRobot HEX sensor: matched to its report, set up, started."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from acquisition.clock import NS_PER_S
 from acquisition.errors import DeviceFaultError, LinkTimeoutError, SettingsError
-from acquisition.settings import Six, Whole
+from acquisition.settings import Number, Usual, Whole
 from ft_sensor.reading import Reading, StreamTiming, Wrench
 from ft_sensor.section import SensorSection
 from ft_sensor.serial_line.framing import FrameScanner, wire_time_ns
@@ -175,13 +175,18 @@ class OptoForceDevice:
             )
 
 
+_Count = Annotated[
+    Number, Field(ge=-5000, le=5000), Usual(-1500.0, 1500.0, "counts per N or N m")
+]
+
+
 class OptoForceSection(SensorSection):
     """[ft_sensor] of a HEX sensor; its options are those of `OptoForceSettings`."""
 
     kind: Literal["optoforce"] = Field(examples=["optoforce"])
-    baudrate: Whole = Field(default=BAUDRATE, gt=0, examples=[BAUDRATE])
-    filter_hz: Whole = Field(default=150, ge=0, examples=[150])
-    sensitivity: Six | None = Field(
+    baudrate: Whole = Field(default=BAUDRATE, gt=0, le=4_000_000, examples=[BAUDRATE])
+    filter_hz: Whole = Field(default=150, ge=0, le=1000, examples=[150])
+    sensitivity: tuple[_Count, _Count, _Count, _Count, _Count, _Count] | None = Field(
         default=None, examples=[[18.28, 18.41, 2.12, 278.72, 259.55, 448.47]]
     )
     serial_number: str | None = Field(

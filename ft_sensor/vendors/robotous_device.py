@@ -251,9 +251,9 @@ class RobotousSection(SensorSection):
     """[ft_sensor] of a Robotous sensor; its options are those of `RobotousSettings`."""
 
     kind: Literal["robotous"] = Field(examples=["robotous"])
-    baudrate: Whole = Field(default=BAUDRATE, gt=0, examples=[BAUDRATE])
-    rate: Whole = Field(default=1000, gt=0, examples=[1000])
-    filter_hz: Whole = Field(default=150, ge=0, examples=[150])
+    baudrate: Whole = Field(default=BAUDRATE, gt=0, le=4_000_000, examples=[BAUDRATE])
+    rate: Whole = Field(default=1000, gt=0, le=2000, examples=[1000])
+    filter_hz: Whole = Field(default=150, ge=0, le=1000, examples=[150])
 
     def build(self, line: PortSettings) -> RobotousDevice:
         """Return the sensor at the end of `line`."""

@@ -131,7 +131,7 @@ def test_a_torque_warning_left_out_is_nine_tenths_of_its_fault(tmp_path):
         (
             "speed_fault = 1.0",
             "speed_fault = 0",
-            "rig.toml: safety.speed_fault = 0 - expected a number > 0 and <= 2, e.g. 1",
+            "rig.toml: safety.speed_fault = 0 - expected a number > 0 and <= 1.5 m/s",
         ),
         (
             "torque_fault_units = 5204",
@@ -141,7 +141,7 @@ def test_a_torque_warning_left_out_is_nine_tenths_of_its_fault(tmp_path):
         (
             "speed_warning = 0.5",
             "speed_warning = -1",
-            "rig.toml: safety.speed_warning = -1 - expected greater than 0, e.g. 0.5",
+            "rig.toml: safety.speed_warning = -1 - expected a number > 0 and <= 1.5",
         ),
     ],
 )

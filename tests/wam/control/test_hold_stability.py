@@ -10,6 +10,7 @@ import importlib
 import numpy as np
 import pytest
 
+from experiments.settings.rig import LOCK_DAMPING, ControlSection
 from fakes.plant.model import arm_and_hand
 from tests.fakes.scenes import CONSTANTS, FRAME, START_Q, TOOL
 from wam.control.joint_lock import LockGains
@@ -36,18 +37,18 @@ def inertia(q):
 HOLD = PositionHold(CONSTANTS)
 
 
-def gains(scale, damping):
+def gains(scale, damping, lock):
     """Return (stiffness, damping, damping on the raw velocity), shape (7, 7) each."""
     k, d = (np.diag(scale * g) for g in (HOLD.stiffness, damping))
     raw = np.zeros((7, 7))
-    k[6, 6], raw[6, 6] = LOCK.kp, LOCK.kd
+    k[6, 6], raw[6, 6] = lock.kp, lock.kd
     return k, d, raw
 
 
-def modes(q, scale, damping=HOLD.damping):
+def modes(q, scale, damping=HOLD.damping, lock=LOCK, delay=DELAY):
     """Return the logarithms of the cycle's eigenvalues over time [1/s]."""
     one, none = np.eye(7), np.zeros((7, 7))
-    k, d, raw = gains(scale, damping)
+    k, d, raw = gains(scale, damping, lock)
     share = ArmSettings().velocity_pole * T
     share /= 1.0 + share
     # State: q, qd, q before, filtered velocity before, torque before.
@@ -59,7 +60,7 @@ def modes(q, scale, damping=HOLD.damping):
     torque = -k @ position - d @ filtered - raw @ difference
     before = np.hstack([none, none, none, none, one])
     velocity = np.hstack([none, one, none, none, none])
-    early, late = DELAY * T, (1 - DELAY) * T
+    early, late = delay * T, (1 - delay) * T
     mobility = np.linalg.inv(inertia(q))
     step = np.vstack(
         [
@@ -102,6 +103,25 @@ def test_an_arm_that_is_guided_is_stable_in_every_pose():
 def test_twice_the_gains_of_the_hold_are_stable_and_six_times_are_not():
     assert max(modes(q, 2.0).real.max() for q in poses()) < 0.0
     assert max(modes(q, 6.0).real.max() for q in poses()) > 0.0
+
+
+def growth(kp, kd):
+    """Return how fast the worst motion grows [1/s] with torques a whole cycle late."""
+    lock = LockGains(kp=kp, kd=kd)
+    return max(modes(q, 1.0, lock=lock, delay=1.0).real.max() for q in poses())
+
+
+def test_every_lock_that_rig_toml_may_ask_for_bears_a_whole_cycle_of_delay():
+    fields = ControlSection.model_fields
+    kp, kd = (
+        next(c.le for c in fields[name].metadata if hasattr(c, "le"))
+        for name in ("lock_kp", "lock_kd")
+    )
+    for stiffness in (0.25 * kp, 0.5 * kp, 0.75 * kp, kp):
+        for damping in (LOCK_DAMPING * stiffness, kd):
+            assert growth(stiffness, damping) < -1.0
+    assert growth(30.0, 0.25) > 0.0  # what was allowed once
+    assert growth(kp, 0.5 * LOCK_DAMPING * kp) > 0.0
 
 
 def test_the_inertia_is_that_of_the_simulated_arm():

@@ -1,0 +1,117 @@
+"""Numbers of settings: their bounds in words, what was meant, what a sound rig has not.
+
+Bounds, unit and usual values stand beside each number in its section and are read here:
+beyond its bounds a number is refused, beyond what is usual it is warned of.
+"""
+
+from collections.abc import Iterator
+from typing import Any, cast, get_args
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from acquisition.settings import Usual
+
+_NUMBERS: dict[object, str] = {int: "a whole number", float: "a number"}
+_BOUNDS = (("gt", ">"), ("ge", ">="), ("lt", "<"), ("le", "<="))
+_DEGREE = 0.017453292519943295  # rad
+# By unit: others that numbers are found in, in this unit.
+_OTHERS: dict[str, tuple[tuple[str, float], ...]] = {
+    "rad": (("degrees", _DEGREE),),
+    "rad/s": (("degrees/s", _DEGREE),),
+    "degrees": (("rad", 1.0 / _DEGREE),),
+    "m": (("cm", 0.01), ("mm", 0.001)),
+    "m/s": (("cm/s", 0.01), ("mm/s", 0.001)),
+    "kg": (("g", 0.001),),
+    "kg m^2": (("kg cm^2", 1e-4), ("kg mm^2", 1e-6), ("g cm^2", 1e-7)),
+    "N m": (("N cm", 0.01), ("N mm", 0.001)),
+    "ms": (("us", 0.001), ("s", 1000.0)),
+    "us": (("ns", 0.001), ("ms", 1000.0)),
+    "mrad": (("rad", 1000.0), ("degrees", 1000.0 * _DEGREE)),
+    "s": (("ms", 0.001),),
+}
+_DECIMAL_POINT = (0.1, 0.01, 0.001, 10.0, 100.0)
+
+
+def number_at(field: FieldInfo | None, item: int | None) -> FieldInfo | None:
+    """Return what stands in a `field`, or at an `item` of it, if that is a number."""
+    while field is not None and field.annotation not in _NUMBERS:
+        kinds = [kind for kind in get_args(field.annotation) if kind is not type(None)]
+        if item is not None and len(kinds) > 1:
+            kinds, item = kinds[item : item + 1], None
+        # An optional number is a union with none; a list of any length has one kind.
+        field = FieldInfo.from_annotation(kinds[0]) if len(kinds) == 1 else None
+    return field
+
+
+def number_words(number: FieldInfo, got: object) -> tuple[str, str]:
+    """Return what a number should be, with bounds and unit; and what may be meant."""
+    usual = _usual(number)
+    unit = usual.unit if usual else ""
+    bounds = [
+        f"{sign} {getattr(constraint, name)}"
+        for constraint in number.metadata
+        for name, sign in _BOUNDS
+        if hasattr(constraint, name)
+    ]
+    words = f"{_NUMBERS[number.annotation]} {' and '.join(bounds)} {unit}".strip()
+    return words, _meant(number, got)
+
+
+def _usual(number: FieldInfo) -> Usual | None:
+    return next((each for each in number.metadata if isinstance(each, Usual)), None)
+
+
+def _meant(number: FieldInfo, got: object) -> str:
+    """Return the likely mistake behind a number as a question; "" = none is likely."""
+    if not isinstance(got, int | float) or isinstance(got, bool):
+        return ""
+    usual, value = _usual(number), float(got)
+    if usual is None:
+        return ""
+
+    def is_usual(factor: float) -> bool:
+        return value != 0.0 and usual.low <= factor * value <= usual.high
+
+    for unit, factor in _OTHERS.get(usual.unit, ()):
+        if is_usual(factor):
+            return f" - is it in {unit}?"
+    if is_usual(-1.0):
+        return " - is its sign right?"
+    if any(is_usual(factor) for factor in _DECIMAL_POINT):
+        return " - is its decimal point right?"
+    return ""
+
+
+def unusual_numbers(section: BaseModel, place: str = "") -> Iterator[str]:
+    """Yield a sentence for each number within its bounds that no sound rig has."""
+    for name, field in type(section).model_fields.items():
+        here = f"{place}.{name}".lstrip(".")
+        value: Any = getattr(section, name)
+        items = cast("tuple[Any, ...]", value) if isinstance(value, tuple) else (value,)
+        for index, each in enumerate(items):
+            item = index if isinstance(value, tuple) else None
+            there = here if item is None else f"{here}[{item}]"
+            if isinstance(each, BaseModel):
+                yield from unusual_numbers(each, there)
+                continue
+            number = number_at(field, item)
+            usual = _usual(number) if number and each is not None else None
+            if number and usual and not usual.low <= each <= usual.high:
+                band = f"{usual.low:g} to {usual.high:g} {usual.unit}".rstrip()
+                yield f"{there} = {each:g}, usual is {band}{_meant(number, each)}"
+
+
+def beyond_real(section: BaseModel, place: str = "") -> str:
+    """Return what no real arm may have of the numbers, "" where there is nothing."""
+    for name, field in type(section).model_fields.items():
+        here, value = f"{place}.{name}".lstrip("."), getattr(section, name)
+        if isinstance(value, BaseModel):
+            if found := beyond_real(value, here):
+                return found
+            continue
+        number = number_at(field, None)
+        usual = _usual(number) if number else None
+        if usual and usual.real is not None and value > usual.real:
+            return f"{here} = {value:g} - expected <= {usual.real:g} {usual.unit}"
+    return ""
