@@ -81,6 +81,11 @@ def axis_names(mask: int) -> tuple[str, ...]:
     return tuple(name for axis, name in enumerate(AXES) if mask >> axis & 1)
 
 
+def largest_load(ranges: Wrench) -> tuple[float, float]:
+    """Return force [N] and moment [N m] that are measured in whatever direction."""
+    return min(ranges[:3]), min(ranges[3:])
+
+
 def largest_traction(ranges: Wrench, lever: float) -> float:
     """Return the largest horizontal force at the sole that can be measured [N].
 

@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from acquisition.settings import File, Number, SettingsSection, Usual, Whole
+from ft_sensor.reading import Wrench
 from ft_sensor.serial_line.link import PortSettings
 from ft_sensor.serial_line.sensor import SerialDevice
 
@@ -33,6 +34,10 @@ class SensorSection(SettingsSection):
     def is_on_bus(self) -> bool:
         """Whether it is asked over the arm's bus and has no port."""
         return False
+
+    def known_ranges(self) -> Wrench | None:
+        """Return what it measures at most [N, N m]; None = it has to be asked."""
+        return None
 
     def build(self, line: PortSettings) -> SerialDevice | None:
         """Return the serial sensor at the end of `line`; None if it is on the bus.

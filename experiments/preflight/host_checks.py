@@ -12,7 +12,8 @@ from experiments.messages import preflight_error
 from experiments.operator.console import BAD, GOOD, WARNING
 from experiments.preflight.page import Add, CheckResult
 from experiments.rig.rig import Rig
-from ft_sensor.reading import axis_names, largest_traction
+from experiments.settings.rig import CONTACT_LIMITS, WITHIN_RANGE, RigSettings
+from ft_sensor.reading import axis_names, largest_load, largest_traction
 from ft_sensor.serial_line.sensor import BURSTY
 from wam.bus.kernel_door import LONGEST_QUEUE, interface_state
 from wam.calibration.friction_file import friction_from_toml
@@ -128,6 +129,33 @@ def reach_words(fields: Mapping[str, str], lever: float) -> str:
     fx, fy, fz, tx, ty, tz = map(float, fields["ranges"].split())
     most = largest_traction((fx, fy, fz, tx, ty, tz), lever)
     return f"F_t up to {most:.0f} N"
+
+
+def check_contact_limits(
+    rig: RigSettings, fields: Mapping[str, str]
+) -> CheckResult | None:
+    """Grade the limits of contact by what the sensor measures; None = all within.
+
+    Args:
+        rig: the settings; a sensor whose range they know has lowered them.
+        fields: what the sensor says about itself; "ranges" has six numbers [N, N m].
+    """
+    lowered = [f"{name} {most:g}" for name, most in rig.lowered_limits().items()]
+    if lowered:
+        text = f"{', '.join(lowered)}: {WITHIN_RANGE:g} of the sensor's range"
+        return CheckResult(GOOD, "contact limits", text)
+    fx, fy, fz, tx, ty, tz = map(float, fields["ranges"].split())
+    force, moment = largest_load((fx, fy, fz, tx, ty, tz))
+    limits = rig.guard_limits()
+    beyond = [
+        f"{name} = {limits[name]:g} > {most:g}"
+        for name in CONTACT_LIMITS
+        if limits[name] > (most := moment if "moment" in name else force)
+    ]
+    if not beyond:
+        return None
+    text = f"beyond the sensor's range, never seen: {', '.join(beyond)}"
+    return CheckResult(WARNING, "contact limits", text)
 
 
 def check_stream(fields: Mapping[str, str]) -> CheckResult | None:

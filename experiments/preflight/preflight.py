@@ -15,6 +15,7 @@ from experiments.preflight.connecting import as_preflight, not_reached
 from experiments.preflight.host_checks import (
     DiskProbe,
     check_code,
+    check_contact_limits,
     check_disk,
     check_governor,
     check_interface,
@@ -171,6 +172,9 @@ def _check_sensor(rig: Rig, arm_state: str, add: Add) -> dict[str, str]:
         raise as_preflight(error, arm_state) from error
     name = f"{fields['model']}, {fields['measured_rate']}"
     add(GOOD, "F/T sensor", f"{name}, {reach_words(fields, _lever(rig))}")
+    result = check_contact_limits(rig.settings.rig, fields)
+    if result is not None:
+        add(result.mark, result.name, result.text)
     return fields
 
 

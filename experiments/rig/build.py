@@ -75,7 +75,7 @@ def build_limits(rig: RigSettings, constants: ArmConstants) -> GuardLimits:
     return GuardLimits(
         q_lower=tuple(constants.q_lower.tolist()),
         q_upper=tuple(constants.q_upper.tolist()),
-        **rig.limits.of_guard(),
+        **rig.guard_limits(),
     )
 
 

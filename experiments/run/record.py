@@ -47,8 +47,8 @@ def recording_screen(
     rig: Rig, trial: str, outcome: TrialOutcome
 ) -> Callable[[int], list[str]]:
     """Return what draws trial `trial`, whose `outcome` is kept up to date."""
-    loop_client, limits = rig.backend.loop_client, rig.settings.rig.limits
-    scales = LiveScales(limits.foot_speed, limits.contact_force)
+    loop_client, limits = rig.backend.loop_client, rig.settings.rig.guard_limits()
+    scales = LiveScales(limits["foot_speed"], limits["contact_force"])
     skipped_before = loop_client.loop.skipped
 
     def lines(width: int) -> list[str]:

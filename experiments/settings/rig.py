@@ -14,8 +14,17 @@ from acquisition.settings import (
     Usual,
     Whole,
 )
+from ft_sensor.reading import largest_load
 from ft_sensor.vendors.registry import AnySensor
 
+WITHIN_RANGE = 0.9  # of the sensor's range: a default limit of contact
+CONTACT_LIMITS = (
+    "contact_force",
+    "contact_force_hold",
+    "contact_moment",
+    "contact_moment_hold",
+    "contact_growth",
+)
 LOCK_DAMPING = 0.0075  # s, least lock_kd over lock_kp: see `ControlSection`
 _Turn = Annotated[Whole, Field(ge=0, lt=65536)]  # counts of one motor turn
 _Angle = Annotated[Number, Field(ge=-6.3, le=6.3), Usual(-4.0, 4.0, "rad")]
@@ -166,7 +175,8 @@ class LimitSection(SettingsSection):
     `tare_spread`, `residual` and `free_disk_gb` are looked at between trials. The
     contact of a push: up to 60 N along the ground, 30 N across it. A trial ends at 100
     N and the arm holds at 150 N, and at their moments with the foot's 0.1 m between
-    sole and sensor; forces that are left out have these values.
+    sole and sensor; what is left out or has these values is 0.9 of the range of a
+    sensor that measures less, see `RigSettings.lowered_limits`.
     """
 
     speed: _Speeds = Field(examples=[[1.5, 1.5, 2.0, 2.5, 4.0, 4.0, 4.0]])
@@ -327,3 +337,44 @@ class RigSettings(SettingsSection):
     operator: OperatorSection = OperatorSection()
     camera: CameraSection = CameraSection()
     safety: SafetySection = _POWER_UP
+
+    @model_validator(mode="after")
+    def _is_measured(self) -> Self:
+        for name, (most, unit) in self._measured().items():
+            limit = getattr(self.limits, name)
+            if limit > most and limit != LimitSection.model_fields[name].default:
+                raise ValueError(
+                    f"limits.{name} = {limit:g} {unit} is beyond the {most:g} {unit} "
+                    f"that the {self.ft_sensor.kind} sensor measures"
+                )
+        return self
+
+    def lowered_limits(self) -> dict[str, float]:
+        """Return the contact limits of the guard that the fitted sensor lowers.
+
+        A limit that has its default value is `WITHIN_RANGE` of what the sensor measures
+        at most; none that ends a trial is above that of hold.
+        """
+        lowered: dict[str, float] = {}
+        for name, (most, _) in self._measured().items():
+            field, limit = LimitSection.model_fields[name], getattr(self.limits, name)
+            ends = name.removesuffix("_hold")
+            least = lowered.get(ends, getattr(self.limits, ends)) if ends != name else 0
+            if limit == field.default and limit > max(WITHIN_RANGE * most, least):
+                lowered[name] = max(WITHIN_RANGE * most, least)
+        return lowered
+
+    def guard_limits(self) -> dict[str, Any]:
+        """Return the limits of the guard as it has them, with this sensor."""
+        return {**self.limits.of_guard(), **self.lowered_limits()}
+
+    def _measured(self) -> dict[str, tuple[float, str]]:
+        """Return by contact limit what the sensor measures at most, with the unit."""
+        ranges = self.ft_sensor.known_ranges()
+        if ranges is None:
+            return {}
+        force, moment = largest_load(ranges)
+        return {
+            name: (moment, "N m") if "moment" in name else (force, "N")
+            for name in CONTACT_LIMITS
+        }

@@ -9,6 +9,7 @@ from acquisition.clock import Clock
 from acquisition.devices import WrenchSample
 from acquisition.errors import DeviceFaultError, LinkTimeoutError
 from acquisition.settings import Whole
+from ft_sensor.reading import Wrench
 from ft_sensor.section import SensorSection
 from ft_sensor.serial_line.link import PortSettings
 from ft_sensor.vendors.barrett_frames import (
@@ -195,6 +196,10 @@ class BarrettSection(SensorSection):
     kind: Literal["barrett"] = Field(examples=["barrett"])
     port: str = Field(default="none", examples=["none"])
     baudrate: Whole = Field(default=1_000_000, gt=0, le=4_000_000, examples=[1_000_000])
+
+    def known_ranges(self) -> Wrench:
+        """Return what it measures at most [N, N m]."""
+        return RANGES
 
     @property
     def is_on_bus(self) -> bool:

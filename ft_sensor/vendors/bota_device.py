@@ -223,6 +223,10 @@ class BotaSection(SensorSection):
     sinc: Whole = Field(default=64, ge=51, le=512, examples=[64])
     ranges: _Ranges | None = Field(default=None, examples=[[*RANGES]])
 
+    def known_ranges(self) -> Wrench:
+        """Return what it measures at most [N, N m]."""
+        return self.ranges or RANGES
+
     def build(self, line: PortSettings) -> BotaDevice:
         """Return the sensor at the end of `line`."""
         settings = BotaSettings(self.sinc, ranges=self.ranges or RANGES)

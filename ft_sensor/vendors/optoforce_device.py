@@ -1,6 +1,7 @@
 """An OptoForce / OnRobot HEX sensor: matched to its report, set up, started."""
 
 from dataclasses import dataclass
+from math import inf
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -55,6 +56,14 @@ class OptoForceSettings:
             )
 
 
+def _full_range(sensitivity: Wrench) -> Wrench:
+    """Return the wrench at full counts [N, N m]; an axis without counts has no end."""
+    fx, fy, fz, tx, ty, tz = (
+        abs(optoforce.FULL_COUNTS / value) if value else inf for value in sensitivity
+    )
+    return fx, fy, fz, tx, ty, tz
+
+
 class OptoForceDevice:
     """Implements `ft_sensor.serial_line.sensor.SerialDevice` for a HEX sensor.
 
@@ -72,9 +81,7 @@ class OptoForceDevice:
         period_ns = NS_PER_S / RATE
         line.require((BAUDRATE, 921600, 460800), optoforce.FRAME_SIZE, period_ns)
         self.line = line
-        full = (abs(optoforce.FULL_COUNTS / value) for value in settings.sensitivity)
-        fx, fy, fz, tx, ty, tz = full
-        self.ranges: Wrench = (fx, fy, fz, tx, ty, tz)
+        self.ranges = _full_range(settings.sensitivity)
         self.timing = StreamTiming(
             period_ns=period_ns,
             wire_ns=wire_time_ns(optoforce.FRAME_SIZE, line.baudrate),
@@ -192,6 +199,10 @@ class OptoForceSection(SensorSection):
     serial_number: str | None = Field(
         default=None, min_length=1, max_length=8, examples=["HEX00042"]
     )
+
+    def known_ranges(self) -> Wrench | None:
+        """Return what it measures at most [N, N m], if its report is given."""
+        return _full_range(self.sensitivity) if self.sensitivity else None
 
     def build(self, line: PortSettings) -> OptoForceDevice:
         """Return the sensor at the end of `line`.
