@@ -18,6 +18,7 @@ from acquisition.devices import BusCondition, SafetyMode
 from acquisition.errors import PreflightError, UnfitDeviceError
 from experiments.operator.keys import AFTER_FAULT
 from experiments.operator.prompts import Prompt
+from ft_sensor.weighing import WeightCause
 
 RESUME = "traction resume"
 REPORT = "traction report"
@@ -85,6 +86,18 @@ def preflight_error(name: str, **fields: object) -> PreflightError:
     )
 
 
+def weight_words(cause: WeightCause, **fields: object) -> dict[str, str]:
+    """Return what explains a wrong weight of the foot, as fields of a message.
+
+    Args:
+        cause: what explains it.
+        fields: foot, mass and `seen` mass [kg], turned [degrees], sign.
+    """
+    names = ("likely", "question", "remedy")
+    parts = zip(names, _WEIGHT_WORDS[cause], strict=True)
+    return {name: words.format_map(fields) for name, words in parts}
+
+
 def explanation(name: str) -> list[str]:
     """Return all there is to say about the message `name`, line by line."""
     message = CATALOGUE[name]
@@ -116,6 +129,29 @@ BUS_WORDS = {  # of a bus on which nothing can be asked
     BusCondition.FULL: "No device on the CAN bus acknowledges: its queue is full.",
     BusCondition.OFF: "The CAN controller has left the bus (bus-off).",
     BusCondition.UNHEARD: "No device on the CAN bus acknowledges.",
+}
+# What explains a weight of the foot that is not as expected; the question; the remedy.
+_WEIGHT_WORDS = {
+    WeightCause.MASS: (
+        "as if the foot weighed {seen:.3f} kg",
+        "Is feet.{foot}.mass {mass:.3f} kg right?",
+        "traction calibrate foot",
+    ),
+    WeightCause.SIGN: (
+        "as if the sensor had the other sign",
+        "Is ft_sensor.sign {sign:+.0f} right (+1 reads the load, -1 the reaction)?",
+        "traction calibrate sensor",
+    ),
+    WeightCause.TURNED: (
+        "as if the sensor were turned by {turned:.0f} degrees about z",
+        "Is ft_sensor.angle_deg right, and the sensor mounted as it was?",
+        "traction calibrate sensor",
+    ),
+    WeightCause.UNKNOWN: (
+        "which neither a mass, nor the other sign, nor a turned sensor explains",
+        "Is feet.{foot}.mass {mass:.3f} kg right?",
+        "traction calibrate foot",
+    ),
 }
 _HEARTBEAT = "heartbeat"  # the monitor of the loop's traffic
 _BUTTON = "other"  # the monitor that a pressed E-stop button shows

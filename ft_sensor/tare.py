@@ -1,4 +1,4 @@
-"""What the sensor shows while the foot touches nothing: tare, and proof of mounting."""
+"""The tare: what the sensor shows while the foot touches nothing."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 from acquisition.clock import NS_PER_S, RATE_HZ
 from acquisition.devices import WrenchSample
 from acquisition.errors import TractionError
-from ft_sensor.payload import Payload
-from wam.model.constants import Array
 
 Wrench = tuple[float, float, float, float, float, float]
 
@@ -92,42 +90,6 @@ def take_mean(
         deviation=cast("Wrench", tuple(wrenches.std(axis=0).tolist())),
         spread=spread,
         samples=len(samples),
-    )
-
-
-@dataclass(frozen=True, slots=True)
-class WeightChange:
-    """How the weight of the free foot turned in the sensor from one pose to another.
-
-    The sensor's bias is in both poses and cancels.
-
-    Attributes:
-        error: difference from what payload and mounting say [N].
-        turned: angle about z by which the sensor itself would have to be turned to see
-            it so [rad], -pi..pi.
-    """
-
-    error: float
-    turned: float
-
-
-def weight_change(
-    payload: Payload, rotations: Sequence[Array], readings: Sequence[Array]
-) -> WeightChange:
-    """Compare the change of the reading between two poses with that of the weight.
-
-    Args:
-        payload: what the sensor carries, and its mounting.
-        rotations: orientation of frame 7 in both poses, shape (3, 3) each.
-        readings: mean raw wrench there, the foot free [N, N m], shape (6,) each.
-    """
-    first, second = (payload.sign * payload.weight(R)[:3] for R in rotations)
-    expected = second - first
-    seen = (readings[1] - readings[0])[:3]
-    turned = np.arctan2(expected[1], expected[0]) - np.arctan2(seen[1], seen[0])
-    return WeightChange(
-        error=float(np.linalg.norm(seen - expected)),
-        turned=float((turned + np.pi) % (2.0 * np.pi) - np.pi),
     )
 
 

@@ -101,6 +101,7 @@ TESTS = {
         "tests/ft_sensor/test_observer.py",
     ),
     "ft_sensor/tare.py": ("tests/ft_sensor/test_tare.py",),
+    "ft_sensor/weighing.py": ("tests/ft_sensor/test_tare.py",),
     "experiments/session/reducer.py": ("tests/experiments/session/test_reducer.py",),
     "experiments/session/crash_recovery.py": (
         "tests/experiments/session/test_crash_recovery.py",
@@ -173,6 +174,7 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     ): _BELOW,
     (
         "ft_sensor/tare.py",
+        "ft_sensor/weighing.py",
         "lasted = float(times[-1] - times[0]) * count / (count - 1) if count > 1 "
         "else 0.0 -> lasted = float(times[-1] - times[0]) * count / (count - 1) "
         "if count > 1 else 1.0",

@@ -11,7 +11,7 @@ from experiments.run.console_loop import ConsoleLoop
 from experiments.run.pose_walk import PoseWalk
 from experiments.run.ready import activate
 from experiments.session.store import iso_utc
-from ft_sensor.calibration.fit import SensorFit, check_residual, fit_sensor
+from ft_sensor.calibration.fit import SensorFit, check_residual, fit_sensor, turn_words
 from ft_sensor.calibration.sensor_file import SensorCalibration
 from wam.calibration.free_space import FreeSpace
 from wam.calibration.poses import MeasurementPose, choose_orientations, plan_halts
@@ -67,7 +67,12 @@ class SensorGuide:
         fit = fit_sensor(rotations[:-1], readings[:-1], mounting)
         drift = float(np.linalg.norm(readings[-1, :3] - readings[0, :3]))
         self._say(fit, drift)
-        check_residual(fit, is_forced=is_forced)
+        free = None
+        if mounting is not None:
+            free = fit_sensor(rotations[:-1], readings[:-1])
+        else:
+            self._say_mounting(fit)
+        check_residual(fit, is_forced=is_forced, free=free)
         return SensorCalibration(
             fit=fit,
             foot=self._rig.row.foot,
@@ -106,6 +111,21 @@ class SensorGuide:
                 hint="Check the sensor's cable and load, then start again.",
             )
         return records["wrench"].mean(axis=0)
+
+    def _say_mounting(self, fit: SensorFit) -> None:
+        """Say where the sensor is not mounted as rig.toml has it."""
+        tool = self._rig.model.tool
+        assert tool is not None
+        if fit.sign != tool.sensor_sign:
+            self._console.say(
+                f"▲ rig.toml says sign {tool.sensor_sign:+.0f}: the sensor has the "
+                "other one. Its calibration goes before rig.toml."
+            )
+        elif turned := turn_words(tool.sensor_angle, fit.angle):
+            self._console.say(
+                f"▲ {turned} from angle_deg of rig.toml. Its calibration goes before "
+                "rig.toml."
+            )
 
     def _say(self, fit: SensorFit, drift: float) -> None:
         com = ", ".join(f"{1e3 * value:.1f}" for value in fit.com)

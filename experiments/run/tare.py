@@ -13,7 +13,7 @@ from acquisition.devices import WrenchSample
 from acquisition.errors import PreflightError, TractionError
 from acquisition.ipc.shared_sensor import unpack_wrenches
 from experiments.fault_injection.plan import FaultTrigger
-from experiments.messages import CATALOGUE, preflight_error
+from experiments.messages import CATALOGUE, preflight_error, weight_words
 from experiments.operator.console import GOOD
 from experiments.operator.prompts import Prompt
 from experiments.rig.rig import Rig
@@ -26,7 +26,8 @@ from experiments.session.states import Event
 from experiments.session.trial_files import write_next_tare
 from ft_sensor.calibration.sensor_file import SensorCalibration, sensor_from_toml
 from ft_sensor.payload import Payload
-from ft_sensor.tare import TareError, TareResult, take_mean, weight_change
+from ft_sensor.tare import TareError, TareResult, take_mean
+from ft_sensor.weighing import WeightChange, weight_change, weight_seen
 from wam.calibration.free_space import FreeSpace
 from wam.calibration.poses import MeasurementPose, plan_halts, tilted_pair
 from wam.model.constants import Array
@@ -111,11 +112,9 @@ def prove_mounting(services: RunServices) -> None:
         readings.append(np.array(mean.wrench))
     change = weight_change(rig.payload, rotations, readings)
     limit = rig.settings.rig.limits.residual
-    if change.error > limit:
-        turned = float(np.degrees(change.turned))
-        raise preflight_error(
-            "mounting", error=change.error, limit=limit, turned=turned
-        )
+    if change.error > limit or change.is_turned:
+        fields = {"error": change.error, "limit": limit}
+        raise preflight_error("mounting", **fields, **_likely(rig, change))
     services.say(
         f"{GOOD} mounting verified: {change.error:.1f} N off (limit {limit:.1f})"
     )
@@ -200,7 +199,7 @@ def _accept(context: RunContext, name: TrialName, result: TareResult) -> None:
     position = context.loop_client.latest()["position"][0]
     rotation = rig.model.sole_pose(position)[1]
     tared = rig.payload.tared(np.array(result.wrench), rotation)
-    _check_residual(rig, tared)
+    _check_residual(rig, tared, rotation)
     rig.tared, rig.tared_ns = tared, result.t_ns
     bias = tared.bias.tolist()
     context.loop_client.set_bias(bias)
@@ -224,14 +223,28 @@ def _close_bracket(context: RunContext) -> None:
     context.console_loop.run_aside(lambda: write_next_tare(folder, name, tare))
 
 
-def _check_residual(rig: Rig, tared: Payload) -> None:
+def _likely(rig: Rig, change: WeightChange) -> dict[str, str]:
+    """Return what explains a weight that is not as expected, for the messages."""
+    payload = rig.payload
+    return weight_words(
+        change.cause,
+        foot=rig.row.foot,
+        mass=payload.mass,
+        seen=abs(change.scale) * payload.mass,
+        turned=float(np.degrees(change.turned)),
+        sign=payload.sign,
+    )
+
+
+def _check_residual(rig: Rig, tared: Payload, rotation: Array) -> None:
     calibrations = rig.settings.calibrations
     known = known_bias(calibrations, rig.row.foot, is_simulated=rig.is_simulated)
     limit = rig.settings.rig.limits.residual
     residual = residual_force(tared, known) if known is not None else 0.0
-    if residual > limit:
-        fields = {"foot": rig.row.foot, "mass": rig.payload.mass}
-        raise preflight_error("residual", residual=residual, limit=limit, **fields)
+    if known is not None and residual > limit:
+        fields = {"residual": residual, "limit": limit}
+        change = weight_seen(tared, rotation, known)
+        raise preflight_error("residual", **fields, **_likely(rig, change))
 
 
 def _wait_still(services: RunServices, name: TrialName) -> None:

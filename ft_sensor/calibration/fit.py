@@ -15,11 +15,13 @@ from numpy.typing import NDArray
 
 from acquisition.errors import SettingsError
 from ft_sensor.payload import TerrainFrame, cross_matrix
+from ft_sensor.weighing import LARGEST_TURN
 from wam.model.constants import GRAVITY, Array
 
 FEWEST = 6  # orientations
 LARGEST_RESIDUAL = 0.3  # N rms; a sound sensor drifts by 0.2 between two poses
 LEAST_SPREAD = 0.15  # of the weight's direction: the smallest singular value, relative
+_LIGHTEST = 0.02  # kg, a weight that is surely seen
 _COARSE = np.radians(np.arange(-180.0, 180.0, 5.0))
 _FINE_STEPS = 40  # halvings of the bracket around the best coarse angle
 
@@ -72,6 +74,13 @@ def fit_sensor(
         angle = _search_angle(seen, forces) if mounting is None else mounting[0]
         fits.append((*_fit_forces(seen, forces, angle), sign))
     residual, angle, mass, bias, sign = min(fits, key=_cost)
+    if mounting is not None and mass < -_LIGHTEST:
+        raise SettingsError(
+            f"The foot's weight turns the other way in the sensor: its sign is not "
+            f"{sign:+.0f}.",
+            hint=f"Write sign = {-sign:.0f} into [ft_sensor] of rig.toml, or run "
+            "traction calibrate sensor.",
+        )
     if mass <= 0.0:
         raise SettingsError(
             "The readings do not change with the orientation.",
@@ -96,13 +105,38 @@ def _cost(fit: tuple[float, float, float, Array, float]) -> float:
     return residual if mass > 0.0 else np.inf
 
 
-def check_residual(fit: SensorFit, *, is_forced: bool) -> None:
+def turn_words(angle: float, other: float) -> str:
+    """Return that a sensor is turned from `angle` to `other` [rad], "" = it is not."""
+    turned = float(np.degrees((other - angle + np.pi) % (2.0 * np.pi) - np.pi))
+    if abs(turned) <= np.degrees(LARGEST_TURN):
+        return ""
+    return f"the sensor is turned by {turned:.0f} degrees about z"
+
+
+def check_residual(
+    fit: SensorFit, *, is_forced: bool, free: SensorFit | None = None
+) -> None:
     """Refuse a fit that explains too little.
 
+    Args:
+        fit: of the readings.
+        is_forced: a person accepts it.
+        free: of the same readings with the mounting fitted too; None = it was.
+
     Raises:
-        SettingsError: more than 0.15 N are left and it is not forced.
+        SettingsError: more than 0.3 N are left and it is not forced.
     """
     if fit.residual > LARGEST_RESIDUAL and not is_forced:
+        turned = ""
+        if free is not None and free.residual <= LARGEST_RESIDUAL:
+            turned = turn_words(fit.angle, free.angle)
+        if turned:
+            raise SettingsError(
+                f"The forces leave {fit.residual:.2f} N rms unexplained (limit "
+                f"{LARGEST_RESIDUAL}), and {free.residual if free else 0.0:.2f} where "
+                f"{turned}.",
+                hint="Mount it as it was, or run traction calibrate sensor.",
+            )
         raise SettingsError(
             f"The forces leave {fit.residual:.2f} N rms unexplained (limit "
             f"{LARGEST_RESIDUAL}).",
@@ -255,13 +289,17 @@ def check_terrain(
     Raises:
         SettingsError: the incline is more than 1 degree off and it is not forced.
     """
-    off = abs(fit.frame.incline - expected.incline)
-    if off > LARGEST_TILT and not is_forced:
+    if is_inclined_otherwise(fit, expected) and not is_forced:
         raise SettingsError(
             f"The container is inclined by {np.degrees(fit.frame.incline):.1f} "
             f"degrees, the matrix says {np.degrees(expected.incline):.1f} (limit 1.0).",
             hint="Is it the right terrain? Level it, touch again, or add --force.",
         )
+
+
+def is_inclined_otherwise(fit: ContainerFit, expected: TerrainFrame) -> bool:
+    """Return whether a touched container is not inclined as its row says."""
+    return abs(fit.frame.incline - expected.incline) > LARGEST_TILT
 
 
 def _check_corners(points: NDArray[np.float64], far: Array, near: Array) -> None:

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from acquisition.devices import WrenchSample
-from ft_sensor.tare import TareError, take_mean, weight_change
+from ft_sensor.tare import TareError, take_mean
+from ft_sensor.weighing import WeightCause, weight_change, weight_seen
 from tests.ft_sensor.test_payload import attitude, mounted
 
 PERIOD_NS = 1_250_000
@@ -166,4 +167,52 @@ def test_a_turned_sensor_is_seen_with_its_angle(example_tool, degrees):
 
 
 def test_the_other_sign_is_seen(example_tool):
-    assert change_of(example_tool, mounted(example_tool, sign=-1.0)).error > 5.0
+    change = change_of(example_tool, mounted(example_tool, sign=-1.0))
+    assert change.error > 5.0
+    assert (change.cause, change.is_turned) == (WeightCause.SIGN, False)
+
+
+@pytest.mark.parametrize("degrees", [-20.0, 20.0, 90.0])
+def test_a_turn_is_neither_mass_nor_sign(example_tool, degrees):
+    change = change_of(example_tool, mounted(example_tool, angle=np.radians(degrees)))
+    assert (change.cause, change.is_turned) == (WeightCause.TURNED, True)
+
+
+def test_a_turn_of_a_sound_sensor_is_none(example_tool):
+    turned = mounted(example_tool, angle=np.radians(8.0))
+    assert not change_of(example_tool, turned).is_turned
+
+
+def test_a_light_foot_shows_a_turned_sensor_too(example_tool):
+    """Its error is below the limit of 1 N that a heavier one is held to."""
+    foot = replace(example_tool.foot, mass=0.2)
+    light = replace(example_tool, foot=foot)
+    change = change_of(light, mounted(light, angle=np.radians(20.0)))
+    assert change.error < 1.0
+    assert change.is_turned
+
+
+@pytest.mark.parametrize("scale", [0.5, 1.5])
+def test_a_wrong_mass_is_a_wrong_mass(example_tool, scale):
+    foot = replace(example_tool.foot, mass=scale * example_tool.foot.mass)
+    change = change_of(example_tool, mounted(replace(example_tool, foot=foot)))
+    assert change.cause is WeightCause.MASS
+    assert change.scale == pytest.approx(scale)
+
+
+def test_a_touch_is_none_of_them(example_tool):
+    payload = mounted(example_tool)
+    readings = [payload.sign * payload.weight(R) for R in POSES]
+    readings[1][:3] += np.cross(readings[1][:3] - readings[0][:3], [0.0, 0.0, 0.4])
+    readings[1][:3] += [1.0, -2.0, 3.0]
+    assert weight_change(payload, POSES, readings).cause is WeightCause.UNKNOWN
+
+
+def test_a_single_tare_tells_sign_from_mass_too(example_tool):
+    payload, pose = mounted(example_tool), POSES[1]
+    known = np.full(6, 0.7)
+    for factor, cause in ((-1.0, WeightCause.SIGN), (1.4, WeightCause.MASS)):
+        reading = known + factor * payload.sign * payload.weight(pose)
+        change = weight_seen(payload.tared(reading, pose), pose, known)
+        assert change.cause is cause
+        assert change.scale == pytest.approx(factor)
