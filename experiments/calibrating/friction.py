@@ -75,6 +75,7 @@ class FrictionGuide:
             gravity=rig.settings.rig.gravity.model,
             measured_utc=iso_utc(rig.clock.utc_ns()),
             is_simulated=rig.is_simulated,
+            is_forced=is_forced,
         )
 
     def page(

@@ -16,6 +16,7 @@ from wam.model.constants import Array
 from wam.model.moments import (
     MomentFit,
     ZeroErrors,
+    check_drawings,
     check_fit,
     check_zeros,
     fit_moments,
@@ -95,20 +96,24 @@ class GravityGuide:
         self._say_residuals(fit, measured)
         zeros = zero_errors(rig.model.constants, q, fit)
         self._say_zeros(zeros)
+        tool = rig.model.tool
+        assert tool is not None
         if not is_forced:
             check_fit(fit)
             check_zeros(zeros)
-        assert rig.model.tool is not None
+            bodies = (tool.sensor, tool.foot)
+            check_drawings(rig.model.constants, fit.mus, bodies, q)
         return GravityCalibration(
             mus=fit.mus,
             residual=fit.residual,
             rank=fit.rank,
             foot=rig.row.foot,
-            tool=rig.model.tool,
+            tool=tool,
             measured_utc=iso_utc(rig.clock.utc_ns()),
             is_simulated=rig.is_simulated,
             poses=q,
             torques=tau,
+            is_forced=is_forced,
         )
 
     def _say_zeros(self, zeros: ZeroErrors) -> None:

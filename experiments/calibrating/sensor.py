@@ -81,6 +81,7 @@ class SensorGuide:
             is_simulated=self._rig.is_simulated,
             rotations=rotations,
             readings=readings,
+            is_forced=is_forced,
         )
 
     def _measure(self, halts: Sequence[MeasurementPose]) -> list[tuple[Array, Array]]:

@@ -180,12 +180,15 @@ def _terrain(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> 
     from experiments.calibrating.terrain import TerrainGuide
     from experiments.session.data_files import write_new_text
     from experiments.session.store import iso_utc
+    from experiments.settings.calibrations import FORCED
     from ft_sensor.calibration.files import terrain_to_toml
+    from ft_sensor.calibration.fit import is_inclined_otherwise
 
     rig = console_loop.rig
     fit, points = TerrainGuide(console_loop).run(is_forced=args.force)
     fields = {
         "simulated": str(rig.is_simulated).lower(),
+        FORCED: str(is_inclined_otherwise(fit, rig.frame)).lower(),
         "measured_utc": iso_utc(rig.clock.utc_ns()),
         "residual": f"{fit.residual:.6f}",
         "roll": f"{fit.roll:.6f}",

@@ -36,7 +36,7 @@ _EXEMPT = (
     "rig.loop.",
     "rig.operator.",
     "rig.limits.residual",
-    "rig.arm.mech_at_home",
+    "rig.arm.",
     "rig.ft_sensor.port",
     "rig.limits.free_disk_gb",
     "terrain.trials",

@@ -27,7 +27,7 @@ from experiments.preflight.host_checks import (
 )
 from experiments.preflight.page import Add, CheckResult, ChecksPage
 from experiments.rig.arm_operations import EXCHANGE_CYCLES
-from experiments.rig.law_calibrations import law_words
+from experiments.rig.law_calibrations import forced_calibrations, law_words
 from experiments.rig.rig import Rig
 from wam.driver.health import complaints, temperature_range
 from wam.driver.home import HOME_LIMIT, check_zero, zero_error
@@ -105,6 +105,8 @@ def _check_host(rig: Rig, data: Path, page: ChecksPage, probe: DiskProbe) -> Non
     page.add(GOOD, "config", f"{rig.settings.origin}, {rig.row.name}, {law}")
     for text in rig.settings.unusual():
         page.add(WARNING, "settings", text)
+    for text in forced_calibrations(rig.settings, rig.calibrations):
+        page.add(WARNING, "calibration", text)
     page.add_result(check_masses(rig))
     page.add_result(check_code(provenance.collect()))
     if not rig.is_stepped:

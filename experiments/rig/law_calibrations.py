@@ -10,14 +10,19 @@ from experiments.rig.build import LawParts, build_tool
 from experiments.settings.calibrations import (
     NOTHING,
     check_kind,
+    fault_of,
+    forced_words,
     read_calibration,
+    unfit,
     with_calibrations,
 )
 from experiments.settings.load import Settings
 from experiments.settings.rig import RigSettings
-from wam.calibration.friction_file import friction_from_toml
+from wam.calibration.friction_file import FrictionCalibration, friction_from_toml
+from wam.calibration.friction_fit import check_friction
 from wam.calibration.gravity_file import (
     GravityCalibration,
+    check_gravity,
     fits_tool,
     gravity_from_toml,
 )
@@ -118,6 +123,9 @@ def build_law_model(
         instead=_INSTEAD,
     )
     _check_tool(rig, stored)
+    fault = gravity_fault(stored)
+    if fault and not stored.is_forced:
+        raise unfit(rig.gravity.file, fault, "gravity", _INSTEAD)
     return gravity_model(constants, tool, stored.mus, stored.tool)
 
 
@@ -168,9 +176,40 @@ def build_compensation(
             hint=f"Run traction calibrate friction again, or {_WITHOUT}. {NOTHING}",
         )
     constants, fit = load_constants(), stored.fit
+    fault = friction_fault(stored)
+    if fault and not stored.is_forced:
+        raise unfit(section.file, fault, "friction", _WITHOUT)
     _check_size(section.file, constants, fit.friction)
     known = known_friction(fit.friction, fit.deviation, fit.asymmetry_deviation)
     return FrictionCompensation(constants, known, section.compensation)
+
+
+def gravity_fault(stored: GravityCalibration) -> str:
+    """Return why "traction calibrate gravity" would refuse it, "" = it would not."""
+    return fault_of(lambda: check_gravity(load_constants(), stored))
+
+
+def friction_fault(stored: FrictionCalibration) -> str:
+    """Return why "traction calibrate friction" would refuse it, "" = it would not."""
+    return fault_of(lambda: check_friction(stored.fit))
+
+
+def forced_calibrations(settings: Settings, calibrations: LawCalibrations) -> list[str]:
+    """Return a sentence for each calibration in use that a person had to force.
+
+    Raises:
+        SettingsError: a calibration is none.
+    """
+    rig, words = settings.rig, forced_words(settings)
+    if rig.gravity.model == "calibrated":
+        weighed = gravity_from_toml(calibrations.gravity, rig.gravity.file)
+        if fault := gravity_fault(weighed):
+            words.append(f"{rig.gravity.file} was forced. {fault}")
+    if rig.friction.model == "calibrated":
+        rubbed = friction_from_toml(calibrations.friction, rig.friction.file)
+        if fault := friction_fault(rubbed):
+            words.append(f"{rig.friction.file} was forced. {fault}")
+    return words
 
 
 def _check_size(name: str, constants: ArmConstants, friction: MotorFriction) -> None:

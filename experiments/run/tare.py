@@ -24,6 +24,7 @@ from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.session.sidecar import TrialName
 from experiments.session.states import Event
 from experiments.session.trial_files import write_next_tare
+from experiments.settings.calibrations import PREFIX
 from ft_sensor.calibration.sensor_file import SensorCalibration, sensor_from_toml
 from ft_sensor.payload import Payload
 from ft_sensor.tare import TareError, TareResult, take_mean
@@ -37,7 +38,6 @@ STILL_SECONDS = 0.3
 STILL_SPEED = 0.01  # m/s
 LIFTED = 0.03  # the foot counts as lifted this far above the plane [m]
 MOST_TARES = 5  # refused in a row: something is wrong that patience cannot mend
-_CALIBRATION = "calibration:"  # before the name of a file in the settings
 
 
 def take_tare(context: RunContext, name: TrialName) -> None:
@@ -149,9 +149,9 @@ def _calibration_of(
 ) -> SensorCalibration | None:
     """Return the sensor's calibration with this foot, None where there is none."""
     for name, text in calibrations.items():
-        if not name.startswith(_CALIBRATION) or "readings" not in text:
+        if not name.startswith(PREFIX) or "readings" not in text:
             continue  # of a container
-        stored = sensor_from_toml(text, name.removeprefix(_CALIBRATION))
+        stored = sensor_from_toml(text, name.removeprefix(PREFIX))
         if stored.foot == foot:
             return stored
     return None

@@ -1,6 +1,6 @@
 """The settings with the calibrations that they name: sensor, feet, containers."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
@@ -14,9 +14,13 @@ from experiments.settings.load import Settings
 from experiments.settings.matrix import TerrainRow
 from experiments.settings.rig import RigSettings
 from ft_sensor.calibration.files import terrain_from_toml, terrain_metadata
+from ft_sensor.calibration.fit import ContainerFit, check_residual, check_terrain
 from ft_sensor.calibration.sensor_file import SensorCalibration, sensor_from_toml
+from ft_sensor.payload import TerrainFrame
 
 NOTHING = "Nothing was started."
+PREFIX = "calibration:"  # before the name of a file among the texts
+FORCED = "forced"  # fact of a container that a person accepted
 
 
 def read_calibration(path: Path, what: str, instead: str) -> str:
@@ -61,6 +65,23 @@ def check_kind(
     raise SettingsError(
         f"{name} was measured on a {theirs} arm, this is a {ours} one.",
         hint=f"{instead[0].upper()}{instead[1:]}, or name another file. {NOTHING}",
+    )
+
+
+def fault_of(check: Callable[[], None]) -> str:
+    """Return what a check says of a calibration, "" where it has nothing to say."""
+    try:
+        check()
+    except SettingsError as error:
+        return error.message
+    return ""
+
+
+def unfit(name: str, fault: str, what: str, instead: str) -> SettingsError:
+    """Return the refusal of a calibration that its command would not have written."""
+    return SettingsError(
+        f"{name} is no calibration to use. {fault}",
+        hint=f"Run traction calibrate {what} again, or {instead}. {NOTHING}",
     )
 
 
@@ -120,8 +141,11 @@ class _Reader:
         terrain, frame = terrain_from_toml(text)
         if terrain != row.name:
             raise _mismatch(name, f"terrain {terrain}", f"terrain {row.name}")
-        is_of_simulation = terrain_metadata(text).get("simulated") == "true"
-        self._check_kind(name, is_of_simulation=is_of_simulation)
+        facts = terrain_metadata(text)
+        self._check_kind(name, is_of_simulation=facts.get("simulated") == "true")
+        fault = _terrain_fault(frame, row)
+        if fault and facts.get(FORCED) != "true":
+            raise unfit(name, fault, "terrain", _INSTEAD.format(name=name))
         measured = {
             "incline_deg": float(np.degrees(frame.incline)),
             "heading_deg": float(np.degrees(frame.heading)),
@@ -135,12 +159,15 @@ class _Reader:
         self._check_kind(name, is_of_simulation=stored.is_simulated)
         if foot is not None and stored.foot != foot:
             raise _mismatch(name, f"foot {stored.foot}", f"foot {foot}")
+        fault = _sensor_fault(stored)
+        if fault and not stored.is_forced:
+            raise unfit(name, fault, what, _INSTEAD.format(name=name))
         return stored
 
     def _read(self, name: str, what: str) -> str:
         instead = _INSTEAD.format(name=name)
         text = read_calibration(self._folder / name, what, instead)
-        self.texts[f"calibration:{name}"] = text
+        self.texts[f"{PREFIX}{name}"] = text
         return text
 
     def _check_kind(self, name: str, *, is_of_simulation: bool) -> None:
@@ -150,6 +177,29 @@ class _Reader:
             is_simulated=self._is_simulated,
             instead=_INSTEAD.format(name=name),
         )
+
+
+def forced_words(settings: Settings) -> list[str]:
+    """Return a sentence for each sensor's or foot's calibration that was forced."""
+    words: list[str] = []
+    for key, text in settings.calibrations.items():
+        name = key.removeprefix(PREFIX)
+        if "readings" not in text:  # a container
+            if terrain_metadata(text).get(FORCED) == "true":
+                words.append(f"{name} was forced: its incline is not the matrix's.")
+        elif fault := _sensor_fault(sensor_from_toml(text, name)):
+            words.append(f"{name} was forced. {fault}")
+    return words
+
+
+def _sensor_fault(stored: SensorCalibration) -> str:
+    return fault_of(lambda: check_residual(stored.fit, is_forced=False))
+
+
+def _terrain_fault(frame: TerrainFrame, row: TerrainRow) -> str:
+    written = replace(frame, incline=float(np.radians(row.incline_deg)))
+    touched = ContainerFit(frame, residual=0.0, roll=0.0)
+    return fault_of(lambda: check_terrain(touched, written, is_forced=False))
 
 
 def _body(stored: SensorCalibration, height: float) -> Mapping[str, object]:

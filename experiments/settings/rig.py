@@ -16,6 +16,7 @@ from acquisition.settings import (
 )
 from ft_sensor.reading import largest_load
 from ft_sensor.vendors.registry import AnySensor
+from wam.calibration.arm_identity import SerialNumbers
 
 WITHIN_RANGE = 0.9  # of the sensor's range: a default limit of contact
 CONTACT_LIMITS = (
@@ -78,6 +79,7 @@ class ArmSection(SettingsSection):
             "traction zero" tells them; left out: the next zeroing is not checked.
         rest: joint positions of the arm whose foot lies on its stand [rad]; left out:
             a person supports the arm before it goes idle.
+        serial_numbers: of the seven pucks that they were read from; left out: any arm.
     """
 
     mech_at_home: tuple[_Turn, _Turn, _Turn, _Turn, _Turn, _Turn, _Turn] | None = Field(
@@ -85,6 +87,9 @@ class ArmSection(SettingsSection):
     )
     rest: tuple[_Angle, _Angle, _Angle, _Angle, _Angle, _Angle, _Angle] | None = Field(
         default=None, examples=[[0.0, 0.77, 0.0, 1.19, 0.0, 1.19, 0.0]]
+    )
+    serial_numbers: SerialNumbers | None = Field(
+        default=None, examples=[[1201, 1202, 1203, 1204, 1205, 1206, 1207]]
     )
 
 

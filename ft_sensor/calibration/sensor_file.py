@@ -29,6 +29,7 @@ class SensorCalibration:
         is_simulated: the sensor was a simulated one.
         rotations: orientations of frame 7 in the base frame, shape (n, 3, 3).
         readings: mean raw readings there [N, N m], shape (n, 6).
+        is_forced: a person accepted it although `check_residual` refuses it.
     """
 
     fit: SensorFit
@@ -38,6 +39,7 @@ class SensorCalibration:
     is_simulated: bool
     rotations: Floats
     readings: Floats
+    is_forced: bool = False
 
     def com_in_frame_7(self, height: float) -> Array:
         """Return the payload's centre in frame 7 [m], shape (3,).
@@ -56,6 +58,7 @@ class _SensorFile(TomlFile):
     foot: str
     measured_utc: str
     is_simulated: bool = Field(strict=True)
+    is_forced: bool = Field(default=False, strict=True)
     mass: Number = Field(ge=0, le=5)  # kg; what a wrist sensor carries
     com: tuple[Number, Number, Number]
     angle: Number = Field(ge=-2 * np.pi, le=2 * np.pi)
@@ -82,6 +85,7 @@ def sensor_to_toml(calibration: SensorCalibration) -> str:
         foot=calibration.foot,
         measured_utc=calibration.measured_utc,
         is_simulated=calibration.is_simulated,
+        is_forced=calibration.is_forced,
         mass=fit.mass,
         com=fit.com.tolist(),
         angle=fit.angle,
@@ -128,4 +132,5 @@ def sensor_from_toml(text: str, name: str) -> SensorCalibration:
         is_simulated=file.is_simulated,
         rotations=np.array(file.rotations).reshape(-1, 3, 3),
         readings=np.array(file.readings),
+        is_forced=file.is_forced,
     )

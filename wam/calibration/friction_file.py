@@ -9,6 +9,7 @@ from pydantic import Field, field_validator
 from acquisition.errors import SettingsError
 from acquisition.settings import Number, Whole
 from acquisition.toml_files import TomlFile, TomlTable
+from wam.calibration.arm_identity import SerialNumbers
 from wam.calibration.friction_fit import FrictionFit
 from wam.calibration.joint_friction import (
     joint_asymmetry,
@@ -33,6 +34,8 @@ class FrictionCalibration:
         gravity: which gravity was subtracted: cad, shipped or calibrated.
         measured_utc: when.
         is_simulated: the arm was a simulated one.
+        is_forced: a person accepted it although `check_friction` refuses it.
+        arm: serial numbers of the seven pucks; None = unknown.
     """
 
     fit: FrictionFit
@@ -40,6 +43,8 @@ class FrictionCalibration:
     gravity: str
     measured_utc: str
     is_simulated: bool
+    is_forced: bool = False
+    arm: tuple[int, ...] | None = None
 
 
 class _FitTable(TomlTable):
@@ -72,6 +77,8 @@ class _FrictionFile(TomlFile):
     gravity: str
     measured_utc: str
     is_simulated: bool = Field(strict=True)
+    is_forced: bool = Field(default=False, strict=True)
+    arm: SerialNumbers | None = None
     coulomb: Any = Field(
         default=None,
         description="At the joints 1 to 7, each turning alone [N m].",
@@ -95,6 +102,8 @@ def friction_to_toml(calibration: FrictionCalibration, constants: ArmConstants) 
         gravity=calibration.gravity,
         measured_utc=calibration.measured_utc,
         is_simulated=calibration.is_simulated,
+        is_forced=calibration.is_forced,
+        arm=calibration.arm,
         **_of_joints(constants, fit.friction),
         coulomb_deviation=joint_deviation(constants, fit.deviation).tolist(),
         coulomb_lower_bound=joint_coulomb(constants, fit.lower_bound).tolist(),
@@ -159,6 +168,8 @@ def friction_from_toml(text: str, name: str) -> FrictionCalibration:
         gravity=file.gravity,
         measured_utc=file.measured_utc,
         is_simulated=file.is_simulated,
+        is_forced=file.is_forced,
+        arm=file.arm,
     )
 
 

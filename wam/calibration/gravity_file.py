@@ -1,6 +1,6 @@
 """A gravity calibration as TOML: first moments, how well they fit, what was fitted."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Self
 
 import numpy as np
@@ -9,7 +9,16 @@ from pydantic import Field, model_validator
 from acquisition.errors import SettingsError
 from acquisition.settings import Number, Whole
 from acquisition.toml_files import TomlFile, TomlTable
-from wam.model.constants import Array, Body
+from wam.calibration.arm_identity import SerialNumbers
+from wam.model.constants import ArmConstants, Array, Body
+from wam.model.moments import (
+    LARGEST_RESIDUAL,
+    check_drawings,
+    check_fit,
+    check_zeros,
+    fit_of,
+    zero_errors,
+)
 from wam.model.tool import Tool, tool_metadata, tool_of
 
 _SAME = 1e-9  # kg and m: the tool of a calibration and of a session
@@ -32,6 +41,8 @@ class GravityCalibration:
         is_simulated: the arm was a simulated one.
         poses: joint positions at which was measured [rad], shape (n, 7).
         torques: what held the arm there [N m], shape (n, 7).
+        is_forced: a person accepted it although `check_gravity` refuses it.
+        arm: serial numbers of the seven pucks; None = unknown.
     """
 
     mus: Array
@@ -43,6 +54,8 @@ class GravityCalibration:
     is_simulated: bool
     poses: Array
     torques: Array
+    is_forced: bool = False
+    arm: tuple[int, ...] | None = None
 
 
 class _BodyTable(TomlTable):
@@ -68,6 +81,8 @@ class _GravityFile(TomlFile):
     foot: str
     measured_utc: str
     is_simulated: bool = Field(strict=True)
+    is_forced: bool = Field(default=False, strict=True)
+    arm: SerialNumbers | None = None
     residual: Number
     rank: Whole
     mus: Annotated[
@@ -90,6 +105,8 @@ def gravity_to_toml(calibration: GravityCalibration) -> str:
         foot=calibration.foot,
         measured_utc=calibration.measured_utc,
         is_simulated=calibration.is_simulated,
+        is_forced=calibration.is_forced,
+        arm=calibration.arm,
         residual=calibration.residual,
         rank=calibration.rank,
         mus=calibration.mus.tolist(),
@@ -123,7 +140,28 @@ def gravity_from_toml(text: str, name: str) -> GravityCalibration:
         is_simulated=file.is_simulated,
         poses=np.array(file.poses),
         torques=np.array(file.torques),
+        is_forced=file.is_forced,
+        arm=file.arm,
     )
+
+
+def check_gravity(constants: ArmConstants, calibration: GravityCalibration) -> None:
+    """Refuse what `traction calibrate gravity` refuses, from what was measured.
+
+    Raises:
+        SettingsError: the torques are not explained, the poses show too little, a joint
+            was zeroed elsewhere, or no such arm weighs this.
+    """
+    q, tool = calibration.poses, calibration.tool
+    fit = fit_of(constants, calibration.mus, q, calibration.torques)
+    check_fit(replace(fit, rank=min(fit.rank, calibration.rank)))
+    if not calibration.residual <= LARGEST_RESIDUAL:
+        raise SettingsError(
+            f"The torques leave {calibration.residual:.2f} N m unexplained, as the "
+            f"file says (limit {LARGEST_RESIDUAL})."
+        )
+    check_zeros(zero_errors(constants, q, fit))
+    check_drawings(constants, calibration.mus, (tool.sensor, tool.foot), q)
 
 
 def fits_tool(calibration: GravityCalibration, tool: Tool) -> bool:

@@ -20,6 +20,7 @@ OBSERVABLE = 12  # numbers of the 21 that show in the torques
 LARGEST_RESIDUAL = 0.5  # N m rms over all joints and poses
 LARGEST_CONDITION = 30.0  # of what is observable; the shipped poses have 7
 LARGEST_ZERO_ERROR = 3.0  # degrees
+FARTHEST = 5.0  # N m from the drawings; another arm's moments are 2.3 off at most
 SEEN_ZEROS = (2, 3, 4, 5)  # joints whose zero shows in the torques
 _TURN = 1e-5  # rad of a difference that stands for a slope
 _LEAST_NOISE = 0.01  # N m that torques are known to at best
@@ -141,13 +142,32 @@ def fit_moments(
     if q.shape != tau.shape or q.ndim != 2 or q.shape[1] != 7:
         raise ValueError(f"q and tau must be (n, 7), got {q.shape} and {tau.shape}")
     Y = np.vstack([regressor(constants, row) for row in q])
-    mus, _, _, values = np.linalg.lstsq(Y, tau.ravel(), rcond=_SINGULAR)
+    mus = np.linalg.lstsq(Y, tau.ravel(), rcond=_SINGULAR)[0]
+    return fit_of(constants, np.asarray(mus, np.float64).reshape(7, 3), q, tau)
+
+
+def fit_of(
+    constants: ArmConstants,
+    mus: Array,
+    q: NDArray[np.float64],
+    tau: NDArray[np.float64],
+) -> MomentFit:
+    """Return how well given moments explain holding torques, as `fit_moments` does.
+
+    Args:
+        constants: of the arm.
+        mus: first moments [kg m], shape (7, 3).
+        q: joint positions at rest [rad], shape (n, 7).
+        tau: holding torques there, free of friction [N m], shape (n, 7).
+    """
+    Y = np.vstack([regressor(constants, row) for row in q])
+    values = np.linalg.svd(Y, compute_uv=False)
     rank = int(np.count_nonzero(values > _SINGULAR * values[0]))
     return MomentFit(
-        mus=np.asarray(mus, np.float64).reshape(7, 3),
+        mus=mus,
         rank=rank,
         condition=float(values[0] / values[rank - 1]),
-        residuals=tau - (Y @ mus).reshape(tau.shape),
+        residuals=tau - (Y @ mus.ravel()).reshape(tau.shape),
     )
 
 
@@ -219,6 +239,33 @@ def check_zeros(found: ZeroErrors) -> None:
         f"{sure[worst] / 4.0:.1f}): its weight pulls elsewhere.",
         hint="Bring the arm home and zero it anew: traction zero.",
     )
+
+
+def check_drawings(
+    constants: ArmConstants, mus: Array, bodies: tuple[Body, ...], q: Array
+) -> None:
+    """Refuse moments of no such arm.
+
+    Args:
+        constants: of the arm by its drawings.
+        mus: first moments [kg m], shape (7, 3), with `bodies`.
+        bodies: that hung on the tool plate.
+        q: joint positions at which they are compared [rad], shape (n, 7).
+
+    Raises:
+        SettingsError: somewhere they are more than 5 N m off.
+    """
+    change = (mus - moments_of_links(constants, bodies)).ravel()
+    off = np.array([regressor(constants, row) @ change for row in q])
+    pose, joint = np.unravel_index(np.abs(off).argmax(), off.shape)
+    worst = float(abs(off[pose, joint]))
+    if not worst <= FARTHEST:
+        raise SettingsError(
+            f"The arm would weigh {worst:.1f} N m otherwise than drawn at joint "
+            f"{joint + 1} in pose {pose + 1} (limit {FARTHEST:g}).",
+            hint="Is the tool in rig.toml the one that was on, and the arm zeroed at "
+            "home?",
+        )
 
 
 def check_fit(fit: MomentFit) -> None:

@@ -46,7 +46,9 @@ def calibration(rig, foot="tread", **changes):
         poses=POSES,
         torques=np.zeros((10, 7)),
     )
-    return gravity_to_toml(dataclasses.replace(found, **changes))
+    found = dataclasses.replace(found, **changes)
+    held = [gravity_torque(CONSTANTS, found.mus, q) for q in POSES]
+    return gravity_to_toml(dataclasses.replace(found, torques=np.array(held)))
 
 
 @pytest.fixture
