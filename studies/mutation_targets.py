@@ -174,7 +174,6 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     ): _BELOW,
     (
         "ft_sensor/tare.py",
-        "ft_sensor/weighing.py",
         "lasted = float(times[-1] - times[0]) * count / (count - 1) if count > 1 "
         "else 0.0 -> lasted = float(times[-1] - times[0]) * count / (count - 1) "
         "if count > 1 else 1.0",
