@@ -12,6 +12,7 @@ from experiments.messages import preflight_error
 from experiments.operator.console import BAD, GOOD, WARNING
 from experiments.preflight.page import Add, CheckResult
 from experiments.rig.rig import Rig
+from experiments.settings.load import SHIPPED
 from experiments.settings.rig import CONTACT_LIMITS, WITHIN_RANGE, RigSettings
 from ft_sensor.reading import axis_names, largest_load, largest_traction
 from ft_sensor.serial_line.sensor import BURSTY
@@ -62,6 +63,20 @@ def check_code(fields: dict[str, str]) -> CheckResult:
         text = f"{fields['software']} {commit}, changed since: the diff is recorded"
         return CheckResult(WARNING, "code", text)
     return CheckResult(GOOD, "code", f"{fields['software']} {commit}")
+
+
+def check_origin(rig: Rig, law: str) -> CheckResult:
+    """Grade where the settings come from: the shipped ones describe no real arm.
+
+    Args:
+        rig: with its settings.
+        law: what floats the arm, in words.
+    """
+    text = f"{rig.settings.origin}, {rig.row.name}, {law}"
+    if rig.is_simulated or rig.settings.origin != SHIPPED:
+        return CheckResult(GOOD, "config", text)
+    ask = "not written for this arm: name its rig.toml with --config"
+    return CheckResult(BAD, "config", f"{text}; {ask}")
 
 
 def check_masses(rig: Rig) -> CheckResult | None:

@@ -20,6 +20,7 @@ from experiments.preflight.host_checks import (
     check_governor,
     check_interface,
     check_masses,
+    check_origin,
     check_stream,
     check_wrenches,
     free_bytes,
@@ -102,7 +103,7 @@ def _check_host(rig: Rig, data: Path, page: ChecksPage, probe: DiskProbe) -> Non
     """Grade what needs no device."""
     settings = rig.settings.rig
     law = law_words(settings, rig.calibrations, rig.row.foot)
-    page.add(GOOD, "config", f"{rig.settings.origin}, {rig.row.name}, {law}")
+    page.add_result(check_origin(rig, law))
     for text in rig.settings.unusual():
         page.add(WARNING, "settings", text)
     for text in forced_calibrations(rig.settings, rig.calibrations):

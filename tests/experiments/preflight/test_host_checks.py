@@ -1,3 +1,7 @@
+import re
+from pathlib import Path
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -6,10 +10,12 @@ from experiments.operator.console import BAD, GOOD, WARNING
 from experiments.preflight.host_checks import (
     check_code,
     check_governor,
+    check_origin,
     check_stream,
     check_wrenches,
     reach_words,
 )
+from experiments.settings.load import SHIPPED
 
 MS = 1_000_000
 NOW_NS = 10**12
@@ -108,3 +114,32 @@ def test_the_largest_traction_is_told():
     fields = {"ranges": "500 500 1200 15 15 12"}
     # 15 N m at a tenth of a metre
     assert reach_words(fields, 0.1) == "F_t up to 150 N"
+
+
+@pytest.mark.parametrize(
+    ("origin", "is_simulated", "mark"),
+    [
+        (SHIPPED, False, BAD),
+        (SHIPPED, True, GOOD),
+        ("lab/rig.toml", False, GOOD),
+    ],
+)
+def test_shipped_settings_are_red_on_a_real_arm(origin, is_simulated, mark):
+    rig = SimpleNamespace(
+        settings=SimpleNamespace(origin=origin),
+        row=SimpleNamespace(name="S0"),
+        is_simulated=is_simulated,
+    )
+    result = check_origin(rig, "gravity cad")
+    assert result.mark == mark
+    assert result.text.startswith(f"{origin}, S0, gravity cad")
+    assert ("--config" in result.text) == (mark == BAD)
+
+
+def test_every_command_of_the_first_day_names_its_rig():
+    page = (Path(__file__).parents[3] / "docs" / "first-day.md").read_text()
+    commands = re.findall(r"`(traction [^`]*)`", page)
+    unnamed = [
+        c for c in commands if "--config lab/rig.toml" not in " ".join(c.split())
+    ]
+    assert unnamed == ["traction init lab"]
