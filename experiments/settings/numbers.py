@@ -83,8 +83,26 @@ def _meant(number: FieldInfo, got: object) -> str:
     return ""
 
 
-def unusual_numbers(section: BaseModel, place: str = "") -> Iterator[str]:
+def unusual_numbers(section: BaseModel) -> Iterator[str]:
     """Yield a sentence for each number within its bounds that no sound rig has."""
+    for place, number, usual, value in _usual_numbers(section, ""):
+        if not usual.low <= value <= usual.high:
+            band = f"{usual.low:g} to {usual.high:g} {usual.unit}".rstrip()
+            yield f"{place} = {value:g}, usual is {band}{_meant(number, value)}"
+
+
+def beyond_real(section: BaseModel) -> str:
+    """Return what no real arm may have of the numbers, "" where there is nothing."""
+    for place, _, usual, value in _usual_numbers(section, ""):
+        if usual.real is not None and value > usual.real:
+            return f"{place} = {value:g} - expected <= {usual.real:g} {usual.unit}"
+    return ""
+
+
+def _usual_numbers(
+    section: BaseModel, place: str
+) -> Iterator[tuple[str, FieldInfo, Usual, float]]:
+    """Yield (dotted name, field, usual values, value) of every number that has them."""
     for name, field in type(section).model_fields.items():
         here = f"{place}.{name}".lstrip(".")
         value: Any = getattr(section, name)
@@ -93,25 +111,8 @@ def unusual_numbers(section: BaseModel, place: str = "") -> Iterator[str]:
             item = index if isinstance(value, tuple) else None
             there = here if item is None else f"{here}[{item}]"
             if isinstance(each, BaseModel):
-                yield from unusual_numbers(each, there)
-                continue
-            number = number_at(field, item)
-            usual = _usual(number) if number and each is not None else None
-            if number and usual and not usual.low <= each <= usual.high:
-                band = f"{usual.low:g} to {usual.high:g} {usual.unit}".rstrip()
-                yield f"{there} = {each:g}, usual is {band}{_meant(number, each)}"
-
-
-def beyond_real(section: BaseModel, place: str = "") -> str:
-    """Return what no real arm may have of the numbers, "" where there is nothing."""
-    for name, field in type(section).model_fields.items():
-        here, value = f"{place}.{name}".lstrip("."), getattr(section, name)
-        if isinstance(value, BaseModel):
-            if found := beyond_real(value, here):
-                return found
-            continue
-        number = number_at(field, None)
-        usual = _usual(number) if number else None
-        if usual and usual.real is not None and value > usual.real:
-            return f"{here} = {value:g} - expected <= {usual.real:g} {usual.unit}"
-    return ""
+                yield from _usual_numbers(each, there)
+            elif each is not None and (number := number_at(field, item)) is not None:
+                usual = _usual(number)
+                if usual is not None:
+                    yield there, number, usual, each

@@ -361,12 +361,14 @@ class RigSettings(SettingsSection):
         at most; none that ends a trial is above that of hold.
         """
         lowered: dict[str, float] = {}
-        for name, (most, _) in self._measured().items():
-            field, limit = LimitSection.model_fields[name], getattr(self.limits, name)
-            ends = name.removesuffix("_hold")
-            least = lowered.get(ends, getattr(self.limits, ends)) if ends != name else 0
-            if limit == field.default and limit > max(WITHIN_RANGE * most, least):
-                lowered[name] = max(WITHIN_RANGE * most, least)
+        for name, (seen, _) in self._measured().items():
+            least = 0.0
+            if name.endswith("_hold"):
+                ends = name.removesuffix("_hold")
+                least = lowered.get(ends, getattr(self.limits, ends))
+            limit, most = getattr(self.limits, name), max(WITHIN_RANGE * seen, least)
+            if limit == LimitSection.model_fields[name].default and limit > most:
+                lowered[name] = most
         return lowered
 
     def guard_limits(self) -> dict[str, Any]:
