@@ -76,6 +76,7 @@ class FrictionGuide:
             measured_utc=iso_utc(rig.clock.utc_ns()),
             is_simulated=rig.is_simulated,
             is_forced=is_forced,
+            arm=rig.serials,
         )
 
     def page(

@@ -114,6 +114,7 @@ class GravityGuide:
             poses=q,
             torques=tau,
             is_forced=is_forced,
+            arm=rig.serials,
         )
 
     def _say_zeros(self, zeros: ZeroErrors) -> None:

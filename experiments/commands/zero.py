@@ -75,8 +75,11 @@ def _check_encoders(rig: Rig, info: ArmInfo, console: Console) -> None:
         PreflightError: the arm is not where home was.
     """
     from experiments.operator.console import GOOD, WARNING
+    from experiments.preflight.identity import check_identity, serial_numbers
     from wam.driver.home import check_home, home_error
 
+    rig.serials = serial_numbers(rig, info)
+    check_identity(rig, console.check)
     before = rig.settings.rig.arm.mech_at_home
     mech = [puck.mech for puck in info.pucks if puck.mech is not None]
     if len(mech) < len(info.pucks):
@@ -84,8 +87,10 @@ def _check_encoders(rig: Rig, info: ArmInfo, console: Console) -> None:
             console.check(WARNING, "encoders", "not absolute: home is not checked")
         return
     if before is None:
+        whose = f", serial_numbers = {[*rig.serials]}" if rig.serials else ""
         console.say(
-            f"To check the next zeroing, in [arm] of rig.toml: mech_at_home = {mech}"
+            "To check the next zeroing, in [arm] of rig.toml: "
+            f"mech_at_home = {mech}{whose}"
         )
         return
     cts = [puck.cts for puck in info.pucks]

@@ -26,6 +26,7 @@ from experiments.preflight.host_checks import (
     free_bytes,
     reach_words,
 )
+from experiments.preflight.identity import check_identity, serial_numbers
 from experiments.preflight.page import Add, CheckResult, ChecksPage
 from experiments.rig.arm_operations import EXCHANGE_CYCLES
 from experiments.rig.law_calibrations import forced_calibrations, law_words
@@ -138,6 +139,8 @@ def _check_arm(rig: Rig, page: ChecksPage) -> ArmInfo:
     page.add(WARNING if ill else GOOD, "pucks 1-7", ", ".join(parts))
     for text in info.warnings:
         page.add(WARNING, "start-up", text)
+    rig.serials = serial_numbers(rig, info)
+    page.attempt(lambda: check_identity(rig, page.add))
     if not info.is_zeroed:
         page.add(BAD, "zero", "not zeroed")
         page.fail(preflight_error("not-zeroed"))

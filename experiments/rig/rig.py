@@ -63,6 +63,7 @@ class Rig:
         law_model: the same as the control law weighs it.
         payload: what the sensor carries, not tared.
         tared: the same with the bias of the newest tare.
+        serials: of the seven pucks, as the preflight read them; None = unknown.
         tared_ns: when that was taken [ns]; 0 = never.
         foresight: what is foreseen with while trials are recorded; None = nothing.
         frame: where the container stands.
@@ -86,6 +87,7 @@ class Rig:
     calibrations: LawCalibrations
     simulation: SimulationControl | None
     is_stepped: bool
+    serials: tuple[int, ...] | None = None
     tared_ns: int = 0
     foresight: ForesightSource | None = None
 

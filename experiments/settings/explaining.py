@@ -99,10 +99,11 @@ def _reason(location: "_Location", error: ErrorDetails) -> str:
     if error["type"] == "union_tag_invalid":
         got = error.get("ctx", {}).get("tag")
         return f'{place}.kind = "{got}" - expected {_kinds(location.kinds)}'
+    is_table = isinstance(error["input"], Mapping)
     got = cast("object", error["input"])
     shown = f'"{got:.80}"' if isinstance(got, str) else f"{got!r:.80}"
     what = error["msg"].removeprefix("Value error, ")
-    if isinstance(got, Mapping) and error["type"] == "value_error":
+    if is_table and error["type"] == "value_error":
         return f"{place}: {what}" if place else what
     number = number_at(location.field, location.item)
     if number is None:

@@ -1,0 +1,56 @@
+"""Is this the arm that its files were measured on? The pucks' serial numbers tell."""
+
+from acquisition.errors import PreflightError, SettingsError
+from experiments.operator.console import BAD, GOOD
+from experiments.preflight.page import Add
+from experiments.rig.rig import Rig
+from wam.calibration.arm_identity import check_same_arm
+from wam.calibration.friction_file import friction_from_toml
+from wam.calibration.gravity_file import gravity_from_toml
+from wam.driver.startup import ArmInfo
+
+
+def serial_numbers(rig: Rig, info: ArmInfo) -> tuple[int, ...] | None:
+    """Return the serial numbers of a real arm's pucks; None = not all are known."""
+    # A driver that does not ask for them has no such field.
+    known = [getattr(puck, "serial", None) for puck in info.pucks]
+    serials = tuple(serial for serial in known if serial is not None)
+    return None if rig.is_simulated or len(serials) < len(known) else serials
+
+
+def measured_on(rig: Rig) -> dict[str, tuple[int, ...] | None]:
+    """Return by file or setting in use which pucks it was measured with.
+
+    Raises:
+        SettingsError: a calibration is none.
+    """
+    settings, texts = rig.settings.rig, rig.calibrations
+    noted: dict[str, tuple[int, ...] | None] = {}
+    if settings.arm.mech_at_home is not None:
+        noted["mech_at_home of rig.toml"] = settings.arm.serial_numbers
+    if settings.gravity.model == "calibrated":
+        weighed = gravity_from_toml(texts.gravity, settings.gravity.file)
+        noted[settings.gravity.file] = weighed.arm
+    if settings.friction.model == "calibrated":
+        rubbed = friction_from_toml(texts.friction, settings.friction.file)
+        noted[settings.friction.file] = rubbed.arm
+    return noted
+
+
+def check_identity(rig: Rig, add: Add) -> None:
+    """Compare the serial numbers of this arm with those that its files state.
+
+    Raises:
+        PreflightError: a file was measured on another arm.
+    """
+    if rig.serials is None:
+        return
+    for name, noted in measured_on(rig).items():
+        try:
+            check_same_arm(name, noted, rig.serials)
+        except SettingsError as error:
+            add(BAD, "identity", error.message)
+            raise PreflightError(
+                error.message, hint=error.hint, arm_state="idle"
+            ) from error
+    add(GOOD, "identity", f"pucks {' '.join(map(str, rig.serials))}")
