@@ -365,7 +365,8 @@ class RigSettings(SettingsSection):
             least = 0.0
             if name.endswith("_hold"):
                 ends = name.removesuffix("_hold")
-                least = lowered.get(ends, getattr(self.limits, ends))
+                own: float = getattr(self.limits, ends)
+                least = lowered.get(ends, own)
             limit, most = getattr(self.limits, name), max(WITHIN_RANGE * seen, least)
             if limit == LimitSection.model_fields[name].default and limit > most:
                 lowered[name] = most
