@@ -105,7 +105,7 @@ class WamArm:
             self._settings.torque_limits,
         )
         self._motion = JointEstimator(transmission, self._settings)
-        self._begin_at_rest()
+        self._show_positions()
         dated = zip(info.pucks, self.health(), strict=True)
         pucks = tuple(replace(puck, health=health) for puck, health in dated)
         return replace(
@@ -247,6 +247,19 @@ class WamArm:
         self._begin_at_rest()
         _check_taken(counts, motion.counts)
         self._safety.mark_zeroed()
+
+    def _show_positions(self) -> None:
+        """Read the first positions, which to the safety module may be a jump.
+
+        Its history is full of them before it judges speed again; the vendor's library
+        leaves it what is left of the excuse.
+        """
+        self._safety.ignore_speed_faults(_IGNORED_SPEED_FAULTS)
+        self._begin_at_rest()
+        for _ in range(_IGNORED_SPEED_FAULTS):
+            self._properties.pause(_MS)
+            self._traffic.exchange(self._clock.now_ns())
+        self._safety.ignore_speed_faults(0)
 
     def _look_at_pendant(self) -> None:
         """Learn why the arm is idle; without an answer the last one stands."""

@@ -75,6 +75,25 @@ def test_sleeping_pucks_are_woken_in_turn_and_left_alone_while_they_boot():
     assert not info.is_zeroed
 
 
+@pytest.mark.parametrize("vers", [33, 61, 200])
+def test_the_first_positions_are_no_speed_fault_to_the_module(vers):
+    number = {33: 102, 61: 55, 200: 55}[vers]  # of IFAULT
+    rig = Rig(NetworkOptions(safety_vers=vers), HOME_COUNTS)
+    arm = WamArm(rig.link, rig.clock)
+    for _ in range(2):  # every start, not only the first
+        rig.sent.clear()
+        arm.start()
+        sent = frames(rig)
+        told = [(i, d) for i, d in enumerate(sent) if d[1][0] == 0x80 | number]
+        (before, five), (after, none) = told
+        assert five == (0x00A, bytes((0x80 | number, 0, 5, 0, 0, 0)))
+        assert none == (0x00A, bytes((0x80 | number, 0, 0, 0, 0, 0)))
+        asked = [i for i, frame in enumerate(sent) if frame == GET_P]
+        assert before + 1 == asked[0]  # the history holds five samples
+        assert len(asked) > 5
+        assert asked[-1] < after
+
+
 def test_a_missing_puck_is_named_with_those_that_answer():
     rig = Rig()
     rig.network.silence(5)

@@ -8,6 +8,7 @@ from wam.driver.arm import WamArm
 from wam.driver.safety_module import SafetyLimits
 from wam.driver.settings import ArmSettings
 
+IFAULT = 0xB7
 RAISED = SafetyLimits(
     speed_warning=1.35,
     speed_fault=1.5,
@@ -21,8 +22,9 @@ def start(rig, limits):
 
 
 def told(rig):
-    """Return (time, data) of everything the safety module was told."""
-    return [(t, d) for t, i, d in rig.sent if i == 0x00A and len(d) == 6]
+    """Return (time, data) of everything the safety module was told of its limits."""
+    told = [(t, d) for t, i, d in rig.sent if i == 0x00A and len(d) == 6]
+    return [(t, d) for t, d in told if d[0] != IFAULT]
 
 
 def test_the_defaults_are_the_power_up_values():
