@@ -12,6 +12,7 @@ import numpy as np
 from acquisition.clock import PERIOD_NS
 from fakes.pucks.event_queue import FRAME_NS, EventQueue
 from wam.bus.frames import (
+    HOST,
     Group,
     compose_id,
     decode_position,
@@ -215,9 +216,9 @@ class BusFaults:
 _HALF_NS = PERIOD_NS // 2  # it speaks between two frames of the arm's own program
 _ASK = b"\x30"  # for the position
 _FRAMES = (
-    (group_id(Group.ARM), _ASK),
-    (group_id(Group.LOWER_TORQUE), encode_torques([0] * 4)),
-    (group_id(Group.WRIST_TORQUE), encode_torques([0] * 4)),
+    (Group.ARM, _ASK),
+    (Group.LOWER_TORQUE, encode_torques([0] * 4)),
+    (Group.WRIST_TORQUE, encode_torques([0] * 4)),
 )
 
 Hear = Callable[[int, int, bytes], None]  # (time [ns], identifier, data)
@@ -230,11 +231,13 @@ class OtherMaster:
         """Take the network's time and what the devices hear with."""
         self._schedule = schedule
         self._hear = hear
+        self._node = HOST
         self._visit = 0  # number of the present one; events of earlier ones are void
 
-    def join(self) -> None:
-        """Begin to send."""
+    def join(self, node: int = HOST) -> None:
+        """Begin to send as `node`."""
         self._visit += 1
+        self._node = node
         visit = self._visit
         self._schedule.after(_HALF_NS, lambda: self._send(visit))
 
@@ -246,7 +249,8 @@ class OtherMaster:
         if visit != self._visit:
             return
         schedule = self._schedule
-        for can_id, data in _FRAMES:
+        for group, data in _FRAMES:
+            can_id = group_id(group, self._node)
             schedule.put(can_id, data)
             self._hear(schedule.now_ns, can_id, data)
         schedule.after(PERIOD_NS, lambda: self._send(visit))

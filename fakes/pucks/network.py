@@ -20,7 +20,6 @@ from wam.bus.frames import (
     GROUP_BIT,
     MOTOR_NODES,
     SAFETY_NODE,
-    SENDER_MASK,
     SENSOR_NODE,
     FrameError,
     Payload,
@@ -85,14 +84,15 @@ class PuckNetwork:
         return self.schedule.take()
 
     def receive(self, t_ns: int, can_id: int, data: Payload) -> None:
-        """Take a host's frame whose last bit arrived at `t_ns`."""
+        """Take a host's frame whose last bit arrived at `t_ns`.
+
+        Devices look at whom it is for, not at whom it names as its sender.
+        """
         schedule = self.schedule
         if schedule.next_ns <= t_ns:
             schedule.advance(t_ns)
         elif schedule.now_ns < t_ns:  # nothing is planned till then
             schedule.now_ns = t_ns
-        if can_id & SENDER_MASK:
-            return
         to = can_id & 0x1F
         try:
             if can_id & GROUP_BIT:

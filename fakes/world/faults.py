@@ -15,6 +15,7 @@ from wam.bus.frames import MOTOR_NODES, SAFETY_NODE, SENSOR_NODE, position_reply
 
 PUCK = 3  # of those that fail alone: its joint carries little, the arm stays up
 FOREIGN_LOAD = 0.6  # of the bus, half of it before the arm's frames and half after
+_OTHER_NODE = 20  # of a master that does not call itself host
 _LOW_VOLTAGE = 20.0  # below what the safety module tolerates [V]
 _HOT = 72  # above OTEMP [degrees Celsius]
 _USUAL = {"TEMP": 35, "ERROR": 0}
@@ -43,6 +44,7 @@ def network_faults(network: PuckNetwork) -> dict[str, Callable[[], None]]:
         "can-down": faults.go_down,
         "not-zeroed": network.forget_positions,
         "bus-shared": network.other_master.join,
+        "bus-shared-as-node": lambda: network.other_master.join(_OTHER_NODE),
         "bus-flooded": lambda: faults.flood(FOREIGN_LOAD),
         "safety-speed": lambda: network.trip("velocity"),
         "safety-torque": lambda: network.trip("torque"),

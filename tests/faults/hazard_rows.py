@@ -527,7 +527,7 @@ ROWS: dict[str, dict[str, Fields]] = {
         "implausible": (
             "two programs drive the arm in turn",
             "another master on the bus",
-            "a frame of node 0 that was not sent from here: before the first frame, and in every cycle",
+            "a frame of a host (of node 0, or to a device or its groups) that was not sent from here: before the first frame, and in every cycle",
             "refused; idle",
             ("bus-shared",),
             "a second program on this computer is refused by the lock",

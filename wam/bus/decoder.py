@@ -10,6 +10,7 @@ from enum import Enum
 from acquisition.devices import SafetyMode
 from wam.bus.error_frames import ERROR_FLAG, EXTENDED_FLAG, error_names
 from wam.bus.frames import (
+    HAND_NODES,
     HOST,
     MOTOR_NODES,
     SAFETY_NODE,
@@ -38,7 +39,7 @@ _MEMBERS = {
     Group.LOWER_TORQUE: range(1, 5),
     Group.WRIST_TORQUE: range(5, 8),
     Group.ARM: range(1, 8),
-    Group.HAND: range(11, 15),
+    Group.HAND: HAND_NODES,
 }
 _GROUP_NAMES = {
     Group.BUS: "every puck",

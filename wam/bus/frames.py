@@ -18,9 +18,9 @@ HOST = 0
 SAFETY_NODE = 10
 SENSOR_NODE = 8
 MOTOR_NODES = range(1, 8)
+HAND_NODES = range(11, 15)
 
 GROUP_BIT = 0x400
-SENDER_MASK = 0x3E0
 TORQUE_LIMIT = 8191  # a 14-bit field, -8192 is never sent
 POSITION_MODULUS = 1 << 22
 _POSITION_MASK = POSITION_MODULUS - 1
@@ -91,6 +91,32 @@ def split_id(can_id: int) -> Address:
 def group_id(group: Group, sender: int = HOST) -> int:
     """Return the identifier of a frame from `sender` to `group`."""
     return compose_id(sender, group, is_group=True)
+
+
+_ADDRESSED = frozenset((*MOTOR_NODES, SENSOR_NODE, SAFETY_NODE))
+_REPORTING = frozenset((*MOTOR_NODES, *HAND_NODES))
+_COMMANDED = frozenset(
+    (Group.BUS, Group.LOWER_TORQUE, Group.WRIST_TORQUE, Group.ARM, Group.HAND)
+)
+MODE_BROADCAST_ID = compose_id(SAFETY_NODE, Group.BUS, is_group=True)
+
+
+def is_of_host(can_id: int) -> bool:
+    """Return whether only a host sends frames with this 11-bit identifier.
+
+    Devices obey whatever sender a frame names, and they never talk to each other: what
+    they say goes to feedback groups. So a frame to a device of the arm, or to a group
+    that takes questions and commands, is a host's; and so is a position that no motor
+    puck reports, which the safety module would take for a heartbeat.
+    """
+    address = split_id(can_id)
+    if address.sender == HOST:
+        return True
+    if not address.is_group:
+        return address.to in _ADDRESSED
+    if address.to == Group.POSITION:
+        return address.sender not in _REPORTING
+    return address.to in _COMMANDED and can_id != MODE_BROADCAST_ID
 
 
 def property_reply_id(node: int) -> int:

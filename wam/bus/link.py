@@ -9,9 +9,8 @@ from typing import NamedTuple, Protocol
 from acquisition.clock import NS_PER_S
 from acquisition.errors import LinkError, LinkFullError
 from wam.bus.error_frames import ERROR_FLAG, BusErrors
-from wam.bus.frames import SAFETY_NODE, SENDER_MASK, Group, compose_id
+from wam.bus.frames import MODE_BROADCAST_ID, is_of_host
 
-MODE_BROADCAST_ID = compose_id(SAFETY_NODE, Group.BUS, is_group=True)
 _FULL = frozenset({errno.ENOBUFS, errno.EAGAIN})  # a queue, a socket's buffer
 DRAIN_AT_MOST = 512  # frames; no flood may keep the loop here
 _PLAUSIBLE_NS = 10 * NS_PER_S  # a stamp further back is of another clock
@@ -20,7 +19,7 @@ _LARGEST_ID = 0x7FF  # of a frame that a WAM uses
 _OF_DEVICES = frozenset(
     can_id
     for can_id in range(_LARGEST_ID + 1)
-    if can_id & SENDER_MASK and can_id != MODE_BROADCAST_ID
+    if not is_of_host(can_id) and can_id != MODE_BROADCAST_ID
 )
 _can_id = itemgetter(0)  # of a frame
 
@@ -131,7 +130,7 @@ class Link(Protocol):
 class CanLink:
     """A bus seen by the driver: sent to, drained, never waited on.
 
-    Frames of hosts (FROM = 0, the own ones included), remote, extended and error
+    Frames of hosts (`is_of_host`, the own ones included), remote, extended and error
     frames are dropped. The safety module's broadcast of a change of mode has no known
     content: it is counted in `mode_hints` and dropped. A bus does not return what was
     sent through it, so a frame of a host that arrives is another master's.
@@ -241,7 +240,7 @@ class CanLink:
                     self.errors.add(can_id, frame[1])
             elif can_id == MODE_BROADCAST_ID:
                 self.mode_hints += 1
-            elif not can_id & SENDER_MASK:
+            elif can_id not in _OF_DEVICES:
                 self.foreign_ids.add(can_id)
                 if self.foreign_id is None:
                     self.foreign_id = can_id

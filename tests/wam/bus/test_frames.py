@@ -315,3 +315,28 @@ def test_identifiers_have_eleven_bits(can_id):
 
 def test_the_safety_module_is_node_10():
     assert frames.SAFETY_NODE == 10
+
+
+@pytest.mark.parametrize("sender", [0, 1, 7, 8, 9, 10, 11, 20, 31])
+@pytest.mark.parametrize("to", [*range(1, 9), 10])
+def test_a_frame_to_a_device_of_the_arm_is_a_hosts_whatever_it_names(sender, to):
+    assert frames.is_of_host(frames.compose_id(sender, to, is_group=False))
+
+
+@pytest.mark.parametrize("sender", [0, 1, 7, 8, 20, 31])
+@pytest.mark.parametrize("group", [0, 1, 2, 4, 5])
+def test_a_command_to_a_group_is_a_hosts_whatever_it_names(sender, group):
+    assert frames.is_of_host(frames.compose_id(sender, group, is_group=True))
+
+
+@pytest.mark.parametrize("sender", [8, 9, 10, 20, 31])
+def test_a_position_of_no_motor_is_a_hosts(sender):
+    assert frames.is_of_host(frames.compose_id(sender, 3, is_group=True))
+
+
+def test_what_devices_say_is_not_of_a_host():
+    replies = [0x426, 0x4E6, 0x506, 0x546, 0x423, 0x4E3, 0x427, 0x50A, 0x50B, 0x50C]
+    hand = [frames.position_reply_id(11), frames.property_reply_id(14)]
+    # A node that is not of the arm may be asked who it is; the safety module announces.
+    others = [frames.property_reply_id(20), frames.MODE_BROADCAST_ID]
+    assert not any(map(frames.is_of_host, [*replies, *hand, *others]))

@@ -242,6 +242,14 @@ def test_the_first_frame_of_another_master_is_kept():
     link.close()
 
 
+@pytest.mark.parametrize("can_id", [0x021, 0x281, 0x4E1, 0x682, 0x684, 0x283 | 0x400])
+def test_another_master_with_a_node_of_its_own_is_one(can_id):
+    link = opened_link(ScriptedBus([message(0x426), message(can_id, b"\x30")]))
+    assert [frame.can_id for frame in link.receive()] == [0x426]
+    assert link.foreign_id == can_id
+    link.close()
+
+
 def test_an_interface_is_set_up_to_come_back_and_to_hold_one_cycle():
     words = setup_command("can1", 500_000).split()
     assert words[:5] == ["ip", "link", "set", "can1", "up"]

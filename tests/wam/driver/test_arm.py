@@ -574,3 +574,15 @@ def test_an_arm_that_is_only_listened_to_is_braked_by_its_own_module():
     assert GET_P not in frames(rig)
     assert rig.network.safety_mode is SafetyMode.IDLE
     assert arm.safety_mode() is SafetyMode.IDLE
+
+
+@pytest.mark.parametrize("node", [0, 3, 8, 20, 31])
+def test_another_master_is_told_whatever_node_it_calls_itself(node):
+    rig, arm = started(NetworkOptions(heartbeat_ns=10_000_000_000))
+    rig.network.pendant("activate")
+    cycle(rig, arm, TAU)
+    assert cycle(rig, arm, TAU).foreign_id is None
+    rig.network.other_master.join(node)
+    rig.rest(CYCLE_NS)
+    assert rig.motors.units == [0] * 7  # the pucks obey it
+    assert cycle(rig, arm, TAU).foreign_id == 0x401 | node << 5

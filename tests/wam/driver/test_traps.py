@@ -21,6 +21,7 @@ from ft_sensor.vendors.barrett_frames import (
 )
 from tests.fakes.stepped import Rig
 from wam.bus.frames import (
+    MODE_BROADCAST_ID,
     Group,
     compose_id,
     decode_force,
@@ -36,7 +37,6 @@ from wam.bus.frames import (
     position_reply_id,
     property_reply_id,
 )
-from wam.bus.link import MODE_BROADCAST_ID
 from wam.bus.properties import Device, names, property_number
 from wam.driver.arm import WamArm
 from wam.driver.pendant import SafetyLevel
