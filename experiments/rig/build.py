@@ -17,6 +17,8 @@ from acquisition.ipc.layout import SharedLayout
 from acquisition.ipc.loop_server import LoopHooks, LoopServer, no_bell
 from acquisition.ipc.shared_sensor import SharedSensor, publish
 from acquisition.sample import Flag
+from acquisition.settings import read_text
+from experiments.settings.load import Settings
 from experiments.settings.matrix import TerrainRow
 from experiments.settings.rig import FootSection, RigSettings
 from experiments.settings.sensor import build_device
@@ -32,6 +34,7 @@ from wam.control.soft_walls import SoftWalls, Walls
 from wam.control.sole_impedance import SoleImpedance
 from wam.driver.arm import WamArm
 from wam.driver.health import health_metadata
+from wam.driver.puck_properties import known_table
 from wam.driver.safety_module import WARNING_SHARE, SafetyLimits
 from wam.driver.settings import ArmSettings
 from wam.model.arm_model import ArmModel
@@ -105,14 +108,42 @@ def build_link(door: Door, shared: SharedLayout, clock: Clock) -> CanLink:
     return CanLink(door, FrameTape(shared.frames, clock).add)
 
 
+def read_properties(settings: Settings) -> str:
+    """Return the text of what this arm's pucks say of themselves, "" for a factory's.
+
+    Raises:
+        SettingsError: the file that rig.toml names cannot be read or is no such table.
+    """
+    name = settings.rig.arm.properties
+    if name is None:
+        return ""
+    path = settings.folder / name
+    try:
+        text = read_text(path)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise SettingsError(
+            f"The puck properties {path} cannot be read ({reason}).",
+            hint="Bring the file back, or take the line properties out of [arm] of "
+            "rig.toml. Nothing was started.",
+        ) from error
+    known_table(text, name)
+    return text
+
+
 def build_arm(
-    rig: RigSettings, constants: ArmConstants, link: CanLink, clock: Clock
+    rig: RigSettings,
+    constants: ArmConstants,
+    link: CanLink,
+    clock: Clock,
+    properties: str = "",
 ) -> WamArm:
-    """Return the driver of the arm on `link`."""
+    """Return the driver of the arm on `link`, whose pucks are as in `properties`."""
     settings = ArmSettings(
         j2mp=constants.j2mp,
         safety_limits=build_safety_limits(rig),
         speed_limits=tuple(rig.limits.speed),
+        pucks=known_table(properties, rig.arm.properties or "pucks.toml"),
     )
     return WamArm(link, clock, settings)
 

@@ -13,7 +13,7 @@ from analysis.foresight.model import RigIdentity
 from experiments.arguments import FRICTION
 from experiments.rig.arm_lock import ArmLock
 from experiments.rig.backend import RigBackend
-from experiments.rig.build import build_tool, terrain_frame
+from experiments.rig.build import build_tool, read_properties, terrain_frame
 from experiments.rig.fake import SimulatedRig, stepped
 from experiments.rig.foresight_source import ForesightSource
 from experiments.rig.law_calibrations import (
@@ -223,6 +223,8 @@ def _jobs(
         "row": row.model_dump(mode="json"),
         "gravity": calibrations.gravity,
         "friction": calibrations.friction,
+        # Those of a simulated arm are a factory's.
+        "properties": read_properties(settings) if world is None else "",
         "can": rig.can.model_dump(mode="json"),
         "terminal": _terminal(),
     }

@@ -131,7 +131,10 @@ class ControlWorker:
             address = can["interface"], can["channel"], can["bitrate"]
             door = open_door(*address, self._clock)
             link = self._link = build_link(door, self._context.shared, self._clock)
-            self._arm = build_arm(self._rig, self._constants, link, self._clock)
+            properties = self._context.settings["properties"]
+            self._arm = build_arm(
+                self._rig, self._constants, link, self._clock, properties
+            )
         return self._arm
 
     def begin(self) -> None:

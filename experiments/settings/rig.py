@@ -80,6 +80,8 @@ class ArmSection(SettingsSection):
         rest: joint positions of the arm whose foot lies on its stand [rad]; left out:
             a person supports the arm before it goes idle.
         serial_numbers: of the seven pucks that they were read from; left out: any arm.
+        properties: file with what the pucks of this arm say of themselves, where that
+            is not what a WAM has from the factory; a path from the folder of rig.toml.
     """
 
     mech_at_home: tuple[_Turn, _Turn, _Turn, _Turn, _Turn, _Turn, _Turn] | None = Field(
@@ -91,6 +93,7 @@ class ArmSection(SettingsSection):
     serial_numbers: SerialNumbers | None = Field(
         default=None, examples=[[1201, 1202, 1203, 1204, 1205, 1206, 1207]]
     )
+    properties: File | None = Field(default=None, examples=["pucks.toml"])
 
 
 class FootSection(SettingsSection):

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from wam.driver.puck_properties import PuckTable, shipped_table
 from wam.driver.safety_module import SafetyLimits
 from wam.driver.transmission import HOST_TORQUE_LIMITS, Matrix
 from wam.model.constants import load_constants
@@ -29,6 +30,7 @@ class ArmSettings:
             those for the pendant's word.
         health_poll_cycles: cycles between questions for the health of a puck.
         safety_limits: what the safety module is set to tolerate.
+        pucks: what the motor pucks have to say of themselves.
         boot_ns: silence while pucks boot [ns].
         idle_ns: longest wait for the safety module to confirm IDLE [ns].
     """
@@ -43,5 +45,6 @@ class ArmSettings:
     safety_poll_cycles: int = 25
     health_poll_cycles: int = 50
     safety_limits: SafetyLimits = field(default_factory=SafetyLimits)
+    pucks: PuckTable = field(default_factory=shipped_table)
     boot_ns: int = 1_000 * _MS
     idle_ns: int = 100 * _MS

@@ -24,6 +24,7 @@ from wam.bus.property_client import PropertyClient
 from wam.driver.discovery import discover_pucks, pucks_verb
 from wam.driver.health import PuckHealth, ask_health
 from wam.driver.pendant import PendantWord
+from wam.driver.puck_properties import Values, ask_properties, compare, refuse
 from wam.driver.safety_module import SafetyModule
 from wam.driver.settings import ArmSettings
 
@@ -46,6 +47,7 @@ class PuckInfo:
             it has no encoder that knows.
         was_asleep: the puck had to be woken.
         health: temperatures, voltage and error.
+        serial: serial number; None = it does not tell.
     """
 
     node: int
@@ -56,6 +58,7 @@ class PuckInfo:
     mech: int | None
     was_asleep: bool
     health: PuckHealth
+    serial: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,8 +88,10 @@ class ArmInfo:
     warnings: tuple[str, ...] = ()
 
     def metadata(self) -> dict[str, str]:
-        """Return firmware and warnings as text for a recording."""
+        """Return firmware, serial numbers and warnings as text for a recording."""
+        serials = ["?" if p.serial is None else str(p.serial) for p in self.pucks]
         return {
+            "arm:serials": " ".join(serials),
             "arm:firmware": " ".join(str(puck.vers) for puck in self.pucks),
             "arm:safety_firmware": str(self.safety_vers),
             "arm:warnings": " ".join(self.warnings) or "none",
@@ -107,6 +112,8 @@ class StartUp:
         self._clock = clock
         self._boot_ns = settings.boot_ns
         self._limits = settings.safety_limits
+        self._expected = settings.pucks
+        self._answers: list[dict[str, int | None]] = []  # of pucks 1 to 7, by name
         self._warnings: list[str] = []
 
     def run(self) -> ArmInfo:
@@ -130,6 +137,7 @@ class StartUp:
         pucks = tuple(self._identify(node, node in asleep) for node in MOTOR_NODES)
         self._check_firmware(pucks)
         self._check_wrist(pucks[-1])
+        self._check_properties(pucks)
         if any(puck.was_asleep for puck in pucks) and safety.is_zeroed():
             safety.forget_zero()  # one puck restarted alone: it has lost its position
         if mode is not SafetyMode.ACTIVE:
@@ -190,7 +198,11 @@ class StartUp:
                     "checked."
                 )
         health = ask_health(lambda number: self._properties.get(node, number), vers)
-        return PuckInfo(node, vers, role, cts, ipnm, mech, was_asleep, health)
+        asked = ask_properties(lambda number: self._properties.get(node, number), vers)
+        known = {"VERS": vers, "ROLE": role, "CTS": cts, "IPNM": ipnm}
+        self._answers.append({**asked, **known, "VBUS": health.bus_voltage})
+        serial = asked.get("SN")
+        return PuckInfo(node, vers, role, cts, ipnm, mech, was_asleep, health, serial)
 
     def _note_firmware(self, who: str, vers: int) -> None:
         """Warn of firmware that nobody has described; the nearest known serves it."""
@@ -234,6 +246,35 @@ class StartUp:
                 f"Puck 7 has {poles} poles: {kind}, a wrist has {POLES_OF_WRIST}.",
                 hint="Traction drives the seven-joint WAM with wrist only.",
             )
+
+    def _check_properties(self, pucks: tuple[PuckInfo, ...]) -> None:
+        """Hold what the pucks say of themselves against what is expected.
+
+        Raises:
+            UnfitDeviceError: a torque or a count would mean something else.
+        """
+        answers, rows = self._answers, self._expected.rows()
+        for name in rows:
+            silent = [i for i, a in enumerate(answers, 1) if a.get(name, 0) is None]
+            if silent:
+                self._warnings.append(
+                    f"{pucks_verb(silent)} not answer GET {name}: it is not compared."
+                )
+        firmware = [puck.vers for puck in pucks]
+        if self._expected.VERS is None and len(set(firmware)) > 1:
+            self._warnings.append(
+                f"The firmware of the pucks differs: {' '.join(map(str, firmware))}."
+            )
+        serials = [puck.serial for puck in pucks if puck.serial is not None]
+        if len(set(serials)) < len(serials):
+            self._warnings.append(
+                "Pucks have the same serial number: "
+                f"{' '.join(map(str, serials))}. They cannot be told apart."
+            )
+        found: dict[str, Values] = {n: [a.get(n) for a in answers] for n in rows}
+        differences = compare(self._expected, found)
+        self._warnings += [f"{d.text}." for d in differences if d.is_warning]
+        refuse(differences, firmware)
 
     def _get(self, node: int, name: str, vers: int) -> int:
         number = _number(node, name, vers)

@@ -40,6 +40,7 @@ from wam.bus.frames import (
 from wam.bus.properties import Device, names, property_number
 from wam.driver.arm import WamArm
 from wam.driver.pendant import SafetyLevel
+from wam.driver.puck_properties import Expectation, PuckTable, shipped_table
 from wam.driver.settings import ArmSettings
 from wam.driver.transmission import HOST_TORQUE_LIMITS, Transmission
 
@@ -52,9 +53,9 @@ LOWER, WRIST = 0x401, 0x402
 POWER_UP_TL1, POWER_UP_TL2 = 4731, 5204
 
 
-def started(options=None, counts=HOME_COUNTS):
+def started(options=None, counts=HOME_COUNTS, **settings):
     rig = Rig(options, counts)
-    arm = WamArm(rig.link, rig.clock)
+    arm = WamArm(rig.link, rig.clock, ArmSettings(**settings))
     info = arm.start()
     rig.sent.clear()
     return rig, arm, info
@@ -153,7 +154,11 @@ def test_trap_05_one_limit_serves_motors_of_different_scale(group, slot):
 
 def test_trap_06_torque_units_and_counts_are_read_from_the_pucks():
     def units_and_angle(**constants):
-        rig, arm, _ = started(NetworkOptions(**constants), counts=(4096,) * 7)
+        known = {n.upper(): Expectation(values=row) for n, row in constants.items()}
+        pucks = shipped_table().overridden(PuckTable(**known))
+        rig, arm, _ = started(
+            NetworkOptions(**constants), counts=(4096,) * 7, pucks=pucks
+        )
         reading = cycle(rig, arm, np.full(7, 0.5))
         sent = {can_id: data for _, can_id, data in rig.sent}
         return decode_torques(sent[LOWER])[0], reading.q[0]
