@@ -761,7 +761,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "positions are read back after they are defined",
             "refused",
             (),
-            "1000 counts",
+            "0.03 rad at a joint",
             (_ARM + "test_positions_are_defined_while_speed_faults_are_ignored",),
         ),
     },

@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from acquisition.clock import Clock
 from acquisition.devices import ArmReading, BusCondition, SafetyMode, Vector
 from acquisition.errors import (
@@ -17,6 +19,7 @@ from wam.bus.property_client import PropertyClient
 from wam.driver.cyclic_io import BusDevice, CycleTraffic
 from wam.driver.discovery import pucks_verb
 from wam.driver.health import PuckHealth
+from wam.driver.home import HOME_LIMIT
 from wam.driver.joint_estimator import JointEstimator
 from wam.driver.safety_module import SafetyModule
 from wam.driver.settings import ArmSettings
@@ -30,7 +33,6 @@ _ALL_FRESH = (1 << MOTORS) - 1
 # the module says whether it was a stop, even when one question or answer is lost.
 _URGENT_CYCLES = 3
 _FIRST_POSITIONS_NS = 1_000 * _MS  # as long as the vendor's library waits for them
-_ZEROED_WITHIN = 1000  # counts; the arm must stand while it is zeroed
 _IGNORED_SPEED_FAULTS = 5  # the safety module's history, as libbarrett says
 
 
@@ -245,7 +247,7 @@ class WamArm:
             self._properties.pause(_MS)
         # The module must see the new positions while it still ignores speed.
         self._begin_at_rest()
-        _check_taken(counts, motion.counts)
+        _check_taken(motion.transmission, counts, motion.counts)
         self._safety.mark_zeroed()
 
     def _show_positions(self) -> None:
@@ -297,11 +299,16 @@ class WamArm:
         )
 
 
-def _check_taken(wanted: Sequence[int], reported: Sequence[int]) -> None:
-    """Raise DeviceFaultError unless the pucks report the counts that were set."""
-    worst = max(abs(w - f) for w, f in zip(wanted, reported, strict=True))
-    if worst > _ZEROED_WITHIN:
+def _check_taken(
+    transmission: Transmission, wanted: Sequence[int], reported: Sequence[int]
+) -> None:
+    """Raise DeviceFaultError unless the joints stand where they were set to stand."""
+    apart = [have - want for have, want in zip(reported, wanted, strict=True)]
+    error = np.abs(transmission.joints(apart))
+    if error.max() > HOME_LIMIT:
+        joint = int(error.argmax()) + 1
         raise DeviceFaultError(
-            f"The pucks report {list(reported)} counts, set were {list(wanted)}.",
+            f"The pucks report {list(reported)} counts, set were {list(wanted)}: "
+            f"joint {joint} is {error.max():.3f} rad off (limit {HOME_LIMIT}).",
             hint="The arm must not move while it is zeroed. Zero it again.",
         )

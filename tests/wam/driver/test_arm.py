@@ -586,3 +586,28 @@ def test_another_master_is_told_whatever_node_it_calls_itself(node):
     rig.rest(CYCLE_NS)
     assert rig.motors.units == [0] * 7  # the pucks obey it
     assert cycle(rig, arm, TAU).foreign_id == 0x401 | node << 5
+
+
+@pytest.mark.parametrize("joint", range(7))
+@pytest.mark.parametrize(("turned", "is_taken"), [(0.028, True), (0.032, False)])
+def test_an_arm_that_moves_while_it_is_zeroed_is_refused_by_the_joint(
+    joint, turned, is_taken
+):
+    rig, arm = started(NetworkOptions(is_zeroed=False), counts=(500,) * 7)
+    motors = arm.transmission.counts(np.eye(7)[joint] * turned)
+    send = rig.link.send
+
+    def send_and_move(can_id, data):
+        send(can_id, data)
+        if (can_id, data[0]) == (7, 0xB0):
+            rig.rest(CYCLE_NS)
+            rig.motors.position = [500 + count for count in motors]
+
+    rig.link.send = send_and_move
+    if is_taken:
+        arm.define_position(HOME)
+        assert arm.safety.is_zeroed()
+        return
+    with pytest.raises(DeviceFaultError, match=f"joint {joint + 1} is 0.03"):
+        arm.define_position(HOME)
+    assert not arm.safety.is_zeroed()
