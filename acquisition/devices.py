@@ -44,6 +44,24 @@ class PositionJump:
     speed: float
 
 
+@dataclass(frozen=True, slots=True)
+class LatePositions:
+    """Positions that came in a cycle in which none was asked for.
+
+    They answer an earlier question, and so may all positions before and after them.
+
+    Attributes:
+        motors: bit i set = that of motor i+1 came.
+        age_ns: since the question that they can answer at best [ns].
+        in_a_row: such cycles in a row, this one included; the cycles between them, in
+            which positions are asked for, do not count.
+    """
+
+    motors: int
+    age_ns: int
+    in_a_row: int
+
+
 @dataclass(slots=True)
 class ArmReading:
     """Joint positions of one cycle.
@@ -55,14 +73,18 @@ class ArmReading:
         q: joint positions [rad], shape (7,); extrapolated where a reply is missing.
         qd: joint velocities [rad/s], shape (7,), filtered as the controller uses them.
         qd7_raw: unfiltered one-cycle difference of joint 7 [rad/s].
-        fresh: bit i set = the reply of motor i+1 arrived in this cycle.
-        is_complete: all seven replies arrived.
+        fresh: bit i set = the reply of motor i+1 arrived in this cycle, or none was
+            asked for.
+        is_complete: all replies that were asked for arrived.
         missing_cycles: incomplete cycles in a row, 0 = this one is complete.
         jump: a position that was not believed in this cycle; None = all were.
         foreign_id: identifier of a frame that another master sent; None = none ever.
         has_bus_error: the bus's controller reported an error since the last reading.
         bus_ns: monotonic time at which the bus had the last reply [ns], 0 = it does
             not tell.
+        is_unasked: no position was asked for in this cycle, on purpose: all of them
+            are extrapolated by one cycle.
+        late: positions that came although none was asked for; None = none did.
     """
 
     host_ns: int
@@ -78,6 +100,8 @@ class ArmReading:
     foreign_id: int | None = None
     has_bus_error: bool = False
     bus_ns: int = 0
+    is_unasked: bool = False
+    late: LatePositions | None = None
 
 
 @dataclass(slots=True)
@@ -115,7 +139,10 @@ class Arm(Protocol):
         ...
 
     def read(self, now_ns: int) -> ArmReading:
-        """Ask for the joint positions and return them; waits 1.5 ms at most."""
+        """Ask for the joint positions and return them; waits 1.5 ms at most.
+
+        Now and then it does not ask, to see whether an earlier question is answered.
+        """
         ...
 
     def listen(self, now_ns: int) -> ArmReading:

@@ -31,6 +31,8 @@ class Flag(IntFlag):
     SIMULATED = 1 << 13
     # 1 << 14 to 1 << 20: the reply of motor 1..7 is fresh
     BUS_ERROR = 1 << 21  # the bus's controller reported an error in this cycle
+    # No position was asked for, on purpose: all are extrapolated, none is missing.
+    ARM_UNASKED = 1 << 22
 
 
 SAFETY_MODE_MASK = 0b111
@@ -193,6 +195,7 @@ _SAFETY_WARNING = int(Flag.SAFETY_WARNING)
 _SAFETY_FAULT = int(Flag.SAFETY_FAULT)
 _DEADLINE_MISSED = int(Flag.DEADLINE_MISSED)
 _BUS_ERROR = int(Flag.BUS_ERROR)
+_ARM_UNASKED = int(Flag.ARM_UNASKED)
 _ROUNDING = 0.05  # what is sent may differ from what was wanted by this [N m]
 
 
@@ -205,6 +208,8 @@ def reading_bits(reading: ArmReading, *, is_late: bool) -> int:
         flags |= _DEADLINE_MISSED
     if reading.has_bus_error:
         flags |= _BUS_ERROR
+    if reading.is_unasked:
+        flags |= _ARM_UNASKED
     return flags
 
 

@@ -1,6 +1,6 @@
 """Faults of the simulated arm and its bus by the names a rehearsal calls them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Protocol
 
 from acquisition.clock import PERIOD_NS
@@ -24,6 +24,9 @@ _USUAL = {"TEMP": 35, "ERROR": 0}
 _BEHIND_THE_OTHERS_NS = 7 * FRAME_NS[3]
 _BEHIND_THE_NEXT_QUESTION_NS = 1_950_000
 _LATE_EVERY = 50  # cycles
+# Late by one cycle, and by two: the replies are taken for those of the present one.
+_PAST_NS, _LONG_PAST_NS = 2_000_000, 3_950_000
+LAST_PUCK = 7  # nothing is on the wire after its reply
 _LOST_SHARE = 0.01  # of the replies of each puck
 
 
@@ -88,10 +91,18 @@ def _reply_faults(faults: BusFaults) -> dict[str, Callable[[], None]]:
         "reply-lost-10": lambda: faults.drop(reply, 10),
         "reply-lost-some": lambda: _lose_some(faults),
         "reply-late": lambda: _answer_too_late(faults),
+        "replies-late": lambda: _answer_always_late(faults, MOTOR_NODES, _PAST_NS),
+        "puck-late": lambda: _answer_always_late(faults, [LAST_PUCK], _LONG_PAST_NS),
         "reply-doubled": lambda: faults.duplicate(reply, None),
         "reply-swapped": lambda: _swap_replies(faults),
         "reply-spoilt": lambda: faults.corrupt(reply, 0, 3),
     }
+
+
+def _answer_always_late(faults: BusFaults, nodes: Iterable[int], late_ns: int) -> None:
+    """Let every reply of `nodes` be late by about whole cycles, for ever."""
+    for node in nodes:
+        faults.delay(position_reply_id(node), late_ns, None)
 
 
 def _lose_some(faults: BusFaults) -> None:

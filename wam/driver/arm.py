@@ -2,11 +2,18 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from statistics import median
 
 import numpy as np
 
 from acquisition.clock import Clock
-from acquisition.devices import ArmReading, BusCondition, SafetyMode, Vector
+from acquisition.devices import (
+    ArmReading,
+    BusCondition,
+    LatePositions,
+    SafetyMode,
+    Vector,
+)
 from acquisition.errors import (
     DeviceFaultError,
     LinkError,
@@ -15,6 +22,7 @@ from acquisition.errors import (
 )
 from wam.bus.frames import MOTOR_NODES
 from wam.bus.link import Link
+from wam.bus.properties import COMMON
 from wam.bus.property_client import PropertyClient
 from wam.driver.cyclic_io import BusDevice, CycleTraffic
 from wam.driver.discovery import pucks_verb
@@ -59,6 +67,8 @@ class WamArm:
         self._safety = SafetyModule(self._properties, clock, vers=0)
         self._motion: JointEstimator | None = None
         self._missing_cycles = 0
+        self._until_unasked = self._settings.unasked_every
+        self._late_in_a_row = 0
         self._is_commanded = True
         self._is_closed = False
 
@@ -122,20 +132,56 @@ class WamArm:
 
         Never raises for missing replies and waits until `give_up_ns` at most. Missing
         joints go on at their last velocity, and stand still after 50 ms of silence.
+        In one of `unasked_every` cycles it does not ask, while nothing is missing.
         """
+        self._until_unasked -= 1
+        if self._until_unasked <= 0 and self._traffic.is_settled:
+            return self.skip(now_ns)
         self._traffic.exchange(now_ns)
         return self._reading(now_ns)
+
+    def skip(self, now_ns: int) -> ArmReading:
+        """Ask for no position and return what is late, with all joints extrapolated.
+
+        Replies carry no number: those that are late by whole cycles look as if they
+        were in time, until a cycle comes that has not asked.
+        """
+        self._until_unasked = self._settings.unasked_every
+        motors, age_ns = self._traffic.skip(now_ns)
+        self._late_in_a_row = self._late_in_a_row + 1 if motors else 0
+        reading = self._reading(now_ns, is_unasked=True)
+        if motors:
+            reading.late = LatePositions(motors, age_ns, self._late_in_a_row)
+        return reading
+
+    def answer_time(self, questions: int) -> int:
+        """Return from a question for STAT to its answer, median [ns]; not in the loop.
+
+        Each puck is asked so many `questions`; 0 = none was answered.
+
+        Raises:
+            LinkError: the bus is down.
+        """
+        times: list[int] = []
+        for node in (*MOTOR_NODES,) * questions:
+            asked_ns = self._clock.now_ns()
+            if self._properties.get(node, COMMON["STAT"]) is not None:
+                times.append(self._clock.now_ns() - asked_ns)
+        return int(median(times)) if times else 0
 
     def listen(self, now_ns: int) -> ArmReading:
         """Ask for no position, or the module would not idle; does not wait."""
         self._traffic.listen(now_ns)
         return self._reading(now_ns)
 
-    def _reading(self, now_ns: int) -> ArmReading:
+    def _reading(self, now_ns: int, *, is_unasked: bool = False) -> ArmReading:
         motion, traffic = self._started(), self._traffic
         fresh = motion.update(now_ns, traffic.received)
-        lost = traffic.received.count(None)
-        self.counters.rejected += MOTORS - lost - fresh.bit_count()
+        if is_unasked:
+            fresh = _ALL_FRESH
+        else:
+            lost = traffic.received.count(None)
+            self.counters.rejected += MOTORS - lost - fresh.bit_count()
         is_complete = fresh == _ALL_FRESH
         self._missing_cycles = 0 if is_complete else self._missing_cycles + 1
         if not (is_complete and self._is_commanded):
@@ -156,6 +202,7 @@ class WamArm:
             jump=motion.jump,
             foreign_id=self._link.foreign_id,
             has_bus_error=traffic.take_bus_error(),
+            is_unasked=is_unasked,
         )
 
     def send(self, tau: Vector, tau_gravity: Vector) -> Vector:

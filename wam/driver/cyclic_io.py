@@ -27,6 +27,7 @@ from wam.driver.transmission import MOTORS
 
 _ARM_ID = group_id(Group.ARM)
 _LOWER_ID, _WRIST_ID = group_id(Group.LOWER_TORQUE), group_id(Group.WRIST_TORQUE)
+_MARGIN_NS = 200_000  # by which two exchanges differ
 _POSITION_INDEX: Final = {position_reply_id(n): n - 1 for n in MOTOR_NODES}
 
 
@@ -37,6 +38,8 @@ class LinkCounters:
     Attributes:
         missing: questions for its position that each of motors 1 to 7 left open.
         stale: position replies that came after their cycle, or twice.
+        late: position replies that came when none was asked for, after their cycle was
+            taken for complete.
         rejected: positions that jumped.
         malformed: frames that contradict the protocol.
         link_errors: times the bus refused.
@@ -47,6 +50,7 @@ class LinkCounters:
     link: Link
     missing: list[int] = field(default_factory=lambda: [0] * MOTORS)
     stale: int = 0
+    late: int = 0
     rejected: int = 0
     malformed: int = 0
     link_errors: int = 0
@@ -61,6 +65,7 @@ class LinkCounters:
         return {
             "link:missing_replies": " ".join(map(str, self.missing)),
             "link:late_replies": str(self.stale),
+            "link:replies_to_earlier_cycles": str(self.late),
             "link:rejected_jumps": str(self.rejected),
             "link:malformed_frames": str(self.malformed),
             "link:bus_errors": str(self.link_errors),
@@ -99,6 +104,7 @@ class CycleTraffic:
         bus_device: asked right after the positions, while the pucks latch theirs.
         counters: what was dropped so far.
         condition: what became of the bus at the last question for positions.
+        took_ns: from the last question to the last reply that was awaited [ns].
     """
 
     def __init__(self, link: Link, clock: Clock, settings: ArmSettings) -> None:
@@ -111,6 +117,8 @@ class CycleTraffic:
         self.bus_device: BusDevice | None = None
         self.counters = LinkCounters(link)
         self.condition = BusCondition.SOUND
+        self.took_ns = 0
+        self._asked_ns = 0  # when positions were asked for last
         self._errors_seen = 0  # error frames
         self._owed = 0  # bit i set = motor i+1 may still answer an earlier question
         self._link = link
@@ -141,6 +149,7 @@ class CycleTraffic:
             self.received = [None] * MOTORS
             self.bus_ns = 0
             self._link.send(_ARM_ID, self._get_p)
+            self._asked_ns = now_ns
             self._ask_companion()
             self._await_replies(now_ns)
             refused = BusCondition.SOUND
@@ -152,11 +161,52 @@ class CycleTraffic:
             self.counters.link_errors += 1
         self._owed = self._missing()
         if not self._owed:
+            self.took_ns = self.arm_ns - now_ns
             self._link.errors.confirm()
         self.condition = refused or self._link.errors.condition
         if self._owed:
             for i in range(MOTORS):
                 self.counters.missing[i] += self._owed >> i & 1
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether every motor answered the last question, as far as one can tell."""
+        return not self._owed
+
+    def skip(self, now_ns: int) -> tuple[int, int]:
+        """Ask for no position at `now_ns`; return what comes all the same.
+
+        A reply that is late by whole cycles comes when its cycle's own would: the bus
+        is listened to for as long as the last exchange took, and a little more.
+
+        Returns:
+            Bits of the motors that answer an earlier question, and the age of the last
+            of these answers [ns] if it is of the last question.
+        """
+        self.poller.begin_cycle(now_ns)
+        self.arm_ns = self.bus_ns = 0
+        motors, age_ns = 0, 0
+        try:
+            self.counters.stale += self._collect()
+            self.received = [None] * MOTORS
+            self._ask_companion()
+            settings, clock = self._settings, self._clock
+            usual_ns = max(settings.first_look_ns, self.took_ns + _MARGIN_NS)
+            deadline_ns = now_ns + min(usual_ns, settings.give_up_ns)
+            clock.sleep_until(min(now_ns + settings.first_look_ns, deadline_ns))
+            came = self._collect()
+            while clock.now_ns() < deadline_ns and clock.wait(self._link, deadline_ns):
+                came += self._collect()
+            if came:
+                motors = (1 << MOTORS) - 1 & ~self._missing()
+                age_ns = clock.now_ns() - self._asked_ns
+                self.counters.late += came
+        except LinkError:
+            self.condition = BusCondition.DOWN
+            self.counters.link_errors += 1
+        self.received = [None] * MOTORS
+        self.bus_ns = 0
+        return motors, age_ns
 
     def listen(self, now_ns: int) -> None:
         """Take what is not a position; ask for none at `now_ns`, and do not wait."""

@@ -26,6 +26,8 @@ class ArmSettings:
         give_up_ns: from request to the end of waiting for replies [ns].
         speed_limits: of the guard, for each joint [rad/s].
         jump_margin: a position is believed up to so many times the speed limits.
+        unasked_every: in one of so many cycles no position is asked for; one that comes
+            then answers an earlier question.
         safety_poll_cycles: cycles between questions for the safety mode, and between
             those for the pendant's word.
         health_poll_cycles: cycles between questions for the health of a puck.
@@ -42,6 +44,7 @@ class ArmSettings:
     give_up_ns: int = 1_500_000
     speed_limits: tuple[float, ...] = (1.5, 1.5, 2.0, 2.5, 4.0, 4.0, 4.0)
     jump_margin: float = 2.0
+    unasked_every: int = 250
     safety_poll_cycles: int = 25
     health_poll_cycles: int = 50
     safety_limits: SafetyLimits = field(default_factory=SafetyLimits)

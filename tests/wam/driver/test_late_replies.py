@@ -1,0 +1,167 @@
+"""Replies that answer an earlier question look in time, until a cycle does not ask."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from fakes.pucks.options import NetworkOptions
+from tests.fakes.stepped import Rig
+from wam.bus.frames import MOTOR_NODES, position_reply_id
+from wam.driver.arm import WamArm
+from wam.driver.settings import ArmSettings
+
+CYCLE_NS = 2_000_000
+EVERY = ArmSettings().unasked_every
+ZERO = np.zeros(7)
+ALL = 0x7F
+GET_P = (0x404, b"\x30")
+TORQUES = 0x401
+
+
+class Bench:
+    """An arm that is asked 500 times a second, its replies late from a time on."""
+
+    def __init__(self, **settings):
+        self.rig = Rig(NetworkOptions(heartbeat_ns=10_000_000_000))
+        settings = ArmSettings(**settings)
+        self.arm = WamArm(self.rig.link, self.rig.clock, settings)
+        self.arm.start()
+        self.rig.network.pendant("activate")
+        self.rig.sent.clear()
+
+    def run(self, cycles):
+        readings = []
+        for _ in range(cycles):
+            reading = self.arm.read(self.rig.clock.t_ns)
+            if reading.is_complete:
+                self.arm.send(ZERO, ZERO)
+            readings.append(reading)
+            self.rig.clock.sleep_until(reading.host_ns + CYCLE_NS)
+        return readings
+
+    def delay(self, nodes, late_ms):
+        for node in nodes:
+            self.rig.network.faults.delay(
+                position_reply_id(node), round(late_ms * 1e6), None
+            )
+
+
+def unasked(readings):
+    return [i for i, reading in enumerate(readings) if reading.is_unasked]
+
+
+@pytest.mark.parametrize(
+    "late_ms", [1.95, 2.0, 2.3, 2.6, 3.3, 3.6, 3.95, 4.0, 4.6, 5.3, 5.9]
+)
+@pytest.mark.parametrize("nodes", [tuple(MOTOR_NODES), (7,), (1,), (3, 6)])
+def test_replies_that_are_late_for_ever_are_found_or_missing(nodes, late_ms):
+    bench = Bench()
+    bench.delay(nodes, late_ms)
+    readings = bench.run(4 * EVERY)
+    late = [r.late for r in readings if r.late is not None]
+    motors = sum(1 << (node - 1) for node in nodes)
+    if not late:  # between give-up and the next question: nothing is ever complete
+        assert max(r.missing_cycles for r in readings) > 3 * EVERY
+        return
+    assert len(late) >= 3
+    assert {r.motors for r in late} == {motors}
+    assert [r.in_a_row for r in late] == list(range(1, len(late) + 1))
+    assert all(r.age_ns > CYCLE_NS for r in late)
+    assert bench.arm.counters.late == len(late) * len(nodes)
+
+
+@pytest.mark.parametrize("late_ms", [1.95, 2.0, 2.6, 3.95, 5.9])
+def test_until_then_they_look_in_time(late_ms):
+    bench = Bench()
+    bench.delay([7], late_ms)
+    readings = bench.run(EVERY - 1)
+    assert all(reading.is_complete for reading in readings[5:])
+    (reading,) = bench.run(1)
+    assert reading.late is not None
+
+
+def test_a_sound_arm_is_never_late():
+    bench = Bench()
+    readings = bench.run(10 * EVERY)
+    assert len(unasked(readings)) == 10
+    assert not any(reading.late for reading in readings)
+    assert bench.arm.counters.late == 0
+
+
+def test_one_cycle_in_250_does_not_ask_and_still_sends_torques():
+    bench = Bench()
+    readings = bench.run(3 * EVERY)
+    assert unasked(readings) == [EVERY - 1, 2 * EVERY - 1, 3 * EVERY - 1]
+    sent = [(i, d) for _, i, d in bench.rig.sent]
+    assert sent.count(GET_P) == 3 * EVERY - 3
+    assert sum(can_id == TORQUES for can_id, _ in sent) == 3 * EVERY
+
+
+def test_a_cycle_that_does_not_ask_is_no_missing_one():
+    bench = Bench()
+    readings = bench.run(EVERY)
+    assert readings[-1].is_unasked
+    assert all(r.is_complete and r.fresh == ALL for r in readings)
+    assert all(r.missing_cycles == 0 for r in readings)
+    assert bench.arm.counters.missing == [0] * 7
+    assert bench.arm.counters.rejected == 0
+
+
+def test_positions_go_on_at_their_velocity_in_a_cycle_that_does_not_ask():
+    bench = Bench()
+    turning = []
+    for _ in range(EVERY + 2):
+        bench.rig.motors.position[6] += 20
+        turning += bench.run(1)
+    steps = [b.q[6] - a.q[6] for a, b in pairwise(turning)]
+    assert turning[EVERY - 1].is_unasked
+    # To half a count: the others are whole ones.
+    assert steps[EVERY - 2] == pytest.approx(steps[EVERY - 3], rel=0.03)
+    assert turning[EVERY - 1].counts[6] == turning[EVERY - 2].counts[6]
+
+
+def test_a_single_late_reply_that_was_missed_is_not_for_ever():
+    bench = Bench()
+    bench.run(EVERY - 2)
+    bench.rig.network.faults.delay(position_reply_id(6), 1_950_000)
+    missed, next_one, then = bench.run(3)
+    assert not missed.is_complete
+    # While an answer is owed every cycle asks.
+    assert not next_one.is_unasked
+    assert then.is_unasked
+    assert then.late is None
+
+
+def test_the_count_begins_anew_when_nothing_is_late_any_more():
+    bench = Bench()
+    bench.delay([7], 2.0)
+    first = [r.late.in_a_row for r in bench.run(2 * EVERY + 5) if r.late]
+    bench.rig.network.faults.clear_faults()
+    bench.run(EVERY)
+    bench.delay([7], 2.0)
+    again = [r.late.in_a_row for r in bench.run(EVERY) if r.late]
+    assert (first, again) == ([1, 2], [1])
+
+
+def test_the_bus_of_the_late_is_recorded():
+    bench = Bench()
+    bench.delay([7], 2.0)
+    bench.run(EVERY)
+    assert bench.arm.counters.metadata()["link:replies_to_earlier_cycles"] == "1"
+
+
+def test_a_device_on_the_bus_is_asked_in_every_cycle():
+    bench, asked = Bench(), []
+
+    class Companion:
+        def poll_frame(self, t_ns):
+            asked.append(t_ns)
+            return 8, b"\x36"
+
+        def on_frame(self, can_id, data):
+            pass
+
+    bench.arm.attach_device(Companion())
+    assert len(unasked(bench.run(EVERY))) == 1
+    assert len(asked) == EVERY
