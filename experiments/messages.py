@@ -12,6 +12,7 @@ from acquisition.control_loop.faults import (
     CircuitCauses,
     Fault,
     GuardVerdict,
+    LateReplies,
     ReplySilence,
 )
 from acquisition.devices import BusCondition, SafetyMode
@@ -235,7 +236,7 @@ def fault_text(verdict: GuardVerdict, context: FaultContext, saved: str = "") ->
     """
     detail, causes = verdict.detail, ""
     is_of_time = verdict.fault in _OF_TIME
-    name, silent = verdict.reason, list[int]()
+    name, nodes = verdict.reason, list[int]()
     if isinstance(detail, CircuitCauses):
         causes = ", ".join(
             f"{cause} fault" for cause in detail.causes if cause != _BUTTON
@@ -244,16 +245,18 @@ def fault_text(verdict: GuardVerdict, context: FaultContext, saved: str = "") ->
         if causes and verdict.fault is not None:
             name = _BY_MONITOR[verdict.fault]
     elif isinstance(detail, ReplySilence):
-        silent = _nodes(detail.silent)
+        nodes = _nodes(detail.silent)
         if context.bus is not BusCondition.SOUND:
             name = _BY_CONDITION[context.bus]
-        elif len(silent) < _PUCKS:
+        elif len(nodes) < _PUCKS:
             name = "puck-silent"
+    elif isinstance(detail, LateReplies):
+        nodes = _nodes(detail.motors)
     values: dict[str, object] = {
         "trial": context.trial,
         "seconds": context.seconds or 0.0,
         "when": "" if context.seconds is None else f" at {context.seconds:.2f} s",
-        "pucks": _who(silent),
+        "pucks": _who(nodes),
         "then": AFTER_FAULT[context.prompt].format(command=context.command),
         "command": context.command,
     }

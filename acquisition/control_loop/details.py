@@ -31,6 +31,19 @@ class ReplySilence:
 
 
 @dataclass(frozen=True, slots=True)
+class LateReplies:
+    """Positions that answer an earlier question.
+
+    Attributes:
+        ms: their age, at least [ms].
+        motors: bit i set = that of motor i+1 was late.
+    """
+
+    ms: float
+    motors: int
+
+
+@dataclass(frozen=True, slots=True)
 class SafetySilence:
     """Age of the safety module's last answer [ms]."""
 
@@ -158,6 +171,7 @@ FaultDetail = (
     NoDetail
     | CircuitCauses
     | ReplySilence
+    | LateReplies
     | SafetySilence
     | PositionJump
     | StuckMotor

@@ -20,6 +20,7 @@ from acquisition.control_loop.details import (
     Joint7Slip,
     JointExcess,
     LateCycles,
+    LateReplies,
     MotionExcess,
     NoDetail,
     ReplySilence,
@@ -53,6 +54,7 @@ class Fault(StrEnum):
     E_STOP = "estop"
     PENDANT_IDLE = "pendant-idle"
     CAN_SILENCE = "can-silence"
+    REPLIES_LATE = "replies-late"
     SAFETY_SILENT = "safety-silent"
     POSITION_JUMP = "position-jump"
     MOTOR_STUCK = "motor-stuck"
@@ -107,6 +109,9 @@ FAULTS: Mapping[Fault, FaultSpec] = {
     Fault.PENDANT_IDLE: FaultSpec(_IDLE, CircuitCauses, ends_session=True),
     Fault.CAN_SILENCE: FaultSpec(
         (Action.HOLD, Action.IDLE), ReplySilence, ends_session=True
+    ),
+    Fault.REPLIES_LATE: FaultSpec(
+        (Action.HOLD, Action.IDLE), LateReplies, ends_session=True
     ),
     Fault.SAFETY_SILENT: FaultSpec(
         (Action.HOLD, Action.IDLE), SafetySilence, ends_session=True

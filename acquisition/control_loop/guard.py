@@ -18,6 +18,7 @@ from acquisition.control_loop.details import (
     Joint7Slip,
     JointExcess,
     LateCycles,
+    LateReplies,
     ReplySilence,
     SafetySilence,
     StillMotor,
@@ -285,6 +286,16 @@ def _check_silence(facts: Facts) -> GuardVerdict:
     return verdict_for(Fault.CAN_SILENCE, detail, is_lasting=is_lasting)
 
 
+def _check_late(facts: Facts) -> GuardVerdict:
+    """Hold, then brake, an arm that tells where it was and not where it is."""
+    late = facts.seen.reading.late
+    if late is None:
+        return OK
+    is_lasting = late.in_a_row >= facts.limits.idle_after_late
+    detail = LateReplies(late.age_ns / NS_PER_MS, late.motors)
+    return verdict_for(Fault.REPLIES_LATE, detail, is_lasting=is_lasting)
+
+
 def _check_master(facts: Facts) -> GuardVerdict:
     """Give up an arm that takes torques of another program as well."""
     foreign_id = facts.seen.reading.foreign_id
@@ -408,6 +419,7 @@ def _check_cadence(facts: Facts) -> GuardVerdict:
 CHECKS: tuple[Callable[[Facts], GuardVerdict], ...] = (
     _check_safety,
     _check_silence,
+    _check_late,
     _check_master,
     _check_move,
     _check_numbers,

@@ -54,6 +54,8 @@ class GuardLimits:
             21 and 33 mm at most in simulated trials; joints 1 and 7 may stand.
         hold_after_missing: incomplete cycles in a row that end in hold.
         idle_after_missing: incomplete cycles in a row that end in idle.
+        idle_after_late: cycles in a row in which positions came that were not asked
+            for, and which end in idle; the first ends in hold.
         idle_after_safety_ms: age of the safety module's last answer that ends in idle
             [ms]; its questions leave every 50 ms, so the mode is unknown after 250.
         armed_inside: a joint's position limit counts after it was this far inside
@@ -80,6 +82,7 @@ class GuardLimits:
     still_ways: Sequence[float] = (inf, 0.06, 0.06, 0.06, 0.06, 0.06, inf)
     hold_after_missing: int = 5
     idle_after_missing: int = 25
+    idle_after_late: int = 3
     idle_after_safety_ms: float = 400.0
     armed_inside: float = 0.1
     motion: MotionLimits = _MOTION

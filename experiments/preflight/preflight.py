@@ -36,6 +36,7 @@ from wam.driver.home import HOME_LIMIT, check_zero, zero_error
 from wam.driver.startup import ArmInfo
 
 STEPPED_TEST = 0.3  # s
+_SLOW_ANSWER_MS = 1.5  # median; over a sound adapter a puck answers after 0.3 ms
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,16 +218,29 @@ def start_devices(rig: Rig) -> ArmInfo:
 
 def _check_exchange(rig: Rig, add: Add) -> None:
     """Grade the way from the request to the seventh position over this adapter."""
-    times = np.array(rig.backend.arm.measure_exchange())
+    measured = rig.backend.arm.measure_exchange()
+    times = np.array(measured.replies_ns)
     lost = EXCHANGE_CYCLES - len(times)
     if len(times) < EXCHANGE_CYCLES // 2:
         add(BAD, "exchange", f"{lost} of {EXCHANGE_CYCLES} cycles incomplete")
         raise preflight_error("exchange", lost=lost, cycles=EXCHANGE_CYCLES)
+    if measured.late:
+        fields = {
+            "late": measured.late,
+            "skipped": measured.unasked,
+            "age": measured.age_ns / 1e6,
+        }
+        add(BAD, "exchange", f"{measured.late} of {measured.unasked} not asked for")
+        raise preflight_error("exchange-late", **fields)
     p50, p99 = np.percentile(times, (50, 99)) / 1e6
     text = f"7 positions after {p50:.2f} ms (p99 {p99:.2f}), {lost} incomplete"
     is_slow = p99 * 1e6 > SLOW_EXCHANGE_NS or lost > 1
     slow = f": slow adapter, limit {SLOW_EXCHANGE_NS / 1e6:.1f} ms" if is_slow else ""
     add(WARNING if is_slow else GOOD, "exchange", text + slow)
+    answer_ms = measured.answer_ns / 1e6
+    if answer_ms > _SLOW_ANSWER_MS:
+        slow = f"a puck answers after {answer_ms:.2f} ms, limit {_SLOW_ANSWER_MS} ms"
+        add(WARNING, "answers", slow)
 
 
 def _check_rights(rig: Rig, add: Add) -> dict[str, str]:

@@ -5,7 +5,8 @@ processes calls it through a proxy of this class (`acquisition.ipc.rpc`), so its
 arguments and results are values that JSON can carry.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,7 +15,35 @@ from acquisition.devices import SafetyMode
 from wam.driver.arm import WamArm
 from wam.driver.startup import ArmInfo
 
-EXCHANGE_CYCLES = 100
+EXCHANGE_CYCLES = 100  # in which positions are asked for
+UNASKED_EVERY = 20  # in one of so many cycles they are not
+_AGE_CYCLES = 5  # at the end, in none of which they are
+_QUESTIONS = 3  # to each puck, how long one answer takes
+
+
+@dataclass(frozen=True, slots=True)
+class ExchangeTimes:
+    """What came of questions for the positions, without torque.
+
+    Attributes:
+        replies_ns: from request to seventh position [ns]; incomplete exchanges are left
+            out.
+        unasked: cycles in which no position was asked for.
+        late: of these, in which positions came: they answer an earlier question.
+        age_ns: between the last question and the last position that came [ns], 0 =
+            none came after its cycle.
+        answer_ns: from a question for a property to its answer [ns], median; 0 = none
+            was answered.
+    """
+
+    replies_ns: list[int]
+    unasked: int = 0
+    late: int = 0
+    age_ns: int = 0
+    answer_ns: int = 0
+
+
+_EXCHANGE_PERIODS = EXCHANGE_CYCLES + (EXCHANGE_CYCLES - 1) // (UNASKED_EVERY - 1)
 
 
 class ArmOperations:
@@ -42,24 +71,44 @@ class ArmOperations:
         """Discover, wake and query the arm; raises as `WamArm.start`."""
         return self._opened().start()
 
-    def measure_exchange(self) -> list[int]:
+    def measure_exchange(self) -> ExchangeTimes:
         """Ask 100 times for the positions, one period apart, without torque.
 
-        Returns:
-            From request to seventh position [ns]; incomplete exchanges are left out.
+        Between them come cycles that do not ask: see `ExchangeTimes.late`.
         """
         arm, clock = self._opened(), self._clock
+        answer_ns = arm.answer_time(_QUESTIONS)
         times: list[int] = []
+        unasked = late = 0
+        was_complete = False
+        for number, _ in enumerate(self._periods(_EXCHANGE_PERIODS), 1):
+            is_unasked = number % UNASKED_EVERY == 0
+            now_ns = clock.now_ns()
+            reading = arm.skip(now_ns) if is_unasked else arm.read(now_ns)
+            if not is_unasked:
+                was_complete = reading.is_complete
+                if was_complete:
+                    times.append(reading.arm_ns - reading.host_ns)
+            elif was_complete:  # a motor that owes an answer may still give it
+                unasked += 1
+                late += reading.late is not None
+        ages = [0]
+        for _ in self._periods(_AGE_CYCLES):
+            reading = arm.skip(clock.now_ns())
+            if reading.late is not None and was_complete:
+                ages.append(reading.late.age_ns)
+        return ExchangeTimes(times, unasked, late, max(ages), answer_ns)
+
+    def _periods(self, count: int) -> Iterator[int]:
+        """Yield at the beginning of each of `count` periods of the loop."""
+        clock = self._clock
         next_ns = clock.now_ns() + PERIOD_NS
-        for _ in range(EXCHANGE_CYCLES):
+        for number in range(count):
             clock.sleep_until(next_ns)
-            reading = arm.read(clock.now_ns())
-            if reading.is_complete:
-                times.append(reading.arm_ns - reading.host_ns)
+            yield number
             if self._poll is not None:
                 self._poll(clock.now_ns())
             next_ns = max(next_ns + PERIOD_NS, clock.now_ns())
-        return times
 
     def define_position(self, q: Sequence[float]) -> None:
         """Tell the arm that its joints stand at `q` [rad]; see `WamArm`."""

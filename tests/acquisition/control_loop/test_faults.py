@@ -20,6 +20,7 @@ RECORDED_NAMES = {
     "estop",
     "pendant-idle",
     "can-silence",
+    "replies-late",
     "safety-silent",
     "position-jump",
     "motor-stuck",

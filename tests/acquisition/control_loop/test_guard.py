@@ -20,7 +20,7 @@ from acquisition.control_loop.faults import (
 )
 from acquisition.control_loop.guard import GuardState, Observation, check
 from acquisition.control_loop.states import ArmState
-from acquisition.devices import ArmReading, PositionJump, SafetyMode
+from acquisition.devices import ArmReading, LatePositions, PositionJump, SafetyMode
 from tests.acquisition.control_loop.limits import guard_limits
 
 MS = 1_000_000
@@ -85,6 +85,10 @@ def missing(cycles):
     return {"missing_cycles": cycles, "is_complete": False, "fresh": 0x5F}
 
 
+def late(in_a_row):
+    return {"late": LatePositions(0x40, 2_200_000, in_a_row), "is_unasked": True}
+
+
 E = 1e-9
 LIMIT_TABLE = [
     (Fault.BUS_SHARED, Action.IDLE, {"foreign_id": None}, {"foreign_id": 0x404}),
@@ -115,6 +119,9 @@ LIMIT_TABLE = [
     (Fault.CAN_SILENCE, Action.HOLD, missing(4), missing(5)),
     (Fault.CAN_SILENCE, Action.HOLD, missing(0), missing(24)),
     (Fault.CAN_SILENCE, Action.IDLE, missing(0), missing(25)),
+    (Fault.REPLIES_LATE, Action.HOLD, {"late": None}, late(1)),
+    (Fault.REPLIES_LATE, Action.HOLD, {"late": None}, late(2)),
+    (Fault.REPLIES_LATE, Action.IDLE, {"late": None}, late(3)),
     (Fault.FOOT_SPEED, Action.DAMP, {"foot_speed": 0.8}, {"foot_speed": 0.8 + E}),
     (
         Fault.JOINT7_SLIP,

@@ -21,7 +21,7 @@ from experiments.messages import CATALOGUE
 from experiments.operator.auto_operator import AutoOperator
 from experiments.operator.prompts import Prompt
 from experiments.preflight import preflight
-from experiments.rig.arm_operations import ArmOperations
+from experiments.rig.arm_operations import ArmOperations, ExchangeTimes
 from experiments.rig.backend import InProcessBackend
 from experiments.rig.build import build_tool
 from experiments.run import ready
@@ -311,7 +311,12 @@ def _saturate(scene):
 
 
 def _no_exchange(scene):
-    scene.patch.setattr(ArmOperations, "measure_exchange", lambda _: [])
+    scene.patch.setattr(ArmOperations, "measure_exchange", lambda _: ExchangeTimes([]))
+    return resume(scene)
+
+
+def _late_replies(scene):
+    scene.rig.faults()["replies-late"]()
     return resume(scene)
 
 
@@ -437,6 +442,7 @@ CASES = {
     "not-zeroed": fault("not-zeroed", 3),
     "ft-silent": fault("ft-silent", 3, words="No F/T data for 100 ms (port open, 0"),
     "disk-full": fault("disk-full@T0+0s", 3, words="2.1 GB free"),
+    "exchange-late": Case(_late_replies, 3, words="in 5 of 5 cycles"),
     "exchange": Case(_no_exchange, 3, words="100 of 100 exchanges"),
     "loop-dead": Case(_no_loop, 3),
     "ft-lost": Case(_lost_sensor, 3, words="while it was tested: The port is gone."),
@@ -470,6 +476,7 @@ CASES = {
     # what takes the arm away; in a trial: test_bus_faults
     "can-silence": struck("can-silence"),
     "safety-silent": struck("safety-silent"),
+    "replies-late": struck("replies-late", words="Pucks 1,2,3,4,5,6,7 have answered"),
     "position-jump": struck("position-jump"),
     "bus-shared": struck("bus-shared", words="frame 4"),
     "puck-silent": struck("puck-silent", words="Puck 3 has not"),
