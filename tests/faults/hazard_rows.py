@@ -67,11 +67,14 @@ ROWS: dict[str, dict[str, Fields]] = {
         "late": (
             "an old position is taken for a new one",
             "busy bus, slow adapter",
-            "replies that come after their cycle, or twice, are counted",
-            "they are thrown away; the next cycle waits for both",
+            "replies that come after their cycle, or twice, are counted. One cycle in 250, and one in 20 at the preflight, asks for none: what comes then is late by whole cycles",
+            "they are thrown away; the next cycle waits for both. Late by whole cycles: hold, the third time in a row brakes; at the preflight refused",
             ("reply-late", "reply-doubled", "reply-swapped"),
             "",
-            (_LOST + "test_a_late_reply_never_answers_the_next_question",),
+            (
+                _LOST + "test_a_late_reply_never_answers_the_next_question",
+                "tests/wam/driver/test_late_replies.py::test_replies_that_are_late_for_ever_are_found_or_missing",
+            ),
         ),
     },
     "joint torque command": {
@@ -540,7 +543,7 @@ ROWS: dict[str, dict[str, Fields]] = {
         "late": (
             "as late positions",
             "slow adapter",
-            "the exchange is timed at the preflight",
+            "the exchange, and the answer of a puck, are timed at the preflight",
             "warned",
             ("reply-late",),
             "",
