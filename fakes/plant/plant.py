@@ -114,6 +114,7 @@ class ArmPlant:
     @q.setter
     def q(self, q: Array) -> None:
         self._body.move(q)
+        self._stand = q.copy()  # it is put there, its stand too
 
     @property
     def qd(self) -> Array:

@@ -72,7 +72,7 @@ def test_what_is_filled_in_is_left_open_in_a_table():
 ARM_TEXTS = {
     Action.END_TRIAL: ("holding",),  # as soon as the console has heard of it
     Action.HOLD: ("holding",),
-    Action.DAMP: ("damping, then holding",),
+    Action.DAMP: ("damped where it is",),
     Action.IDLE: ("idle", "stopped by its hardware", "UNKNOWN"),
 }
 

@@ -66,6 +66,7 @@ FAULTS = (
     "ft-jump",
     "ft-reboot",
     "ft-clock-jump",
+    "early-activation",
     "not-a-number",
     "joint-limit",
     "torque-limit",

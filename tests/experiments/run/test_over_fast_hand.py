@@ -13,10 +13,11 @@ from experiments.settings.load import load_settings
 
 J1, J6 = 0, 5
 PULL = 8.0  # N m of the hand at joint 1
+FASTEST = (3.0, 3.0, 4.0, 5.0, 8.0, 8.0, 8.0)
 # Low limits, so that the safety module has nothing to say yet.
 LIMITS = {
-    "overspeed": {"speed": (0.4, *[9.0] * 6)},
-    "foot-speed": {"foot_speed": 0.06, "speed": (9.0,) * 7},
+    "overspeed": {"speed": (0.4, *FASTEST[1:])},
+    "foot-speed": {"foot_speed": 0.06, "speed": FASTEST},
 }
 
 
