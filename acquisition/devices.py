@@ -45,6 +45,23 @@ class PositionJump:
 
 
 @dataclass(frozen=True, slots=True)
+class MotorChange:
+    """A property of a motor's controller that is not what it was at the start.
+
+    Attributes:
+        motor: its number, 1-7.
+        name: of the property.
+        was: its value at the start.
+        value: its value now.
+    """
+
+    motor: int
+    name: str
+    was: int
+    value: int
+
+
+@dataclass(frozen=True, slots=True)
 class LatePositions:
     """Positions that came in a cycle in which none was asked for.
 
@@ -85,6 +102,7 @@ class ArmReading:
         is_unasked: no position was asked for in this cycle, on purpose: all of them
             are extrapolated by one cycle.
         late: positions that came although none was asked for; None = none did.
+        change: of a motor's controller since the start; None = none was seen.
     """
 
     host_ns: int
@@ -102,6 +120,7 @@ class ArmReading:
     bus_ns: int = 0
     is_unasked: bool = False
     late: LatePositions | None = None
+    change: MotorChange | None = None
 
 
 @dataclass(slots=True)

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from acquisition.devices import PositionJump
+from acquisition.devices import MotorChange, PositionJump
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,6 +172,7 @@ FaultDetail = (
     | CircuitCauses
     | ReplySilence
     | LateReplies
+    | MotorChange
     | SafetySilence
     | PositionJump
     | StuckMotor

@@ -29,7 +29,7 @@ from acquisition.control_loop.details import (
     StillMotor,
     StuckMotor,
 )
-from acquisition.devices import PositionJump
+from acquisition.devices import MotorChange, PositionJump
 
 
 class Action(Enum):
@@ -60,6 +60,7 @@ class Fault(StrEnum):
     MOTOR_STUCK = "motor-stuck"
     MOTOR_STILL = "motor-still"
     BUS_SHARED = "bus-shared"
+    PUCK_CHANGED = "puck-changed"
     NOT_ASKED_ACTIVE = "not-asked-active"
     ACTIVATION_MOTION = "activation-motion"
     HOLD_MOTION = "hold-motion"
@@ -124,6 +125,7 @@ FAULTS: Mapping[Fault, FaultSpec] = {
         _IDLE, StillMotor, needs_trial=True, ends_session=True
     ),
     Fault.BUS_SHARED: FaultSpec(_IDLE, ForeignFrame, ends_session=True),
+    Fault.PUCK_CHANGED: FaultSpec(_IDLE, MotorChange, ends_session=True),
     Fault.NOT_ASKED_ACTIVE: FaultSpec(_IDLE, ends_session=True),
     Fault.ACTIVATION_MOTION: FaultSpec(_IDLE, MotionExcess, ends_session=True),
     Fault.HOLD_MOTION: FaultSpec(_IDLE, MotionExcess, ends_session=True),

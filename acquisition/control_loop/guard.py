@@ -304,6 +304,17 @@ def _check_master(facts: Facts) -> GuardVerdict:
     return verdict_for(Fault.BUS_SHARED, ForeignFrame(foreign_id))
 
 
+def _check_change(facts: Facts) -> GuardVerdict:
+    """Give up an arm whose torques or counts mean something else than at the start.
+
+    Silence goes before: a controller that restarts answers as another one.
+    """
+    reading = facts.seen.reading
+    if reading.change is None or reading.missing_cycles:
+        return OK
+    return verdict_for(Fault.PUCK_CHANGED, reading.change)
+
+
 def _check_move(facts: Facts) -> GuardVerdict:
     """Idle a move that turns a motor in vain: it would be pulled on for ever."""
     motor = facts.seen.stuck_motor
@@ -421,6 +432,7 @@ CHECKS: tuple[Callable[[Facts], GuardVerdict], ...] = (
     _check_silence,
     _check_late,
     _check_master,
+    _check_change,
     _check_move,
     _check_numbers,
     _check_position,

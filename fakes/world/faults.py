@@ -17,6 +17,7 @@ PUCK = 3  # of those that fail alone: its joint carries little, the arm stays up
 FOREIGN_LOAD = 0.6  # of the bus, half of it before the arm's frames and half after
 _OTHER_NODE = 20  # of a master that does not call itself host
 _LOW_VOLTAGE = 20.0  # below what the safety module tolerates [V]
+_OTHER_IPNM = 2500  # of the motor that PUCK says to have
 _HOT = 72  # above OTEMP [degrees Celsius]
 _USUAL = {"TEMP": 35, "ERROR": 0}
 # A reply that waits for six others comes last; one that waits for almost a cycle comes
@@ -39,6 +40,7 @@ def network_faults(network: PuckNetwork) -> dict[str, Callable[[], None]]:
         "puck-silent": lambda: network.silence(PUCK),
         "puck-reboot": lambda: network.reboot(PUCK),
         "puck-hot": lambda: network.set_property(PUCK, "TEMP", _HOT),
+        "puck-changed": lambda: network.set_property(PUCK, "IPNM", _OTHER_IPNM),
         "puck-error": lambda: network.set_property(PUCK, "ERROR", 7),
         "can-silence": lambda: _silence_all(network),
         "bus-off": faults.go_off,
@@ -76,6 +78,7 @@ def clear_network_faults(network: PuckNetwork) -> None:
         network.silence(node, is_mute=False)
     network.disobey(is_disobedient=False)
     network.set_bus_voltage(NOMINAL_VOLTAGE)
+    network.set_property(PUCK, "IPNM", network.options.ipnm[PUCK - 1])
     for node in MOTOR_NODES:
         network.silence(node, is_mute=False)
         for name, value in _USUAL.items():

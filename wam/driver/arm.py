@@ -101,7 +101,8 @@ class WamArm:
             LinkTimeoutError: a device stopped answering on the way.
             LinkError: the bus is down.
         """
-        info = StartUp(self._properties, self._clock, self._settings).run()
+        start_up = StartUp(self._properties, self._clock, self._settings)
+        info = start_up.run()
         self._safety = SafetyModule(self._properties, self._clock, info.safety_vers)
         self._poller.set_firmware(info.safety_vers)
         self._poller.note_mode(info.safety_mode, self._clock.now_ns())
@@ -109,6 +110,7 @@ class WamArm:
         health = [puck.health for puck in info.pucks]
         firmware = [puck.vers for puck in info.pucks]
         self._poller.health.begin(health, firmware, self._clock.now_ns())
+        self._poller.watch.begin(start_up.answers, firmware)
         self._traffic.set_firmware(firmware[0])  # P and T are the same in all seven
         transmission = Transmission(
             self._settings.j2mp,
@@ -203,6 +205,7 @@ class WamArm:
             foreign_id=self._link.foreign_id,
             has_bus_error=traffic.take_bus_error(),
             is_unasked=is_unasked,
+            change=self._poller.watch.change,
         )
 
     def send(self, tau: Vector, tau_gravity: Vector) -> Vector:

@@ -31,6 +31,7 @@ class ArmSettings:
         safety_poll_cycles: cycles between questions for the safety mode, and between
             those for the pendant's word.
         health_poll_cycles: cycles between questions for the health of a puck.
+        watch_poll_cycles: cycles between questions for what a puck said at the start.
         safety_limits: what the safety module is set to tolerate.
         pucks: what the motor pucks have to say of themselves.
         boot_ns: silence while pucks boot [ns].
@@ -47,6 +48,7 @@ class ArmSettings:
     unasked_every: int = 250
     safety_poll_cycles: int = 25
     health_poll_cycles: int = 50
+    watch_poll_cycles: int = 50
     safety_limits: SafetyLimits = field(default_factory=SafetyLimits)
     pucks: PuckTable = field(default_factory=shipped_table)
     boot_ns: int = 1_000 * _MS

@@ -103,6 +103,9 @@ class StartUp:
 
     It follows libbarrett's start-up, without its waits for a person. What that library
     neither reads nor verifies is a warning here.
+
+    Attributes:
+        answers: properties of pucks 1 to 7 by name; None = it did not answer.
     """
 
     def __init__(
@@ -113,7 +116,7 @@ class StartUp:
         self._boot_ns = settings.boot_ns
         self._limits = settings.safety_limits
         self._expected = settings.pucks
-        self._answers: list[dict[str, int | None]] = []  # of pucks 1 to 7, by name
+        self.answers: list[dict[str, int | None]] = []
         self._warnings: list[str] = []
 
     def run(self) -> ArmInfo:
@@ -200,7 +203,7 @@ class StartUp:
         health = ask_health(lambda number: self._properties.get(node, number), vers)
         asked = ask_properties(lambda number: self._properties.get(node, number), vers)
         known = {"VERS": vers, "ROLE": role, "CTS": cts, "IPNM": ipnm}
-        self._answers.append({**asked, **known, "VBUS": health.bus_voltage})
+        self.answers.append({**asked, **known, "VBUS": health.bus_voltage})
         serial = asked.get("SN")
         return PuckInfo(node, vers, role, cts, ipnm, mech, was_asleep, health, serial)
 
@@ -253,7 +256,7 @@ class StartUp:
         Raises:
             UnfitDeviceError: a torque or a count would mean something else.
         """
-        answers, rows = self._answers, self._expected.rows()
+        answers, rows = self.answers, self._expected.rows()
         for name in rows:
             silent = [i for i, a in enumerate(answers, 1) if a.get(name, 0) is None]
             if silent:

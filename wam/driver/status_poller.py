@@ -20,6 +20,7 @@ from wam.bus.link import Link
 from wam.bus.properties import MODERN, Device, nearest_documented, property_number
 from wam.driver.health import HealthTable
 from wam.driver.pendant import PendantWord, decode_pendant
+from wam.driver.property_watch import PropertyWatch
 from wam.driver.safety_module import decode_mode
 from wam.driver.settings import ArmSettings
 
@@ -36,7 +37,7 @@ class StatusPoller:
     """Asks safety module and pucks how they are and keeps the newest answers.
 
     In a cycle there is one question at most. The mode goes before the pendant's word,
-    the word before the pucks' health.
+    the word before the pucks' health, and that before what they are.
 
     Attributes:
         mode: last known mode of the safety module.
@@ -45,6 +46,7 @@ class StatusPoller:
         faults: monitors of the module that report a fault.
         excused: monitors that made no sense at start-up; they are left out.
         health: the newest answers of the pucks.
+        watch: what they must go on answering.
         is_lowering: IDLE is sent again with every question for its mode,
             until it says that it is.
     """
@@ -56,6 +58,7 @@ class StatusPoller:
         self.faults: tuple[str, ...] = ()
         self.excused: tuple[str, ...] = ()
         self.health = HealthTable()
+        self.watch = PropertyWatch()
         self.is_lowering = False
         self._link = link
         self._settings = settings
@@ -63,10 +66,11 @@ class StatusPoller:
         self._unanswered = 0
         self._hints_seen = 0
         self._has_asked = False
-        # In cycles; halves and thirds, so that the three seldom fall due together.
+        # In cycles; halves and thirds, so that they seldom fall due together.
         self._until_mode = 0
         self._until_pendant = settings.safety_poll_cycles // 2
         self._until_health = settings.health_poll_cycles // 3
+        self._until_watch = 2 * settings.watch_poll_cycles // 3
         self.set_firmware(MODERN)
 
     def set_firmware(self, vers: int) -> None:
@@ -80,6 +84,7 @@ class StatusPoller:
         self._until_mode -= 1
         self._until_pendant -= 1
         self._until_health -= 1
+        self._until_watch -= 1
 
     def ask(self, *, is_urgent: bool = False) -> None:
         """Put the question that is due, if there is one, once in a cycle.
@@ -105,6 +110,10 @@ class StatusPoller:
             self._until_health = self._settings.health_poll_cycles
             node, number = self.health.next_question()
             self._link.send(node, encode_get(number))
+        elif self._until_watch <= 0:
+            self._until_watch = self._settings.watch_poll_cycles
+            if (question := self.watch.next_question()) is not None:
+                self._link.send(question[0], encode_get(question[1]))
 
     def on_frame(self, can_id: int, data: Payload) -> None:
         """Take a frame that is no position.
@@ -120,6 +129,7 @@ class StatusPoller:
             return
         if node is not None:
             self.health.note(node, reply, self._now_ns)
+            self.watch.note(node, reply)
         elif reply.number == _MODE:
             mode = decode_mode(reply.value)
             if mode is not SafetyMode.UNKNOWN:  # nonsense leaves the question open

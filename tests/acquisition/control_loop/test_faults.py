@@ -26,6 +26,7 @@ RECORDED_NAMES = {
     "motor-stuck",
     "motor-still",
     "bus-shared",
+    "puck-changed",
     "not-asked-active",
     "activation-motion",
     "hold-motion",

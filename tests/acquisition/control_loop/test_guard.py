@@ -20,7 +20,13 @@ from acquisition.control_loop.faults import (
 )
 from acquisition.control_loop.guard import GuardState, Observation, check
 from acquisition.control_loop.states import ArmState
-from acquisition.devices import ArmReading, LatePositions, PositionJump, SafetyMode
+from acquisition.devices import (
+    ArmReading,
+    LatePositions,
+    MotorChange,
+    PositionJump,
+    SafetyMode,
+)
 from tests.acquisition.control_loop.limits import guard_limits
 
 MS = 1_000_000
@@ -89,6 +95,7 @@ def late(in_a_row):
     return {"late": LatePositions(0x40, 2_200_000, in_a_row), "is_unasked": True}
 
 
+CHANGE = MotorChange(3, "PIDX", 3, 2)
 E = 1e-9
 LIMIT_TABLE = [
     (Fault.BUS_SHARED, Action.IDLE, {"foreign_id": None}, {"foreign_id": 0x404}),
@@ -122,6 +129,7 @@ LIMIT_TABLE = [
     (Fault.REPLIES_LATE, Action.HOLD, {"late": None}, late(1)),
     (Fault.REPLIES_LATE, Action.HOLD, {"late": None}, late(2)),
     (Fault.REPLIES_LATE, Action.IDLE, {"late": None}, late(3)),
+    (Fault.PUCK_CHANGED, Action.IDLE, {"change": None}, {"change": CHANGE}),
     (Fault.FOOT_SPEED, Action.DAMP, {"foot_speed": 0.8}, {"foot_speed": 0.8 + E}),
     (
         Fault.JOINT7_SLIP,

@@ -49,6 +49,7 @@ from tests.experiments.program import (
     write_config,
 )
 from wam.control.controller import FootController
+from wam.driver import property_watch
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
 
@@ -316,8 +317,25 @@ def _no_exchange(scene):
 
 
 def _late_replies(scene):
-    scene.rig.faults()["replies-late"]()
+    """Let replies be late from the sensor's check on, before the exchange is timed."""
+    usual = preflight.reach_words
+
+    def words(*arguments):
+        scene.rig.faults()["replies-late"]()
+        return usual(*arguments)
+
+    scene.patch.setattr(preflight, "reach_words", words)
     return resume(scene)
+
+
+def _changed_puck(scene):
+    """Ask for one property in turn, so that a short session comes to it."""
+
+    def change(scene):
+        scene.rig.faults()["puck-changed"]()
+
+    scene.patch.setattr(property_watch, "WATCHED", ("IPNM",))
+    return resume(scene, press=once(Prompt.LIFT, change))
 
 
 def _no_loop(scene):
@@ -479,6 +497,7 @@ CASES = {
     "replies-late": struck("replies-late", words="Pucks 1,2,3,4,5,6,7 have answered"),
     "position-jump": struck("position-jump"),
     "bus-shared": struck("bus-shared", words="frame 4"),
+    "puck-changed": Case(_changed_puck, 4, words="IPNM of puck 3 was 2700"),
     "puck-silent": struck("puck-silent", words="Puck 3 has not"),
     "bus-off": struck("bus-off"),
     "interface-down": struck("interface-down"),

@@ -1,0 +1,68 @@
+"""What a puck said at the start is asked again while the arm is driven."""
+
+import numpy as np
+import pytest
+
+from acquisition.devices import MotorChange
+from fakes.pucks.options import NetworkOptions
+from tests.fakes.stepped import Rig
+from wam.bus.frames import MOTOR_NODES
+from wam.driver.arm import WamArm
+from wam.driver.property_watch import WATCHED
+from wam.driver.settings import ArmSettings
+
+CYCLE_NS = 2_000_000
+EVERY = ArmSettings().watch_poll_cycles
+TURN = EVERY * len(WATCHED) * len(MOTOR_NODES)  # cycles until all were asked
+ZERO = np.zeros(7)
+
+
+class Bench:
+    def __init__(self, **options):
+        self.rig = Rig(NetworkOptions(heartbeat_ns=10_000_000_000, **options))
+        self.arm = WamArm(self.rig.link, self.rig.clock)
+        self.arm.start()
+        self.rig.sent.clear()
+
+    def run(self, cycles):
+        for _ in range(cycles):
+            reading = self.arm.read(self.rig.clock.t_ns)
+            self.arm.send(ZERO, ZERO)
+            self.rig.clock.sleep_until(reading.host_ns + CYCLE_NS)
+        return reading
+
+
+@pytest.mark.parametrize(
+    ("node", "name", "was", "value"),
+    [(3, "PIDX", 3, 2), (2, "MT", 4860, 700), (7, "IPNM", 17474, 2700)],
+)
+def test_a_property_that_changes_is_told_with_both_values(node, name, was, value):
+    bench = Bench()
+    assert bench.run(10).change is None
+    bench.rig.network.set_property(node, name, value)
+    assert bench.run(TURN + 50).change == MotorChange(node, name, was, value)
+
+
+def test_another_start_begins_anew():
+    bench = Bench()
+    bench.rig.network.set_property(7, "MT", 1400)
+    assert bench.run(TURN + 50).change is not None
+    bench.arm.start()
+    assert bench.run(TURN + 50).change is None
+
+
+@pytest.mark.parametrize("vers", [65, 128, 200])
+def test_all_are_asked_in_turn_and_none_changes_by_itself(vers):
+    bench = Bench(vers=(vers,) * 7)
+    assert bench.run(TURN + 100).change is None
+    asked = {(i, d) for _, i, d in bench.rig.sent if i in MOTOR_NODES and len(d) == 1}
+    # Five of these and four of health, TEMP, THERM, VBUS and ERROR, of each puck.
+    assert len(asked) == (len(WATCHED) + 4) * len(MOTOR_NODES)
+
+
+def test_no_cycle_has_two_questions():
+    bench = Bench()
+    bench.run(TURN)
+    nodes = (*MOTOR_NODES, 10)
+    times = [t for t, i, d in bench.rig.sent if i in nodes and len(d) == 1]
+    assert len({t // CYCLE_NS for t in times}) == len(times)
