@@ -62,10 +62,10 @@ def doubts_of(trial: PreparedTrial) -> list[Doubt]:
     if units:
         return units
     late = list(_timing(trial))
-    rubbing = (np.abs(smooth.v_t) > SLOWEST) & (np.abs(smooth.F_n) > PRESSED)
-    if np.count_nonzero(rubbing) < FEWEST:
+    sliding = (np.abs(smooth.v_t) > SLOWEST) & (np.abs(smooth.F_n) > PRESSED)
+    if np.count_nonzero(sliding) < FEWEST:
         return late
-    v, load, along = smooth.v_t[rubbing], smooth.F_n[rubbing], smooth.F_t[rubbing]
+    v, load, along = smooth.v_t[sliding], smooth.F_n[sliding], smooth.F_t[sliding]
     return [*late, *_normal(load), *_signs(v, load, along)]
 
 
@@ -244,7 +244,7 @@ def _sideways(lateral: Array, along: Array) -> Iterator[Doubt]:
 def _free_moment(force: Array, moment: Array) -> Iterator[Doubt]:
     """Judge the part of the moment along the force, which no point of action gives.
 
-    A force at a point has no moment along itself; what a rubbing sole adds about the
+    A force at a point has no moment along itself; what a sliding sole adds about the
     normal is small against the force times the sole's radius.
     """
     along = np.einsum("ni,ni->n", force, moment)

@@ -232,9 +232,9 @@ def build_loop_server(parts: LoopConfig) -> LoopServer:
 
     def metadata() -> dict[str, str]:
         arm, compensation = parts.arm, parts.law.compensation
-        rubbing = {} if compensation is None else compensation.metadata()
+        friction = {} if compensation is None else compensation.metadata()
         return {
-            **rubbing,
+            **friction,
             **health_metadata(arm.health(), parts.clock.now_ns()),
             **arm.counters.metadata(),
             "link": arm.counters.text(),

@@ -226,7 +226,7 @@ def _check_size(name: str, constants: ArmConstants, friction: MotorFriction) -> 
 
 
 def twin_gravity(rig: RigSettings, known: LawCalibrations) -> str:
-    """Return which gravity the twin of a rig has, corrected by what rubbing showed.
+    """Return which gravity the twin of a rig has, corrected by what friction showed.
 
     What a calibration of friction takes for an asymmetry depends on the weight that it
     subtracted: both belong together. Without one it is what was weighed, if anything.

@@ -204,8 +204,8 @@ def _end(
     context.loop_client.advance(TICK)  # the newest metadata is written down
     devices = context.loop_client.device_metadata()
     recorder.event(20, "link", devices.get("link", ""))
-    rubbing = _friction_lines(devices)
-    for line in rubbing:
+    friction = _friction_lines(devices)
+    for line in friction:
         recorder.event(30, "friction", line)
     recorder.event(20, "stop", outcome.reason)
     try:
@@ -223,7 +223,7 @@ def _end(
         "samples · written and verified"
     )
     if outcome.status == "complete" and context.stance is not None:
-        warnings = [f" {WARNING} {line}" for line in rubbing]
+        warnings = [f" {WARNING} {line}" for line in friction]
         context.say_page([written, *stance_lines(context.stance, outcome), *warnings])
         return
     if outcome.status == "complete":
@@ -232,7 +232,7 @@ def _end(
             lambda: review_trial(path, context.state.aim)
         )
         lines = [f" {m} {text}" for m, text in review.lines(archive.kept_ratios())]
-        warnings = [f" {WARNING} {line}" for line in rubbing]
+        warnings = [f" {WARNING} {line}" for line in friction]
         kept = kept_traces(context.metadata.folder)
         traces = review.trace_lines(kept, name.kept, context.console.width)
         context.say_page([written, *lines, *warnings, *traces])

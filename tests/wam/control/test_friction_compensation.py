@@ -158,11 +158,11 @@ def test_random_ways_never_gain_energy_at_a_fifth_too_much(seed):
         turned = angles - before
         speeds = (turned / 0.002).tolist()
         bristles.take(speeds)
-        rubbing = np.array(bristles.torques(speeds))
+        friction = np.array(bristles.torques(speeds))
         bristles.follow(speeds)
         tau = compensation.torque(reading(number, angles), NOTHING)
         motors = np.linalg.solve(CONSTANTS.j2mp.T, tau)
-        gained += float((motors + rubbing) @ turned)
+        gained += float((motors + friction) @ turned)
         most = max(most, gained)
         before = angles
     held = float((0.96 * TRUE.coulomb * 4.0 * TRUE.presliding).sum())
