@@ -21,6 +21,7 @@ from acquisition.control_loop.loop import Loop
 from acquisition.control_loop.states import ArmState
 from fakes.clock import SteppedClock
 from fakes.plant.model import PlantOptions, Support
+from fakes.plant.wiring import Wiring
 from fakes.world.rig import FakeRig, SimulatedScene
 from tests.acquisition.control_loop.limits import guard_limits
 from tests.fakes.scenes import CONSTANTS, FRAME, START_Q, TOOL
@@ -193,28 +194,13 @@ class _NoSensor:
         return []
 
 
-def _miswire(rig: FakeRig, wrong: WrongRig) -> None:
-    """Change what passes between pucks and motors."""
-    plant = rig.plant
+def _wiring(rig: FakeRig, wrong: WrongRig) -> Wiring:
+    """Return what passes between pucks and motors of a rig that stands."""
     turns = CONSTANTS.j2mp @ CONSTANTS.home / (2.0 * np.pi)
     home = turns * np.array(CONSTANTS.cts)  # where the arm was zeroed
-    usual_torques, usual_counts = plant.set_torques, plant.counts
-    free, start = wrong.free_rotor - 1, usual_counts()
-
-    def set_torques(units: Sequence[int]) -> None:
-        made = wrong.torque.dot(np.array(units, dtype=float))
-        if free >= 0:
-            made[free] = 0.0
-        usual_torques([round(unit) for unit in made])
-
-    def counts() -> list[int]:
-        moved = np.array(usual_counts(), dtype=float) - home
-        told = home + wrong.counts.dot(moved)
-        if free >= 0:  # under the law's spring a rotor alone stays where it is
-            told[free] = start[free]
-        return [round(count) for count in told]
-
-    plant.set_torques, plant.counts = set_torques, counts
+    torn = wrong.free_rotor
+    torn_at = rig.plant.counts()[torn - 1] if torn else 0
+    return Wiring(wrong.torque, wrong.counts, home, torn, torn_at)
 
 
 def run(wrong: WrongRig, friction: float, state: ArmState = ArmState.HOLD) -> RunAway:
@@ -226,7 +212,7 @@ def run(wrong: WrongRig, friction: float, state: ArmState = ArmState.HOLD) -> Ru
     clock.attach(rig)
     rig.plant.terrain = None
     arm = WamArm(CanLink(PythonCanDoor(rig.bus, clock)), clock)
-    _miswire(rig, wrong)
+    rig.plant.wiring = _wiring(rig, wrong)
     arm.start()
     for node, name, value in wrong.properties:
         rig.network.set_property(node, name, value)

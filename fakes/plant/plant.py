@@ -28,6 +28,7 @@ from fakes.plant.model import (
     motor_weights,
 )
 from fakes.plant.windings import shorted_damping
+from fakes.plant.wiring import Wiring
 from fakes.truth import Truth
 from ft_sensor.payload import TerrainFrame
 from wam.model.constants import GRAVITY, ArmConstants, Array
@@ -52,6 +53,7 @@ class ArmPlant:
         truth: what really happened; None = not written down.
         friction: of the motors.
         support: what bears the arm while no motor drives it.
+        wiring: what is wrong between pucks and motors; None = nothing is.
     """
 
     def __init__(
@@ -82,6 +84,7 @@ class ArmPlant:
         self.finger = (0.0, 0.0, 0.0)
         self.t_ns = 0
         self.truth: Truth | None = None
+        self.wiring: Wiring | None = None
         # Mean wrench of the ground over a cycle.
         self._ground: Wrench = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         self._push = (0.0, 0.0, 0.0)  # force of the hand
@@ -138,10 +141,15 @@ class ArmPlant:
 
     def counts(self) -> Sequence[int]:
         """Return encoder counts of the seven motors."""
-        return [floor(count) for count in self._body.counts()]
+        counts = self._body.counts()
+        if self.wiring is not None:
+            counts = self.wiring.told_of(np.array(counts)).tolist()
+        return [floor(count) for count in counts]
 
     def set_torques(self, units: Sequence[int]) -> None:
         """Apply torques [puck units] to motors 1 to 7 from now on."""
+        if self.wiring is not None:
+            units = self.wiring.made_of(units)
         self._body.drive(units)
         is_pulled = any(units)
         if is_pulled is not self._is_pulled:
