@@ -124,6 +124,10 @@ class PuckNetwork:
         """Let the safety module ignore hosts that lower its mode, or obey again."""
         self._safety.is_disobedient = is_disobedient
 
+    def say_idle(self, *, says_idle: bool = True) -> None:
+        """Let the safety module answer IDLE whatever its mode, or the truth again."""
+        self._safety.says_idle = says_idle
+
     def set_heartbeat(self, heartbeat_ns: int) -> None:
         """Let the safety module wait otherwise than expected for positions [ns]."""
         self._safety.set_heartbeat(heartbeat_ns)

@@ -65,6 +65,7 @@ class FakeSafetyModule:
         mode: the true mode.
         is_mute: its transmit wire is cut.
         is_disobedient: it ignores a host that lowers its mode.
+        says_idle: it answers IDLE whatever its mode.
     """
 
     def __init__(
@@ -76,6 +77,7 @@ class FakeSafetyModule:
         self.mode = options.safety_mode
         self.is_mute = False
         self.is_disobedient = False
+        self.says_idle = False
         self._heartbeat_ns = options.heartbeat_ns
         self._options = options
         vers = nearest_documented(options.safety_vers)
@@ -205,7 +207,8 @@ class FakeSafetyModule:
         self._fault("heartbeat")
 
     def _answer(self, number: int, name: str) -> None:
-        computed = {"MODE": int(self.mode), "PEN": encode_pendant(self.pendant_word)}
+        mode = SafetyMode.IDLE if self.says_idle else self.mode
+        computed = {"MODE": int(mode), "PEN": encode_pendant(self.pendant_word)}
         value = computed.get(name, self._properties.get(name))
         if value is not None and not self.is_mute:
             self._schedule.reply(SAFETY_NODE, number, name, value)

@@ -60,6 +60,7 @@ def network_faults(network: PuckNetwork) -> dict[str, Callable[[], None]]:
         ),
         "safety-silent": lambda: network.silence(SAFETY_NODE),
         "safety-disobedient": network.disobey,
+        "safety-false-idle": lambda: _say_idle(network),
         "estop": lambda: network.pendant("estop"),
         "pendant-idle": lambda: network.pendant("idle"),
     }
@@ -77,6 +78,7 @@ def clear_network_faults(network: PuckNetwork) -> None:
     for node in (SAFETY_NODE, SENSOR_NODE):
         network.silence(node, is_mute=False)
     network.disobey(is_disobedient=False)
+    network.say_idle(says_idle=False)
     network.set_bus_voltage(NOMINAL_VOLTAGE)
     network.set_property(PUCK, "IPNM", network.options.ipnm[PUCK - 1])
     for node in MOTOR_NODES:
@@ -111,6 +113,12 @@ def _answer_always_late(faults: BusFaults, nodes: Iterable[int], late_ns: int) -
 def _lose_some(faults: BusFaults) -> None:
     for node in MOTOR_NODES:
         faults.drop(position_reply_id(node), None, _LOST_SHARE)
+
+
+def _say_idle(network: PuckNetwork) -> None:
+    """Let the module say IDLE, and obey nobody."""
+    network.disobey()
+    network.say_idle()
 
 
 def _silence_all(network: PuckNetwork) -> None:

@@ -41,6 +41,7 @@ _ALL_FRESH = (1 << MOTORS) - 1
 # the module says whether it was a stop, even when one question or answer is lost.
 _URGENT_CYCLES = 3
 _FIRST_POSITIONS_NS = 1_000 * _MS  # as long as the vendor's library waits for them
+_BEARING_NODE = 2  # its motor bears most of the arm
 _IGNORED_SPEED_FAULTS = 5  # the safety module's history, as libbarrett says
 
 
@@ -254,12 +255,16 @@ class WamArm:
         """Idle the arm: module to IDLE, confirmed, then zero torque.
 
         Zero torque while ACTIVE would be free fall, so without the confirmation none
-        is sent; the heartbeat then stops the arm within 0.1 s of the last reading.
+        is sent, nor when a puck contradicts the module; the heartbeat then stops the
+        arm within 0.1 s of the last reading.
         Never raises. Returns whether the module confirmed.
         """
         if self._is_closed:
             return self._poller.mode in BRAKED
         mode = self._safety.lower_to_idle(self._settings.idle_ns)
+        if mode is SafetyMode.IDLE and self._safety.is_driven(_BEARING_NODE):
+            self._poller.contradicted_by = _BEARING_NODE
+            mode = SafetyMode.ACTIVE  # whatever the module says
         self._poller.note_mode(mode, self._clock.now_ns())
         if self._poller.mode not in BRAKED:
             self._poller.is_lowering = True

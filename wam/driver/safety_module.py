@@ -10,7 +10,12 @@ from acquisition.clock import Clock
 from acquisition.devices import SafetyMode
 from acquisition.errors import DeviceFaultError, LinkError
 from wam.bus.frames import SAFETY_NODE
-from wam.bus.properties import Device, nearest_documented, property_number
+from wam.bus.properties import (
+    Device,
+    PuckMode,
+    nearest_documented,
+    property_number,
+)
 from wam.bus.property_client import PropertyClient
 from wam.driver.pendant import MONITORS, NO_PENDANT, PendantWord, decode_pendant
 
@@ -94,6 +99,17 @@ class SafetyModule:
                 break
             self._properties.pause(_RETRY_NS // 10)
         return mode
+
+    def is_driven(self, node: int) -> bool:
+        """Return whether a motor puck says that it obeys torques.
+
+        In IDLE it does not, whatever the module says. A silent one is not judged.
+        """
+        try:
+            mode = self._properties.get(node, _MODE, _RETRY_NS)
+        except LinkError:
+            return False
+        return mode == PuckMode.TORQUE
 
     def _ask_down(self) -> int | None:
         """Ask for IDLE once; return MODE as answered, None without an answer."""

@@ -17,7 +17,13 @@ from wam.bus.frames import (
     property_reply_id,
 )
 from wam.bus.link import Link
-from wam.bus.properties import MODERN, Device, nearest_documented, property_number
+from wam.bus.properties import (
+    MODERN,
+    Device,
+    PuckMode,
+    nearest_documented,
+    property_number,
+)
 from wam.driver.health import HealthTable
 from wam.driver.pendant import PendantWord, decode_pendant
 from wam.driver.property_watch import PropertyWatch
@@ -49,6 +55,8 @@ class StatusPoller:
         watch: what they must go on answering.
         is_lowering: IDLE is sent again with every question for its mode,
             until it says that it is.
+        contradicted_by: puck that obeyed torques when the module said IDLE; the module
+            is not believed before this puck agrees. 0 = none.
     """
 
     def __init__(self, link: Link, settings: ArmSettings) -> None:
@@ -60,6 +68,7 @@ class StatusPoller:
         self.health = HealthTable()
         self.watch = PropertyWatch()
         self.is_lowering = False
+        self.contradicted_by = 0
         self._link = link
         self._settings = settings
         self._now_ns = 0
@@ -130,9 +139,13 @@ class StatusPoller:
         if node is not None:
             self.health.note(node, reply, self._now_ns)
             self.watch.note(node, reply)
+            if reply.number == _MODE and node == self.contradicted_by:
+                self._note_puck_mode(reply.value)
         elif reply.number == _MODE:
             mode = decode_mode(reply.value)
-            if mode is not SafetyMode.UNKNOWN:  # nonsense leaves the question open
+            is_doubted = mode is SafetyMode.IDLE and self.contradicted_by
+            # Nonsense leaves the question open.
+            if mode is not SafetyMode.UNKNOWN and not is_doubted:
                 self.note_mode(mode, self._now_ns)
         elif reply.number == self._pen:
             word = reply.value & 0xFFFFFFFF
@@ -150,6 +163,7 @@ class StatusPoller:
     def begin(self, pendant: PendantWord) -> None:
         """Take the word of a start; what makes no sense in it is left out later."""
         self.is_lowering = False
+        self.contradicted_by = 0
         self.excused = pendant.unclear
         self.note_pendant(pendant)
 
@@ -157,6 +171,11 @@ class StatusPoller:
         """Take the monitors that the module has just reported."""
         self.warnings = pendant.warnings
         self.faults = pendant.faults
+
+    def _note_puck_mode(self, value: int) -> None:
+        if value != PuckMode.TORQUE:
+            self.contradicted_by = 0
+            self.note_mode(SafetyMode.IDLE, self._now_ns)
 
     def _ask_mode(self) -> None:
         """Ask for the mode; only questions asked in their time count as unanswered.
@@ -172,4 +191,6 @@ class StatusPoller:
         # Until IDLE is confirmed the arm may still have torques: it is asked for again.
         if self.is_lowering:
             self._link.send(SAFETY_NODE, _SET_IDLE)
+        if self.contradicted_by:
+            self._link.send(self.contradicted_by, _GET_MODE)
         self._link.send(SAFETY_NODE, _GET_MODE)

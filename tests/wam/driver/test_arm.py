@@ -486,9 +486,9 @@ def test_idle_is_confirmed_before_zero_torque_is_sent():
     assert arm.idle()
     order = frames(rig)
     zeros = [i for i, (can_id, _) in enumerate(order) if can_id in (0x401, 0x402)]
-    assert order[:2] == [SAFETY_TO_IDLE, GET_MODE]
-    assert zeros == [2, 3]
-    assert decode_torques(order[2][1]) == (0, 0, 0, 0)
+    assert order[:3] == [SAFETY_TO_IDLE, GET_MODE, (2, GET_MODE[1])]
+    assert zeros == [3, 4]
+    assert decode_torques(order[3][1]) == (0, 0, 0, 0)
     assert rig.network.safety_mode is SafetyMode.IDLE
 
 
@@ -611,3 +611,41 @@ def test_an_arm_that_moves_while_it_is_zeroed_is_refused_by_the_joint(
     with pytest.raises(DeviceFaultError, match=f"joint {joint + 1} is 0.03"):
         arm.define_position(HOME)
     assert not arm.safety.is_zeroed()
+
+
+def test_a_module_that_says_idle_is_not_believed_against_a_puck():
+    rig, arm = started()
+    rig.network.pendant("activate")
+    for _ in range(40):
+        cycle(rig, arm, TAU)
+    driven = list(rig.motors.units)
+    rig.network.disobey()
+    rig.network.say_idle()
+    assert arm.idle() is False
+    assert arm.safety_mode() is SafetyMode.ACTIVE
+    assert rig.motors.units == driven  # without torque it would fall
+    for _ in range(60):
+        arm.listen(rig.clock.t_ns)
+        rig.rest(CYCLE_NS)
+    assert rig.network.safety_mode is SafetyMode.IDLE  # by its own heartbeat
+    assert arm.safety_mode() is SafetyMode.IDLE
+
+
+def test_a_module_that_says_idle_is_not_believed_while_positions_go_on():
+    rig, arm = started()
+    rig.network.pendant("activate")
+    rig.network.disobey()
+    rig.network.say_idle()
+    arm.idle()
+    for _ in range(200):
+        cycle(rig, arm, TAU)
+    assert rig.network.safety_mode is SafetyMode.ACTIVE
+    assert arm.safety_mode() is not SafetyMode.IDLE
+
+
+def test_an_arm_without_an_answer_of_its_puck_is_idle_as_the_module_says():
+    rig, arm = started()
+    rig.network.pendant("activate")
+    cycle(rig, arm, TAU)
+    rig.network.silence(2)
+    assert arm.idle() is True
