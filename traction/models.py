@@ -74,7 +74,7 @@ class Model:
         if self.name == TUSTIN:
             parts = (f"{key} {self.parameters[key]:.3g} {UNITS[key]}" for key in UNITS)
             values = ": " + ", ".join(part.removesuffix(" 1") for part in parts)
-        doubts = f" [{', '.join(self.flags)}]" if self.flags else ""
+        doubts = f" [{_shortened(self.flags)}]" if self.flags else ""
         return (
             f"<{TITLES[self.name]} of {self.terrain}, {self.trials} trials, "
             f"{self.samples} samples{values}{doubts}>"
@@ -336,3 +336,9 @@ def _score(terrain: str, folds: Sequence[FoldResult], name: str) -> ModelScore |
         crps=mean_of([score.crps for score in of_model]),
         coverage90=mean_of([score.coverage90 for score in of_model]),
     )
+
+
+def _shortened(flags: Sequence[str]) -> str:
+    """Return the first of what is to be doubted in a model, and how many more."""
+    first, more = flags[0], len(flags) - 1
+    return f"{first}, and {more} more" if more else first

@@ -132,7 +132,7 @@ def follow(memory: MotionMemory | None, now: DrivenMotion) -> MotionMemory:
             now.energy,
         )
     if now.energy > memory.energy and now.now_ns - memory.since_ns <= _LAG_NS:
-        return memory._replace(energy=now.energy)
+        return memory._replace(energy=now.energy, least=now.energy)
     if now.energy < memory.least:
         return memory._replace(least=now.energy)
     return memory

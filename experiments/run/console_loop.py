@@ -30,7 +30,9 @@ REFRESH_NS = 125_000_000  # between two pictures of the live screen
 DAMP_SECONDS = 0.2  # between an urgent stop and idle
 _OWN_QUIT = frozenset({Prompt.REVIEW, Prompt.READY})  # [q] has a meaning of its own
 # Nothing is wanted of the arm.
-_AT_REST = frozenset({Prompt.REVIEW, Prompt.PAUSED, Prompt.DAMPED, Prompt.UNDO})
+_AT_REST = frozenset(
+    {Prompt.REVIEW, Prompt.PAUSED, Prompt.DAMPED, Prompt.UNDO, Prompt.LAY_DOWN}
+)
 _DAMPED = "ARM: damped where it is. [space] once you hold it: then it holds again."
 # Of an arm whose motors work.
 _DRIVEN = frozenset({ArmState.FLOAT, ArmState.HOLD, ArmState.DAMP, ArmState.GUIDE})
@@ -240,8 +242,8 @@ class ConsoleLoop:
     def lay_down(self) -> None:
         """Have the arm supported before it goes idle, for then it sinks.
 
-        It stands still, weakly enough for a hand that carries the foot onto its stand.
-        Without an answer, or at a request to stop, it goes idle all the same.
+        It stands still, weakly enough for a hand that carries the foot onto its stand;
+        an arm that was damped for its motion stays so. Without an answer, or at a request to stop, it goes idle all the same.
         """
         loop_client, requests = self.loop_client, self.stop.count
         if loop_client.status.state not in _DRIVEN or self.console.is_lost:
@@ -250,7 +252,10 @@ class ConsoleLoop:
         rest = self.rig.settings.rig.arm.rest
         self.console.say(_SUPPORT if rest is None else _LAY_DOWN)
         try:
-            loop_client.request(ArmState.GUIDE)
+            verdict = loop_client.status.verdict
+            self._reported = "" if verdict is None else verdict.reason
+            is_damped = loop_client.status.state is ArmState.DAMP
+            loop_client.request(ArmState.DAMP if is_damped else ArmState.GUIDE)
             for _ in range(round(LAY_DOWN_SECONDS / TICK)):
                 state = self._advance(Prompt.LAY_DOWN, None)
                 is_wanted = self.operator.answer(state) == " "

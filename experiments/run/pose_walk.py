@@ -30,7 +30,7 @@ def guided(console_loop: ConsoleLoop, work: Callable[[], None], command: str) ->
     """Do `work` and return the exit code; an error is shown on the console.
 
     Every way out leaves the arm idle: after a stop it holds first, or damps when the
-    stop was asked for twice. The message of a fault names `command` to start again.
+    stop was asked for twice; an arm that is driven is supported first. The message of a fault names `command` to start again.
     """
     console = console_loop.console
     try:
@@ -38,7 +38,6 @@ def guided(console_loop: ConsoleLoop, work: Callable[[], None], command: str) ->
     except StopRequestedError:
         console_loop.stop_arm()
         console_loop.loop_client.advance(_HOLD)
-        console_loop.lay_down()
         console.say(f"Stopped as asked. {_NOTHING}")
         return INTERRUPTED
     except ArmFaultError as fault:
@@ -52,6 +51,7 @@ def guided(console_loop: ConsoleLoop, work: Callable[[], None], command: str) ->
         console.problem(f"{error} {_NOTHING}")
         return error.exit_code
     finally:
+        console_loop.lay_down()
         confirmed = console_loop.make_safe()
         mode = console_loop.rig.backend.safety_mode()
         console.say(rest_text(mode, is_confirmed=confirmed))

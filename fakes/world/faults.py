@@ -141,7 +141,7 @@ def _answer_too_late(faults: BusFaults) -> None:
 _JOINT_6, _JOINT_7 = 5, 6
 # A blow that the driver still believes [rad/s]; the safety module does not count the
 # wrist, so the guard acts.
-_BLOW = 6.0
+_BLOW = 10.0
 # The lock of 20 N m/rad lets go of 50 mrad at 1 N m; the joint may have 1.3 N m. A
 # sudden twist would swing beyond that, so it grows.
 _TWIST, _TWIST_STEP = 1.2, 0.02  # N m

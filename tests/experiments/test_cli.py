@@ -155,7 +155,7 @@ def test_check_finds_the_simulated_rig_fit(config, tmp_path):
     done = traction("check", "--fake", "--fast", *options)
     assert (done.code, done.err) == (0, "")
     assert done.out.splitlines()[0].endswith("SIMULATED")
-    assert done.out.count(" ✔ ") + done.out.count(" ▲ code") == 11
+    assert done.out.count(" ✔ ") + done.out.count(" ▲ code") == 12
     assert done.out.endswith("The rig is ready. No torque was sent.\n")
     assert list(tmp_path.iterdir()) == []
 

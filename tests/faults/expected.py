@@ -200,6 +200,12 @@ _FEW = "are too few for a tare"
 _FLAGGED = "F/T samples were flagged during tare"
 _ASKED = "Joint 7 was asked for "
 _STAYS = replace(OK, why="the arm is idle, and stays so")
+_PUSHED_AWAY = Cell(
+    End.ENDED,
+    "The arm does not stay where it holds",
+    arm=Arm(10, "idle", ArmState.IDLE, "idle"),
+    why="it holds already, and is pushed away",
+)
 _BRAKED = Cell(End.ABSENT, why="joint 7 is damped like the others")
 _SLIP = Cell(
     End.REDONE,
@@ -402,7 +408,9 @@ TABLE: dict[str, Row] = {
         "foot-speed",
         idle=Cell(End.TOLD, "The foot moved at ", why="found when the arm is moved"),
     ),
-    "overspeed": _limit("Joint 6 ", "overspeed", preflight=_STAYS, idle=_STAYS),
+    "overspeed": _limit(
+        "Joint 6 ", "overspeed", preflight=_STAYS, idle=_STAYS, tare=_PUSHED_AWAY
+    ),
     "joint7-slip": _row(
         OK,
         preflight=_BRAKED,

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from tests.faults.expected import HOLD, OK, OTHER_REFUSED, TABLE, Arm, Cell, End
+from tests.faults.expected import DAMP, HOLD, OK, OTHER_REFUSED, TABLE, Arm, Cell, End
 from tests.faults.phases import PHASES
 
 _TARE = PHASES.index("tare")
@@ -28,10 +28,14 @@ _MET = Cell(
 )
 _OWN = {
     "joint7-slip": _UNLOCKED,
+    "overspeed": _BLOWN,
     "lie-of-motor-3": _IN_VAIN,
     "contact-force": _MET,
     "second-command": OTHER_REFUSED,
 }
+_BLOWN = Cell(
+    End.UNMEASURED, "Joint 6 ", arm=Arm(10, "driven", DAMP, "damped where it is")
+)
 _STOPPING = {End.ENDED, End.TOLD, End.REDONE, End.SOMEHOW}
 
 

@@ -13,6 +13,8 @@ import numpy as np
 
 from experiments.messages import CATALOGUE
 from experiments.rig.arm_lock import ArmLock
+from fakes.plant.model import Support
+from fakes.plant.wiring import Wiring
 from tests.experiments.program import write_config
 from tests.faults.rehearse import MS, SimulatedScene, Strike, inject
 from wam.bus.frames import MOTOR_NODES, position_reply_id
@@ -25,6 +27,7 @@ _ALMOST = 0.95  # of what driver and guard believe
 _PERIOD = 0.002  # s
 _LONG_BEAT_NS = 1000 * MS
 _ARM_SETTINGS = ArmSettings()
+_FAR_AWAY = (0.1, 0.3, 0.35)  # m, terrain frame
 _SPEEDS = np.array(_ARM_SETTINGS.speed_limits)
 
 
@@ -140,6 +143,44 @@ def _stuck(motor: int) -> Strike:
     return inject
 
 
+def _wire(motor: int, share: float) -> Strike:
+    """Return a strike after which a motor makes this share of its torque."""
+
+    def inject(scene: SimulatedScene) -> None:
+        torque = np.eye(7)
+        torque[motor - 1, motor - 1] = share
+        scene.rig.plant.wiring = Wiring(torque=torque)
+
+    return inject
+
+
+def _say(node: int, name: str, value: int) -> Strike:
+    """Return a strike after which a puck has another value of a property."""
+    return lambda scene: scene.rig.network.set_property(node, name, value)
+
+
+def _late(late_ns: int) -> Strike:
+    """Return a strike after which every reply is late, for ever."""
+
+    def inject(scene: SimulatedScene) -> None:
+        for node in MOTOR_NODES:
+            reply = position_reply_id(node)
+            scene.rig.network.faults.delay(reply, late_ns, None)
+
+    return inject
+
+
+def _let_go(scene: SimulatedScene) -> None:
+    """Let the person go away; nothing bears the arm."""
+    scene.rig.plant.hand.let_go()
+    scene.rig.plant.support = Support.NONE
+
+
+def _drag(scene: SimulatedScene) -> None:
+    """Let the person draw the foot away, whatever is asked of the arm."""
+    scene.rig.plant.hand.carry(_FAR_AWAY)
+
+
 def _stall_under_a_long_heartbeat(scene: SimulatedScene) -> None:
     """Take the computer away for 150 ms; the module would wait for a second."""
     scene.rig.network.set_heartbeat(_LONG_BEAT_NS)
@@ -184,6 +225,17 @@ _BY_HAND: dict[str, Strike] = {
     "disk-read-only": _no_disk(errno.EROFS),
     "stall-150-ms, heartbeat 1 s": _stall_under_a_long_heartbeat,
     "can-silence, heartbeat 1 s": _long_heartbeat_and_silence,
+    "replies-late-2": _late(3_950_000),
+    "replies-late-3": _late(5_900_000),
+    "hand-gone": _let_go,
+    "hold-dragged": _drag,
+    "wrong-pidx": _say(3, "PIDX", 2),
+    "wrong-mt": _say(2, "MT", 400),
+    "wrong-grp": _say(3, "GRPB", 2),
+    "wrong-ipnm": _say(7, "IPNM", 27000),
+    "wrong-cts": _say(4, "CTS", 40960),
+    **{f"dead-motor-{motor}": _wire(motor, 0.0) for motor in MOTOR_NODES},
+    **{f"reversed-motor-{motor}": _wire(motor, -1.0) for motor in MOTOR_NODES},
     **{f"lie-of-motor-{motor}": _step_lie(motor) for motor in MOTOR_NODES},
     **{f"stuck-motor-{motor}": _stuck(motor) for motor in MOTOR_NODES},
     **{f"creep-of-motor-{motor}": _creeping_lie(motor) for motor in MOTOR_NODES},

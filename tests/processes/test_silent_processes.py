@@ -91,7 +91,7 @@ def test_ctrl_c_ends_a_session_with_everything_put_away(tmp_path):
     with running_trial(tmp_path) as seen:
         seen.process.send_signal(signal.SIGINT)
         assert seen.process.wait(15) == 5, seen.output()
-        assert "ARM: idle, braked." in seen.output()
+        assert "ARM: idle; it sinks slowly, support it." in seen.output()
         assert not list(tmp_path.rglob("*.partial"))
 
 
@@ -141,6 +141,6 @@ def test_whatever_stands_still_the_arm_is_not_thrown(tmp_path, victim, seconds):
         seen.process.send_signal(signal.SIGINT)
         assert until(lambda: not is_running(seen.process.pid), 30)
         assert "Traceback" not in seen.output()
-        assert "ARM: idle, braked." in seen.output()
+        assert "ARM: idle; it sinks slowly, support it." in seen.output()
         for speeds in true_speeds(seen.data):
             assert (speeds < FASTEST).all()

@@ -131,4 +131,4 @@ def leave_in_trial(person, leave):
     leave(person)
     assert person.end() == 5
     assert person.settings() == person.before
-    person.see("ARM: idle, braked.")
+    person.see("ARM: idle; it sinks slowly, support it.")

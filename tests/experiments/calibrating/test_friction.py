@@ -91,7 +91,7 @@ def test_the_operator_sees_the_friction_of_every_joint(calibrated):
     assert "clear the space" in done.out
     for name in ("Coulomb", "asymmetry", "break-away", "at 0.01 rad/s", "at 0.4 rad/s"):
         assert name in done.out
-    assert done.out.rstrip().endswith("ARM: idle, braked.")
+    assert done.out.rstrip().endswith("ARM: idle; it sinks slowly, support it.")
 
 
 def test_a_page_lies_beside_the_calibration(calibrated):

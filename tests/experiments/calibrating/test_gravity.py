@@ -120,7 +120,7 @@ def test_the_person_is_told_to_clear_the_space_and_sees_the_residuals(calibrated
     assert "clear the space" in done.out
     assert "rank 12 of 12" in done.out
     assert "SIMULATED" in done.out.splitlines()[0]
-    assert done.out.rstrip().endswith("ARM: idle, braked.")
+    assert done.out.rstrip().endswith("ARM: idle; it sinks slowly, support it.")
 
 
 def test_the_hand_is_off_the_arm_while_it_is_weighed(tmp_path):
@@ -147,7 +147,7 @@ def test_ctrl_c_on_the_way_writes_nothing_and_leaves_the_arm_idle(tmp_path):
     assert done.code == 130
     assert speeds[0] > 0.1  # it was moving
     assert "Stopped as asked. Nothing was written." in done.out
-    assert done.out.rstrip().endswith("ARM: idle, braked.")
+    assert done.out.rstrip().endswith("ARM: idle; it sinks slowly, support it.")
     assert rig.network.safety_mode is SafetyMode.IDLE
     assert not list(tmp_path.iterdir())
 

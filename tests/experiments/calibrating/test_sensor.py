@@ -122,7 +122,7 @@ def test_the_person_sees_what_was_found_and_how_to_use_it(calibrated):
     done, out = calibrated
     assert "degrees about z7, sign -1" in done.out
     assert f'calibration = "{out.name}" in [ft_sensor] of rig.toml' in done.out
-    assert done.out.rstrip().endswith("ARM: idle, braked.")
+    assert done.out.rstrip().endswith("ARM: idle; it sinks slowly, support it.")
 
 
 def test_a_calibration_survives_its_file(calibrated):
@@ -203,7 +203,7 @@ def test_a_sensor_that_was_turned_since_its_calibration_is_refused(
     away = (float(turned[1]) - off + 180.0) % 360.0 - 180.0
     assert abs(away) < 10.0
     assert "traction calibrate sensor" in done.err
-    assert "ARM: idle, braked." in done.out
+    assert "ARM: idle; it sinks slowly, support it." in done.out
     assert not list((tmp_path / "data").rglob("*.mcap"))
 
 

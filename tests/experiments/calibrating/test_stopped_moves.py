@@ -78,7 +78,7 @@ def test_whoever_asked_for_the_move_hears_that_it_was_stopped_and_why(frozen):
     assert done.code == 4
     assert "0.5 s" in done.err
     assert "move was stopped" in done.err
-    assert done.out.rstrip().endswith("ARM: idle, braked.")
+    assert done.out.rstrip().endswith("ARM: idle; it sinks slowly, support it.")
     assert console.built.rigs[-1].network.safety_mode is SafetyMode.IDLE
 
 

@@ -48,7 +48,7 @@ def test_ctrl_c_in_a_running_trial_closes_it_and_keeps_the_earlier_one(
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=60)
     assert (process.returncode, err) == (5, "")
-    assert out.splitlines()[-2] == "ARM: idle, braked."
+    assert out.splitlines()[-2] == "ARM: idle; it sinks slowly, support it."
     folder = only_session(tmp_path)
     path = folder / "trials" / "T01.mcap"
     assert verify_file(path).sha256 == sidecar(path)["sha256"]

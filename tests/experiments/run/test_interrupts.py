@@ -100,7 +100,7 @@ def test_ctrl_c_ends_every_phase_with_the_arm_at_rest(
     assert state.running is None
     assert session.rig.network.safety_mode is SafetyMode.IDLE
     assert not session.rig.plant.qd.any()
-    assert "ARM: idle, braked." in session.done.out.splitlines()
+    assert "ARM: idle; it sinks slowly, support it." in session.done.out.splitlines()
     assert session.done.err == ""
     assert not list(session.folder.rglob("*.partial"))
     assert len(kept_and_sound(session.folder)) == len(state.kept)

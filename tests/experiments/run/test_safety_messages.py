@@ -29,7 +29,7 @@ VL1 = 45
         (
             "pendant-idle",
             ("velocity",),
-            "The safety module put the arm to idle: velocity fault. ARM: idle, braked.",
+            "The safety module put the arm to idle: velocity fault. ARM: idle; it sinks slowly, support it.",
         ),
         (
             "pendant-idle",

@@ -94,7 +94,7 @@ def test_ctrl_c_holds_the_arm_until_the_trial_is_closed_and_then_brakes_it(once)
     assert last_mode(once.folder / "rejected" / "T02a.mcap") is SafetyMode.ACTIVE
     assert once.rig.network.safety_mode is SafetyMode.IDLE
     braked, hint = once.done.out.splitlines()[-2:]
-    assert braked == "ARM: idle, braked."
+    assert braked == "ARM: idle; it sinks slowly, support it."
     assert hint.startswith("To go on: traction resume S001")
 
 
@@ -155,7 +155,7 @@ def test_a_crash_of_the_program_brakes_the_arm_and_says_where_the_log_is(
     log = seen.folder / "log.txt"
     assert seen.done.code == 1
     assert seen.done.err.startswith(
-        f"Bug: ZeroDivisionError: so to speak. ARM: idle, braked. Log: {log}."
+        f"Bug: ZeroDivisionError: so to speak. ARM: idle; it sinks slowly, support it. Log: {log}."
     )
     assert "ZeroDivisionError" in log.read_text()
     assert seen.rig.network.safety_mode is SafetyMode.IDLE

@@ -39,7 +39,7 @@ def cycles(first_trial):
 def test_a_session_ends_with_exit_code_0(recorded):
     assert recorded.done.code == 0
     assert recorded.done.err == ""
-    assert "ARM: idle, braked." in recorded.done.out
+    assert "ARM: idle; it sinks slowly, support it." in recorded.done.out
 
 
 def test_a_session_says_how_to_go_on(recorded):

@@ -71,8 +71,8 @@ def test_what_others_report_hides_nothing_worse(bench):
     bench.cycle.report(verdict_for(Fault.CONSOLE_SILENT))
     bench.arm.qd = np.full(7, 9.0)
     bench.run()
-    assert bench.reason == Fault.OVERSPEED
-    assert bench.state is ArmState.DAMP
+    assert bench.reason == Fault.HOLD_MOTION
+    assert bench.state is ArmState.IDLE
 
 
 def test_a_report_is_obeyed_once(bench):
