@@ -243,29 +243,37 @@ class ConsoleLoop:
         """Have the arm supported before it goes idle, for then it sinks.
 
         It stands still, weakly enough for a hand that carries the foot onto its stand;
-        an arm that was damped for its motion stays so. Without an answer, or at a request to stop, it goes idle all the same.
+        an arm that is damped for its motion stays so before somebody has it. Without an answer, or at a request to stop, it goes idle all the same.
         """
-        loop_client, requests = self.loop_client, self.stop.count
+        loop_client = self.loop_client
         if loop_client.status.state not in _DRIVEN or self.console.is_lost:
             return
         self.show(None)
         rest = self.rig.settings.rig.arm.rest
-        self.console.say(_SUPPORT if rest is None else _LAY_DOWN)
+        verdict = loop_client.status.verdict
+        self._reported = "" if verdict is None else verdict.reason
         try:
-            verdict = loop_client.status.verdict
-            self._reported = "" if verdict is None else verdict.reason
-            is_damped = loop_client.status.state is ArmState.DAMP
-            loop_client.request(ArmState.DAMP if is_damped else ArmState.GUIDE)
-            for _ in range(round(LAY_DOWN_SECONDS / TICK)):
-                state = self._advance(Prompt.LAY_DOWN, None)
-                is_wanted = self.operator.answer(state) == " "
-                if is_wanted and self._lies(rest):
+            if loop_client.status.state is ArmState.DAMP:
+                self.console.say(_DAMPED)
+                if not self._await_hand(Prompt.DAMPED, lambda: True):
                     return
-                if self.stop.count > requests or self.console.is_lost:
-                    return
-            self.console.say(_NOBODY)
+            self.console.say(_SUPPORT if rest is None else _LAY_DOWN)
+            loop_client.request(ArmState.GUIDE)
+            self._await_hand(Prompt.LAY_DOWN, lambda: self._lies(rest))
         except (ArmFaultError, TractionError):
             return  # the arm is not under control: it is idled at once
+
+    def _await_hand(self, prompt: Prompt, is_done: Callable[[], bool]) -> bool:
+        """Return whether the operator says so and it is done, not stopped, in time."""
+        requests = self.stop.count
+        for _ in range(round(LAY_DOWN_SECONDS / TICK)):
+            state = self._advance(prompt, None)
+            if self.operator.answer(state) == " " and is_done():
+                return True
+            if self.stop.count > requests or self.console.is_lost:
+                return False
+        self.console.say(_NOBODY)
+        return False
 
     def _lies(self, rest: Sequence[float] | None) -> bool:
         """Return whether the foot is on its stand, as far as that is known."""

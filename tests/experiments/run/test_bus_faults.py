@@ -24,7 +24,10 @@ ALL_FRESH = 0x7F << MOTOR_FRESH_SHIFT
 
 # name: (what the message begins with, what it says of the arm, the last line,
 #        the true mode at the end)
-BRAKED, UNKNOWN = "ARM: idle; it sinks slowly, support it.", "ARM: UNKNOWN - support it."
+BRAKED, UNKNOWN = (
+    "ARM: idle; it sinks slowly, support it.",
+    "ARM: UNKNOWN - support it.",
+)
 NO_POWER = "ARM: stopped by its hardware, without power."
 IDLE, E_STOP = SafetyMode.IDLE, SafetyMode.E_STOP
 HELD = "ARM: held by its last torques, being braked - support it."
