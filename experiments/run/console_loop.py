@@ -243,7 +243,8 @@ class ConsoleLoop:
         """Have the arm supported before it goes idle, for then it sinks.
 
         It stands still, weakly enough for a hand that carries the foot onto its stand;
-        an arm that is damped for its motion stays so before somebody has it. Without an answer, or at a request to stop, it goes idle all the same.
+        an arm that is damped for its motion stays so before somebody has it. Without
+        an answer, or at a request to stop, it goes idle all the same.
         """
         loop_client = self.loop_client
         if loop_client.status.state not in _DRIVEN or self.console.is_lost:

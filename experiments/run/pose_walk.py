@@ -30,7 +30,8 @@ def guided(console_loop: ConsoleLoop, work: Callable[[], None], command: str) ->
     """Do `work` and return the exit code; an error is shown on the console.
 
     Every way out leaves the arm idle: after a stop it holds first, or damps when the
-    stop was asked for twice; an arm that is driven is supported first. The message of a fault names `command` to start again.
+    stop was asked for twice; an arm that is driven is supported first. The message of a
+    fault names `command` to start again.
     """
     console = console_loop.console
     try:

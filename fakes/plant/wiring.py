@@ -1,4 +1,4 @@
-"""Between pucks and motors: cables, coils and encoders that are not what they should be.
+"""Between pucks and motors: cables, coils and encoders that are not as built.
 
 A motor whose plug is turned, whose coil is open or which has another puck's cable does
 something else with a torque than its puck believes; an encoder's cable on another puck

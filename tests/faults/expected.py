@@ -232,7 +232,10 @@ _NAN = "A position or torque was not a number."
 _CANNOT_COUNT = Cell(End.ENDED, "Joint torques are not numbers")
 _HEARTBEAT = f"{_MODULE}heartbeat fault."
 
+NOTHING = "nothing"  # what the others are measured by
+
 TABLE: dict[str, Row] = {
+    NOTHING: _row(OK),
     "reply-lost": _row(OK),
     "reply-lost-3": _row(OK),
     "reply-lost-10": _ending(

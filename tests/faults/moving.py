@@ -26,6 +26,9 @@ _MET = Cell(
     " N on the foot beyond its weight (limit 40)",
     arm=Arm(30, "driven", HOLD, "holding"),
 )
+_BLOWN = Cell(
+    End.UNMEASURED, "Joint 6 ", arm=Arm(10, "driven", DAMP, "damped where it is")
+)
 _OWN = {
     "joint7-slip": _UNLOCKED,
     "overspeed": _BLOWN,
@@ -33,9 +36,6 @@ _OWN = {
     "contact-force": _MET,
     "second-command": OTHER_REFUSED,
 }
-_BLOWN = Cell(
-    End.UNMEASURED, "Joint 6 ", arm=Arm(10, "driven", DAMP, "damped where it is")
-)
 _STOPPING = {End.ENDED, End.TOLD, End.REDONE, End.SOMEHOW}
 
 

@@ -16,6 +16,7 @@ from experiments.rig.arm_lock import ArmLock
 from fakes.plant.model import Support
 from fakes.plant.wiring import Wiring
 from tests.experiments.program import write_config
+from tests.faults.expected import NOTHING
 from tests.faults.rehearse import MS, SimulatedScene, Strike, inject
 from wam.bus.frames import MOTOR_NODES, position_reply_id
 from wam.control.controller import FootController
@@ -211,6 +212,7 @@ def _second_command(_: SimulatedScene) -> None:
 
 
 _BY_HAND: dict[str, Strike] = {
+    NOTHING: lambda _: None,
     "joint-limit": _tighten(_behind_a_stop),
     "torque-limit": _tighten(_weak),
     "foot-speed": _tighten(_swing),

@@ -6,7 +6,7 @@ from statistics import median
 
 import numpy as np
 
-from acquisition.clock import Clock
+from acquisition.clock import NS_PER_MS, Clock
 from acquisition.devices import (
     ArmReading,
     BusCondition,
@@ -35,7 +35,7 @@ from wam.driver.startup import ArmInfo, StartUp
 from wam.driver.status_poller import BRAKED
 from wam.driver.transmission import MOTORS, Transmission
 
-_MS = 1_000_000
+_MS = NS_PER_MS
 _ALL_FRESH = (1 << MOTORS) - 1
 # Pucks without power are silent first; asked in these many incomplete cycles at once,
 # the module says whether it was a stop, even when one question or answer is lost.
@@ -339,6 +339,7 @@ class WamArm:
     def _begin_at_rest(self) -> None:
         """Take the positions as they are, with velocity zero."""
         deadline_ns = self._clock.now_ns() + _FIRST_POSITIONS_NS
+        stale = self.counters.stale
         while (now_ns := self._clock.now_ns()) < deadline_ns:
             self._traffic.exchange(now_ns)
             counts = [c for c in self._traffic.received if c is not None]
@@ -348,6 +349,12 @@ class WamArm:
                 return
             self._properties.pause(_MS)
         silent = [n for n in MOTOR_NODES if self._traffic.received[n - 1] is None]
+        if late := self.counters.stale - stale:
+            raise LinkTimeoutError(
+                f"{pucks_verb(silent)} not report a position in time: {late} replies "
+                "came after the next question.",
+                hint="Is the CAN adapter slow (USB), or the bus busy? See: ip -s link.",
+            )
         raise LinkTimeoutError(
             f"{pucks_verb(silent)} not report a position.",
             hint="Check the cable, or a puck in reset.",

@@ -29,7 +29,8 @@ VL1 = 45
         (
             "pendant-idle",
             ("velocity",),
-            "The safety module put the arm to idle: velocity fault. ARM: idle; it sinks slowly, support it.",
+            "The safety module put the arm to idle: velocity fault. "
+            "ARM: idle; it sinks slowly, support it.",
         ),
         (
             "pendant-idle",

@@ -155,7 +155,8 @@ def test_a_crash_of_the_program_brakes_the_arm_and_says_where_the_log_is(
     log = seen.folder / "log.txt"
     assert seen.done.code == 1
     assert seen.done.err.startswith(
-        f"Bug: ZeroDivisionError: so to speak. ARM: idle; it sinks slowly, support it. Log: {log}."
+        f"Bug: ZeroDivisionError: so to speak. ARM: idle; it sinks slowly, support it. "
+        f"Log: {log}."
     )
     assert "ZeroDivisionError" in log.read_text()
     assert seen.rig.network.safety_mode is SafetyMode.IDLE

@@ -5,6 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from acquisition.errors import LinkTimeoutError
 from fakes.pucks.options import NetworkOptions
 from tests.fakes.stepped import Rig
 from wam.bus.frames import MOTOR_NODES, position_reply_id
@@ -165,3 +166,12 @@ def test_a_device_on_the_bus_is_asked_in_every_cycle():
     bench.arm.attach_device(Companion())
     assert len(unasked(bench.run(EVERY))) == 1
     assert len(asked) == EVERY
+
+
+def test_a_start_says_that_positions_come_too_late_and_not_that_they_are_missing():
+    rig = Rig()
+    arm = WamArm(rig.link, rig.clock)
+    for node in MOTOR_NODES:
+        rig.network.faults.delay(position_reply_id(node), 3_950_000, None)
+    with pytest.raises(LinkTimeoutError, match=r"in time: \d+ replies came after"):
+        arm.start()
