@@ -173,7 +173,7 @@ class PoseWalk:
             f"Joint {joint + 1} is {apart[joint]:.3f} rad from where it was sent "
             f"(limit {ASTRAY[joint]:g}).",
             hint="Is something in the way, or has an encoder failed?",
-            arm_state="idle: it sinks slowly, support it",
+            arm_state="idle; it sinks slowly, support it",
         )
 
     def end(self) -> None:
