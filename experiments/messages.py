@@ -206,6 +206,9 @@ _OF_TIME = {
 }
 
 
+_UNKNOWN = "UNKNOWN - support it"
+
+
 @dataclass(frozen=True, slots=True)
 class FaultContext:
     """When and where a fault came.
@@ -218,6 +221,7 @@ class FaultContext:
         command: with which the work goes on once it has ended.
         load: of a computer that simulates on the wall clock; None = it does not, or a
             fault was asked for.
+        is_unconfirmed: idle was asked for, and not confirmed.
     """
 
     trial: str = "The session"
@@ -226,6 +230,7 @@ class FaultContext:
     prompt: Prompt | None = Prompt.READY
     command: str = RESUME
     load: ComputerLoad | None = None
+    is_unconfirmed: bool = False
 
 
 def fault_text(verdict: GuardVerdict, context: FaultContext, saved: str = "") -> str:
@@ -265,13 +270,15 @@ def fault_text(verdict: GuardVerdict, context: FaultContext, saved: str = "") ->
     if context.load is not None and is_of_time:
         values |= {**asdict(context.load), "what": message.what.format_map(values)}
         message = replace(CATALOGUE["too-busy"], arm=message.arm)
+    if context.is_unconfirmed and message.arm.startswith("idle"):
+        message = replace(message, arm=_UNKNOWN)
     return message.text(values, saved)
 
 
 def rest_text(mode: SafetyMode, *, is_confirmed: bool) -> str:
     """Return what the arm does at the end, `is_confirmed` by the safety module."""
     if not is_confirmed:
-        return "ARM: UNKNOWN - support it."
+        return f"ARM: {_UNKNOWN}."
     if mode is SafetyMode.E_STOP:
         return "ARM: stopped by its hardware, without power; it sinks, support it."
     return "ARM: idle; it sinks slowly, support it."

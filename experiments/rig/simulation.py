@@ -52,7 +52,7 @@ class SimulatedHand:
         if state.prompt is Prompt.SUPPORT:
             self._simulation.lift()
             self._simulation.pendant("activate")
-        elif state.prompt in (Prompt.LIFT, Prompt.LAY_DOWN):
+        elif state.prompt is Prompt.LIFT:
             self._simulation.lift()
         elif state.prompt is Prompt.CLEAR:
             self._simulation.let_go()
@@ -69,5 +69,5 @@ class SimulatedHand:
                 self._simulation.stand()
             else:
                 self._simulation.push()
-        elif state.prompt is Prompt.REVIEW:
+        elif state.prompt in (Prompt.REVIEW, Prompt.LAY_DOWN):
             self._simulation.rest()

@@ -7,7 +7,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from acquisition.control_loop.faults import OK, Action, GuardVerdict
+from acquisition.control_loop.faults import OK, Action, Fault, GuardVerdict
 from acquisition.control_loop.states import ArmState
 from acquisition.errors import TractionError
 from acquisition.ipc.loop_client import LoopClient
@@ -34,6 +34,10 @@ _AT_REST = frozenset(
     {Prompt.REVIEW, Prompt.PAUSED, Prompt.DAMPED, Prompt.UNDO, Prompt.LAY_DOWN}
 )
 _DAMPED = "ARM: damped where it is. [space] once you hold it: then it holds again."
+# Faults after which no hand is to lead the arm by what is known of its place.
+_LED_ASTRAY = frozenset(
+    {Fault.REPLIES_LATE, Fault.POSITION_JUMP, Fault.CAN_SILENCE, Fault.PUCK_CHANGED}
+)
 # Of an arm whose motors work.
 _DRIVEN = frozenset({ArmState.FLOAT, ArmState.HOLD, ArmState.DAMP, ArmState.GUIDE})
 LAY_DOWN_SECONDS = 60.0  # the arm waits so long for a hand before it goes idle
@@ -258,8 +262,11 @@ class ConsoleLoop:
                 self.console.say(_DAMPED)
                 if not self._await_hand(Prompt.DAMPED, lambda: True):
                     return
+            if verdict is not None and verdict.fault in _LED_ASTRAY:
+                rest = None
+            else:
+                loop_client.request(ArmState.GUIDE)
             self.console.say(_SUPPORT if rest is None else _LAY_DOWN)
-            loop_client.request(ArmState.GUIDE)
             self._await_hand(Prompt.LAY_DOWN, lambda: self._lies(rest))
         except (ArmFaultError, TractionError):
             return  # the arm is not under control: it is idled at once

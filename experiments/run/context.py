@@ -204,7 +204,12 @@ class RunContext(RunServices):
         faults = self.console_loop.faults
         is_rehearsed = faults is not None and faults.are_any
         load = busy_load(self.rig, is_rehearsed=is_rehearsed)
-        context = replace(self.state.fault_context, bus=bus, load=load)
+        context = replace(
+            self.state.fault_context,
+            bus=bus,
+            load=load,
+            is_unconfirmed=self.loop_client.status.state is ArmState.UNKNOWN,
+        )
         if self.journal.state.is_complete:  # neither a trial nor `resume` follows
             prompt = None if context.prompt is Prompt.READY else context.prompt
             context = replace(context, prompt=prompt, command=REPORT)

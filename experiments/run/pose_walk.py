@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from acquisition.control_loop.states import ArmState
 from acquisition.errors import PreflightError, TractionError
 from acquisition.ipc.shared_sensor import unpack_wrenches
 from experiments.messages import FaultContext, fault_text, rest_text
@@ -42,8 +43,14 @@ def guided(console_loop: ConsoleLoop, work: Callable[[], None], command: str) ->
         console.say(f"Stopped as asked. {_NOTHING}")
         return INTERRUPTED
     except ArmFaultError as fault:
-        bus = console_loop.loop_client.loop.bus_condition
-        place = FaultContext("The calibration", bus=bus, prompt=None, command=command)
+        loop_client = console_loop.loop_client
+        place = FaultContext(
+            "The calibration",
+            bus=loop_client.loop.bus_condition,
+            prompt=None,
+            command=command,
+            is_unconfirmed=loop_client.status.state is ArmState.UNKNOWN,
+        )
         was_moving = isinstance(fault, MoveStoppedError)
         result = f"{_STOPPED} {_NOTHING}" if was_moving else _NOTHING
         console.problem(fault_text(fault.verdict, place, result))

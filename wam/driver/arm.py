@@ -41,6 +41,7 @@ _ALL_FRESH = (1 << MOTORS) - 1
 # the module says whether it was a stop, even when one question or answer is lost.
 _URGENT_CYCLES = 3
 _FIRST_POSITIONS_NS = 1_000 * _MS  # as long as the vendor's library waits for them
+_DOUBTED = 5  # cycles until positions that were late are not asked for again
 _BEARING_NODE = 2  # its motor bears most of the arm
 _IGNORED_SPEED_FAULTS = 5  # the safety module's history, as libbarrett says
 
@@ -149,8 +150,9 @@ class WamArm:
         Replies carry no number: those that are late by whole cycles look as if they
         were in time, until a cycle comes that has not asked.
         """
-        self._until_unasked = self._settings.unasked_every
         motors, age_ns = self._traffic.skip(now_ns)
+        # A lock or a damper on old positions is none: what is late is proved soon.
+        self._until_unasked = _DOUBTED if motors else self._settings.unasked_every
         self._late_in_a_row = self._late_in_a_row + 1 if motors else 0
         reading = self._reading(now_ns, is_unasked=True)
         if motors:
