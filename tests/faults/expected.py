@@ -226,6 +226,50 @@ _LOADED = Cell(
     ("interrupted: contact-force",),
     Arm(30, "driven", HOLD, "holding"),
 )
+_PAST = " answered an earlier question: positions are "
+# One cycle in 250 asks for nothing; what is late then is proved within 20 ms.
+_OLD = Arm(520, "idle", ArmState.IDLE, "UNKNOWN, held with positions of the past")
+_UNPROVED = replace(OK, why="the session ends before a cycle asks for nothing")
+
+
+def _late() -> Row:
+    """Return the row of positions that are always late by whole cycles."""
+    return _ending(
+        _PAST,
+        _OLD,
+        "replies-late",
+        preflight=_refused(" not report a position in time: "),
+        recording=Cell(
+            End.ENDED, _PAST, AT_REVIEW, _OLD, why="the recording is shorter than that"
+        ),
+        review=replace(_UNPROVED, arm=None),
+        end=_UNPROVED,
+    )
+
+
+def _said_by(name: str, puck: int) -> Row:
+    """Return the row of a puck that says something else of itself from the start."""
+    later = Cell(End.ABSENT, why="read at every start; later: puck-changed")
+    return _row(later, preflight=_refused(f"{name} of puck {puck} is "))
+
+
+_REVERSED = Cell(End.SOMEHOW, why="what moves the arm shows it, if anything does")
+_DEAD = Cell(
+    End.SOMEHOW,
+    why="a person who holds the arm bears what the motor does not, and nothing that "
+    "is measured shows it; else the arm is idled as it sinks",
+)
+_NOT_REWIRED = Cell(End.ABSENT, why="no cable is changed while the arm is driven")
+_ASKED_IN_TURN = replace(
+    OK, why="one property is asked for every 0.1 s: all of them take 3.5 s"
+)
+_LET_GO = replace(OK, why="the arm holds, or lies with its virtual weight")
+_DRAGGED = replace(OK, why="the person gives way at the next prompt, within 0.2 m")
+_NEVER_SEEN_ACTIVE = Cell(
+    End.NOT_ACTIVATED,
+    "The arm was not activated within 120 s.",
+    why="the module says idle for ever, and the arm is held",
+)
 _SHARED = "Another program sends to the arm: frame "
 _EARLY = "The arm was activated before it was asked for."
 _NAN = "A position or torque was not a number."
@@ -308,9 +352,31 @@ TABLE: dict[str, Row] = {
     ),
     "early-activation": _row(
         replace(OK, why="the arm is active already"),
-        preflight=Cell(End.ENDED, _EARLY, why="found as soon as the loop runs"),
+        preflight=replace(
+            _not_ready("The arm was not activated within 120 s."),
+            why="nobody asks for positions yet: the module idles it, and says why",
+        ),
         idle=Cell(End.ENDED, _EARLY, arm=replace(_IDLE, limit_ms=10)),
     ),
+    "replies-late": _late(),
+    "replies-late-2": _late(),
+    "replies-late-3": _late(),
+    "puck-late": _late(),
+    "puck-changed": _row(_ASKED_IN_TURN, preflight=_refused("IPNM of puck 3 is ")),
+    "wrong-pidx": _said_by("PIDX", 3),
+    "wrong-mt": _said_by("MT", 2),
+    "wrong-grp": _said_by("GRPB", 3),
+    "wrong-ipnm": _said_by("IPNM", 7),
+    "wrong-cts": _said_by("CTS", 4),
+    **{f"dead-motor-{motor}": _row(_DEAD) for motor in range(1, 8)},
+    **{
+        f"reversed-motor-{motor}": _row(
+            _NOT_REWIRED, preflight=_REVERSED, idle=_REVERSED
+        )
+        for motor in range(1, 8)
+    },
+    "hand-gone": _row(_LET_GO),
+    "hold-dragged": _row(_DRAGGED),
     "estop": _ending(
         "Stop pressed", _STOPPED, "estop", preflight=_IN_STOP, idle=_UNPOWERED
     ),
@@ -362,6 +428,13 @@ TABLE: dict[str, Row] = {
         ),
     ),
     "safety-disobedient": _row(OK),
+    "safety-false-idle": _ending(
+        "The pendant or the safety module put the arm to idle",
+        Arm(60, "last torques", ArmState.UNKNOWN, "UNKNOWN - support it"),
+        "pendant-idle",
+        preflight=_NEVER_SEEN_ACTIVE,
+        idle=_NEVER_SEEN_ACTIVE,
+    ),
     **{f"lie-of-motor-{motor}": _row(OK) for motor in range(1, 7)},
     # The lock pushes joint 7 back to where it was, with nearly all that it may have.
     "lie-of-motor-7": _row(

@@ -29,13 +29,23 @@ _MET = Cell(
 _BLOWN = Cell(
     End.UNMEASURED, "Joint 6 ", arm=Arm(10, "driven", DAMP, "damped where it is")
 )
+_LATE = replace(TABLE["replies-late"][_TARE], end=End.UNMEASURED)
 _OWN = {
     "joint7-slip": _UNLOCKED,
+    "puck-changed": Cell(End.UNMEASURED, "IPNM of puck 3 was "),
+    "replies-late": _LATE,
+    "replies-late-2": _LATE,
+    "replies-late-3": _LATE,
+    "puck-late": _LATE,
+    "hold-dragged": _ASTRAY,
     "overspeed": _BLOWN,
     "lie-of-motor-3": _IN_VAIN,
     "contact-force": _MET,
     "second-command": OTHER_REFUSED,
 }
+_LAME = Cell(
+    End.UNMEASURED, why="the arm is idled as it sinks, or a motor turns in vain"
+)
 _STOPPING = {End.ENDED, End.TOLD, End.REDONE, End.SOMEHOW}
 
 
@@ -46,6 +56,8 @@ def _cell(fault: str) -> Cell:
     still = TABLE[fault][_TARE]
     if fault.startswith("stuck"):
         return _IN_VAIN
+    if fault.startswith("dead"):
+        return _LAME
     if fault.startswith("creep"):
         return _ASTRAY
     if fault.startswith("ft-"):

@@ -83,6 +83,12 @@ LIMP = Promise(
     why="a motor whose puck restarted has no torque: its joints sink until the arm is "
     "idle",
 )
+DEAD = Promise(
+    speed=1.5,
+    drive=110.0,
+    why="a motor without torque leaves its joints to the hand, which bears them, or "
+    "they sink until the arm is idle",
+)
 STUCK = Promise(
     speed=1.75,
     why="a motor whose encoder stands still in a move is pulled until its torque would "
@@ -102,6 +108,8 @@ def promise_of(fault: str, cell: Cell) -> Promise:
         return own[fault]
     if fault.startswith("stuck"):
         return STUCK
+    if fault.startswith(("dead", "reversed")):
+        return DEAD
     return Promise() if cell.arm is None else STOPPING
 
 
