@@ -110,8 +110,8 @@ def _print(
     console.say(f"{met}. {folder / 'bands.json'}")
     deciding = [f.band.id for f in gated(plan, results) if f.band.id in failed]
     if beside := sorted(failed.difference(deciding)):
-        of = "for a twin" if plan.is_twin else f"at friction {plan.friction:g}"
-        console.say(f"Outside: {', '.join(beside)}; not gated {of}.")
+        condition = "for a twin" if plan.is_twin else f"at friction {plan.friction:g}"
+        console.say(f"Outside: {', '.join(beside)}; not gated {condition}.")
     if not deciding:
         return 0
     console.problem(f"Outside their bands: {', '.join(deciding)}.")

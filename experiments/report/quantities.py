@@ -58,8 +58,8 @@ def _traction(place: int) -> _Recorded:
     return lambda trial: trial.traction[:, place]
 
 
-def _raw(of: slice) -> _Recorded:
-    return lambda trial: trial.cycles["wrench_raw"][:, of]
+def _raw(columns: slice) -> _Recorded:
+    return lambda trial: trial.cycles["wrench_raw"][:, columns]
 
 
 def _flag(flag: Flag) -> _Recorded:
@@ -220,10 +220,16 @@ QUANTITIES: tuple[TrialQuantity, ...] = (
 
 def _kept(name: str, values: Callable[[PreparedTrial], Values]) -> KeptQuantity:
     """Return a column of the kept samples: as of the whole trial, but smoothed."""
-    (of,) = (each for each in QUANTITIES if each.names == (name,))
-    meaning = of.meaning if name == "t" else f"{of.meaning}; smoothed"
+    (quantity,) = (each for each in QUANTITIES if each.names == (name,))
+    meaning = quantity.meaning if name == "t" else f"{quantity.meaning}; smoothed"
     return Quantity(
-        of.names, of.unit, of.frame, meaning, values, of.resolution, of.kind
+        quantity.names,
+        quantity.unit,
+        quantity.frame,
+        meaning,
+        values,
+        quantity.resolution,
+        quantity.kind,
     )
 
 

@@ -153,7 +153,9 @@ def analyse(plan: AcceptancePlan, data: Path) -> list[BandResult]:
     With fewer than ten trials only the bands on slips, samples and truth are returned.
     """
     trials = _load(plan, data)
-    series = {name: [trial.series() for trial in of] for name, of in trials.items()}
+    series = {
+        name: [trial.series() for trial in group] for name, group in trials.items()
+    }
     is_whole = plan.trials >= WHOLE
     options = StudyOptions(
         prepare=PrepareOptions(container_travel=plan.travel),
@@ -268,17 +270,17 @@ def _grounds(
 
 def _truth(trials: dict[str, list[RecordedTrial]]) -> list[BandResult]:
     errors = {
-        name: [e for trial in of if (e := compare_with_truth(trial)) is not None]
-        for name, of in trials.items()
+        name: [e for trial in group if (e := compare_with_truth(trial)) is not None]
+        for name, group in trials.items()
     }
-    every = [error for of in errors.values() for error in of]
+    every = [error for group in errors.values() for error in group]
     if not every:
         return [BandResult(band, ()) for band in TRUTH_BANDS]
     values = (
-        tuple(1e3 * max(e.v_t for e in of) for of in errors.values() if of),
+        tuple(1e3 * max(e.v_t for e in group) for group in errors.values() if group),
         (float(np.mean([e.F_t for e in every])),),
         (float(np.mean([e.F_n for e in every])),),
-        _predicted([trial for of in trials.values() for trial in of]),
+        _predicted([trial for group in trials.values() for trial in group]),
     )
     return [BandResult(*pair) for pair in zip(TRUTH_BANDS, values, strict=True)]
 

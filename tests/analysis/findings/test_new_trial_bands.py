@@ -58,10 +58,10 @@ def results(make_series, moving):
 
 
 def test_shares_of_a_terrain_add_up(results):
-    assert [of.terrain for of in results.shares] == ["S0", "TF"]
-    for of in results.shares:
-        assert of.trials == 4
-        assert of.density.sum() == pytest.approx(10.0)
+    assert [share.terrain for share in results.shares] == ["S0", "TF"]
+    for share in results.shares:
+        assert share.trials == 4
+        assert share.density.sum() == pytest.approx(10.0)
 
 
 def test_components_of_every_terrain_are_in_the_study(results):

@@ -198,7 +198,10 @@ def test_a_fold_is_another_one_where_any_of_its_samples_is(trials):
     touched = [
         any(
             np.array_equal(rows.F_t, changed.F_t)
-            for rows in (task.own, *(r for of in task.others.values() for r in of))
+            for rows in (
+                task.own,
+                *(r for group in task.others.values() for r in group),
+            )
         )
         or task.terrain == "B0"
         for task in after
@@ -211,7 +214,9 @@ def test_a_fold_is_another_one_where_any_of_its_samples_is(trials):
 
 def test_folds_of_other_targets_have_other_outlines(trials):
     before, _ = plan_folds(trials, SMALL_FIT)
-    moved = {n: [replace(t, F_t=t.F_t + 1) for t in of] for n, of in trials.items()}
+    moved = {
+        n: [replace(t, F_t=t.F_t + 1) for t in group] for n, group in trials.items()
+    }
     after, _ = plan_folds(trials, SMALL_FIT, moved)
     assert before.outline(0)[3] == after.outline(0)[3]
     assert before.outline(0)[4:6] != after.outline(0)[4:6]

@@ -78,10 +78,10 @@ def test_two_trials_show_no_spread_between_them():
 
 def test_more_trials_show_the_level_better_by_the_root_of_their_number():
     ends = Interval(0.0, 1.0)
-    of = TrialComponents(
+    components = TrialComponents(
         10, 8.0, between=0.6, within=1.0, tau=0.5, measurement=0.1,
         intervals={"between": ends}, gain=3.0,
     )  # fmt: skip
-    assert of.independent == pytest.approx(8.0)
-    assert of.level_sd(1) == pytest.approx(np.sqrt(0.36 + 1.0 / 8.0))
-    assert of.level_sd(9) == pytest.approx(of.level_sd(1) / 3.0)
+    assert components.independent == pytest.approx(8.0)
+    assert components.level_sd(1) == pytest.approx(np.sqrt(0.36 + 1.0 / 8.0))
+    assert components.level_sd(9) == pytest.approx(components.level_sd(1) / 3.0)

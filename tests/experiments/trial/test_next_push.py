@@ -44,8 +44,8 @@ def folder(tmp_path):
 
 def keep(folder, pushes, **changed):
     """Write a sidecar per trial; the changes are those of the last one."""
-    for k, of in enumerate(pushes):
-        details = {"verdict": "keep", "coverage": SPARSE, "push": of.plain()}
+    for k, record in enumerate(pushes):
+        details = {"verdict": "keep", "coverage": SPARSE, "push": record.plain()}
         details |= changed if k == len(pushes) - 1 else {}
         path = folder.trials / f"T{k + 1:02d}.json"
         path.write_text(json.dumps(details))
