@@ -86,7 +86,7 @@ class Newcomer:
         fcntl.ioctl(program, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
         start = time.monotonic()
         process = subprocess.Popen(
-            ["bash", "-c", f"{line}\npwd > '{self._place}'"],
+            ["bash", "-c", f"{line}\npwd > '{self._folder_file}'"],
             cwd=self.folder,
             env=self._surroundings,
             stdin=program,
@@ -99,12 +99,12 @@ class Newcomer:
         seconds = time.monotonic() - start
         code = process.wait()
         os.close(screen)
-        if self._place.exists():
-            self.folder = Path(self._place.read_text().strip())
+        if self._folder_file.exists():
+            self.folder = Path(self._folder_file.read_text().strip())
         return Step(text, seconds, code, words)
 
     @property
-    def _place(self) -> Path:
+    def _folder_file(self) -> Path:
         return Path(self._surroundings["HOME"]) / "place"
 
 

@@ -41,8 +41,8 @@ _TRIAL = re.compile(r"● REC T01  (\d+\.\d) s")
 def main() -> int:
     """Record, draw into the file that is named, return the exit code."""
     program = [sys.executable, "-m", "experiments"]
-    with tempfile.TemporaryDirectory() as place:
-        folder = Path(place)
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch)
         command = [*program, "run", "S0", "--fake", "--fast", "--trials", "1"]
         cast = folder / "screen.cast"
         head = {"version": 2, "width": COLUMNS, "height": ROWS}

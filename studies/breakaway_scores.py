@@ -153,9 +153,9 @@ def calibration_error(
     risks: np.ndarray, is_below: np.ndarray, weights: np.ndarray
 ) -> float:
     """Return the mean of |predicted - seen| over ten bins of the predicted risk."""
-    place = np.minimum((risks * BINS).astype(int), BINS - 1).ravel()
-    total = np.bincount(place, weights.ravel(), BINS)
-    off = np.bincount(place, (weights * (risks - is_below)).ravel(), BINS)
+    bin_index = np.minimum((risks * BINS).astype(int), BINS - 1).ravel()
+    total = np.bincount(bin_index, weights.ravel(), BINS)
+    off = np.bincount(bin_index, (weights * (risks - is_below)).ravel(), BINS)
     return float(np.abs(off).sum() / total.sum())
 
 

@@ -227,10 +227,10 @@ def record(share: float, options: argparse.Namespace, folder: Path) -> None:
         print(f"session at {share:g}, {word}: exit {code}", file=sys.stderr)
 
 
-def measure(options: argparse.Namespace, place: Path) -> Iterator[SessionFigures]:
+def measure(options: argparse.Namespace, root: Path) -> Iterator[SessionFigures]:
     """Yield the figures of every session."""
     for share in options.shares:
-        folder = place / f"{share:g}"
+        folder = root / f"{share:g}"
         record(share, options, folder)
         for word in words_of(folder):
             yield figures_of(folder, share, word)
@@ -277,13 +277,13 @@ def main() -> None:
     parser.add_argument("--write", type=Path, help="page to write")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
-        place = options.keep or Path(scratch)
-        sessions = list(measure(options, place))
+        root = options.keep or Path(scratch)
+        sessions = list(measure(options, root))
         rows = [session.row() for session in sessions]
         print(MEASURED, *rows, sep="\n")
         if options.write is None:
             return
-        rig = load_settings(place / f"{options.shares[0]:g}" / "rig.toml").rig
+        rig = load_settings(root / f"{options.shares[0]:g}" / "rig.toml").rig
         load = 9.81 * rig.control.virtual_mass
         image = options.write.with_suffix(".png")
         image.write_bytes(picture(sessions, load))

@@ -237,8 +237,8 @@ def shortfalls(stones: Sequence[Outcome], plates: Sequence[Outcome]) -> list[str
             own = [o for o in group if o.terrain == terrain]
             pairs += [(terrain, mean(own, NEW, key) - q, 0.05) for key, q in BANDS]
         missed += [
-            f"{place}: a band is off by {error:+.3f} (limit {limit})"
-            for place, error, limit in pairs
+            f"{group}: a band is off by {error:+.3f} (limit {limit})"
+            for group, error, limit in pairs
             if abs(error) > limit
         ]
     gain = mean(stones, BEFORE, "nlpd") - mean(stones, NEW, "nlpd")

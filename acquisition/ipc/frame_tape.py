@@ -28,7 +28,7 @@ class FrameTape:
 
     def __init__(self, ring: Ring, clock: Clock) -> None:
         self._clock = clock
-        self._place = (ring.counter, ring.memory, *ring.places, _FRAME.pack_into)
+        self._target = (ring.counter, ring.memory, *ring.layout, _FRAME.pack_into)
 
     def add(self, frames: Iterable[tuple[int, bytes, int]]) -> None:
         """Keep frames that were sent or arrived just now, oldest first.
@@ -39,11 +39,11 @@ class FrameTape:
             frames: identifier, data and monotonic time [ns] of each, 0 = of now.
         """
         now_ns = self._clock.now_ns()
-        counter, memory, slots, stride, pack_into = self._place
+        counter, memory, slots, stride, pack_into = self._target
         number = counter[0]
         for can_id, data, t_ns in frames:
-            place = number % slots * stride
-            pack_into(memory, place, t_ns or now_ns, can_id, len(data), data)
+            offset = number % slots * stride
+            pack_into(memory, offset, t_ns or now_ns, can_id, len(data), data)
             number += 1
             counter[0] = number
 

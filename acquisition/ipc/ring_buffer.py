@@ -18,9 +18,9 @@ class Ring:
     The record being written is never handed out, so `slots - 1` records can be read.
 
     Attributes:
-        slots: places for records; record n goes to place n % slots.
-        places: number of places, and bytes from one to the next.
-        memory: the places, for a writer that packs its records there.
+        slots: number of slots for records; record n goes to slot n % slots.
+        layout: number of slots, and bytes from one to the next.
+        memory: the slots, for a writer that packs its records there.
         counter: one number, of records written: a writer raises it behind each record.
     """
 
@@ -29,7 +29,7 @@ class Ring:
         self.slots = slots
         self._size = dtype.itemsize
         self._stride = lines(dtype.itemsize)
-        self.places = (slots, self._stride)
+        self.layout = (slots, self._stride)
         self.counter = memory[:8].cast("Q")
         self.memory = memory[LINE : self.size_of(dtype, slots)]
         self._records: Record = np.ndarray(

@@ -63,7 +63,7 @@ class GroundLikelihood:
         grounds = [rows.grounds[g] for g in self._present]
         self._resemblance = Resemblance(grounds, grounds)
         self._starts = np.flatnonzero(np.diff(rows.ground, prepend=-1))
-        self._place = np.searchsorted(self._present, rows.ground)
+        self._ground_index = np.searchsorted(self._present, rows.ground)
         self._trials = rows.blocks()
         self._shared = SquaredExponential().over(X, X)
         self._added = SquaredExponential().over(X, X)
@@ -77,7 +77,7 @@ class GroundLikelihood:
         K0, of_shared = self._shared(theta[:3])
         unit, of_added = self._added(np.concatenate([[0.0], theta[5:7]]))
         B, slopes = self._resemblance.at(theta)
-        wide = B[np.ix_(self._place, self._place)]
+        wide = B[np.ix_(self._ground_index, self._ground_index)]
         factor = _factor(K0 + wide * unit, theta, self._is_plate, self._trials)
         a = factor.solve(self._y)
         lml = -0.5 * float(self._y @ a + a.size * np.log(2.0 * np.pi))

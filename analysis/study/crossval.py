@@ -111,13 +111,13 @@ class FoldPlan(Sequence[FoldTask]):
         self._tested = (
             self._fitted if targets is trials else PooledSamples.of(targets, usable)
         )
-        self._places = [
+        self._folds = [
             (name, k) for name, folds in usable.items() if len(folds) > 1 for k in folds
         ]
 
     def __len__(self) -> int:
         """Return the number of folds."""
-        return len(self._places)
+        return len(self._folds)
 
     @overload
     def __getitem__(self, index: int) -> FoldTask: ...
@@ -127,7 +127,7 @@ class FoldPlan(Sequence[FoldTask]):
         """Return everything that one fold needs."""
         if isinstance(index, slice):
             return [self[k] for k in range(len(self))[index]]
-        terrain, fold = self._places[index]
+        terrain, fold = self._folds[index]
         rest = [self._fitted.trial(terrain, k) for k in self._others(terrain, fold)]
         return FoldTask(
             terrain=terrain,
@@ -141,7 +141,7 @@ class FoldPlan(Sequence[FoldTask]):
 
     def outline(self, index: int) -> tuple[object, ...]:
         """Return what tells a fold from others, digests in the place of samples."""
-        (terrain, fold), (_, tested) = self._places[index], self._digests
+        (terrain, fold), (_, tested) = self._folds[index], self._digests
         met = self._met(terrain, fold, lambda name, k: tested[name][k])
         own = tested[terrain][fold]
         return ("fold", terrain, fold, self._wholes[terrain], own, met, self._options)

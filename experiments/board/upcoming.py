@@ -106,7 +106,7 @@ def suggest_order(rows: Sequence[BoardRow], done: Sequence[str]) -> list[str]:
     A foot that wears, a sensor that drifts and a person who learns change with time.
     If the inclines came in rising order, these could not be told from the incline. So
     of many random orders that one is taken in which inclination, size of the stones
-    and tread go least with the place in the whole sequence.
+    and tread go least with the position in the whole sequence.
 
     Args:
         rows: the matrix.
@@ -124,7 +124,7 @@ def suggest_order(rows: Sequence[BoardRow], done: Sequence[str]) -> list[str]:
 
 
 def confounding(order: Sequence[str], factors: Mapping[str, Sequence[float]]) -> float:
-    """Return the largest |correlation| of a factor with the place in `order`."""
+    """Return the largest |correlation| of a factor with the position in `order`."""
     columns = _columns(order, factors, 0)
     return max((column.of(order) for column in columns), default=0.0)
 
@@ -135,39 +135,39 @@ class _Column:
 
     Attributes:
         centred: the factor less its mean, by the name of the terrain.
-        size: its spread times that of the places in the sequence.
-        places: those that are still to be filled, less the mean of all.
-        begun: sum of the products of place and factor at the beginning.
+        size: its spread times that of the positions in the sequence.
+        positions: those that are still to be filled, less the mean of all.
+        begun: sum of the products of position and factor at the beginning.
     """
 
     centred: Mapping[str, float]
     size: float
-    places: Sequence[float]
+    positions: Sequence[float]
     begun: float
 
     def of(self, order: Sequence[str]) -> float:
-        """Return |correlation| with the place if the rest comes in this order."""
-        own = [p * self.centred[n] for p, n in zip(self.places, order, strict=True)]
+        """Return |correlation| with the position if the rest comes in this order."""
+        own = [p * self.centred[n] for p, n in zip(self.positions, order, strict=True)]
         return abs(math.fsum((self.begun, *own))) / self.size
 
 
 def _columns(
     order: Sequence[str], factors: Mapping[str, Sequence[float]], begun: int
 ) -> list[_Column]:
-    """Return the factors that vary; the first `begun` terrains keep their places."""
+    """Return the factors that vary; the first `begun` terrains keep their positions."""
     count = len(order)
-    places = [place - (count - 1) / 2 for place in range(count)]
-    squares = math.fsum(p * p for p in places)
+    positions = [position - (count - 1) / 2 for position in range(count)]
+    squares = math.fsum(p * p for p in positions)
     columns: list[_Column] = []
     for values in zip(*(factors[name] for name in order), strict=True):
         mean = math.fsum(values) / count
         centred = [value - mean for value in values]
         size = math.sqrt(math.fsum(c * c for c in centred) * squares)
         if size > 0.0:
-            pairs = zip(places[:begun], centred[:begun], strict=True)
+            pairs = zip(positions[:begun], centred[:begun], strict=True)
             first = math.fsum(p * c for p, c in pairs)
             named = dict(zip(order, centred, strict=True))
-            columns.append(_Column(named, size, places[begun:], first))
+            columns.append(_Column(named, size, positions[begun:], first))
     return columns
 
 

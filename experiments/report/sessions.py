@@ -73,8 +73,8 @@ class ReportRequest:
 
     def sorted(self, names: Iterable[str]) -> list[str]:
         """Return `names` in the matrix's order, others last by name."""
-        place = {name: i for i, name in enumerate(self.terrains)}
-        return sorted(names, key=lambda name: (place.get(name, len(place)), name))
+        rank = {name: i for i, name in enumerate(self.terrains)}
+        return sorted(names, key=lambda name: (rank.get(name, len(rank)), name))
 
 
 def _load_trials(

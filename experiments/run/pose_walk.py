@@ -42,10 +42,10 @@ def guided(console_loop: ConsoleLoop, work: Callable[[], None], command: str) ->
         return INTERRUPTED
     except ArmFaultError as fault:
         bus = console_loop.loop_client.loop.bus_condition
-        place = FaultContext("The calibration", bus=bus, prompt=None, command=command)
+        context = FaultContext("The calibration", bus=bus, prompt=None, command=command)
         was_moving = isinstance(fault, MoveStoppedError)
         result = f"{_STOPPED} {_NOTHING}" if was_moving else _NOTHING
-        console.problem(fault_text(fault.verdict, place, result))
+        console.problem(fault_text(fault.verdict, context, result))
         return 4
     except TractionError as error:
         console.problem(f"{error} {_NOTHING}")

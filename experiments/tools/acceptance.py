@@ -99,17 +99,17 @@ def calibrate_arm(plan: AcceptancePlan, data: Path) -> AcceptancePlan:
     if plan.config is not None or plan.is_twin or plan.friction < _RUBS:
         return plan
     data.mkdir(parents=True, exist_ok=True)
-    folder, place = data / "rig", data / "calibration"
+    folder, calibration = data / "rig", data / "calibration"
     config = folder / "rig.toml"
     simulated = ["--fake", "--fast", "--operator-script", "auto", "--no-color"]
     simulated += ["--seed", str(plan.seed), *_arm(plan)]
-    simulated += ["--config", str(config), "--data", str(place)]
+    simulated += ["--config", str(config), "--data", str(calibration)]
     steps = (["init", str(folder)], ["calibrate", "friction", *simulated])
     for step in steps:
-        if code := _record(step, place):
+        if code := _record(step, calibration):
             raise SessionError(
                 f"traction {step[0]} ended with exit code {code}.",
-                hint=f"What it said: {place}.log",
+                hint=f"What it said: {calibration}.log",
             )
     section = r'(\[friction\][^\[]*?model = )"none"([^\[]*?file = )"friction.toml"'
     used = r'\1"calibrated"\2"friction.fake.toml"'
@@ -192,10 +192,10 @@ def as_plain(plan: AcceptancePlan, results: Sequence[BandResult]) -> dict[str, o
     }
 
 
-def _record(arguments: list[str], place: Path) -> int:
+def _record(arguments: list[str], folder: Path) -> int:
     """Run one command of its own; what it says goes beside the data."""
     command = [sys.executable, "-m", "experiments", *arguments]
-    with place.with_name(place.name + ".log").open("w") as log:
+    with folder.with_name(folder.name + ".log").open("w") as log:
         return subprocess.run(
             command, stdin=subprocess.DEVNULL, stdout=log, stderr=log, check=False
         ).returncode

@@ -88,8 +88,8 @@ class FarSide:
 
 def _settings(rig: str, matrix: str) -> Settings:
     """Return the settings from the text of two files."""
-    with tempfile.TemporaryDirectory(prefix="lab") as place:
-        folder = Path(place)
+    with tempfile.TemporaryDirectory(prefix="lab") as scratch:
+        folder = Path(scratch)
         (folder / "rig.toml").write_text(rig, encoding="utf-8")
         (folder / "matrix.toml").write_text(matrix, encoding="utf-8")
         return load_settings(folder / "rig.toml")

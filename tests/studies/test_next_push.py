@@ -27,7 +27,7 @@ def trial(aim, k):
     """Return a trial that comes out at its aim."""
     rng = np.random.default_rng([aim, k])
     F_n, v_t = (
-        place * rng.uniform(0.6, 1.4, 60) for place in (AIMS[aim].F_n, AIMS[aim].v_t)
+        level * rng.uniform(0.6, 1.4, 60) for level in (AIMS[aim].F_n, AIMS[aim].v_t)
     )
     F_t = 2.0 + 0.8 * F_n + rng.normal(0.0, 0.5, 60) + rng.normal(0.0, 0.5)
     t = np.linspace(0.0, 12.0, ROWS)

@@ -90,17 +90,17 @@ def test_posterior_adds_the_normal_priors():
     assert posterior(moved)[0] == pytest.approx(bare - 0.5 * 0.25 * mean.size)
 
 
-@pytest.mark.parametrize("place", [1, 3])
-def test_prediction_has_the_closed_form_of_conditioning(place):
+@pytest.mark.parametrize("index", [1, 3])
+def test_prediction_has_the_closed_form_of_conditioning(index):
     rows = drawn(per_trial=2)
     process = GroundPosterior(rows).climbed(CENTRE)
     inputs = np.random.default_rng(3).normal(size=(3, 2))
-    predicted = process.given(rows).predict(GROUNDS[place], inputs)
+    predicted = process.given(rows).predict(GROUNDS[index], inputs)
     # the three points as a further trial of that ground, their noise taken off
     both = GroundRows(
         np.vstack([rows.inputs, inputs]),
         np.concatenate([rows.y, np.zeros(3)]),
-        np.concatenate([rows.ground, np.full(3, place)]),
+        np.concatenate([rows.ground, np.full(3, index)]),
         np.concatenate([rows.trial, [90, 91, 92]]),
         GROUNDS,
     )

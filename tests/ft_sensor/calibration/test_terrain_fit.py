@@ -20,8 +20,8 @@ def frame(incline_deg=10.0, heading_deg=0.0):
 def corners(terrain, more=()):
     """Return the corners in the order of the prompts, then `more` (x, y) on top."""
     axes = terrain.axes()
-    places = [(0, 1), (0, -1), (LENGTH, 1), (LENGTH, -1)]
-    flat = [(x, y * HALF_WIDTH) for x, y in places] + list(more)
+    outline = [(0, 1), (0, -1), (LENGTH, 1), (LENGTH, -1)]
+    flat = [(x, y * HALF_WIDTH) for x, y in outline] + list(more)
     return np.array([terrain.far_end + x * axes[0] + y * axes[1] for x, y in flat])
 
 

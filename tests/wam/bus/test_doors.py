@@ -91,11 +91,11 @@ class ScriptedCalls:
     @staticmethod
     def _give(header, frame, ancillary):
         fields = struct.unpack("@PIPNPNi0P", ctypes.string_at(header, 56))
-        _, _, places, _, control, control_room, _ = fields
+        _, _, iovec, _, control, control_room, _ = fields
         assert control_room == 128  # the last call's sizes are gone
-        place, room = struct.unpack("@PN", ctypes.string_at(places, 16))
+        address, room = struct.unpack("@PN", ctypes.string_at(iovec, 16))
         size = min(len(frame), room)
-        ctypes.memmove(place, frame, size)
+        ctypes.memmove(address, frame, size)
         ctypes.memmove(control, ancillary, len(ancillary))
         ctypes.memmove(header + 40, struct.pack("@N", len(ancillary)), 8)
         ctypes.memmove(header + 56, struct.pack("@I", size), 4)
