@@ -1,8 +1,9 @@
-"""The one door to matplotlib: style, colours, watermark and files of every figure.
+"""Style, colours, watermark and files of every figure.
 
-Colours are Okabe and Ito's, safe for colour-blind readers, and never the only sign of a
-difference. Figures are drawn on `Figure` objects of their own, so that nothing is
-shared between them and no screen is needed.
+The only module that imports matplotlib. Colours are Okabe and Ito's, safe for
+colour-blind readers, and never the only sign of a difference. Figures are drawn on
+`Figure` objects of their own, so that nothing is shared between them and no screen is
+needed.
 """
 
 import io

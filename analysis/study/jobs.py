@@ -1,4 +1,4 @@
-"""The one door to dask, by joblib: independent tasks on cores or on a cluster."""
+"""Independent tasks on cores or on a cluster; the only module that imports dask."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext

@@ -14,7 +14,7 @@ from experiments.preflight.page import Add, CheckResult
 from experiments.rig.rig import Rig
 from ft_sensor.reading import axis_names, largest_traction
 from ft_sensor.serial_line.sensor import BURSTY
-from wam.bus.kernel_door import LONGEST_QUEUE, interface_state
+from wam.bus.socketcan import LONGEST_QUEUE, interface_state
 from wam.calibration.friction_file import friction_from_toml
 from wam.calibration.friction_reach import (
     reaches_along,

@@ -24,7 +24,7 @@ from ft_sensor.payload import LiveFoot, TerrainFrame, payload_of
 from ft_sensor.serial_line.link import SerialLink, SerialPort
 from ft_sensor.serial_line.sensor import SerialSensor
 from ft_sensor.vendors.barrett import BarrettSensor
-from wam.bus.link import CanLink, Door
+from wam.bus.link import CanLink, Transport
 from wam.control.controller import FootController
 from wam.control.friction_compensation import FrictionCompensation
 from wam.control.joint_lock import LockGains
@@ -100,9 +100,9 @@ def build_safety_limits(rig: RigSettings) -> SafetyLimits:
     return SafetyLimits(speed, safety.speed_fault, torque, safety.torque_fault_units)
 
 
-def build_link(door: Door, shared: SharedLayout, clock: Clock) -> CanLink:
-    """Return the link through a door; every frame goes into the shared memory too."""
-    return CanLink(door, FrameTape(shared.frames, clock).add)
+def build_link(transport: Transport, shared: SharedLayout, clock: Clock) -> CanLink:
+    """Return the link over a transport; every frame goes into the shared memory too."""
+    return CanLink(transport, FrameTape(shared.frames, clock).add)
 
 
 def build_arm(

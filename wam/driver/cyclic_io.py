@@ -41,7 +41,7 @@ class LinkCounters:
         malformed: frames that contradict the protocol.
         link_errors: times the bus refused.
         withheld: torques not sent because earlier frames had not left.
-        link: the bus, which says what its door is and what was lost there.
+        link: the bus, which says what its transport is and what was lost there.
     """
 
     link: Link
