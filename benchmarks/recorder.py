@@ -101,7 +101,7 @@ def run(seconds: float, rate: int) -> dict[str, float]:
         lost = int(reader.metadata["result"]["lost_in_ring"])
         size = path.stat().st_size
     child.stop()
-    warm = memory[min(len(memory) // 2, 180) :]  # the rings have been round by then
+    warm = memory[min(len(memory) // 2, 180) :]  # the buffers have been round by then
     return {
         "seconds": seconds,
         "rate": rate,

@@ -1,8 +1,9 @@
 """A session that another process records, served to viewers 50 times a second.
 
-The rings of the session lie in memory without a name. They are opened anew for reading
-through the console's entry in /proc, which asks nothing of any process of the session:
-nothing can be written, nobody waits, and whatever happens here goes unnoticed there.
+The ring buffers of the session lie in memory without a name. They are opened anew for
+reading through the console's entry in /proc, which asks nothing of any process of the
+session: nothing can be written, nobody waits, and whatever happens here goes unnoticed
+there.
 """
 
 from collections.abc import Callable, Mapping

@@ -97,7 +97,7 @@ def check_wrenches(samples: Record, now_ns: int, stale_ms: float) -> CheckResult
     """Grade rate, age and noise of force samples.
 
     Args:
-        samples: newest records of the board's ring of wrenches, oldest first.
+        samples: newest records of the ring buffer of wrenches, oldest first.
         now_ns: monotonic time [ns].
         stale_ms: age at which a sample counts as stale [ms].
     """

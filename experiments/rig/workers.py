@@ -146,7 +146,7 @@ class ControlWorker:
             shared=self._context.shared,
             clock=self._clock,
             is_simulated=self._is_simulated,
-            ring=self._ring_bell,
+            signal=self._signal,
         )
         self._loop_server = build_loop_server(parts)
 
@@ -170,8 +170,8 @@ class ControlWorker:
             release(self._arm, self._link)
         self._arm = self._link = None
 
-    def _ring_bell(self) -> None:
-        """Ring the bell of the console's terminal, if it has one."""
+    def _signal(self) -> None:
+        """Sound the bell of the console's terminal, if it has one."""
         path = self._context.settings.get("terminal")
         if not path:
             return
