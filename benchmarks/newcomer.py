@@ -140,7 +140,7 @@ def _key_for(words: str) -> str:
     return ""
 
 
-def told(step: Step) -> Step:
+def print_step(step: Step) -> Step:
     """Print what a step took."""
     print(f"{step.seconds:7.1f} s  {step.text}", flush=True)
     return step
@@ -152,11 +152,11 @@ def walk(home: Path, without: list[str]) -> list[Step]:
     somebody = Newcomer(home)
     steps = list[Step]()
     for text in (x for x in commands_of(page) if x not in without):
-        steps.append(told(somebody.type(text)))
+        steps.append(print_step(somebody.type(text)))
         if steps[-1].code:
             return steps
     (somebody.folder / "example.py").write_text(example_of(page))
-    steps.append(told(somebody.type(".venv/bin/python example.py")))
+    steps.append(print_step(somebody.type(".venv/bin/python example.py")))
     return steps
 
 

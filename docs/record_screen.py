@@ -89,8 +89,8 @@ def _thinned(
     clock = last = trial = 0.0
     for at, kind, text in events:
         step = min(at - last, _STILL)
-        if told := _TRIAL.findall(text):
-            now = float(told[-1])
+        if times := _TRIAL.findall(text):
+            now = float(times[-1])
             step, trial = max(now - trial, 0.0), now
         clock, last = clock + step, at
         if shown and clock - shown[-1][0] < _APART:

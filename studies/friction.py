@@ -112,15 +112,15 @@ def goal_lines(sessions: Sequence[SessionFigures], load: float) -> str:
         rest = np.array(session.rest)
         off, spread = rest.mean() / load - 1.0, _deviation(rest)
         words = [
-            f"mean {off:+.0%} ({_met(abs(off) <= _MEAN_OFF)})",
-            f"deviation {spread:.2f} N ({_met(spread <= _SPREAD)})",
+            f"mean {off:+.0%} ({_verdict(abs(off) <= _MEAN_OFF)})",
+            f"deviation {spread:.2f} N ({_verdict(spread <= _SPREAD)})",
         ]
         name = f"{session.share:g}, compensated {session.compensated}"
         lines.append(f"- {name}: {', '.join(words)}")
     return "\n".join(lines)
 
 
-def _met(is_met: bool) -> str:
+def _verdict(is_met: bool) -> str:
     return "met" if is_met else "missed"
 
 

@@ -79,8 +79,8 @@ def make_pool(folder: Path, terrain: str, per_aim: int = PER_AIM) -> Pool:
     return [
         [
             PoolTrial(record, np.array(rows))
-            for told, rows in trials
-            if (record := PushRecord.from_plain(told)) is not None
+            for fields, rows in trials
+            if (record := PushRecord.from_plain(fields)) is not None
         ]
         for trials in plain
     ]
@@ -133,10 +133,10 @@ def play(
         aim = int(np.argmax(np.where(is_there, worth, -np.inf)))
         trial = pool[aim][orders[aim].pop()]
         records.append(replace(trial.record, aim=AIMS[aim]))
-        known, told = Knowledge.at(records, theta), Knowledge.of(records, kind)
+        known, fitted = Knowledge.at(records, theta), Knowledge.of(records, kind)
         for target in TARGETS:
             sd[target].append(spread_of(known, target))
-            nlpd[target].append(density(told, target, left))
+            nlpd[target].append(density(fitted, target, left))
             stopping = stopping_of(records, kind, target)
             if stopping is not None and stopping.is_enough:
                 enough.setdefault(target, len(records))

@@ -28,7 +28,7 @@ from analysis.tustin.identifiability import Interval
 
 RUN = 5  # neighbours that are taken together
 APART = 4  # kept samples from one to the next: nearer ones share the moving average
-TOLD_APART = 1.4  # log likelihood that a level must gain: 5 % on the edge of its range
+LEAST_GAIN = 1.4  # log likelihood that a level must gain: 5 % on the edge of its range
 
 _STREAM = 3_000_000  # apart from folds, terrain fits and tables
 _DRAWS = 100  # of trials with replacement, at most
@@ -99,9 +99,9 @@ class TrialComponents:
     gain: float
 
     @property
-    def is_told_apart(self) -> bool:
-        """Whether the spread between trials is told apart from none."""
-        return self.gain >= TOLD_APART
+    def is_distinguishable(self) -> bool:
+        """Whether the spread between trials can be told from none."""
+        return self.gain >= LEAST_GAIN
 
     @property
     def independent(self) -> float:

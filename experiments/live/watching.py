@@ -58,7 +58,7 @@ class WatchedSession:
         self._foreseen = shared.foresight.written
         self._journal = folder.path / "events.jsonl"
         self._size = -1
-        self._told = len(folder.events())
+        self._sent = len(folder.events())
         config = folder.path / "config.toml"
         text = read_text(config) if config.exists() else ""
         self._encoder = LiveEncoder(urdf(load_constants()), text)
@@ -91,7 +91,7 @@ class WatchedSession:
             return []
         self._size = size
         events = self.folder.events()
-        new, self._told = events[self._told :], max(self._told, len(events))
+        new, self._sent = events[self._sent :], max(self._sent, len(events))
         return [
             (
                 {EVENTS_TOPIC: encode_log(now_ns, _EVENT_LEVEL, _EVENT_NAME, text)},

@@ -61,7 +61,7 @@ class FarSide:
         if value == DONE:
             return
         if value == 0:
-            raise FarSideError(self.exchange.said())
+            raise FarSideError(self.exchange.message())
         raise FarSideError("the host's process that simulates the arm has ended.")
 
     def say(self, call: Call, t_ns: int, text: str) -> None:

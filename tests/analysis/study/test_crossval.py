@@ -14,7 +14,7 @@ from analysis.gp.kernels import SquaredExponential
 from analysis.gp.likelihood import Likelihood
 from analysis.gp.noise import ConstantNoise
 from analysis.gp.search import posterior_search
-from analysis.study.crossval import choose_rows, met_trials, plan_folds, run_fold
+from analysis.study.crossval import choose_rows, paired_trials, plan_folds, run_fold
 from analysis.study.metrics import mean_absolute_error
 from analysis.study.models import GP_SE, TUSTIN, FitOptions
 from analysis.study.store import task_key
@@ -62,8 +62,8 @@ def test_model_of_fold_k_meets_trial_k_of_the_other_terrains(trials):
     ],
 )
 def test_trials_pair_by_number_and_wrap_where_they_cannot(models, tests, pairs):
-    met = [(k, trial) for k in models for trial in met_trials(k, models, tests)]
-    assert met == pairs
+    paired = [(k, trial) for k in models for trial in paired_trials(k, models, tests)]
+    assert paired == pairs
 
 
 def test_chosen_rows_are_distinct_and_depend_on_seed_terrain_and_fold(trials):
