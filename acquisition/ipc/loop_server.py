@@ -57,7 +57,7 @@ class LoopHooks:
 
 
 class LoopServer:
-    """Wraps a cycle for the loop: obeys the mailbox, publishes, watches the others.
+    """Wraps a cycle for the loop: obeys the commands, publishes, watches the others.
 
     Attributes:
         is_over: the loop is to end after this cycle.

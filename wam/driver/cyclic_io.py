@@ -141,7 +141,7 @@ class CycleTraffic:
             self.received = [None] * MOTORS
             self.bus_ns = 0
             self._link.send(_ARM_ID, self._get_p)
-            self._ask_companion()
+            self._ask_bus_device()
             self._await_replies(now_ns)
             refused = BusCondition.SOUND
         except LinkFullError:
@@ -203,8 +203,8 @@ class CycleTraffic:
         except LinkError:
             self.counters.link_errors += 1
 
-    def _ask_companion(self) -> None:
-        """Send the companion's question; a refusal does not cost the positions."""
+    def _ask_bus_device(self) -> None:
+        """Ask the other device on the bus; a refusal does not cost the positions."""
         if self.bus_device is None:
             return
         can_id, data = self.bus_device.poll_frame(self._clock.now_ns())
