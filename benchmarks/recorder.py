@@ -2,8 +2,9 @@
 
     python -m benchmarks.recorder [--seconds 60] [--rate 500] [--json]
 
-A pacing writer fills the board as a loop would, `--rate` cycles a second with two force
-samples and thirteen frames each, bit patterns changing so that compression has work.
+A pacing writer fills the shared memory as a loop would, `--rate` cycles a second with
+two force samples and thirteen frames each, bit patterns changing so that compression
+has work.
 """
 
 import argparse

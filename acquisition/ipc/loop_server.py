@@ -1,4 +1,4 @@
-"""The loop's side of the board: commands in, status and times out, others watched."""
+"""The loop in shared memory: commands in, status and times out, others watched."""
 
 import json
 from collections.abc import Callable, Mapping

@@ -196,7 +196,7 @@ def build_loop_server(parts: LoopConfig) -> LoopServer:
     is_shared = isinstance(parts.sensor, SharedSensor)
 
     def on_wrench(samples: list[WrenchSample]) -> None:
-        if not is_shared:  # those of a shared sensor are on the board already
+        if not is_shared:  # those of a shared sensor are in the shared memory already
             publish(samples, shared.wrenches)
 
     def metadata() -> dict[str, str]:

@@ -10,7 +10,7 @@ from acquisition.ipc.shared_sensor import pack_wrench, unpack_wrenches
 from acquisition.schema import CYCLE
 
 finite = st.floats(allow_nan=False)
-BOARD = SharedLayout.create()
+SHARED = SharedLayout.create()
 
 
 def test_two_who_map_the_same_memory_see_the_same():
@@ -57,11 +57,11 @@ def test_areas_do_not_overlap():
 )
 def test_a_sample_survives_the_ring(t_ns, counter, wrench, status, valid, saturated):
     sample = WrenchSample(t_ns, counter, wrench, status, valid, saturated)
-    buffer = BOARD.wrenches
+    buffer = SHARED.wrenches
     buffer.write(pack_wrench(sample))
     assert unpack_wrenches(buffer.last(1)) == [sample]
 
 
 def test_the_memory_has_no_name_that_could_be_left_behind():
-    descriptor = BOARD.memory.descriptor
+    descriptor = SHARED.memory.descriptor
     assert "memfd" in str(Path(f"/proc/self/fd/{descriptor}").readlink())

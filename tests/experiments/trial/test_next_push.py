@@ -79,9 +79,9 @@ def test_enough_is_said_with_what_the_matrix_wants(folder, row):
     row = row.model_copy(update={"trials": 20})
     keep(folder, everywhere(12))
     assert next_push(folder, row).enough.endswith("; 20 are wanted")
-    board = enough_of([folder], row)
-    assert board.startswith("S0: enough after 12: two more trials would move the grid")
-    assert board.endswith("; 20 are wanted.")
+    line = enough_of([folder], row)
+    assert line.startswith("S0: enough after 12: two more trials would move the grid")
+    assert line.endswith("; 20 are wanted.")
 
 
 def test_nothing_is_said_of_a_terrain_that_is_complete(folder, row):

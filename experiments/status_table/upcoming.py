@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING
 
 from acquisition.errors import TrialFileError
 from experiments.arguments import data_option
-from experiments.board.matrix_board import counted_of, facts_of_row, is_of, matches
 from experiments.session.lock import owner_of
+from experiments.status_table.table import counted_of, facts_of_row, is_of, matches
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from experiments.board.board_cache import BoardRow
-    from experiments.board.session_summaries import SeenSession
+    from experiments.status_table.session_summaries import SeenSession
+    from experiments.status_table.summary_cache import StatusRow
 
 _DRAWS = 400  # orders
 _SEED = 1  # the same data give the same advice
@@ -28,7 +28,7 @@ _SEED = 1  # the same data give the same advice
 def next_steps(
     data: Path,
     seen: Sequence[SeenSession],
-    rows: Sequence[BoardRow],
+    rows: Sequence[StatusRow],
     *,
     is_simulated: bool,
 ) -> list[str]:
@@ -71,7 +71,7 @@ def _left(session: SeenSession) -> str:
 
 
 def enough_lines(
-    seen: Sequence[SeenSession], rows: Sequence[BoardRow], where: Mapping[str, str]
+    seen: Sequence[SeenSession], rows: Sequence[StatusRow], where: Mapping[str, str]
 ) -> list[str]:
     """Return the terrains whose kept trials are enough for their target.
 
@@ -80,7 +80,7 @@ def enough_lines(
     Args:
         seen: the sessions.
         rows: the terrains and their targets.
-        where: only these, as in `count_board`.
+        where: only these, as in `count_rows`.
     """
     lines: list[str] = []
     sessions = counted_of(seen, where)
@@ -94,13 +94,13 @@ def enough_lines(
     return [text for text in lines if text]
 
 
-def _enough(own: Sequence[SeenSession], row: BoardRow) -> str:
+def _enough(own: Sequence[SeenSession], row: StatusRow) -> str:
     from experiments.session.kept_files import enough_of
 
     return enough_of([s.folder for s in own], row)
 
 
-def suggest_order(rows: Sequence[BoardRow], done: Sequence[str]) -> list[str]:
+def suggest_order(rows: Sequence[StatusRow], done: Sequence[str]) -> list[str]:
     """Return the terrains still to be recorded in a good order.
 
     A foot that wears, a sensor that drifts and a person who learns change with time.
@@ -171,7 +171,7 @@ def _columns(
     return columns
 
 
-def _factors(row: BoardRow) -> tuple[float, ...]:
+def _factors(row: StatusRow) -> tuple[float, ...]:
     """Return inclination and, as 0 or 1: big stones, a plate, a bare foot."""
     signs = (row.stones == "big", row.stones == "none", row.foot == "bare")
     return (row.incline_deg, *map(float, signs))
