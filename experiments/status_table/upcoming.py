@@ -120,13 +120,16 @@ def suggest_order(rows: Sequence[StatusRow], done: Sequence[str]) -> list[str]:
     columns = _columns([*begun, *rest], factors, len(begun))
     dice = random.Random(_SEED)
     orders = [dice.sample(rest, len(rest)) for _ in range(_DRAWS)]
-    return min(orders, key=lambda order: max((c.of(order) for c in columns), default=0))
+    return min(
+        orders,
+        key=lambda order: max((c.correlation(order) for c in columns), default=0),
+    )
 
 
 def confounding(order: Sequence[str], factors: Mapping[str, Sequence[float]]) -> float:
     """Return the largest |correlation| of a factor with the position in `order`."""
     columns = _columns(order, factors, 0)
-    return max((column.of(order) for column in columns), default=0.0)
+    return max((column.correlation(order) for column in columns), default=0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,7 +148,7 @@ class _Column:
     positions: Sequence[float]
     begun: float
 
-    def of(self, order: Sequence[str]) -> float:
+    def correlation(self, order: Sequence[str]) -> float:
         """Return |correlation| with the position if the rest comes in this order."""
         own = [p * self.centred[n] for p, n in zip(self.positions, order, strict=True)]
         return abs(math.fsum((self.begun, *own))) / self.size
