@@ -41,12 +41,12 @@ def openblas_settings(cpu: Path = _CPU) -> dict[str, str]:
     pairs = (
         line.partition(":")[::2] for line in text.partition("\n\n")[0].splitlines()
     )
-    said = {name.strip(): value.strip() for name, value in pairs}
-    family = said.get("cpu family", "")
+    fields = {name.strip(): value.strip() for name, value in pairs}
+    family = fields.get("cpu family", "")
     is_newer = family.isdecimal() and int(family) > _LAST_KNOWN
-    if said.get("vendor_id") != "AuthenticAMD" or not is_newer:
+    if fields.get("vendor_id") != "AuthenticAMD" or not is_newer:
         return ONE_THREAD
-    if not set(said.get("flags", "").split()) >= _AVX512:
+    if not set(fields.get("flags", "").split()) >= _AVX512:
         return ONE_THREAD
     return ONE_THREAD | {"OPENBLAS_CORETYPE": "SkylakeX"}
 

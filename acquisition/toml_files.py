@@ -47,11 +47,11 @@ class TomlFile(TomlTable):
 
 def _first_problem(error: ValidationError) -> str:
     first = error.errors(include_url=False, include_input=False)[0]
-    place = ".".join(map(str, first["loc"]))
+    location = ".".join(map(str, first["loc"]))
     if first["type"] == "missing":
-        return f"{place} is missing"
+        return f"{location} is missing"
     what = first["msg"].removeprefix("Value error, ")
-    return f"{place}: {what}" if place else what
+    return f"{location}: {what}" if location else what
 
 
 def _lines(table: BaseModel | Mapping[str, object], name: str) -> str:
@@ -61,8 +61,8 @@ def _lines(table: BaseModel | Mapping[str, object], name: str) -> str:
         above = f"# {comment}\n" if comment else ""
         if isinstance(value, BaseModel | Mapping):
             inner = cast("BaseModel | Mapping[str, object]", value)
-            place = f"{name}{key}"
-            tables += f"\n{above}[{place}]\n{_lines(inner, f'{place}.')}"
+            header = f"{name}{key}"
+            tables += f"\n{above}[{header}]\n{_lines(inner, f'{header}.')}"
         elif value is not None:
             values += f"{above}{key} = {_value(value)}\n"
     return values + tables

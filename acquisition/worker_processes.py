@@ -194,9 +194,9 @@ def _end_with(ends: Connection) -> None:
 def _environment_of_workers() -> Generator[None]:
     """Let a new interpreter find this code, and no module of the working folder."""
     before = dict(os.environ)
-    places = (_ROOT, os.environ.get("PYTHONPATH", ""))
+    paths = (_ROOT, os.environ.get("PYTHONPATH", ""))
     os.environ.update(openblas_settings() | before)
-    os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, places))
+    os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, paths))
     os.environ["PYTHONSAFEPATH"] = "1"
     try:
         yield

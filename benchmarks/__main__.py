@@ -28,7 +28,7 @@ NAMES = (
     "analysis_speed",
     "scale",
     "cluster",
-    "can_doors",
+    "can_transports",
     "codec",
     "load",
     "recorder",

@@ -26,7 +26,7 @@ from acquisition.trial_file.writer import TrialHeader
 from benchmarks.rows import BenchRow
 from experiments.rig.rig import FakeOptions, Rig, build_rig
 from experiments.settings.load import load_settings
-from fakes.bus.in_process import FakeCanBus, InProcessDoor
+from fakes.bus.in_process import FakeCanBus, InProcessTransport
 from fakes.plant.plant import ArmPlant
 from fakes.sensor.port import FakeSerialPort
 from ft_sensor.payload import LiveFoot
@@ -43,8 +43,8 @@ PARTS = {
     "plant": ((ArmPlant, "advance"),),
     "bus and pucks": (
         (FakeCanBus, "advance"),
-        (InProcessDoor, "send"),
-        (InProcessDoor, "receive"),
+        (InProcessTransport, "send"),
+        (InProcessTransport, "receive"),
     ),
     "arm driver": ((WamArm, "read"), (WamArm, "send")),
     "sensor simulation": ((FakeSerialPort, "advance"),),

@@ -1,7 +1,7 @@
 """Sessions as they lie on the disk, made in a moment: what `scale` counts.
 
 Journal, session.json and sidecars are what the program writes; the recordings are a few
-kilobytes of noise, for the board looks at nothing but their checksums.
+kilobytes of noise, for `status` looks at nothing but their checksums.
 """
 
 import hashlib

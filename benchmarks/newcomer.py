@@ -86,7 +86,7 @@ class Newcomer:
         fcntl.ioctl(program, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
         start = time.monotonic()
         process = subprocess.Popen(
-            ["bash", "-c", f"{line}\npwd > '{self._place}'"],
+            ["bash", "-c", f"{line}\npwd > '{self._folder_file}'"],
             cwd=self.folder,
             env=self._surroundings,
             stdin=program,
@@ -99,12 +99,12 @@ class Newcomer:
         seconds = time.monotonic() - start
         code = process.wait()
         os.close(screen)
-        if self._place.exists():
-            self.folder = Path(self._place.read_text().strip())
+        if self._folder_file.exists():
+            self.folder = Path(self._folder_file.read_text().strip())
         return Step(text, seconds, code, words)
 
     @property
-    def _place(self) -> Path:
+    def _folder_file(self) -> Path:
         return Path(self._surroundings["HOME"]) / "place"
 
 
@@ -140,7 +140,7 @@ def _key_for(words: str) -> str:
     return ""
 
 
-def told(step: Step) -> Step:
+def print_step(step: Step) -> Step:
     """Print what a step took."""
     print(f"{step.seconds:7.1f} s  {step.text}", flush=True)
     return step
@@ -152,11 +152,11 @@ def walk(home: Path, without: list[str]) -> list[Step]:
     somebody = Newcomer(home)
     steps = list[Step]()
     for text in (x for x in commands_of(page) if x not in without):
-        steps.append(told(somebody.type(text)))
+        steps.append(print_step(somebody.type(text)))
         if steps[-1].code:
             return steps
     (somebody.folder / "example.py").write_text(example_of(page))
-    steps.append(told(somebody.type(".venv/bin/python example.py")))
+    steps.append(print_step(somebody.type(".venv/bin/python example.py")))
     return steps
 
 

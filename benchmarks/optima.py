@@ -39,7 +39,7 @@ class RawRecord:
     """What one fit reached beside the best of twenty starts.
 
     Attributes:
-        place: terrain and fold.
+        fold: terrain and its fold.
         model: its name.
         ours: log likelihood, or minus the sum of squares.
         best: the same of the best of all runs.
@@ -48,7 +48,7 @@ class RawRecord:
         seconds: processor time of our search [s].
     """
 
-    place: str
+    fold: str
     model: str
     ours: float
     best: float
@@ -62,9 +62,9 @@ def examine(task: FoldTask) -> list[RawRecord]:
     chosen = choose_rows(task)
     rows = given(task)
     sse, best = rows.curve.sse, many_starts(task.training)
-    place = f"{task.terrain} fold {task.fold + 1}"
+    fold = f"{task.terrain} fold {task.fold + 1}"
     is_missed = sse > (1.0 + _SQUARES) * best
-    found = [RawRecord(place, TUSTIN, -sse, -min(sse, best), is_missed, 0, 0.0)]
+    found = [RawRecord(fold, TUSTIN, -sse, -min(sse, best), is_missed, 0, 0.0)]
     training = TrainingSet(task.training, task.lengths, chosen)
     trial, order = training.trial_of()[chosen], np.argsort(chosen)
     trials = TrialRows(trial[order], np.zeros(trial.size))
@@ -80,7 +80,7 @@ def examine(task: FoldTask) -> list[RawRecord]:
             count = sum(start.evaluations for start in ours.starts)
             is_missed = ours.lml < best - _MISSED
             found.append(
-                RawRecord(place, title, ours.lml, best, is_missed, count, spent)
+                RawRecord(fold, title, ours.lml, best, is_missed, count, spent)
             )
     return found
 
@@ -119,7 +119,7 @@ def summary(found: Sequence[RawRecord]) -> list[str]:
             )
         lines.append(line)
     return lines + [
-        f"  missed: {one.place} {one.model}: {one.ours:.4f}, best {one.best:.4f}"
+        f"  missed: {one.fold} {one.model}: {one.ours:.4f}, best {one.best:.4f}"
         for one in found
         if one.is_missed
     ]

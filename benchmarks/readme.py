@@ -44,14 +44,14 @@ def _errors(terrain: dict[str, Any]) -> str:
     return ", ".join(f"{value:.2f}" for value in values) + " N"
 
 
-def is_same(row: str, told: str) -> bool:
+def is_same(row: str, printed: str) -> bool:
     """Return whether a line of README says what a row does, to 5 % of each number.
 
     Libraries of linear algebra differ in the last digits from machine to machine.
     """
-    if _NUMBER.sub("#", row) != _NUMBER.sub("#", told):
+    if _NUMBER.sub("#", row) != _NUMBER.sub("#", printed):
         return False
-    pairs = zip(_NUMBER.findall(row), _NUMBER.findall(told), strict=True)
+    pairs = zip(_NUMBER.findall(row), _NUMBER.findall(printed), strict=True)
     return all(abs(float(a) - float(b)) <= _DRIFT * float(a) for a, b in pairs)
 
 
@@ -62,8 +62,8 @@ def main() -> int:
     folder, readme = parser.parse_args().folder, README.read_text()
     fits = json.loads((folder / "study" / "fits.json").read_text())
     rows = demo_rows(fits)
-    told = readme.splitlines()
-    drifted = [row for row in rows if not any(is_same(row, line) for line in told)]
+    lines = readme.splitlines()
+    drifted = [row for row in rows if not any(is_same(row, line) for line in lines)]
     for row in rows:
         print(f"{'!' if row in drifted else ' '} {row}")
     for warning in fits["warnings"]:

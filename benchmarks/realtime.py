@@ -91,7 +91,7 @@ def alternate(rig: Rig, windows: int, seconds: float, program: Path) -> RawRecor
 
 
 def columns(timings: Record) -> Times:
-    """Return deadline, woke, replies, sent of records of the ring of timings."""
+    """Return deadline, woke, replies, sent of records of the buffer of timings."""
     names = ("deadline_ns", "woke_ns", "replies_ns", "sent_ns")
     return np.column_stack([timings[name].astype(np.int64) for name in names])
 

@@ -2,8 +2,9 @@
 
     python -m benchmarks.recorder [--seconds 60] [--rate 500] [--json]
 
-A pacing writer fills the board as a loop would, `--rate` cycles a second with two force
-samples and thirteen frames each, bit patterns changing so that compression has work.
+A pacing writer fills the shared memory as a loop would, `--rate` cycles a second with
+two force samples and thirteen frames each, bit patterns changing so that compression
+has work.
 """
 
 import argparse
@@ -101,7 +102,7 @@ def run(seconds: float, rate: int) -> dict[str, float]:
         lost = int(reader.metadata["result"]["lost_in_ring"])
         size = path.stat().st_size
     child.stop()
-    warm = memory[min(len(memory) // 2, 180) :]  # the rings have been round by then
+    warm = memory[min(len(memory) // 2, 180) :]  # the buffers have been round by then
     return {
         "seconds": seconds,
         "rate": rate,

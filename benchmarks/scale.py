@@ -1,4 +1,4 @@
-"""How cost grows: folds with the number of trials, the board with that of sessions.
+"""How cost grows: folds with the number of trials, `status` with that of sessions.
 
     python -m benchmarks.scale [--json]
 
@@ -65,7 +65,7 @@ def folds_of(count: int) -> dict[str, float]:
     return {"count": count, "seconds": min(times), "megabytes": peak / 1e6}
 
 
-def board_of(count: int) -> dict[str, float]:
+def status_of(count: int) -> dict[str, float]:
     """Return the processor time of `traction status` over so many sessions [s].
 
     The second look counts, at files that have not changed; the first one hashes all.
@@ -125,27 +125,27 @@ def measured() -> dict[str, Any]:
         nothing = min(_status(empty, Path(folder)) for _ in range(_REPEATS))
     return {
         "folds": [folds_of(count) for count in TRIALS],
-        "boards": [board_of(count) for count in SESSIONS],
+        "boards": [status_of(count) for count in SESSIONS],
         "empty": nothing,
     }
 
 
 def rows_of(found: dict[str, Any]) -> list[BenchRow]:
     """Return the table's lines."""
-    folds, boards = found["folds"], found["boards"]
-    last, board = folds[-1], boards[-1]
+    folds, statuses = found["folds"], found["boards"]
+    last, status = folds[-1], statuses[-1]
     unchanged = "`status`, 1,000 sessions, nothing changed"
     grown = {
         "planning grows as trials to the power of": exponent(folds, "seconds"),
         "its memory grows to the power of": exponent(folds, "megabytes"),
-        "`status` grows as sessions to the power of": exponent(boards, "seconds"),
+        "`status` grows as sessions to the power of": exponent(statuses, "seconds"),
     }
     return [
         BenchRow("folds of 800 trials: memory", last["megabytes"], "MB", 300),
         BenchRow("folds of 800 trials: planned and known", last["seconds"], "s", 1),
         BenchRow("shipped per Dask task", shipped_bytes() / 1e3, "kB", 40),
         BenchRow("`status`, an empty folder", 1e3 * found["empty"], "ms", 150),
-        BenchRow(unchanged, board["seconds"], "s", 1.0),
+        BenchRow(unchanged, status["seconds"], "s", 1.0),
         *(BenchRow(what, power, "", _LINEAR) for what, power in grown.items()),
     ]
 

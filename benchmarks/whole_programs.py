@@ -97,8 +97,8 @@ def rows() -> list[BenchRow]:
     """Return what was measured, for the table."""
     ctypes.CDLL(None).prctl(_SUBREAPER, 1)  # their processes become ours
     with tempfile.TemporaryDirectory() as folder:
-        place = Path(folder)
-        return [*demo_rows(place / "demo"), study_row(place / "study")]
+        root = Path(folder)
+        return [*demo_rows(root / "demo"), study_row(root / "study")]
 
 
 if __name__ == "__main__":

@@ -41,8 +41,8 @@ _TRIAL = re.compile(r"● REC T01  (\d+\.\d) s")
 def main() -> int:
     """Record, draw into the file that is named, return the exit code."""
     program = [sys.executable, "-m", "experiments"]
-    with tempfile.TemporaryDirectory() as place:
-        folder = Path(place)
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch)
         command = [*program, "run", "S0", "--fake", "--fast", "--trials", "1"]
         cast = folder / "screen.cast"
         head = {"version": 2, "width": COLUMNS, "height": ROWS}
@@ -89,8 +89,8 @@ def _thinned(
     clock = last = trial = 0.0
     for at, kind, text in events:
         step = min(at - last, _STILL)
-        if told := _TRIAL.findall(text):
-            now = float(told[-1])
+        if times := _TRIAL.findall(text):
+            now = float(times[-1])
             step, trial = max(now - trial, 0.0), now
         clock, last = clock + step, at
         if shown and clock - shown[-1][0] < _APART:

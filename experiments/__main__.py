@@ -26,7 +26,7 @@ COMMANDS = {
     "stance": "record stances: the simulated foot stands and is asked for traction",
     "resume": "continue an unfinished session",
     "redo": "record one trial of a session again",
-    "status": "the matrix board, counted from verified files",
+    "status": "kept trials per terrain, counted from verified files",
     "note": "write a remark on a session or a trial",
     "verdict": "change the verdict on a recorded trial",
     "zero": "set the home position after confirmation",

@@ -25,21 +25,21 @@ class NameCompleter(BaseCompleter):
         parsed_args: argparse.Namespace,
     ) -> list[str]:
         """Return the names that begin with `prefix`."""
-        place = action.metavar if isinstance(action.metavar, str) else action.dest
+        metavar = action.metavar if isinstance(action.metavar, str) else action.dest
         with suppress(TractionError, OSError, ValueError):
-            names = _names(place.split("[")[0], action.dest, parsed_args)
+            names = _names(metavar.split("[")[0], action.dest, parsed_args)
             if names is not None:
                 return [name for name in names if name.startswith(prefix)]
         return list(FilesCompleter()(prefix))
 
 
-def _names(place: str, dest: str, args: argparse.Namespace) -> Iterable[str] | None:
+def _names(metavar: str, dest: str, args: argparse.Namespace) -> Iterable[str] | None:
     """Return what may stand there; None = a file."""
-    if place == "SESSION":
+    if metavar == "SESSION":
         return _sessions(args)
-    if place == "TRIAL":
+    if metavar == "TRIAL":
         return _trials(args)
-    if place == "TERRAIN" or dest == "terrain":
+    if metavar == "TERRAIN" or dest == "terrain":
         return _terrains(args)
     if dest == "fault":
         return _faults(args)

@@ -206,8 +206,8 @@ def boot(
     if is_shown:
         words += " --echo"
     job = _JOB.format(root=ROOT, python=sys.executable, names=words)
-    with tempfile.TemporaryDirectory(prefix="lab") as place:
-        folder = Path(place)
+    with tempfile.TemporaryDirectory(prefix="lab") as scratch:
+        folder = Path(scratch)
         first_root = folder / "initramfs"
         busybox = Path(program("busybox"))
         first_root.write_bytes(initramfs.build(busybox, kernel.modules, job))

@@ -102,7 +102,7 @@ class Exchange:
         _LENGTH.pack_into(self._memory, _TEXT_AT, len(data))
         self._memory[start : start + len(data)] = data
 
-    def said(self) -> str:
+    def message(self) -> str:
         """Return the text of the other side."""
         (length,) = _LENGTH.unpack_from(self._memory, _TEXT_AT)
         start = _TEXT_AT + _LENGTH.size

@@ -15,7 +15,7 @@ PROGRAMS: Mapping[str, str] = {
     "apt-get": "apt",
 }
 ALWAYS = ("seabios",)  # no program of its own: the firmware of the emulated machine
-PLACES = "/usr/sbin:/usr/bin:/sbin:/bin:/usr/local/sbin:/usr/local/bin"
+SEARCH_PATH = "/usr/sbin:/usr/bin:/sbin:/bin:/usr/local/sbin:/usr/local/bin"
 
 
 class LabError(Exception):
@@ -24,7 +24,7 @@ class LabError(Exception):
 
 def find_program(name: str) -> str | None:
     """Return the path of a program, also of those only root has in its PATH."""
-    return shutil.which(name) or shutil.which(name, path=PLACES)
+    return shutil.which(name) or shutil.which(name, path=SEARCH_PATH)
 
 
 def missing_packages(

@@ -60,13 +60,13 @@ class Scores:
 
 
 def rounds(trials: Trials) -> range:
-    return range(max(len(of) for of in trials.values()))
+    return range(max(len(group) for group in trials.values()))
 
 
 def without(trials: Trials, k: int) -> dict[str, list[PreparedTrial]]:
     return {
-        name: [trial for i, trial in enumerate(of) if i != k]
-        for name, of in trials.items()
+        name: [trial for i, trial in enumerate(group) if i != k]
+        for name, group in trials.items()
     }
 
 
@@ -75,9 +75,9 @@ def from_rest(trials: Trials, kinds: Mapping[str, str]) -> list[Predicted]:
     predicted = []
     for k in rounds(trials):
         models = fit_break_away(without(trials, k), kinds, BreakAwayOptions(draws=0))
-        for name, of in trials.items():
-            if k < len(of) and name in models:
-                predicted += _predict(name, of[k], _risk(models[name]))
+        for name, group in trials.items():
+            if k < len(group) and name in models:
+                predicted += _predict(name, group[k], _risk(models[name]))
     return predicted
 
 
@@ -87,10 +87,11 @@ def in_motion(trials: Trials, points: int) -> list[Predicted]:
 
     predicted = []
     for k in rounds(trials):
-        for name, of in without(trials, k).items():
+        for name, group in without(trials, k).items():
             if k >= len(trials[name]):
                 continue
-            model = ModelFitter(TrainingSet.of(of, points, k), FitOptions()).fit(GP_SE)
+            training = TrainingSet.of(group, points, k)
+            model = ModelFitter(training, FitOptions()).fit(GP_SE)
 
             def risk(required: np.ndarray, F_n: np.ndarray, gp=model) -> np.ndarray:
                 answer = gp.predict(F_n, np.full(F_n.size, SLOWEST))
@@ -152,17 +153,17 @@ def calibration_error(
     risks: np.ndarray, is_below: np.ndarray, weights: np.ndarray
 ) -> float:
     """Return the mean of |predicted - seen| over ten bins of the predicted risk."""
-    place = np.minimum((risks * BINS).astype(int), BINS - 1).ravel()
-    total = np.bincount(place, weights.ravel(), BINS)
-    off = np.bincount(place, (weights * (risks - is_below)).ravel(), BINS)
+    bin_index = np.minimum((risks * BINS).astype(int), BINS - 1).ravel()
+    total = np.bincount(bin_index, weights.ravel(), BINS)
+    off = np.bincount(bin_index, (weights * (risks - is_below)).ravel(), BINS)
     return float(np.abs(off).sum() / total.sum())
 
 
 def load(path: Path) -> dict[str, list[PreparedTrial]]:
     tables = load_tables([path])
     return {
-        name: [prepare_trial(s, PrepareOptions()) for s in of]
-        for name, of in tables.items()
+        name: [prepare_trial(s, PrepareOptions()) for s in series]
+        for name, series in tables.items()
     }
 
 
@@ -183,7 +184,7 @@ def table(trials: Trials, points: int) -> list[tuple[str, str, Scores]]:
         groups = {"stones": pooled} | {
             name: [p for p in predicted if p.terrain == name] for name in trials
         }
-        rows += [(n, title, score(of)) for n, of in groups.items() if of]
+        rows += [(n, title, score(group)) for n, group in groups.items() if group]
     order = ["stones", *trials]
     return sorted(rows, key=lambda row: order.index(row[0]))
 

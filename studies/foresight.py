@@ -49,7 +49,9 @@ def load_pool(path: Path, per_terrain: int) -> list[WatchedTrial]:
         own = trials.setdefault(trial.terrain, [])
         if len(own) < per_terrain:
             own.append(trial)
-    kinds = {n: terrain_kind(n, {t.stones for t in of}) for n, of in trials.items()}
+    kinds = {
+        n: terrain_kind(n, {t.stones for t in group}) for n, group in trials.items()
+    }
     return watch_all(trials, kinds)
 
 
@@ -74,7 +76,7 @@ def contour_alarms(
     """Return (alarms a minute, minutes) of contour trials, taken to be of a rig."""
     columns = parse_columns("t=t_s,v_t=vt_mps,F_n=Fn_N,F_t=Ft_N")
     tables = load_tables(sorted(folder.glob("*.csv")), columns)
-    trials = [watch_series(s, "", rig) for of in tables.values() for s in of]
+    trials = [watch_series(s, "", rig) for series in tables.values() for s in series]
     score = score_slips(foresee(model, trials, {}))
     return score.per_minute, score.seconds / 60.0
 
@@ -165,7 +167,7 @@ def main() -> int:
     pools = {path.name: load_pool(path, args.trials) for path in args.pools}
     judge, recalls, models = Judge(), [], {}
     for name, trials in pools.items():
-        others = [t for other, of in pools.items() if other != name for t in of]
+        others = [t for other, pool in pools.items() if other != name for t in pool]
         model = fit_foresight(others or trials)
         if model is None:
             raise SystemExit(f"{name}: nothing to learn from")

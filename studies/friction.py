@@ -112,15 +112,15 @@ def goal_lines(sessions: Sequence[SessionFigures], load: float) -> str:
         rest = np.array(session.rest)
         off, spread = rest.mean() / load - 1.0, _deviation(rest)
         words = [
-            f"mean {off:+.0%} ({_met(abs(off) <= _MEAN_OFF)})",
-            f"deviation {spread:.2f} N ({_met(spread <= _SPREAD)})",
+            f"mean {off:+.0%} ({_verdict(abs(off) <= _MEAN_OFF)})",
+            f"deviation {spread:.2f} N ({_verdict(spread <= _SPREAD)})",
         ]
         name = f"{session.share:g}, compensated {session.compensated}"
         lines.append(f"- {name}: {', '.join(words)}")
     return "\n".join(lines)
 
 
-def _met(is_met: bool) -> str:
+def _verdict(is_met: bool) -> str:
     return "met" if is_met else "missed"
 
 
@@ -227,10 +227,10 @@ def record(share: float, options: argparse.Namespace, folder: Path) -> None:
         print(f"session at {share:g}, {word}: exit {code}", file=sys.stderr)
 
 
-def measure(options: argparse.Namespace, place: Path) -> Iterator[SessionFigures]:
+def measure(options: argparse.Namespace, root: Path) -> Iterator[SessionFigures]:
     """Yield the figures of every session."""
     for share in options.shares:
-        folder = place / f"{share:g}"
+        folder = root / f"{share:g}"
         record(share, options, folder)
         for word in words_of(folder):
             yield figures_of(folder, share, word)
@@ -277,13 +277,13 @@ def main() -> None:
     parser.add_argument("--write", type=Path, help="page to write")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
-        place = options.keep or Path(scratch)
-        sessions = list(measure(options, place))
+        root = options.keep or Path(scratch)
+        sessions = list(measure(options, root))
         rows = [session.row() for session in sessions]
         print(MEASURED, *rows, sep="\n")
         if options.write is None:
             return
-        rig = load_settings(place / f"{options.shares[0]:g}" / "rig.toml").rig
+        rig = load_settings(root / f"{options.shares[0]:g}" / "rig.toml").rig
         load = 9.81 * rig.control.virtual_mass
         image = options.write.with_suffix(".png")
         image.write_bytes(picture(sessions, load))

@@ -162,9 +162,9 @@ def main() -> int:
     options = parser.parse_args()
     rows, missed = list[str](), 0
     with tempfile.TemporaryDirectory() as scratch:
-        place = options.keep or Path(scratch)
+        root = options.keep or Path(scratch)
         for share in options.shares:
-            folders = [place / f"{share:g}-{seed}" for seed in options.seeds]
+            folders = [root / f"{share:g}-{seed}" for seed in options.seeds]
             pairs = zip(folders, options.seeds, strict=True)
             files = [calibrate(folder, share, seed) for folder, seed in pairs]
             shown = verdicts([errors_of(*pair) for pair in files])

@@ -87,9 +87,9 @@ def _changes(node: ast.AST) -> Iterator[Callable[[ast.AST], None]]:
     if isinstance(node, ast.Constant) and type(node.value) in {int, float}:
         yield lambda n: setattr(n, "value", _other(n.value))
     if isinstance(node, ast.FunctionDef | ast.If | ast.For):
-        for place, statement in enumerate(node.body):
+        for index, statement in enumerate(node.body):
             if _is_removable(statement):
-                yield lambda n, i=place: n.body.__setitem__(i, ast.Pass())
+                yield lambda n, i=index: n.body.__setitem__(i, ast.Pass())
 
 
 def _other(value: float) -> float:
@@ -132,12 +132,12 @@ def mutations(path: str) -> list[Mutation]:
     nodes, hidden = list(ast.walk(tree)), _skipped(tree)
     sound = ast.unparse(tree)
     found: list[Mutation] = []
-    for place, node in enumerate(nodes):
+    for index, node in enumerate(nodes):
         if id(node) in hidden:
             continue
         for number, _ in enumerate(_changes(node)):
             changed = copy.deepcopy(tree)
-            twin = list(ast.walk(changed))[place]
+            twin = list(ast.walk(changed))[index]
             list(_changes(twin))[number](twin)
             source = ast.unparse(ast.fix_missing_locations(changed))
             text = _first_change(sound, source)
@@ -247,8 +247,8 @@ def main() -> int:
     parser.add_argument("--only", default="", help="part of a module's path")
     given = parser.parse_args()
     chosen, killed = sample(given.count, given.seed, given.round, given.only), 0
-    with tempfile.TemporaryDirectory(prefix="mutations-") as place:
-        tree = MutatedTree(Path(place))
+    with tempfile.TemporaryDirectory(prefix="mutations-") as scratch:
+        tree = MutatedTree(Path(scratch))
         paths = dict.fromkeys(mutation.path for mutation in chosen)
         unsound = [path for path in paths if not tree.is_sound(path)]
         if unsound:

@@ -180,7 +180,7 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     ): _BELOW,
     (
         f"{_CONTROL}/friction_compensation.py",
-        "self._borne = [0.0] * 7 -> self._borne = [0.0] * 8",
+        "self._load_torques = [0.0] * 7 -> self._load_torques = [0.0] * 8",
     ): _UNREAD,
     (
         f"{_CONTROL}/friction_compensation.py",
@@ -188,8 +188,8 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     ): "what fades before anything was pushed is 0 all the time",
     (
         f"{_CONTROL}/friction_compensation.py",
-        "if load and (less := (load_at - abs(borne))) > 0.0: -> "
-        "if load and (less := (load_at - abs(borne))) >= 0.0:",
+        "if load and (less := (load_at - abs(load_torque))) > 0.0: -> "
+        "if load and (less := (load_at - abs(load_torque))) >= 0.0:",
     ): "a load that is less by nothing takes nothing",
     (
         f"{_CONTROL}/friction_compensation.py",
@@ -236,7 +236,7 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     ): _EIGHTH,
     (
         f"{_CONTROL}/friction_compensation.py",
-        "self._borne = [0.0] * 7 -> self._borne = [1.0] * 7",
+        "self._load_torques = [0.0] * 7 -> self._load_torques = [1.0] * 7",
     ): _UNREAD,
     (
         f"{_CONTROL}/friction_compensation.py",
@@ -411,8 +411,8 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     ): _BELOW,
     (
         "acquisition/ipc/loop_server.py",
-        "if console_ns > LONELY_NS and self._cycles % _BELL_EVERY == 0: -> "
-        "if console_ns >= LONELY_NS and self._cycles % _BELL_EVERY == 0:",
+        "if console_ns > LONELY_NS and self._cycles % _SIGNAL_EVERY == 0: -> "
+        "if console_ns >= LONELY_NS and self._cycles % _SIGNAL_EVERY == 0:",
     ): _BELOW,
     (
         "wam/bus/frames.py",

@@ -71,16 +71,18 @@ def make_pool(folder: Path, terrain: str, per_aim: int = PER_AIM) -> Pool:
             [PoolTrial.of(simulate(terrain, aim, k)) for k in range(per_aim)]
             for aim in range(len(AIMS))
         ]
-        plain = [[(t.record.plain(), t.rows.tolist()) for t in of] for of in pool]
+        plain = [
+            [(t.record.plain(), t.rows.tolist()) for t in trials] for trials in pool
+        ]
         path.write_text(json.dumps(plain))
     plain = json.loads(path.read_text())
     return [
         [
             PoolTrial(record, np.array(rows))
-            for told, rows in of
-            if (record := PushRecord.from_plain(told)) is not None
+            for fields, rows in trials
+            if (record := PushRecord.from_plain(fields)) is not None
         ]
-        for of in plain
+        for trials in plain
     ]
 
 
@@ -119,7 +121,7 @@ def play(
 ) -> Session:
     """Return a session of ten trials; a seed leaves out and draws the same trials."""
     rng = np.random.default_rng(seed)
-    orders = [rng.permutation(len(of)).tolist() for of in pool]
+    orders = [rng.permutation(len(trials)).tolist() for trials in pool]
     left = [pool[a][o.pop()].rows for a, o in enumerate(orders) for _ in range(TESTED)]
     records: list[PushRecord] = []
     sd: dict[str, list[float]] = {target: [] for target in TARGETS}
@@ -131,10 +133,10 @@ def play(
         aim = int(np.argmax(np.where(is_there, worth, -np.inf)))
         trial = pool[aim][orders[aim].pop()]
         records.append(replace(trial.record, aim=AIMS[aim]))
-        known, told = Knowledge.at(records, theta), Knowledge.of(records, kind)
+        known, fitted = Knowledge.at(records, theta), Knowledge.of(records, kind)
         for target in TARGETS:
             sd[target].append(spread_of(known, target))
-            nlpd[target].append(density(told, target, left))
+            nlpd[target].append(density(fitted, target, left))
             stopping = stopping_of(records, kind, target)
             if stopping is not None and stopping.is_enough:
                 enough.setdefault(target, len(records))
@@ -170,7 +172,7 @@ def density(known: Knowledge, target: str, left: Sequence[np.ndarray]) -> float:
 
 def emptiest(pool: Pool) -> Choice:
     """Return the choice of the aim whose trials lie in the emptiest cells."""
-    cells = [sum(cells_of(trial.rows) for trial in of) for of in pool]
+    cells = [sum(cells_of(trial.rows) for trial in trials) for trials in pool]
 
     def choose(
         records: Sequence[PushRecord], rng: np.random.Generator
@@ -206,7 +208,7 @@ def advised(kind: str, target: str) -> Choice:
 
 def play_all(pool: Pool, kind: str, seeds: int) -> dict[str, list[Session]]:
     """Return the sessions of every way to choose, seed by seed."""
-    theta = Knowledge.of([t.record for of in pool for t in of[:4]], kind).theta
+    theta = Knowledge.of([t.record for trials in pool for t in trials[:4]], kind).theta
     ways: dict[str, Choice] = {
         "random": lambda records, rng: rng.uniform(size=len(AIMS)).tolist(),
         "usual": lambda records, rng: FIRST,

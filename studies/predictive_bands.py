@@ -111,7 +111,7 @@ def best_of(model: NewTrialModel, training: TrainingSet, starts: int) -> float:
 def load_study(path: Path) -> dict[str, list[TractionSeries]]:
     """Return the trials of a table or of a folder of recorded sessions, by terrain."""
     if path.is_file():
-        return {name: list(of) for name, of in load_tables([path]).items()}
+        return {name: list(series) for name, series in load_tables([path]).items()}
     trials: dict[str, list[TractionSeries]] = {}
     for session in list_sessions(path):
         series = [load_trial(file).series() for file in session.kept_trials()]
@@ -125,8 +125,8 @@ def evaluate(
     trials: dict[str, list[TractionSeries]], jobs: int, starts: int
 ) -> list[Outcome]:
     prepared = {
-        name: [prepare_trial(series, PrepareOptions()) for series in of]
-        for name, of in trials.items()
+        name: [prepare_trial(series, PrepareOptions()) for series in group]
+        for name, group in trials.items()
     }
     folds, _ = plan_folds(prepared, FitOptions(draws=0))
     return run_tasks(run_fold, [Task(fold, starts) for fold in folds], jobs)
@@ -182,7 +182,9 @@ def of_kind(
     *,
     plates: bool,
 ) -> list[Outcome]:
-    kinds = {n: terrain_kind(n, [s.stones for s in of]) for n, of in trials.items()}
+    kinds = {
+        n: terrain_kind(n, [s.stones for s in group]) for n, group in trials.items()
+    }
     return [o for o in outcomes if (kinds[o.terrain] == FLAT) == plates]
 
 
@@ -235,8 +237,8 @@ def shortfalls(stones: Sequence[Outcome], plates: Sequence[Outcome]) -> list[str
             own = [o for o in group if o.terrain == terrain]
             pairs += [(terrain, mean(own, NEW, key) - q, 0.05) for key, q in BANDS]
         missed += [
-            f"{place}: a band is off by {error:+.3f} (limit {limit})"
-            for place, error, limit in pairs
+            f"{group}: a band is off by {error:+.3f} (limit {limit})"
+            for group, error, limit in pairs
             if abs(error) > limit
         ]
     gain = mean(stones, BEFORE, "nlpd") - mean(stones, NEW, "nlpd")

@@ -358,8 +358,8 @@ def main() -> None:
         given.write.write_text(page(records))
         return
     report = recorder(given.record, given.seed) if given.record else tell
-    with tempfile.TemporaryDirectory(prefix="soak-") as place:
-        soak = soaked(given.hours, given.seed, Path(place), report)
+    with tempfile.TemporaryDirectory(prefix="soak-") as scratch:
+        soak = soaked(given.hours, given.seed, Path(scratch), report)
     print("\n".join(summary(soak)))
 
 

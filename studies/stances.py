@@ -144,8 +144,8 @@ def table_lines(results: dict[StanceCase, StanceTotals]) -> list[str]:
 
 def _order(case: StanceCase) -> tuple[int, int, str, float]:
     names = ["none", "constant-mu", "avoid-slip", "oracle"]
-    place = list(GROUNDS).index(case.terrain)
-    return place, names.index(case.policy), case.training, case.risk
+    rank = list(GROUNDS).index(case.terrain)
+    return rank, names.index(case.policy), case.training, case.risk
 
 
 def claims(results: dict[StanceCase, StanceTotals]) -> list[tuple[str, bool]]:

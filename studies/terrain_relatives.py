@@ -66,7 +66,8 @@ def nine_trial_fits(
 ) -> dict[tuple[str, int], float]:
     """Return the NLPD of every trial left out of its terrain's own fit."""
     prepared = {
-        n: [prepare_trial(s, PrepareOptions()) for s in of] for n, of in trials.items()
+        n: [prepare_trial(s, PrepareOptions()) for s in group]
+        for n, group in trials.items()
     }
     folds, _ = plan_folds(prepared, OPTIONS)
     results = run_tasks(run_fold, folds, jobs)
@@ -77,7 +78,8 @@ def compare(
     trials: Mapping[str, Sequence[TractionSeries]], jobs: int, draws: int
 ) -> list[Figures]:
     prepared = {
-        n: [prepare_trial(s, PrepareOptions()) for s in of] for n, of in trials.items()
+        n: [prepare_trial(s, PrepareOptions()) for s in group]
+        for n, group in trials.items()
     }
     grounds, nine = grounds_of(trials), nine_trial_fits(trials, jobs)
     tasks = [

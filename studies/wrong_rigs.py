@@ -25,8 +25,8 @@ from fakes.plant.wiring import Wiring
 from fakes.world.rig import FakeRig, SimulatedScene
 from tests.acquisition.control_loop.limits import guard_limits
 from tests.fakes.scenes import CONSTANTS, FRAME, START_Q, TOOL
-from wam.bus.doors import PythonCanDoor
 from wam.bus.link import CanLink
+from wam.bus.transports import PythonCanTransport
 from wam.control.controller import FootController
 from wam.control.soft_walls import SoftWalls, Walls
 from wam.driver.arm import WamArm
@@ -211,7 +211,7 @@ def run(wrong: WrongRig, friction: float, state: ArmState = ArmState.HOLD) -> Ru
     rig = FakeRig(scene, CONSTANTS, TOOL, clock, options)
     clock.attach(rig)
     rig.plant.terrain = None
-    arm = WamArm(CanLink(PythonCanDoor(rig.bus, clock)), clock)
+    arm = WamArm(CanLink(PythonCanTransport(rig.bus, clock)), clock)
     rig.plant.wiring = _wiring(rig, wrong)
     arm.start()
     for node, name, value in wrong.properties:

@@ -1,4 +1,4 @@
-"""Tables as pandas data frames, the one door to pandas."""
+"""Tables as pandas data frames, the only module that imports pandas."""
 
 from __future__ import annotations
 

@@ -17,24 +17,24 @@ def check_packages() -> None:
     """
     home = Path(__file__).resolve().parent.parent
     for name in OWN:
-        places = _places(name)
-        if (home / name) in places:
+        locations = _locations(name)
+        if (home / name) in locations:
             continue
-        if not places:
+        if not locations:
             raise ImportError(
                 f"Traction is not complete: its package {name!r} is missing beside "
                 f"{home / 'traction'}. Install it again.",
                 name=name,
             )
         raise ImportError(
-            f"{places[0]} hides the package {name!r} of Traction, which is "
+            f"{locations[0]} hides the package {name!r} of Traction, which is "
             f"{home / name}. Rename the one that hides it, or start Python in another "
             "folder.",
             name=name,
         )
 
 
-def _places(name: str) -> list[Path]:
+def _locations(name: str) -> list[Path]:
     """Return where Python finds a package: its folders, or its file."""
     try:
         spec = find_spec(name)
@@ -42,7 +42,7 @@ def _places(name: str) -> list[Path]:
         return []
     if spec is None:
         return []
-    places = list(spec.submodule_search_locations or [])
-    if not places and spec.origin:
-        places = [spec.origin]
-    return [Path(place).resolve() for place in places]
+    locations = list(spec.submodule_search_locations or [])
+    if not locations and spec.origin:
+        locations = [spec.origin]
+    return [Path(location).resolve() for location in locations]

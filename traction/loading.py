@@ -99,4 +99,6 @@ def load_tables(
     files = [Path(path) for path in many]
     tables = tables_by_terrain(files, columns, terrain, None, units, rate)
     name = files[0].name if len(files) == 1 else f"{len(files)} files"
-    return TrialSet(name, tuple(trial_of(s) for of in tables.values() for s in of))
+    return TrialSet(
+        name, tuple(trial_of(s) for series in tables.values() for s in series)
+    )

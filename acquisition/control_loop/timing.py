@@ -27,7 +27,7 @@ SLOW_EXCHANGE_NS = 1_300_000  # p99 of the seventh position; the cycle may not c
 
 
 def pack_timing(tick: Tick, replies_ns: int, sent_ns: int, ended_ns: int) -> bytes:
-    """Return the bytes of one record of the ring of timings."""
+    """Return the bytes of one record of the buffer of timings."""
     return _TIMING.pack(
         tick.number,
         tick.deadline_ns,
@@ -81,7 +81,7 @@ def spread(times_ns: NDArray[np.int64]) -> LatencyQuantiles:
 
 
 def loop_report(timings: Record) -> LoopReport | None:
-    """Return what the records of the ring of timings say; None for fewer than two."""
+    """Return what the records of the buffer of timings say; None for fewer than two."""
     if len(timings) < 2:
         return None
     columns = {

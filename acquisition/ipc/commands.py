@@ -12,7 +12,7 @@ from acquisition.control_loop.faults import GuardVerdict, from_plain, to_plain
 from acquisition.control_loop.states import ArmState, ControlStatus
 from acquisition.devices import BusCondition, SafetyMode
 from acquisition.ipc.latest_value import Slot
-from acquisition.ipc.ring_buffer import Ring
+from acquisition.ipc.ring_buffer import RingBuffer
 from acquisition.record_layout import struct_of
 
 _VALUES = 12  # numbers that a command has at most
@@ -60,10 +60,10 @@ class Command:
 class CommandQueue:
     """Both ends of the commands; the console posts, the loop takes."""
 
-    def __init__(self, ring: Ring) -> None:
-        self._ring = ring
-        self._reader = ring.reader()
-        self.posted = ring.written
+    def __init__(self, buffer: RingBuffer) -> None:
+        self._buffer = buffer
+        self._reader = buffer.reader()
+        self.posted = buffer.written
 
     def post(
         self, kind: CommandKind, argument: int = 0, values: tuple[float, ...] = ()
@@ -71,7 +71,7 @@ class CommandQueue:
         """Leave a command and return its number."""
         self.posted += 1
         padded = (*values, *_NOTHING[len(values) :])
-        self._ring.write(_COMMAND.pack(self.posted, kind, argument, *padded))
+        self._buffer.write(_COMMAND.pack(self.posted, kind, argument, *padded))
         return self.posted
 
     def take(self) -> list[Command]:

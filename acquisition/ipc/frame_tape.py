@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from acquisition.clock import Clock
-from acquisition.ipc.ring_buffer import Ring
+from acquisition.ipc.ring_buffer import RingBuffer
 from acquisition.record_layout import GAP, struct_of
 from acquisition.sample import Record
 
@@ -24,11 +24,11 @@ _FRAME: Final = struct_of(FRAME_DTYPE)
 
 
 class FrameTape:
-    """Writes the frames of the bus into a ring that outlives its writer."""
+    """Writes the frames of the bus into a ring buffer that outlives its writer."""
 
-    def __init__(self, ring: Ring, clock: Clock) -> None:
+    def __init__(self, buffer: RingBuffer, clock: Clock) -> None:
         self._clock = clock
-        self._place = (ring.counter, ring.memory, *ring.places, _FRAME.pack_into)
+        self._target = (buffer.counter, buffer.memory, *buffer.layout, _FRAME.pack_into)
 
     def add(self, frames: Iterable[tuple[int, bytes, int]]) -> None:
         """Keep frames that were sent or arrived just now, oldest first.
@@ -39,18 +39,18 @@ class FrameTape:
             frames: identifier, data and monotonic time [ns] of each, 0 = of now.
         """
         now_ns = self._clock.now_ns()
-        counter, memory, slots, stride, pack_into = self._place
+        counter, memory, slots, stride, pack_into = self._target
         number = counter[0]
         for can_id, data, t_ns in frames:
-            place = number % slots * stride
-            pack_into(memory, place, t_ns or now_ns, can_id, len(data), data)
+            offset = number % slots * stride
+            pack_into(memory, offset, t_ns or now_ns, can_id, len(data), data)
             number += 1
             counter[0] = number
 
 
-def last_frames(ring: Ring, seconds: float = SECONDS) -> Record:
+def last_frames(buffer: RingBuffer, seconds: float = SECONDS) -> Record:
     """Return the frames of the last `seconds` before the newest one, oldest first."""
-    frames = ring.last(ring.slots)
+    frames = buffer.last(buffer.slots)
     if not len(frames):
         return frames
     earliest = int(frames["t_ns"][-1]) - int(seconds * 1e9)

@@ -14,7 +14,7 @@ from acquisition.errors import LinkError
 from acquisition.ipc.commands import COMMAND_DTYPE
 from acquisition.ipc.frame_tape import FRAME_DTYPE
 from acquisition.ipc.latest_value import Slot
-from acquisition.ipc.ring_buffer import LayoutType, Ring
+from acquisition.ipc.ring_buffer import LayoutType, RingBuffer
 from acquisition.ipc.shared_memory import LINE, SharedMemory, lines
 from acquisition.ipc.shared_sensor import WRENCH_DTYPE
 from acquisition.schema import CYCLE, FORESIGHT
@@ -52,7 +52,7 @@ _SLOTS: Mapping[str, int] = {  # largest value of each [bytes]
     "health": 8192,
     "trial_start": 64,
 }
-_RINGS: Mapping[str, tuple[LayoutType, int]] = {  # type and number of records
+_BUFFERS: Mapping[str, tuple[LayoutType, int]] = {  # type and number of records
     "commands": (COMMAND_DTYPE, 256),
     "cycles": (CYCLE.dtype, 8192),  # 16 s at 500 Hz
     "wrenches": (WRENCH_DTYPE, WRENCH_SLOTS),
@@ -64,11 +64,11 @@ _AREAS: Mapping[str, int] = {  # in the order of the memory [bytes]
     "identity": LINE,
     "heartbeats": lines(8 * len(ProcessRole)),
     **{name: LINE + most for name, most in _SLOTS.items()},
-    **{name: lines(Ring.size_of(*ring)) for name, ring in _RINGS.items()},
+    **{name: lines(RingBuffer.size_of(*spec)) for name, spec in _BUFFERS.items()},
 }
 _SIZE = sum(_AREAS.values())
 # What tells one layout from another; it is never 0, which new memory is.
-_IDENTITY = 1 + zlib.crc32(repr([(d.descr, n) for d, n in _RINGS.values()]).encode())
+_IDENTITY = 1 + zlib.crc32(repr([(d.descr, n) for d, n in _BUFFERS.values()]).encode())
 
 
 class SharedLayout:
@@ -103,12 +103,12 @@ class SharedLayout:
         self.recorder = Slot(areas["recorder"])
         self.health = Slot(areas["health"])
         self.trial_start = Slot(areas["trial_start"])
-        self.commands = Ring(areas["commands"], *_RINGS["commands"])
-        self.cycles = Ring(areas["cycles"], *_RINGS["cycles"])
-        self.wrenches = Ring(areas["wrenches"], *_RINGS["wrenches"])
-        self.frames = Ring(areas["frames"], *_RINGS["frames"])
-        self.timings = Ring(areas["timings"], *_RINGS["timings"])
-        self.foresight = Ring(areas["foresight"], *_RINGS["foresight"])
+        self.commands = RingBuffer(areas["commands"], *_BUFFERS["commands"])
+        self.cycles = RingBuffer(areas["cycles"], *_BUFFERS["cycles"])
+        self.wrenches = RingBuffer(areas["wrenches"], *_BUFFERS["wrenches"])
+        self.frames = RingBuffer(areas["frames"], *_BUFFERS["frames"])
+        self.timings = RingBuffer(areas["timings"], *_BUFFERS["timings"])
+        self.foresight = RingBuffer(areas["foresight"], *_BUFFERS["foresight"])
 
     @classmethod
     def create(cls) -> "SharedLayout":

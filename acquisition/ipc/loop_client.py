@@ -9,7 +9,7 @@ from acquisition.control_loop.law import SoleGoal
 from acquisition.control_loop.states import ArmState, ControlStatus
 from acquisition.ipc.commands import CommandKind, CommandQueue, LoopStatus, StatusSlot
 from acquisition.ipc.layout import ProcessRole, SharedLayout
-from acquisition.ipc.ring_buffer import RingReader
+from acquisition.ipc.ring_buffer import RingBufferReader
 from acquisition.sample import Record
 
 PORTION = 10  # cycles between two looks of the console: 20 ms
@@ -125,11 +125,11 @@ class LoopClient:
         """Return the newest record, shape (1,); empty before the first cycle."""
         return self._shared.cycles.last(1)
 
-    def wrenches(self) -> RingReader:
+    def wrenches(self) -> RingBufferReader:
         """Return a reader of the sensor's samples from now on."""
         return self._shared.wrenches.reader()
 
-    def timings(self) -> RingReader:
+    def timings(self) -> RingBufferReader:
         """Return a reader of the loop's timings from now on."""
         return self._shared.timings.reader()
 

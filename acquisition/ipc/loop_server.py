@@ -1,4 +1,4 @@
-"""The loop's side of the board: commands in, status and times out, others watched."""
+"""The loop in shared memory: commands in, status and times out, others watched."""
 
 import json
 from collections.abc import Callable, Mapping
@@ -23,9 +23,9 @@ from acquisition.ipc.layout import ProcessRole, SharedLayout
 
 MS = 1_000_000
 SILENT_NS = 500 * MS  # of console or recorder: the arm holds
-LONELY_NS = 60_000 * MS  # of the console: the arm rings for help
+LONELY_NS = 60_000 * MS  # of the console: the arm signals for help
 ORPHAN_NS = 1_000 * MS  # an arm whose console has died holds this long, then goes idle
-_FACTS_EVERY = _BELL_EVERY = RATE_HZ  # cycles, once a second
+_FACTS_EVERY = _SIGNAL_EVERY = RATE_HZ  # cycles, once a second
 
 # Named once: to look a member of an Enum up takes longer than to compare it.
 _CONSOLE, _CONTROL, _RECORDER = (
@@ -37,8 +37,8 @@ _CONSOLE, _CONTROL, _RECORDER = (
 MetadataSource = Callable[[], Mapping[str, str]]
 
 
-def no_bell() -> None:
-    """Ring no bell."""
+def no_signal() -> None:
+    """Give no signal."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,16 +48,16 @@ class LoopHooks:
     Attributes:
         now_ns: tells the monotonic time [ns].
         metadata: what the devices say about themselves; asked once a second.
-        ring: rings a bell for a person.
+        signal: sounds a bell for a person.
     """
 
     now_ns: Callable[[], int]
     metadata: MetadataSource
-    ring: Callable[[], None] = no_bell
+    signal: Callable[[], None] = no_signal
 
 
 class LoopServer:
-    """Wraps a cycle for the loop: obeys the mailbox, publishes, watches the others.
+    """Wraps a cycle for the loop: obeys the commands, publishes, watches the others.
 
     Attributes:
         is_over: the loop is to end after this cycle.
@@ -126,8 +126,8 @@ class LoopServer:
         console_ns = now_ns - heartbeats.last_ns(_CONSOLE)
         if console_ns > SILENT_NS:
             self._cycle.report(verdict_for(Fault.CONSOLE_SILENT))
-            if console_ns > LONELY_NS and self._cycles % _BELL_EVERY == 0:
-                self._hooks.ring()
+            if console_ns > LONELY_NS and self._cycles % _SIGNAL_EVERY == 0:
+                self._hooks.signal()
         if (
             self._cycle.is_recording
             and now_ns - heartbeats.last_ns(_RECORDER) > SILENT_NS

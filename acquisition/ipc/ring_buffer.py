@@ -12,24 +12,24 @@ from acquisition.sample import Record
 LayoutType = np.dtype[np.void]
 
 
-class Ring:
-    """A ring of fixed records in memory that may be shared: one writer, any readers.
+class RingBuffer:
+    """Fixed records in memory that may be shared: a ring with one writer, any readers.
 
     The record being written is never handed out, so `slots - 1` records can be read.
 
     Attributes:
-        slots: places for records; record n goes to place n % slots.
-        places: number of places, and bytes from one to the next.
-        memory: the places, for a writer that packs its records there.
+        slots: number of slots for records; record n goes to slot n % slots.
+        layout: number of slots, and bytes from one to the next.
+        memory: the slots, for a writer that packs its records there.
         counter: one number, of records written: a writer raises it behind each record.
     """
 
     def __init__(self, memory: memoryview, dtype: LayoutType, slots: int) -> None:
-        """Lay the ring over `memory` of at least `size_of(dtype, slots)` bytes."""
+        """Lay the buffer over `memory` of at least `size_of(dtype, slots)` bytes."""
         self.slots = slots
         self._size = dtype.itemsize
         self._stride = lines(dtype.itemsize)
-        self.places = (slots, self._stride)
+        self.layout = (slots, self._stride)
         self.counter = memory[:8].cast("Q")
         self.memory = memory[LINE : self.size_of(dtype, slots)]
         self._records: Record = np.ndarray(
@@ -38,7 +38,7 @@ class Ring:
 
     @staticmethod
     def size_of(dtype: LayoutType, slots: int) -> int:
-        """Return how much memory such a ring needs [bytes]."""
+        """Return how much memory such a buffer needs [bytes]."""
         return LINE + slots * lines(dtype.itemsize)
 
     @property
@@ -54,9 +54,9 @@ class Ring:
         self.memory[start : start + self._size] = payload
         counter[0] = number + 1
 
-    def reader(self) -> "RingReader":
+    def reader(self) -> "RingBufferReader":
         """Return a reader that starts at the next record."""
-        return RingReader(self)
+        return RingBufferReader(self)
 
     def since(self, position: int) -> tuple[Record, int]:
         """Return (records from `position` on, number lost because overwritten)."""
@@ -75,22 +75,22 @@ class Ring:
         return self.since(max(0, self.written - count))[0]
 
 
-class RingReader:
-    """Reads a ring from where it last stopped.
+class RingBufferReader:
+    """Reads a ring buffer from where it last stopped.
 
     Attributes:
         lost: records that were overwritten before they were read.
     """
 
-    def __init__(self, ring: Ring) -> None:
-        self._ring = ring
-        self._position = ring.written
+    def __init__(self, buffer: RingBuffer) -> None:
+        self._buffer = buffer
+        self._position = buffer.written
         self.lost = 0
 
     @property
     def backlog(self) -> int:
         """Records that have been written and not read."""
-        return self._ring.written - self._position
+        return self._buffer.written - self._position
 
     @property
     def position(self) -> int:
@@ -99,17 +99,17 @@ class RingReader:
 
     def seek(self, position: int) -> None:
         """Read from record number `position` on, or the oldest that there is."""
-        oldest = max(0, self._ring.written - self._ring.slots + 1)
-        self._position = min(max(oldest, position), self._ring.written)
+        oldest = max(0, self._buffer.written - self._buffer.slots + 1)
+        self._position = min(max(oldest, position), self._buffer.written)
 
     def rewind(self, records: int) -> None:
         """Go back so that the next read begins `records` records earlier."""
-        oldest = max(0, self._ring.written - self._ring.slots + 1)
+        oldest = max(0, self._buffer.written - self._buffer.slots + 1)
         self._position = max(oldest, self._position - records)
 
     def read(self) -> Record:
         """Return every record that is new, in order; counts what was lost."""
-        records, lost = self._ring.since(self._position)
+        records, lost = self._buffer.since(self._position)
         self._position += len(records) + lost
         self.lost += lost
         return records

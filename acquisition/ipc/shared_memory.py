@@ -81,14 +81,14 @@ class SharedMemory:
         folder = Path(f"/proc/{pid}/fd")
         found: list[tuple[int, int, Path]] = []
         with suppress(FileNotFoundError, ProcessLookupError):
-            for place in folder.iterdir():
+            for link in folder.iterdir():
                 with suppress(FileNotFoundError):
-                    if os.readlink(place) == _MEMORY_LINK:  # noqa: PTH115
-                        made_ns = place.stat().st_ctime_ns
-                        found.append((made_ns, int(place.name), place))
+                    if os.readlink(link) == _MEMORY_LINK:  # noqa: PTH115
+                        made_ns = link.stat().st_ctime_ns
+                        found.append((made_ns, int(link.name), link))
             if found:
-                *_, place = max(found)
-                descriptor = os.open(place, os.O_RDONLY | os.O_CLOEXEC)
+                *_, link = max(found)
+                descriptor = os.open(link, os.O_RDONLY | os.O_CLOEXEC)
                 if os.fstat(descriptor).st_size:
                     return cls(descriptor, is_writable=False)
                 os.close(descriptor)  # it is being made

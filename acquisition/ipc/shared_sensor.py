@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 
 from acquisition.devices import WrenchSample
-from acquisition.ipc.ring_buffer import Ring
+from acquisition.ipc.ring_buffer import RingBuffer
 from acquisition.record_layout import struct_of
 from acquisition.sample import Record
 
@@ -25,8 +25,8 @@ _WRENCH: Final = struct_of(WRENCH_DTYPE)
 class SharedSensor:
     """Takes samples from shared memory; is an `acquisition.devices.WrenchSensor`."""
 
-    def __init__(self, ring: Ring) -> None:
-        self._reader = ring.reader()
+    def __init__(self, buffer: RingBuffer) -> None:
+        self._reader = buffer.reader()
 
     def open(self) -> None:
         """Do nothing: the process that has the port has opened it."""
@@ -50,10 +50,10 @@ class SharedSensor:
         """Do nothing: the process that has the port closes it."""
 
 
-def publish(samples: list[WrenchSample], ring: Ring) -> None:
+def publish(samples: list[WrenchSample], buffer: RingBuffer) -> None:
     """Write samples into a ring buffer, oldest first."""
     for sample in samples:
-        ring.write(pack_wrench(sample))
+        buffer.write(pack_wrench(sample))
 
 
 def pack_wrench(sample: WrenchSample) -> bytes:

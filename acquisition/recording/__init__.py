@@ -1,5 +1,5 @@
 """The recorder: from shared memory to a verified trial file.
 
-`recorder` drains the rings into a `TrialWriter`, ends a file, reads it back and gives
+`recorder` drains the buffers into a `TrialWriter`, ends a file, reads it back and gives
 it its final name; `recorder_process` is the same in a process of its own.
 """

@@ -1,4 +1,4 @@
-"""The recorder: drains the board into a trial file, every 20 ms."""
+"""The recorder: drains the shared memory into a trial file, every 20 ms."""
 
 import contextlib
 import json
@@ -68,7 +68,7 @@ class TrialRecording(Protocol):
 
 
 class Recorder:
-    """Writes one trial at a time from the board; implements `TrialRecording`.
+    """Writes one trial at a time from the shared memory; implements `TrialRecording`.
 
     `drain` is called every 20 ms or so.
 
@@ -197,7 +197,7 @@ class Recorder:
             self._claim.close()
 
     def publish_state(self) -> None:
-        """Write to the board how the recorder is doing."""
+        """Write to the shared memory how the recorder is doing."""
         failure = self.failure
         state = {
             "is_recording": self.is_recording,

@@ -36,8 +36,8 @@ MAX_NAMED = 1_000  # metadata records and attachments
 MAX_METADATA = 2**20  # bytes of one metadata record
 MAX_SUMMARY = 8 * 2**20  # bytes; two hours of chunks need half of it
 _LENGTH = struct.Struct("<I")  # of a text, and of the texts of a mapping
-_INDEX_HEAD = struct.Struct("<QQQQI")  # start, end, offset, length, bytes of places
-_INDEX_PLACE = struct.Struct("<HQ")  # channel, offset of its message index
+_INDEX_HEAD = struct.Struct("<QQQQI")  # start, end, offset, length, bytes of offsets
+_INDEX_OFFSET = struct.Struct("<HQ")  # channel, offset of its message index
 _INDEX_TAIL = struct.Struct("<QI")  # length of the indexes, length of the compression
 _INDEX_SIZES = struct.Struct("<QQ")  # packed, unpacked
 
@@ -138,9 +138,9 @@ def _add_record(summary: Summary, raw: RawRecord) -> None:
 
 def _chunk_index(body: memoryview) -> ChunkIndex:
     """Take a chunk index apart in four steps; there are hundreds in a file."""
-    start_ns, end_ns, offset, length, places = _INDEX_HEAD.unpack_from(body)
-    at = _INDEX_HEAD.size + places
-    offsets = dict(_INDEX_PLACE.iter_unpack(body[_INDEX_HEAD.size : at]))
+    start_ns, end_ns, offset, length, offset_bytes = _INDEX_HEAD.unpack_from(body)
+    at = _INDEX_HEAD.size + offset_bytes
+    offsets = dict(_INDEX_OFFSET.iter_unpack(body[_INDEX_HEAD.size : at]))
     index_length, name_bytes = _INDEX_TAIL.unpack_from(body, at)
     at += _INDEX_TAIL.size
     packed, size = _INDEX_SIZES.unpack_from(body, at + name_bytes)
@@ -200,7 +200,7 @@ def _metadata(data: memoryview, index: MetadataIndex, path: Path) -> Metadata:
 
 
 def _text_at(body: memoryview, at: int) -> tuple[str, int]:
-    """Return a text and the place behind it; several hundred are in a file."""
+    """Return a text and the offset behind it; several hundred are in a file."""
     (length,) = _LENGTH.unpack_from(body, at)
     start, end = at + _LENGTH.size, at + _LENGTH.size + length
     if end > len(body):

@@ -148,8 +148,8 @@ class TrialReader:
         count = len(offsets)
         if count > len(out):
             raise TrialFileError(self.path, "has more messages than announced")
-        places = len(data) - _HEAD.itemsize - out.dtype.itemsize + 1
-        if count and not 0 <= int(offsets.max()) < places:
+        limit = len(data) - _HEAD.itemsize - out.dtype.itemsize + 1
+        if count and not 0 <= int(offsets.max()) < limit:
             raise TrialFileError(self.path, "has an index outside its chunk")
         if count:
             at = offsets.astype(np.intp)
@@ -225,8 +225,8 @@ def _gather(data: bytes, start: int, offsets: NDArray[np.intp], out: Record) -> 
     windows first.
     """
     size = out.dtype.itemsize
-    places = len(data) - start - size + 1
-    windows = np.ndarray((places,), f"V{size}", data, offset=start, strides=(1,))
+    count = len(data) - start - size + 1
+    windows = np.ndarray((count,), f"V{size}", data, offset=start, strides=(1,))
     out.view(f"V{size}")[: len(offsets)] = windows[offsets]
 
 

@@ -69,7 +69,7 @@ def _view(
     """Return the message that goes on with `fields` of a cycle after `writer`."""
     empty = np.zeros((), CYCLE.dtype)
     assert CYCLE.dtype.fields is not None
-    offsets = {field: place[1] for field, place in CYCLE.dtype.fields.items()}
+    offsets = {field: entry[1] for field, entry in CYCLE.dtype.fields.items()}
     append = writer.sequence if are_counted else writer.array
     parts: list[tuple[slice, slice]] = []
     for name in fields:

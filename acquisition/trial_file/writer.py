@@ -96,7 +96,7 @@ class TrialWriter:
                         self._add(topic, log_time, view, publish_time, number)
 
     def write_wrenches(self, samples: Record) -> None:
-        """Append one batch of sensor samples (records of the board's ring)."""
+        """Append one batch of sensor samples (records of the ring buffer)."""
         if not len(samples):
             return
         log_time = int(samples["t_ns"][-1]) + self._header.utc_offset_ns
@@ -132,7 +132,7 @@ class TrialWriter:
                 self._add(topic, log_time, data[i * size : (i + 1) * size])
 
     def write_can(self, frames: Record) -> None:
-        """Append raw CAN frames (records of the board's ring) as one batch."""
+        """Append raw CAN frames (records of the ring buffer) as one batch."""
         if not len(frames):
             return
         log_time = int(frames["t_ns"][-1]) + self._header.utc_offset_ns

@@ -61,7 +61,10 @@ def fit_pushes(
 
     As `fit_break_away`, but a terrain off stones of fewer than 15 slips has none.
     """
-    every = [TerrainPushes(name, tuple(map(tuple, of))) for name, of in pushes.items()]
+    every = [
+        TerrainPushes(name, tuple(map(tuple, trials)))
+        for name, trials in pushes.items()
+    ]
     return fit_planned(
         BreakAwayTask(tuple(every), kinds, options or BreakAwayOptions())
     )
@@ -70,21 +73,26 @@ def fit_pushes(
 def fit_planned(task: BreakAwayTask) -> dict[str, BreakAwayModel]:
     """Return the models of a task, in the order of its terrains; a pure function."""
     options, surface = task.options, groups_of(task.kinds)["surface"]
-    known = [of for of in task.terrains if len(of.pushes) >= LEAST_TRIALS]
-    stones = [of for of in known if surface[of.name] == ROCKY]
-    stones = [of for of in stones if of.slips >= LEAST_OF_STONES]
-    others = [of for of in known if surface[of.name] != ROCKY]
+    known = [
+        terrain for terrain in task.terrains if len(terrain.pushes) >= LEAST_TRIALS
+    ]
+    stones = [terrain for terrain in known if surface[terrain.name] == ROCKY]
+    stones = [terrain for terrain in stones if terrain.slips >= LEAST_OF_STONES]
+    others = [terrain for terrain in known if surface[terrain.name] != ROCKY]
     groups = [stones] if stones else []
-    groups += [[of] for of in others if of.slips >= LEAST_SLIPS]
+    groups += [[terrain] for terrain in others if terrain.slips >= LEAST_SLIPS]
     fitted = {
         name: model
         for group in groups
         for name, model in _fit_group(group, options).items()
     }
-    for of in known:
-        if of.name not in fitted and (model := _fit_sliding(of, options)) is not None:
-            fitted[of.name] = model
-    return {of.name: fitted[of.name] for of in task.terrains if of.name in fitted}
+    for terrain in known:
+        if terrain.name in fitted:
+            continue
+        if (model := _fit_sliding(terrain, options)) is not None:
+            fitted[terrain.name] = model
+    names = [terrain.name for terrain in task.terrains]
+    return {name: fitted[name] for name in names if name in fitted}
 
 
 def _random(names: Sequence[str], options: BreakAwayOptions) -> np.random.Generator:

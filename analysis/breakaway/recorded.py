@@ -79,8 +79,8 @@ def plan_break_away(
         options: what a slip is, and how many times trials are resampled.
     """
     terrains: list[TerrainPushes] = []
-    for name, of in trials.items():
-        usable = [trial for trial in of if trial.kept]
+    for name, group in trials.items():
+        usable = [trial for trial in group if trial.kept]
         pushes = tuple(find_pushes(trial, options.v_slip) for trial in usable)
         slow = tuple(_slow_rows(trial) for trial in usable)
         terrains.append(TerrainPushes(name, pushes, slow))

@@ -141,13 +141,13 @@ def load_csv(path: Path, columns: Mapping[str, str], rate: float | None) -> CsvT
             ]
             names = {*header, *(split_header(column)[0] for column in header)}
             has_time = rate is None or columns["t"] in names
-            places, stated = _places(path, header, columns, has_time=has_time)
+            indices, stated = _column_indices(path, header, columns, has_time=has_time)
             rows = (line for line in lines if line.strip())
             first = next(rows, None)
             if first is None:
                 hint = "Check that it was copied completely."
                 raise refusal(path, "a header but no rows", hint)
-            table = _numbers(path, chain([first], rows), places, delimiter)
+            table = _numbers(path, chain([first], rows), indices, delimiter)
     except UnicodeDecodeError as error:
         raise refusal(
             path, "neither a text table nor an npz", "Give CSV files in UTF-8."
@@ -177,17 +177,17 @@ def _delimiter(header: str) -> str:
     return max(",;\t", key=header.count)
 
 
-def _places(
+def _column_indices(
     path: Path, header: list[str], columns: Mapping[str, str], *, has_time: bool
 ) -> tuple[list[int], dict[str, str]]:
-    """Return (place of each column, unit of each that states one).
+    """Return (index of each column, unit of each that states one).
 
     A header `v_t [mm/s]` is the column v_t, or a column of that whole name. Without
     `has_time` no time is looked for.
     """
     bare = [split_header(name) for name in header]
     names = [name for name, _ in bare]
-    places: list[int] = []
+    indices: list[int] = []
     stated: dict[str, str] = {}
     missing: list[str] = []
     for name in COLUMNS if has_time else COLUMNS[1:]:
@@ -196,9 +196,9 @@ def _places(
             among = header if column in header else names
             if among.count(column) > 1:
                 raise refusal(path, f"column {column} occurs twice", _NAMED)
-            place = among.index(column)
-            places.append(place)
-            stated[name] = bare[place][1]
+            index = among.index(column)
+            indices.append(index)
+            stated[name] = bare[index][1]
         else:
             missing.append(column)
     if missing:
@@ -211,32 +211,32 @@ def _places(
             f"{', '.join(header)[:300] or 'none'}",
             named,
         )
-    return places, stated
+    return indices, stated
 
 
-def _with_points(row: str, places: list[int], delimiter: str) -> str:
+def _with_points(row: str, indices: list[int], delimiter: str) -> str:
     """Return a row with points for its decimal commas.
 
     Raises:
         ValueError: a number has both, so one of them groups its digits.
     """
     cells = row.split(delimiter)
-    if any("," in cells[k] and "." in cells[k] for k in places if k < len(cells)):
+    if any("," in cells[k] and "." in cells[k] for k in indices if k < len(cells)):
         raise ValueError("a number with a comma and a point")
     return row.replace(",", ".")
 
 
 def _numbers(
-    path: Path, rows: Iterable[str], places: list[int], delimiter: str
+    path: Path, rows: Iterable[str], indices: list[int], delimiter: str
 ) -> Array:
-    """Read the columns at `places`; beside semicolons and tabs a comma is a point."""
+    """Read the columns at `indices`; beside semicolons and tabs a comma is a point."""
     if delimiter != ",":
-        rows = (_with_points(row, places, delimiter) for row in rows)
+        rows = (_with_points(row, indices, delimiter) for row in rows)
     try:
         return np.loadtxt(
             rows,
             delimiter=delimiter,
-            usecols=places,
+            usecols=indices,
             ndmin=2,
             comments=None,
             quotechar='"',

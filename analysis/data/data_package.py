@@ -257,8 +257,8 @@ def _read(path: Path) -> DataPackage:
         ) from error
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
-        place = ".".join(str(part) for part in first["loc"])
+        location = ".".join(str(part) for part in first["loc"])
         raise SettingsError(
-            f"{path}: it is not a data package of tables ({place}: {first['msg']}).",
+            f"{path}: it is not a data package of tables ({location}: {first['msg']}).",
             hint="Make it with: traction export SESSION --to DIR.",
         ) from error

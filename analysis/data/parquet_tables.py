@@ -1,4 +1,4 @@
-"""Parquet tables, the one door to pyarrow: written and read with units and origin."""
+"""Parquet tables with units and origin; the only module that imports pyarrow."""
 
 import json
 from collections.abc import Mapping, Sequence

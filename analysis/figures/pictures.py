@@ -62,8 +62,8 @@ def png_of_few_colours(pixels: Pixels, dpi: int) -> bytes:
     numbers = number[inks]
     counts = np.bincount(numbers, weights=lengths).astype(np.intp)
     shades = np.column_stack([colours, colours >> 8, colours >> 16]).astype(np.uint8)
-    palette, places = _palette(shades, counts)
-    indices = np.repeat(places[numbers], lengths).reshape(packed.shape)
+    palette, palette_index = _palette(shades, counts)
+    indices = np.repeat(palette_index[numbers], lengths).reshape(packed.shape)
     image = Image.fromarray(indices, "P")
     image.putpalette(palette.tobytes())
     png = io.BytesIO()
@@ -72,7 +72,7 @@ def png_of_few_colours(pixels: Pixels, dpi: int) -> bytes:
 
 
 def _palette(shades: Pixels, counts: np.ndarray) -> tuple[Pixels, Pixels]:
-    """Return at most 256 colours, shape (k, 3), and the place of every shade in them.
+    """Return at most 256 colours, shape (k, 3), and the index of every shade in them.
 
     Args:
         shades: different colours, shape (n, 3).
@@ -87,8 +87,8 @@ def _palette(shades: Pixels, counts: np.ndarray) -> tuple[Pixels, Pixels]:
     shared = row.quantize(_COLOURS - _EXACT, dither=Image.Dither.NONE)
     entries = np.array(shared.getpalette(), dtype=np.uint8).reshape(-1, 3)
     starts = np.cumsum(weights) - weights
-    places = np.empty(len(shades), dtype=np.uint8)
-    places[exact] = np.arange(_EXACT)
-    places[others] = _EXACT + np.asarray(shared)[0, starts]
+    palette_index = np.empty(len(shades), dtype=np.uint8)
+    palette_index[exact] = np.arange(_EXACT)
+    palette_index[others] = _EXACT + np.asarray(shared)[0, starts]
     palette = np.concatenate([shades[exact], entries[: _COLOURS - _EXACT]])
-    return palette, places
+    return palette, palette_index

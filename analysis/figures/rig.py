@@ -104,13 +104,13 @@ def _draw_by_trial(
     measure: Callable[[RigTrial], float | None],
 ) -> None:
     colours = terrain_colours(kinds)
-    for place, terrain in enumerate(kinds):
+    for position, terrain in enumerate(kinds):
         values = [measure(trial) for trial in rig if trial.terrain == terrain]
         spread = (np.arange(len(values)) + 0.5) / len(values) - 0.5
         pairs = [(x, y) for x, y in zip(spread, values, strict=True) if y is not None]
         if pairs:
             x, y = np.array(pairs).T
-            ax.plot(place + 0.8 * x, y, "o", ms=2.8, color=colours[terrain])
+            ax.plot(position + 0.8 * x, y, "o", ms=2.8, color=colours[terrain])
     ax.grid(visible=False, axis="x")
 
 

@@ -1,8 +1,9 @@
-"""The one door to matplotlib: style, colours, watermark and files of every figure.
+"""Style, colours, watermark and files of every figure.
 
-Colours are Okabe and Ito's, safe for colour-blind readers, and never the only sign of a
-difference. Figures are drawn on `Figure` objects of their own, so that nothing is
-shared between them and no screen is needed.
+The only module that imports matplotlib. Colours are Okabe and Ito's, safe for
+colour-blind readers, and never the only sign of a difference. Figures are drawn on
+`Figure` objects of their own, so that nothing is shared between them and no screen is
+needed.
 """
 
 import io
@@ -219,15 +220,15 @@ def _svg(key: str, figure: Figure) -> str:
 
 
 def _axes_of(figure: Figure) -> str:
-    """Return place, limits and labels of the axes that are shown, as JSON."""
+    """Return position, limits and labels of the axes that are shown, as JSON."""
     width, height = 72.0 * figure.get_size_inches()
     found: list[dict[str, Any]] = []
     for ax in figure.axes:
         if not ax.get_visible() or "log" in (ax.get_xscale(), ax.get_yscale()):
             continue
-        place = ax.get_position()
-        left, right = width * place.x0, width * place.x1
-        top, bottom = height * (1.0 - place.y1), height * (1.0 - place.y0)
+        box = ax.get_position()
+        left, right = width * box.x0, width * box.x1
+        top, bottom = height * (1.0 - box.y1), height * (1.0 - box.y0)
         found.append(
             {
                 "box": [round(v, 2) for v in (left, top, right, bottom)],

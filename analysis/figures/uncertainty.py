@@ -39,9 +39,9 @@ def draw_calibration(results: StudyResults) -> Figure | None:
     for ax, (key, nominal) in zip(axes, BANDS, strict=True):
         ax.axhline(nominal, color="black", lw=1.0, ls=(0, (4, 2)))
         for k, model in enumerate(models):
-            place = np.arange(len(terrains)) + (k - (len(models) - 1) / 2) * width
+            x = np.arange(len(terrains)) + (k - (len(models) - 1) / 2) * width
             ax.errorbar(
-                place,
+                x,
                 [coverage_of(result, model, key) for result in terrains],
                 yerr=[standard_error(r.scores(model, key)) or 0.0 for r in terrains],
                 fmt=MODEL_MARKERS[k % len(MODEL_MARKERS)],

@@ -231,7 +231,7 @@ def _rig_rows(
 
 def _claim(claim: PaperClaim) -> dict[str, Any]:
     return {
-        "place": claim.place,
+        "place": claim.reference,
         "statement": claim.statement,
         "shown": claim.shown,
         "agrees": claim.agreement.value,

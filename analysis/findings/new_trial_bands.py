@@ -131,5 +131,5 @@ def conformal_reach(scores: Sequence[Array], nominal: float) -> float:
     weight = np.concatenate([np.full(s.size, 1.0 / s.size) for s in scores])
     order = np.argsort(values)
     reached = np.cumsum(weight[order]) / (len(scores) + 1)
-    place = int(np.searchsorted(reached, nominal - 1e-12))
-    return float(values[order][place]) if place < values.size else float("inf")
+    index = int(np.searchsorted(reached, nominal - 1e-12))
+    return float(values[order][index]) if index < values.size else float("inf")

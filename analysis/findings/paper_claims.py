@@ -32,14 +32,14 @@ class PaperClaim:
     """One statement of the paper beside what the study shows.
 
     Attributes:
-        place: where the paper makes it.
+        reference: where the paper makes it.
         statement: what it says.
         shown: what this study shows, or what is missing.
         agreement: whether the two agree.
         numbers: of `shown`, SI units, shares as 1.
     """
 
-    place: str
+    reference: str
     statement: str
     shown: str
     agreement: Agreement
@@ -49,7 +49,7 @@ class PaperClaim:
 class _Statement(NamedTuple):
     """A statement of the paper, what it takes to show it, and how."""
 
-    place: str
+    reference: str
     text: str
     needs: str
     show: Callable[[PaperEvidence], ClaimResult | None]
@@ -63,12 +63,12 @@ def paper_claims(evidence: PaperEvidence) -> list[PaperClaim]:
 
 
 def _held(evidence: PaperEvidence, statement: _Statement) -> PaperClaim:
-    place, text, needs, show = statement
+    reference, text, needs, show = statement
     shown = show(evidence)
     if shown is None:
         missing = f"Not testable in this study: it needs {needs}."
-        return PaperClaim(place, text, missing, Agreement.OPEN, {})
-    return PaperClaim(place, text, *shown)
+        return PaperClaim(reference, text, missing, Agreement.OPEN, {})
+    return PaperClaim(reference, text, *shown)
 
 
 def _sticking(evidence: PaperEvidence) -> ClaimResult | None:

@@ -149,11 +149,13 @@ def residual_band(result: TerrainResult, model: str) -> ResidualBand | None:
         return None
     v = SampleTable.of(held_out_trials(result, model)).v_t
     edges = np.linspace(v.min(), v.max(), _BINS + 1)
-    place = np.clip(np.searchsorted(edges, v, "right") - 1, 0, _BINS - 1)
-    full = [k for k in range(_BINS) if np.count_nonzero(place == k) >= _FEWEST]
+    bin_index = np.clip(np.searchsorted(edges, v, "right") - 1, 0, _BINS - 1)
+    full = [k for k in range(_BINS) if np.count_nonzero(bin_index == k) >= _FEWEST]
     return ResidualBand(
         v=np.array([0.5 * (edges[k] + edges[k + 1]) for k in full]),
-        quantiles=np.array([np.quantile(residual[place == k], SHARES) for k in full])
+        quantiles=np.array(
+            [np.quantile(residual[bin_index == k], SHARES) for k in full]
+        )
         .reshape(-1, len(SHARES))
         .T,
         bias=float(residual.mean()),

@@ -27,6 +27,6 @@ def calibration_error(
     if weight is None:
         off = [abs(float((p[rows] - truth[rows]).sum())) for rows in equal_bins(p)]
         return sum(off) / p.size
-    place = np.minimum((p * BINS).astype(int), BINS - 1)
-    total = np.bincount(place, weight * (p - truth), BINS)
+    bin_index = np.minimum((p * BINS).astype(int), BINS - 1)
+    total = np.bincount(bin_index, weight * (p - truth), BINS)
     return float(np.abs(total).sum() / weight.sum())

@@ -107,8 +107,8 @@ class RiskTable:
 
     def at(self, F_t: float, F_n: float) -> float:
         """Return the risk of a push to `F_t` [N] at a load `F_n` [N]."""
-        i, a = _place(self._load, F_n)
-        j, b = _place(self._force, F_t)
+        i, a = _bracket(self._load, F_n)
+        j, b = _bracket(self._force, F_t)
         low, high = self._rows[i], self._rows[i + 1]
         left = low[j] + b * (low[j + 1] - low[j])
         right = high[j] + b * (high[j + 1] - high[j])
@@ -120,7 +120,7 @@ class RiskTable:
         return loads[0] <= F_n <= loads[1] and F_t <= forces[1]
 
 
-def _place(axis: list[float], value: float) -> tuple[int, float]:
+def _bracket(axis: list[float], value: float) -> tuple[int, float]:
     if value <= axis[0]:
         return 0, 0.0
     if value >= axis[-1]:

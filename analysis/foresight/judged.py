@@ -227,13 +227,13 @@ def _own(run: ForesightRun) -> list[list[float]]:
     """Return probabilities of the own terrain, its surface and none after `SLID`."""
     if run.trial.terrain not in run.terrains:
         return []
-    place = run.terrains.index(run.trial.terrain)
+    index = run.terrains.index(run.trial.terrain)
     own = run.trial.surface
     alike = [k for k, surface in enumerate(run.surfaces) if surface == own]
     wanted = int(ForesightFlag.SLIDING)
     sliding = [state for state in run.states if state.flags & wanted]
     states = [sliding[n - 1] if n <= len(sliding) else None for n in SLID]
-    terrain = [np.nan if s is None else s.terrains[place] for s in states]
+    terrain = [np.nan if s is None else s.terrains[index] for s in states]
     none = [np.nan if s is None else s.none for s in states]
     known = [np.nan if s is None else _part(s.terrains, alike) for s in states]
     return [terrain, known, none]

@@ -135,12 +135,12 @@ def fit_logistic(
     w = np.zeros(design.shape[1])
     share = float(weight @ truth) / float(weight.sum())
     w[0] = np.log(share / (1.0 - share))
-    place = loss.at(w)
+    iterate = loss.at(w)
     for _ in range(_STEPS):
-        before, place = place, loss.improved(place)
-        if float(np.abs(place.w - before.w).max()) < _CONVERGED:
+        before, iterate = iterate, loss.improved(iterate)
+        if float(np.abs(iterate.w - before.w).max()) < _CONVERGED:
             break
-    columns = (mean, scale, place.w)
+    columns = (mean, scale, iterate.w)
     plain_mean, plain_scale, plain_w = (tuple(c.tolist()) for c in columns)
     return RidgeLogistic(plain_mean, plain_scale, pairs, plain_w)
 
@@ -187,7 +187,7 @@ def _design(features: Array, mean: Array, scale: Array, pairs: Pairs) -> Array:
     return np.column_stack([np.ones(len(z)), z, *products])
 
 
-class _Place(NamedTuple):
+class _Iterate(NamedTuple):
     """Weights, what they say of every row, and what is lost with them."""
 
     w: Array
@@ -211,20 +211,20 @@ class _Loss:
     weight: Array
     penalty: Array
 
-    def at(self, w: Array) -> _Place:
+    def at(self, w: Array) -> _Iterate:
         logit = self.design @ w
         lost = np.logaddexp(0.0, np.where(self.truth, -logit, logit))
         loss = float(self.weight @ lost + 0.5 * self.penalty @ w**2)
-        return _Place(w, logit, loss)
+        return _Iterate(w, logit, loss)
 
-    def improved(self, place: _Place) -> _Place:
+    def improved(self, iterate: _Iterate) -> _Iterate:
         """Return the weights after a Newton step, halved until nothing is lost."""
-        w, p = place.w, _logistic(place.logit)
+        w, p = iterate.w, _logistic(iterate.logit)
         gradient = self.design.T @ (self.weight * (p - self.truth)) + self.penalty * w
         bend = (self.design.T * (self.weight * p * (1.0 - p))) @ self.design
         step = np.linalg.solve(bend + np.diag(self.penalty), gradient)
         for halvings in range(_HALVINGS):
             after = self.at(w - 0.5**halvings * step)
-            if after.loss <= place.loss:
+            if after.loss <= iterate.loss:
                 return after
-        return place
+        return iterate

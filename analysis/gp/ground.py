@@ -63,8 +63,8 @@ class GroundRows:
         """Degrees of freedom of the spread between trials, on stones and plates."""
         pairs = {*zip(self.ground.tolist(), self.trial.tolist(), strict=True)}
         left = [0, 0]
-        for place, ground in enumerate(self.grounds):
-            count = sum(g == place for g, _ in pairs)
+        for index, ground in enumerate(self.grounds):
+            count = sum(g == index for g, _ in pairs)
             left[ground.is_plate] += max(count - 1, 0)
         return left[0], left[1]
 

@@ -61,9 +61,9 @@ class GroundLikelihood:
         self._ground = rows.ground
         self._present = sorted(set(rows.ground.tolist()))
         grounds = [rows.grounds[g] for g in self._present]
-        self._of = Resemblance(grounds, grounds)
+        self._resemblance = Resemblance(grounds, grounds)
         self._starts = np.flatnonzero(np.diff(rows.ground, prepend=-1))
-        self._place = np.searchsorted(self._present, rows.ground)
+        self._ground_index = np.searchsorted(self._present, rows.ground)
         self._trials = rows.blocks()
         self._shared = SquaredExponential().over(X, X)
         self._added = SquaredExponential().over(X, X)
@@ -76,8 +76,8 @@ class GroundLikelihood:
         """
         K0, of_shared = self._shared(theta[:3])
         unit, of_added = self._added(np.concatenate([[0.0], theta[5:7]]))
-        B, slopes = self._of.at(theta)
-        wide = B[np.ix_(self._place, self._place)]
+        B, slopes = self._resemblance.at(theta)
+        wide = B[np.ix_(self._ground_index, self._ground_index)]
         factor = _factor(K0 + wide * unit, theta, self._is_plate, self._trials)
         a = factor.solve(self._y)
         lml = -0.5 * float(self._y @ a + a.size * np.log(2.0 * np.pi))
@@ -87,8 +87,8 @@ class GroundLikelihood:
             np.add.reduceat(W * unit, self._starts, axis=0), self._starts, axis=1
         )
         slope = np.zeros(len(NAMES))
-        for k, of in slopes.items():
-            slope[k] = (by_ground * of).sum()
+        for k, derivative in slopes.items():
+            slope[k] = (by_ground * derivative).sum()
         slope[5:7] = of_added(W * wide)[1:]
         slope[10:] = self._noise_slopes(W, theta)
         slope[:3] = of_shared(W)
@@ -268,9 +268,9 @@ def prior_of(unit: float) -> tuple[Array, Array]:
 
 def _by_surface(theta: Array, is_plate: Array) -> tuple[Array, Array]:
     """Return sc^2 and sn^2 of rows on stones and plates, each of shape (n,)."""
-    of = is_plate.astype(int)
+    surface = is_plate.astype(int)
     variances = np.exp(2.0 * theta[10:])
-    return variances[:2][of], variances[2:][of]
+    return variances[:2][surface], variances[2:][surface]
 
 
 def _factor(K: Array, theta: Array, is_plate: Array, trials: Sequence[slice]) -> Factor:

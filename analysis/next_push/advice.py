@@ -99,8 +99,8 @@ def _function_gains(
         k = int(np.argmax(variance - each))
         F_n, v_t = points[k]
         now, then = 2.0 * np.sqrt(variance[k]), 2.0 * np.sqrt(each[k])
-        place = f"{F_n:g} N, {v_t:g} m/s"
-        reasons.append(f"F_t at {place} from ± {now:.1f} to ± {then:.1f} N")
+        condition = f"{F_n:g} N, {v_t:g} m/s"
+        reasons.append(f"F_t at {condition} from ± {now:.1f} to ± {then:.1f} N")
     return gains, reasons
 
 

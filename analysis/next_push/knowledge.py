@@ -51,7 +51,7 @@ _PLATE = (
     (-1.4, 0.7),
     (0.4, 0.7),
 )
-_SC = {False: 10, True: 11}  # places in the priors of all ground: stones, plates
+_SC = {False: 10, True: 11}  # indices in the priors of all ground: stones, plates
 _REACH = 4.0  # prior standard deviations that the search goes
 _HOPELESS = 1e25
 _SMALLEST = 1e-12  # variance that rounding may leave [N^2]
@@ -168,7 +168,7 @@ def _likeliest(records: Sequence[PushRecord], r: Array, kind: str) -> Array:
 
     mean, sd = _prior(kind)
     X = _standard(_inputs(records))
-    likelihood = Likelihood(_KERNEL, _NOISE, X, r, _places(records))
+    likelihood = Likelihood(_KERNEL, _NOISE, X, r, _trial_rows(records))
 
     def downhill(theta: Array) -> tuple[float, Array]:
         try:
@@ -190,16 +190,16 @@ def _prior(kind: str) -> tuple[Array, Array]:
     """Return means and standard deviations of the priors; sc is that of all ground."""
     mean, sd = np.array(_PLATE if kind == FLAT else _STONES, dtype=float).T
     of_all, sd_of_all = prior_of(1.0)
-    place = _SC[kind == FLAT]
-    mean[4], sd[4] = of_all[place], sd_of_all[place]
+    index = _SC[kind == FLAT]
+    mean[4], sd[4] = of_all[index], sd_of_all[index]
     return mean, sd
 
 
 def _within(theta: Array, records: Sequence[PushRecord]) -> Array:
     """Return the covariance of the rows of trials, noise included, shape (n, n)."""
-    X, places = _standard(_inputs(records)), _places(records)
+    X, trials = _standard(_inputs(records)), _trial_rows(records)
     C = _KERNEL.matrix(theta[:3], X, X)
-    for rows, block in _NOISE.shared(X, places)(theta[3:]).blocks:
+    for rows, block in _NOISE.shared(X, trials)(theta[3:]).blocks:
         C[rows, rows] += block
     C.flat[:: len(C) + 1] += np.exp(2.0 * theta[3])
     return C
@@ -210,7 +210,7 @@ def _inputs(records: Sequence[PushRecord]) -> Array:
     return np.column_stack(columns)
 
 
-def _places(records: Sequence[PushRecord]) -> TrialRows:
+def _trial_rows(records: Sequence[PushRecord]) -> TrialRows:
     label = np.repeat(np.arange(len(records)), [r.t.size for r in records])
     return TrialRows(label, np.concatenate([r.t for r in records]))
 

@@ -210,7 +210,7 @@ def _below_zero(dissipation: Dissipation) -> str:
 
 
 def _between(components: TrialComponents) -> str:
-    if not components.is_told_apart:
+    if not components.is_distinguishable:
         return f"not distinguishable from 0 (gain {components.gain:.1f})"
     return f"{_with_interval(components, 'between', 'N')} (gain {components.gain:.1f})"
 

@@ -1,6 +1,6 @@
 """The report: one HTML file that needs nothing else, and every number beside it.
 
-The one door to jinja2.
+The only module that imports jinja2.
 """
 
 import base64

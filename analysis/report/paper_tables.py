@@ -198,7 +198,7 @@ def bounded_text(bounds: TustinBounds, key: str, value: float) -> str:
 
 
 def _statement_row(claim: PaperClaim) -> tuple[str, ...]:
-    return claim.place, claim.statement, claim.shown, claim.agreement.value
+    return claim.reference, claim.statement, claim.shown, claim.agreement.value
 
 
 def _summary_row(result: TerrainResult, models: Sequence[str]) -> list[str]:

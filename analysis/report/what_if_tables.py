@@ -71,18 +71,18 @@ def plain_choice(choice: StudyVariant, before: Study, after: Study) -> dict[str,
     }
 
 
-Place = tuple[str, str, str]  # terrain, model, measure
+Measure = tuple[str, str, str]  # terrain, model, measure
 
 
-def _pair(before: Study, after: Study, place: Place) -> PairedComparison | None:
-    terrain, model, key = place
+def _pair(before: Study, after: Study, measure: Measure) -> PairedComparison | None:
+    terrain, model, key = measure
     first, second = (s.terrains[terrain].scores(model, key) for s in (before, after))
     return compare(first, second)
 
 
-def _numbers(before: Study, after: Study, place: Place) -> dict[str, Any]:
-    terrain, model, key = place
-    paired = _pair(before, after, place)
+def _numbers(before: Study, after: Study, measure: Measure) -> dict[str, Any]:
+    terrain, model, key = measure
+    paired = _pair(before, after, measure)
     return {
         "before": mean_of(before.terrains[terrain].scores(model, key)),
         "after": mean_of(after.terrains[terrain].scores(model, key)),
@@ -90,8 +90,8 @@ def _numbers(before: Study, after: Study, place: Place) -> dict[str, Any]:
     }
 
 
-def _cells(before: Study, after: Study, place: Place) -> list[str]:
-    numbers = _numbers(before, after, place)
+def _cells(before: Study, after: Study, measure: Measure) -> list[str]:
+    numbers = _numbers(before, after, measure)
     means = [numbers["before"], numbers["after"]]
     texts = ["–" if mean is None else f"{mean:.3f}" for mean in means]
-    return [*texts, paired_cell(_pair(before, after, place))]
+    return [*texts, paired_cell(_pair(before, after, measure))]

@@ -120,7 +120,7 @@ class StanceWatch:
     _early: float = 0.0
     _seconds: float = 0.0
     _loads: list[float] = field(default_factory=list[float])
-    _borne: list[float] = field(default_factory=list[float])
+    _loads_held: list[float] = field(default_factory=list[float])
     _force: float = 0.0
     _moved: float = 0.0
     _fastest: float = 0.0
@@ -140,7 +140,7 @@ class StanceWatch:
             return
         if not self._is_giving:
             self._force = max(self._force, F_t)
-            self._borne.append(F_n)
+            self._loads_held.append(F_n)
         is_slip = x - self.x0 > MOVED or v_t > FAST
         self._is_giving |= is_slip or gives_way(x - self.x0, v_t)
         if is_slip:
@@ -155,7 +155,7 @@ class StanceWatch:
             risk=self.risk,
             scale=self.scale,
             load=_mean(self._loads),
-            borne=_mean(self._borne),
+            borne=_mean(self._loads_held),
             force=self._force,
             delivered=self.delivered,
             early=self._early,

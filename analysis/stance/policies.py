@@ -91,7 +91,7 @@ def oracle(
     sample: StanceSample, foresight: StanceForesight, request: StanceRequest
 ) -> StanceCommand:
     """Take three quarters of what the ground truly bears; only a simulation tells."""
-    command = avoid_slip(sample, _told(foresight), request)
+    command = avoid_slip(sample, _uninformed(foresight), request)
     most = min(request.peak, _OF_CAPACITY * foresight.capacity)
     if command.phase not in _PUSHING:
         return replace(command, F_n=MOST_F_N)
@@ -135,7 +135,7 @@ def _loads() -> tuple[float, ...]:
     return tuple(LEAST_F_N + _LOAD_STEP * k for k in range(count + 1))
 
 
-def _told(foresight: StanceForesight) -> StanceForesight:
+def _uninformed(foresight: StanceForesight) -> StanceForesight:
     """Return foresight that knows no terrain: the plan of constant mu."""
     return StanceForesight({}, {}, capacity=foresight.capacity)
 

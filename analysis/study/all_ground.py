@@ -145,12 +145,12 @@ def rows_of(known: Sequence[TerrainRows], c: float | None) -> GroundRows:
     """Return the rows of trials with warped forces, as the process takes them."""
     tables = [table for terrain in known for table in terrain.trials]
     sizes = [table.count for table in tables]
-    place = [g for g, terrain in enumerate(known) for _ in terrain.trials]
+    ground_index = [g for g, terrain in enumerate(known) for _ in terrain.trials]
     rows = SampleTable.joined(tables)
     return GroundRows(
         inputs=rows.inputs,
         y=warped(rows.F_t, c),
-        ground=np.repeat(np.array(place, dtype=np.intp), sizes),
+        ground=np.repeat(np.array(ground_index, dtype=np.intp), sizes),
         trial=np.repeat(np.arange(len(tables)), sizes),
         grounds=tuple(terrain.ground for terrain in known),
     )
@@ -207,5 +207,5 @@ def _unit(F_t: Array, c: float | None) -> float:
 
 def _evenly(table: SampleTable, count: int) -> SampleTable:
     """Return about `count` rows of a trial, evenly spaced over it."""
-    places = np.linspace(0, table.count - 1, min(count, table.count))
-    return table.take(places.round().astype(np.intp))
+    positions = np.linspace(0, table.count - 1, min(count, table.count))
+    return table.take(positions.round().astype(np.intp))

@@ -111,13 +111,13 @@ class FoldPlan(Sequence[FoldTask]):
         self._tested = (
             self._fitted if targets is trials else PooledSamples.of(targets, usable)
         )
-        self._places = [
+        self._folds = [
             (name, k) for name, folds in usable.items() if len(folds) > 1 for k in folds
         ]
 
     def __len__(self) -> int:
         """Return the number of folds."""
-        return len(self._places)
+        return len(self._folds)
 
     @overload
     def __getitem__(self, index: int) -> FoldTask: ...
@@ -127,7 +127,7 @@ class FoldPlan(Sequence[FoldTask]):
         """Return everything that one fold needs."""
         if isinstance(index, slice):
             return [self[k] for k in range(len(self))[index]]
-        terrain, fold = self._places[index]
+        terrain, fold = self._folds[index]
         rest = [self._fitted.trial(terrain, k) for k in self._others(terrain, fold)]
         return FoldTask(
             terrain=terrain,
@@ -135,16 +135,17 @@ class FoldPlan(Sequence[FoldTask]):
             training=SampleTable.joined(rest),
             lengths=tuple(rows.count for rows in rest),
             own=self._tested.trial(terrain, fold),
-            others=self._met(terrain, fold, self._tested.trial),
+            others=self._paired(terrain, fold, self._tested.trial),
             options=self._options,
         )
 
     def outline(self, index: int) -> tuple[object, ...]:
         """Return what tells a fold from others, digests in the place of samples."""
-        (terrain, fold), (_, tested) = self._places[index], self._digests
-        met = self._met(terrain, fold, lambda name, k: tested[name][k])
+        (terrain, fold), (_, tested) = self._folds[index], self._digests
+        paired = self._paired(terrain, fold, lambda name, k: tested[name][k])
         own = tested[terrain][fold]
-        return ("fold", terrain, fold, self._wholes[terrain], own, met, self._options)
+        whole, options = self._wholes[terrain], self._options
+        return ("fold", terrain, fold, whole, own, paired, options)
 
     def __getstate__(self) -> dict[str, object]:
         """Return what a worker needs."""
@@ -165,13 +166,13 @@ class FoldPlan(Sequence[FoldTask]):
     def _others(self, terrain: str, fold: int) -> list[int]:
         return [k for k in self._usable[terrain] if k != fold]
 
-    def _met(
+    def _paired(
         self, terrain: str, fold: int, value_of: Callable[[str, int], T]
     ) -> dict[str, tuple[T, ...]]:
         """Return `value_of` every trial of another terrain that a fold is tested on."""
         own = self._usable[terrain]
         return {
-            other: tuple(value_of(other, k) for k in met_trials(fold, own, tests))
+            other: tuple(value_of(other, k) for k in paired_trials(fold, own, tests))
             for other, tests in self._usable.items()
             if other != terrain
         }
@@ -246,7 +247,7 @@ def choose_rows(task: FoldTask) -> Indices:
     return np.random.default_rng(key).choice(task.training.count, count, replace=False)
 
 
-def met_trials(fold: int, models: Sequence[int], tests: Sequence[int]) -> list[int]:
+def paired_trials(fold: int, models: Sequence[int], tests: Sequence[int]) -> list[int]:
     """Return the trials of another terrain that the model of a fold meets, in order.
 
     Fold k meets trial k where both exist. A fold or trial left over is paired by

@@ -68,8 +68,8 @@ def _file_of(module: str, root: Path) -> Path | None:
     """Return the file of a module of the project, None for anything else."""
     if module.partition(".")[0] not in _PACKAGES:
         return None
-    place = root.joinpath(*module.split("."))
-    files = (place.with_suffix(".py"), place / "__init__.py")
+    base = root.joinpath(*module.split("."))
+    files = (base.with_suffix(".py"), base / "__init__.py")
     return next((path for path in files if path.is_file()), None)
 
 

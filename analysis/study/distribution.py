@@ -120,9 +120,9 @@ class NewTrialPrediction:
             wanted = ndtr(self.shape.inverse(ndtri(wanted)))
         total = self.within + self.between
         ratio = self.between / np.maximum(total, np.finfo(float).tiny)
-        places = np.linspace(0.0, 1.0, _RATIOS)
+        grid = np.linspace(0.0, 1.0, _RATIOS)
         table = _mixture_quantiles(tuple(wanted.tolist()), self.freedom)
-        width = np.array([np.interp(ratio, places, column) for column in table])
+        width = np.array([np.interp(ratio, grid, column) for column in table])
         return unwarped(self.centre + np.sqrt(total) * width, self.c)
 
     def log_density(self, F_t: Array) -> Array:

@@ -1,4 +1,4 @@
-"""The one door to dask, by joblib: independent tasks on cores or on a cluster."""
+"""Independent tasks on cores or on a cluster; the only module that imports dask."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
@@ -77,7 +77,7 @@ class Batch:
     tasks: Sequence[Any]
 
 
-Place = tuple[int, int]  # of a task: number of its batch, and in it
+TaskIndex = tuple[int, int]  # of a task: number of its batch, and in it
 
 
 class Store(Protocol):
@@ -135,19 +135,19 @@ def run_batches(
     """
     keep_memory()  # what is fitted here, beside the tasks, is quicker for it, too
     where = workers if isinstance(workers, Workers) else Workers(workers)
-    places = [
+    indices = [
         (k, n) for k, batch in enumerate(batches) for n in range(len(batch.tasks))
     ]
-    results = {} if store is None else _stored(store, batches, places)
-    left = [place for place in places if place not in results]
+    results = {} if store is None else _stored(store, batches, indices)
+    left = [index for index in indices if index not in results]
     if progress is not None and results:
-        progress(len(results), len(places))
+        progress(len(results), len(indices))
     for (k, n), result in _stream(batches, left, where):
         results[k, n] = result
         if store is not None:
             store.put(batches[k].function, _key(batches[k].tasks, n), result)
         if progress is not None:
-            progress(len(results), len(places))
+            progress(len(results), len(indices))
     return [
         [results[k, n] for n in range(len(batch.tasks))]
         for k, batch in enumerate(batches)
@@ -160,10 +160,10 @@ def _key(tasks: Sequence[Any], number: int) -> object:
 
 
 def _stored(
-    store: Store, batches: Sequence[Batch], places: Sequence[Place]
-) -> dict[Place, Any]:
-    results: dict[Place, Any] = {}
-    for k, n in places:
+    store: Store, batches: Sequence[Batch], indices: Sequence[TaskIndex]
+) -> dict[TaskIndex, Any]:
+    results: dict[TaskIndex, Any] = {}
+    for k, n in indices:
         result = store.get(batches[k].function, _key(batches[k].tasks, n))
         if result is not None:
             results[k, n] = result
@@ -171,9 +171,9 @@ def _stored(
 
 
 def _stream(
-    batches: Sequence[Batch], left: Sequence[Place], where: Workers
-) -> Iterator[tuple[Place, Any]]:
-    """Yield (place, result) of every task left as it is done, in any order."""
+    batches: Sequence[Batch], left: Sequence[TaskIndex], where: Workers
+) -> Iterator[tuple[TaskIndex, Any]]:
+    """Yield (index, result) of every task left as it is done, in any order."""
     count = where.count(len(left))
     if not left:
         return
@@ -200,7 +200,7 @@ def _shared(batches: Sequence[Batch]) -> dict[int, Sequence[Any]]:
 
 def _calls(
     batches: Sequence[Batch],
-    left: Sequence[Place],
+    left: Sequence[TaskIndex],
     taking: Callable[..., Any],
     shared: Mapping[int, Any],
 ) -> list[Any]:
@@ -217,23 +217,23 @@ def _calls(
 
 
 def _read_and_taken(
-    function: Callable[[Any], Any], place: Place, file: Path
-) -> tuple[Place, Any]:
-    return _taken(function, place, read_shared(file)[place[0]])
+    function: Callable[[Any], Any], index: TaskIndex, file: Path
+) -> tuple[TaskIndex, Any]:
+    return _taken(function, index, read_shared(file)[index[0]])
 
 
 def _one_threaded(
     function: Callable[[Any], Any],
-    place: Place,
+    index: TaskIndex,
     task: Any,  # noqa: ANN401
-) -> tuple[Place, Any]:
+) -> tuple[TaskIndex, Any]:
     # A library is limited only once it is loaded: SciPy brings one of its own.
     import scipy.linalg  # noqa: F401
     from threadpoolctl import threadpool_limits
 
     keep_memory()
     with threadpool_limits(1):
-        return place, function(task)
+        return index, function(task)
 
 
 def is_guarded(address: str) -> bool:
@@ -242,11 +242,11 @@ def is_guarded(address: str) -> bool:
     Dask carries pickled objects: who can write into the connection can execute
     anything here. It has to be authenticated by TLS, or stay on this machine.
     """
-    scheme, _, place = address.rpartition("://")
+    scheme, _, netloc = address.rpartition("://")
     if scheme not in {"", "tcp", "tls"}:
         return False
     try:
-        host = urlsplit(f"//{place}").hostname or ""
+        host = urlsplit(f"//{netloc}").hostname or ""
         is_loopback = host == "localhost" or ip_address(host).is_loopback
     except ValueError:
         is_loopback = False
@@ -254,9 +254,9 @@ def is_guarded(address: str) -> bool:
 
 
 def _on_cluster(
-    address: str, batches: Sequence[Batch], left: Sequence[Place]
+    address: str, batches: Sequence[Batch], left: Sequence[TaskIndex]
 ) -> Iterator[Any]:
-    """Yield (place, result) from the Dask scheduler at `address`.
+    """Yield (index, result) from the Dask scheduler at `address`.
 
     Tasks that are shared go to every worker once.
     """
@@ -281,9 +281,9 @@ def _on_cluster(
 
 
 def _taken(
-    function: Callable[[Any], Any], place: Place, tasks: Sequence[Any]
-) -> tuple[Place, Any]:
-    return _one_threaded(function, place, tasks[place[1]])
+    function: Callable[[Any], Any], index: TaskIndex, tasks: Sequence[Any]
+) -> tuple[TaskIndex, Any]:
+    return _one_threaded(function, index, tasks[index[1]])
 
 
 def _client(address: str) -> Any:  # noqa: ANN401

@@ -28,7 +28,7 @@ from analysis.tustin.identifiability import Interval
 
 RUN = 5  # neighbours that are taken together
 APART = 4  # kept samples from one to the next: nearer ones share the moving average
-TOLD_APART = 1.4  # log likelihood that a level must gain: 5 % on the edge of its range
+LEAST_GAIN = 1.4  # log likelihood that a level must gain: 5 % on the edge of its range
 
 _STREAM = 3_000_000  # apart from folds, terrain fits and tables
 _DRAWS = 100  # of trials with replacement, at most
@@ -99,9 +99,9 @@ class TrialComponents:
     gain: float
 
     @property
-    def is_told_apart(self) -> bool:
-        """Whether the spread between trials is told apart from none."""
-        return self.gain >= TOLD_APART
+    def is_distinguishable(self) -> bool:
+        """Whether the spread between trials can be told from none."""
+        return self.gain >= LEAST_GAIN
 
     @property
     def independent(self) -> float:
@@ -133,10 +133,10 @@ def fit_components(task: ComponentsTask) -> TrialComponents | None:
         )
         for n in ("F_n", "v_t", "F_t", "t")
     )
-    inputs, places = np.column_stack([F_n, v_t]), TrialRows(label, t)
+    inputs, trials = np.column_stack([F_n, v_t]), TrialRows(label, t)
     try:
         whole, without = (
-            fit_gp(inputs, F_t, SquaredExponential(), noise, trials=places)
+            fit_gp(inputs, F_t, SquaredExponential(), noise, trials=trials)
             for noise in (
                 TrialNoise(ConstantNoise(), has_drift=True),
                 TrialNoise(ConstantNoise(), has_level=False, has_drift=True),
@@ -147,7 +147,7 @@ def fit_components(task: ComponentsTask) -> TrialComponents | None:
     theta = whole.theta[len(whole.kernel.names) :]
     residual = F_t - whole.mean(inputs)
     names = ("measurement", "between", "within", "tau")
-    per_trial, draws = _PerTrial(residual, places), min(task.options.draws, _DRAWS)
+    per_trial, draws = _PerTrial(residual, trials), min(task.options.draws, _DRAWS)
     intervals = _intervals(per_trial, theta, draws, rng) if draws else []
     point = dict(zip(names, np.exp(theta).tolist(), strict=True))
     return TrialComponents(
@@ -180,17 +180,17 @@ class _PerTrial:
 
     Args:
         residual: measured minus predicted force [N], shape (n,).
-        places: where the rows come from.
+        trials: which trials the rows come from, and when.
     """
 
-    def __init__(self, residual: Array, places: TrialRows) -> None:
-        blocks = places.blocks()
+    def __init__(self, residual: Array, trials: TrialRows) -> None:
+        blocks = trials.blocks()
         longest = max(rows.stop - rows.start for rows in blocks)
         shape = (len(blocks), longest)
         self._r, t, self._is_row = np.zeros(shape), np.zeros(shape), np.zeros(shape)
         for k, rows in enumerate(blocks):
             count = rows.stop - rows.start
-            self._r[k, :count], t[k, :count] = residual[rows], places.t[rows]
+            self._r[k, :count], t[k, :count] = residual[rows], trials.t[rows]
             self._is_row[k, :count] = 1.0
         self._same = self._is_row[:, :, None] * self._is_row[:, None, :]
         self._gap = np.abs(t[:, :, None] - t[:, None, :])

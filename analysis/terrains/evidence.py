@@ -188,8 +188,8 @@ def calibration_of(windows: Sequence[SurfaceProbability]) -> Calibration:
     is_rocky = np.array([window.surface == ROCKY_GROUND for window in windows])
     share = float(is_rocky.mean())
     weight = np.where(is_rocky, 0.5 / max(share, 1e-9), 0.5 / max(1.0 - share, 1e-9))
-    place = np.minimum((p * _BINS).astype(int), _BINS - 1)
-    off = np.bincount(place, weight * (p - is_rocky), _BINS)
+    bin_index = np.minimum((p * _BINS).astype(int), _BINS - 1)
+    off = np.bincount(bin_index, weight * (p - is_rocky), _BINS)
     is_sure = np.maximum(p, 1.0 - p) >= SURE
     return Calibration(
         error=float(np.abs(off).sum() / weight.sum()),

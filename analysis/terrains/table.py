@@ -55,8 +55,8 @@ class Table:
 
     def at(self, F_n: float, v_t: float) -> tuple[float, ...]:
         """Return the quantiles [N] at one point, shape (q,); a few microseconds."""
-        i, a = _place(self.F_n, F_n)
-        j, b = _place(self.v_t, v_t)
+        i, a = _bracket(self.F_n, F_n)
+        j, b = _bracket(self.v_t, v_t)
         return tuple(_blend(rows, i, a, j, b) for rows in self.forces)
 
     def covers(self, F_n: float, v_t: float) -> bool:
@@ -72,8 +72,8 @@ class Table:
     def over(self, F_n: Array, v_t: Array) -> Array:
         """Return the quantiles [N] at many points, shape (q, n)."""
         loads, speeds, cells = self._arrays
-        i, a = _places(*loads, F_n)
-        j, b = _places(*speeds, v_t)
+        i, a = _brackets(*loads, F_n)
+        j, b = _brackets(*speeds, v_t)
         cell = i * len(self.v_t) + j
         if cell.size <= _AT_ONCE:
             return _blended(cells.take(cell, axis=1), a, b).T
@@ -113,7 +113,7 @@ def normal_scores(shares: tuple[float, ...]) -> Array:
     return ndtri(np.array(shares))
 
 
-def _place(axis: tuple[float, ...], value: float) -> tuple[int, float]:
+def _bracket(axis: tuple[float, ...], value: float) -> tuple[int, float]:
     """Return (lower point, share of the way to the next), clamped to the axis."""
     if value <= axis[0]:
         return 0, 0.0
@@ -127,11 +127,11 @@ def _numbered(axis: tuple[float, ...]) -> tuple[Array, Array]:
     return np.array(axis), np.arange(len(axis), dtype=np.float64)
 
 
-def _places(points: Array, numbers: Array, values: Array) -> tuple[np.ndarray, Array]:
+def _brackets(points: Array, numbers: Array, values: Array) -> tuple[np.ndarray, Array]:
     """Return (lower points, shares of the way to the next), clamped to the axis."""
-    place = np.interp(values, points, numbers)
-    i = place.astype(np.intp)
-    return i, place - i
+    position = np.interp(values, points, numbers)
+    i = position.astype(np.intp)
+    return i, position - i
 
 
 def _blended(corners: Array, a: Array, b: Array) -> Array:

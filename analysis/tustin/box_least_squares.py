@@ -19,7 +19,7 @@ from analysis.data.series import Array
 _RIDGE = 1.0 + 1e-12 * np.eye(3)
 _TINY = np.finfo(np.float64).tiny * np.eye(3)
 _ORDERS = np.array(list(permutations(range(3))))  # (6, 3)
-_PLACES = np.argsort(_ORDERS, axis=1)  # where each parameter is in an order
+_INVERSE_ORDERS = np.argsort(_ORDERS, axis=1)  # where each parameter is in an order
 
 
 def solve_in_box(G: Array, c: Array, lower: Array, upper: Array) -> Array:
@@ -85,4 +85,4 @@ def _on_a_bound(G: Array, c: Array, held: Array, low: Array, high: Array) -> Arr
     cost += p_k * (G_kk * p_k - 2.0 * c_k)
     best, rows = np.argmin(cost, axis=1), np.arange(c.shape[0])
     ordered = np.stack([p_i, p_j, p_k], axis=-1)[rows, best]
-    return np.take_along_axis(ordered, _PLACES[best], axis=1)
+    return np.take_along_axis(ordered, _INVERSE_ORDERS[best], axis=1)

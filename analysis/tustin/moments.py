@@ -58,9 +58,9 @@ class Moments(NamedTuple):
         used, index = np.flatnonzero(filled), (np.cumsum(filled) - 1)[index]
         columns = (problem.F_n, problem.static, problem.v_t, problem.F_t)
         trial = np.repeat(np.arange(len(lengths)), lengths)
-        place, size = trial * used.size + index, len(lengths) * used.size
+        cell, size = trial * used.size + index, len(lengths) * used.size
         sums = [
-            np.bincount(place, problem.weights * columns[a] * columns[b], size)
+            np.bincount(cell, problem.weights * columns[a] * columns[b], size)
             for a, b in _PAIRS
         ]
         count = np.bincount(index, minlength=used.size)
@@ -71,7 +71,7 @@ class Moments(NamedTuple):
 
 # (0, 0) is F_n F_n, (0, 3) F_n F_t and so on
 _PAIRS = [(a, b) for a in range(4) for b in range(a, 4)]
-_PLACES = np.array(  # of the products in a symmetric matrix
+_PAIR_INDEX = np.array(  # of the products in a symmetric matrix
     [[_PAIRS.index((min(a, b), max(a, b))) for b in range(4)] for a in range(4)]
 )
 
@@ -116,7 +116,7 @@ def _gram(sums: Array, v: Array, q: Array) -> Array:
     for weight, columns in parts:
         products[:, columns] = _weighted(weight, sums[..., columns])
     products[:, 7:] = sums[..., 7:].sum(axis=-2)
-    return products[:, _PLACES]
+    return products[:, _PAIR_INDEX]
 
 
 def _weighted(weight: Array, columns: Array) -> Array:
@@ -223,7 +223,7 @@ def _promising(grid: Array, sse: Array) -> Array:
             taken.append((i, j))
         if len(taken) == _POLISHED:
             break
-    return np.array([grid[place] for place in taken])
+    return np.array([grid[index] for index in taken])
 
 
 Loss = Literal["squares", "huber", "student"]

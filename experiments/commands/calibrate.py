@@ -82,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
     settings = load_settings(args.config)
     row = settings.row(args.terrain or settings.matrix.terrains[0].name)
     settings, row = _without_old(args.what, settings, row)
-    out = args.to or _place(args.what, settings, row, is_fake=args.fake)
+    out = args.to or _output_path(args.what, settings, row, is_fake=args.fake)
     for path in _written(args, out):
         _check_out(path)
     args.chosen = _chosen_poses(args, settings, row)
@@ -231,7 +231,9 @@ def _without_old(
     return settings.without_sensor(row.foot, is_mounted=what == "foot"), row
 
 
-def _place(what: str, settings: Settings, row: TerrainRow, *, is_fake: bool) -> Path:
+def _output_path(
+    what: str, settings: Settings, row: TerrainRow, *, is_fake: bool
+) -> Path:
     """Return where the file goes, beside rig.toml; what is simulated is marked."""
     from experiments.rig.law_calibrations import friction_path, gravity_path
 
@@ -240,9 +242,9 @@ def _place(what: str, settings: Settings, row: TerrainRow, *, is_fake: bool) -> 
         "foot": f"foot_{row.foot}.toml",
         "terrain": f"terrain_{row.name}.toml",
     }
-    places = {"gravity": gravity_path, "friction": friction_path}
-    place = places.get(what)
-    path = place(settings) if place else settings.folder / names[what]
+    law_paths = {"gravity": gravity_path, "friction": friction_path}
+    law_path = law_paths.get(what)
+    path = law_path(settings) if law_path else settings.folder / names[what]
     if not is_fake or path.stem.endswith(".fake"):
         return path
     return path.with_name(f"{path.stem}.fake{path.suffix}")

@@ -153,9 +153,9 @@ def _listen(
     """
     from acquisition.clock import SystemClock
     from acquisition.errors import SettingsError
-    from wam.bus.doors import open_door
     from wam.bus.link import CanLink
     from wam.bus.log import BusTraffic
+    from wam.bus.transports import open_transport
 
     if is_fake:
         raise SettingsError(
@@ -168,8 +168,8 @@ def _listen(
         f"traction check --bus        {can.interface}:{can.channel} for {seconds:g} s, "
         "nothing is sent"
     )
-    door = open_door(can.interface, can.channel, can.bitrate, clock)
-    link = CanLink(door, traffic)
+    transport = open_transport(can.interface, can.channel, can.bitrate, clock)
+    link = CanLink(transport, traffic)
     try:
         deadline_ns = clock.now_ns() + round(seconds * 1e9)
         while clock.now_ns() < deadline_ns:

@@ -106,12 +106,12 @@ def _print(
     ]
     console.table(["", "measure", "value", "band"], rows)
     failed = {finding.band.id for finding in results if not finding.is_met}
-    met = f"{len(results) - len(failed)} of {len(results)} bands met"
-    console.say(f"{met}. {folder / 'bands.json'}")
+    summary = f"{len(results) - len(failed)} of {len(results)} bands met"
+    console.say(f"{summary}. {folder / 'bands.json'}")
     deciding = [f.band.id for f in gated(plan, results) if f.band.id in failed]
     if beside := sorted(failed.difference(deciding)):
-        of = "for a twin" if plan.is_twin else f"at friction {plan.friction:g}"
-        console.say(f"Outside: {', '.join(beside)}; not gated {of}.")
+        condition = "for a twin" if plan.is_twin else f"at friction {plan.friction:g}"
+        console.say(f"Outside: {', '.join(beside)}; not gated {condition}.")
     if not deciding:
         return 0
     console.problem(f"Outside their bands: {', '.join(deciding)}.")

@@ -182,8 +182,8 @@ def _sum_up(tally: BusSummary, console: Console) -> None:
         f"than 1 ms, {silent} did not come; {tally.unasked} came without a request."
     )
     if tally.errors:
-        told = ", ".join(f"{name} {n}" for name, n in sorted(tally.errors.items()))
-        console.say(f"Error frames of the controller: {told}.")
+        counts = ", ".join(f"{name} {n}" for name, n in sorted(tally.errors.items()))
+        console.say(f"Error frames of the controller: {counts}.")
     if tally.answers:
         console.say(f"Slowest answer: {tally.slowest_ns // 1000} us.")
     for what, count in tally.silent.most_common():

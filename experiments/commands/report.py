@@ -112,8 +112,8 @@ def _as_json(page: Path, sessions: list[str], missing: list[str]) -> str:
     fits = page.parent.parent / "fits.json"
     numbers = json.loads(fits.read_bytes())
     terrains = {
-        name: {"trials": of["trials"], "mae": of["mae"]}
-        for name, of in numbers["terrains"].items()
+        name: {"trials": terrain["trials"], "mae": terrain["mae"]}
+        for name, terrain in numbers["terrains"].items()
     }
     content = {
         "schema": 1,
@@ -167,7 +167,9 @@ def _report_stances(sessions: Sequence[SessionFolder], data: Path) -> Path:
     groups: list[StanceGroup] = []
     for session in sessions:
         task = read_stance_task(session)
-        outcomes = [one for _, of in stance_outcomes(session) for one in of]
+        outcomes = [
+            outcome for _, group in stance_outcomes(session) for outcome in group
+        ]
         if task is not None and outcomes:
             groups.append(
                 StanceGroup(session.terrain, task.name, task.request, outcomes)

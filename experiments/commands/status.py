@@ -1,4 +1,4 @@
-"""traction status: the matrix board."""
+"""traction status: kept trials per terrain."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence
 
-    from experiments.board.matrix_board import MatrixRow
     from experiments.operator.console import Console
     from experiments.session.kept_files import Deviation
     from experiments.session.store import SessionFolder
     from experiments.settings.matrix import TerrainRow
+    from experiments.status_table.table import MatrixRow
 
 EXAMPLES = """\
-  traction status                           the board, and what comes next
+  traction status                           the table, and what comes next
   traction status --where kind=live,stones=big --follow   watch a part of it"""
 
 _HEADER = ("terrain", "kind", "kept", "trials", "rejected", "sessions")
@@ -51,33 +51,33 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print the board, counted from files whose checksum is right."""
-    from experiments.board.board_cache import BoardCache, cache_path
-    from experiments.board.matrix_board import (
-        compare_board,
-        count_board,
+    """Print the table, counted from files whose checksum is right."""
+    from experiments.operator.console import Console
+    from experiments.status_table.summary_cache import SummaryCache, cache_path
+    from experiments.status_table.table import (
+        count_rows,
+        find_deviations,
         parse_where,
         see_sessions,
     )
-    from experiments.board.upcoming import enough_lines, next_steps
-    from experiments.operator.console import Console
+    from experiments.status_table.upcoming import enough_lines, next_steps
 
-    cache = BoardCache(None if args.fresh else cache_path(args.data))
+    cache = SummaryCache(None if args.fresh else cache_path(args.data))
     rows = cache.rows(_settings_texts(args.config), lambda: _terrains(args.config))
     where = parse_where(args.where)
     console = Console(color=not args.no_color)
 
-    def look() -> Board:
+    def look() -> StatusTable:
         seen = see_sessions(args.data, where, cache)
         cache.save()
-        lines = count_board(seen, rows, where)
+        lines = count_rows(seen, rows, where)
         known, terrains = [s.folder for s in seen], {row.name for row in rows}
         kinds = {line.is_simulated for line in lines if line.sessions} or {False}
         steps = enough_lines(seen, rows, where)
         for kind in sorted(kinds):
             steps += next_steps(args.data, seen, rows, is_simulated=kind)
-        notes = board_notes(args.data, known, terrains, where, lines)
-        return Board(lines, notes, steps, compare_board(seen, where))
+        notes = table_notes(args.data, known, terrains, where, lines)
+        return StatusTable(lines, notes, steps, find_deviations(seen, where))
 
     if args.follow:
         return _follow(lambda: look().plain(), console)
@@ -85,7 +85,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 @dataclass(frozen=True, slots=True)
-class Board:
+class StatusTable:
     """Everything that one look at the sessions has to tell.
 
     Attributes:
@@ -101,28 +101,28 @@ class Board:
     deviations: list[Deviation]
 
     def plain(self) -> list[str]:
-        """Return the board as lines of text."""
+        """Return the table as lines of text."""
         from experiments.operator.console import aligned
 
         table = aligned([_HEADER, *map(_row, self.lines)])
         return [*table, *self.notes, *self.steps]
 
 
-def board_notes(
+def table_notes(
     data: Path,
     known: Sequence[SessionFolder],
     terrains: Collection[str],
     where: Mapping[str, str],
-    board: Sequence[object],
+    lines: Sequence[object],
 ) -> list[str]:
-    """Return why a board shows less than somebody may expect, a line for each reason.
+    """Return why the table shows less than somebody may expect, a line for each reason.
 
     Args:
         data: the data folder.
         known: its sessions.
         terrains: names of those of the matrix.
-        where: the conditions that the board was counted with.
-        board: its rows.
+        where: the conditions that it was counted with.
+        lines: of the table.
     """
     from acquisition.trial_file.data_files import list_folder
     from experiments.session.store import JOURNAL_FILE
@@ -146,27 +146,27 @@ def board_notes(
         for session in known
         if session.terrain not in terrains
     ]
-    if where and not board:
+    if where and not lines:
         asked = ",".join(f"{key}={value}" for key, value in where.items())
         notes.append(f"Nothing matches --where {asked}.")
     return notes
 
 
-def _show(board: Board, console: Console, *, is_json: bool) -> int:
+def _show(table: StatusTable, console: Console, *, is_json: bool) -> int:
     """Print what was seen; return the exit code."""
     from experiments.operator.console import BAD
 
-    for note in board.notes:  # not in the way of a program that reads the board
+    for note in table.notes:  # not in the way of a program that reads it
         console.problem(note)
     if is_json:
-        console.say(json.dumps([line.as_dict() for line in board.lines], indent=1))
+        console.say(json.dumps([line.as_dict() for line in table.lines], indent=1))
     else:
-        console.table(_HEADER, [_row(line) for line in board.lines])
-        for step in board.steps:
+        console.table(_HEADER, [_row(line) for line in table.lines])
+        for step in table.steps:
             console.say(step)
-    for deviation in board.deviations:
+    for deviation in table.deviations:
         console.problem(f"{BAD} {deviation.text()}.")
-    return _NOT_AS_KEPT if board.deviations else 0
+    return _NOT_AS_KEPT if table.deviations else 0
 
 
 def _settings_texts(config: Path | None) -> list[bytes] | None:

@@ -115,8 +115,8 @@ def _quietly(action: Callable[[], object]) -> None:
 def _flip_a_bit(path: Path) -> None:
     """Change one bit in the middle of what the disk has of a running trial."""
     with path.open("r+b") as file:
-        place = path.stat().st_size // 2
-        file.seek(place)
+        offset = path.stat().st_size // 2
+        file.seek(offset)
         byte = file.read(1)[0]
-        file.seek(place)
+        file.seek(offset)
         file.write(bytes((byte ^ 0x10,)))

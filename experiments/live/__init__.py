@@ -1,5 +1,5 @@
 """The second screen: a session or a trial for viewers that speak Foxglove's protocol.
 
-`channels` turns samples into messages, `server` is the door to foxglove-sdk, `watching`
+`channels` turns samples into messages, `server` imports foxglove-sdk, `watching`
 follows a session that another process records.
 """

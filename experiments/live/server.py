@@ -1,4 +1,4 @@
-"""The door to foxglove-sdk: channels on a WebSocket of this computer, read only."""
+"""Channels on a WebSocket of this computer; the only importer of foxglove-sdk."""
 
 from __future__ import annotations
 

@@ -1,8 +1,9 @@
 """A session that another process records, served to viewers 50 times a second.
 
-The rings of the session lie in memory without a name. They are opened anew for reading
-through the console's entry in /proc, which asks nothing of any process of the session:
-nothing can be written, nobody waits, and whatever happens here goes unnoticed there.
+The ring buffers of the session lie in memory without a name. They are opened anew for
+reading through the console's entry in /proc, which asks nothing of any process of the
+session: nothing can be written, nobody waits, and whatever happens here goes unnoticed
+there.
 """
 
 from collections.abc import Callable, Mapping
@@ -57,7 +58,7 @@ class WatchedSession:
         self._foreseen = shared.foresight.written
         self._journal = folder.path / "events.jsonl"
         self._size = -1
-        self._told = len(folder.events())
+        self._sent = len(folder.events())
         config = folder.path / "config.toml"
         text = read_text(config) if config.exists() else ""
         self._encoder = LiveEncoder(urdf(load_constants()), text)
@@ -90,7 +91,7 @@ class WatchedSession:
             return []
         self._size = size
         events = self.folder.events()
-        new, self._told = events[self._told :], max(self._told, len(events))
+        new, self._sent = events[self._sent :], max(self._sent, len(events))
         return [
             (
                 {EVENTS_TOPIC: encode_log(now_ns, _EVENT_LEVEL, _EVENT_NAME, text)},

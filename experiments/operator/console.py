@@ -98,8 +98,8 @@ class Console:
             except OSError:
                 self._lose()
 
-    def bell(self, times: int = 1) -> None:
-        """Ring the terminal's bell, if there is a terminal."""
+    def sound(self, times: int = 1) -> None:
+        """Sound the terminal's bell, if there is a terminal."""
         if not self._is_terminal or self.is_lost:
             return
         try:

@@ -1,4 +1,4 @@
-"""What a person with both hands on the arm hears: bells, and words where possible."""
+"""What a person with both hands on the arm hears: sounds, and words where possible."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from experiments.settings.rig import OperatorSection
 
 
 class FeedbackSignal(Enum):
-    """A moment, with the number of bells and the words for it."""
+    """A moment, with the number of sounds and the words for it."""
 
     START = (1, "recording")
     TOO_FAST = (3, "slower")
@@ -25,17 +25,17 @@ class OperatorFeedback:
     """Gives cues through the console's bell and a speech program."""
 
     def __init__(
-        self, console: Console, speech: SpeechOutput | None, *, rings: bool
+        self, console: Console, speech: SpeechOutput | None, *, has_sound: bool
     ) -> None:
         self._console = console
         self._speaker = speech
-        self._rings = rings
+        self._has_sound = has_sound
 
     def give(self, cue: FeedbackSignal) -> None:
         """Give one cue; never waits."""
-        bells, words = cue.value
-        if self._rings:
-            self._console.bell(bells)
+        sounds, words = cue.value
+        if self._has_sound:
+            self._console.sound(sounds)
         if self._speaker is not None:
             self._speaker.say(words)
 
@@ -49,7 +49,7 @@ def build_feedback(settings: OperatorSection, console: Console) -> OperatorFeedb
     """Return the cues as [operator] of rig.toml wants them."""
     program = find_speech() if settings.speech else None
     speech = SpeechOutput(program) if program is not None else None
-    return OperatorFeedback(console, speech, rings=settings.bell)
+    return OperatorFeedback(console, speech, has_sound=settings.bell)
 
 
 _PROGRAMS = ("spd-say", "espeak-ng", "espeak", "say")

@@ -16,7 +16,7 @@ from experiments.settings.load import SHIPPED
 from experiments.settings.rig import CONTACT_LIMITS, WITHIN_RANGE, RigSettings
 from ft_sensor.reading import axis_names, largest_load, largest_traction
 from ft_sensor.serial_line.sensor import BURSTY
-from wam.bus.kernel_door import LONGEST_QUEUE, interface_state
+from wam.bus.socketcan import LONGEST_QUEUE, interface_state
 from wam.calibration.friction_file import friction_from_toml
 from wam.calibration.friction_reach import (
     reaches_along,
@@ -113,7 +113,7 @@ def check_wrenches(samples: Record, now_ns: int, stale_ms: float) -> CheckResult
     """Grade rate, age and noise of force samples.
 
     Args:
-        samples: newest records of the board's ring of wrenches, oldest first.
+        samples: newest records of the ring buffer of wrenches, oldest first.
         now_ns: monotonic time [ns].
         stale_ms: age at which a sample counts as stale [ms].
     """

@@ -128,7 +128,7 @@ def _check_arm(rig: Rig, page: ChecksPage) -> ArmInfo:
         raise not_reached(error, rig.settings.rig) from error
     can = rig.settings.rig.can
     where = "simulated" if rig.is_simulated else f"{can.interface}:{can.channel}"
-    page.add(GOOD, "bus", f"{where}, {info.door}")
+    page.add(GOOD, "bus", f"{where}, {info.transport}")
     versions = sorted({puck.vers for puck in info.pucks})
     woken = sum(puck.was_asleep for puck in info.pucks)
     parts = [f"firmware {', '.join(map(str, versions))}"]

@@ -1,8 +1,8 @@
-"""The RO-Crate of a publication: who did what with which files. The door to rocrate.
+"""The RO-Crate of a publication: who did what with which files.
 
 RO-Crate 1.1 with the Process Run Crate profile 0.5
 (https://w3id.org/ro/wfrun/process/0.5): every recording is an action of the software on
-its settings, the study one on the recordings.
+its settings, the study one on the recordings. No other module imports rocrate.
 """
 
 import json

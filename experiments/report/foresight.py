@@ -80,7 +80,9 @@ def watched_trials(
         TrialFileError: a file is not a sound trial any more.
     """
     surface = groups_of(study.kinds)["surface"]
-    tasks = [WatchTask(t.path, surface[n]) for n, of in trials.items() for t in of]
+    tasks = [
+        WatchTask(t.path, surface[n]) for n, group in trials.items() for t in group
+    ]
     return run_tasks(watch_file, tasks, study.options.n_jobs)
 
 

@@ -228,7 +228,10 @@ def _recording(to: Path, path: Path, trial: RecordedTrial) -> RecordingAction:
 def _environment(code: Mapping[str, str]) -> str:
     """Return the code and every installed package, one a line."""
     packages = sorted(
-        {f"{of.metadata['Name']}=={of.version}" for of in metadata.distributions()},
+        {
+            f"{package.metadata['Name']}=={package.version}"
+            for package in metadata.distributions()
+        },
         key=str.lower,
     )
     return "\n".join(

@@ -29,7 +29,7 @@ _JOINT_SPEED = 1.6e-4  # rad/s: a tenth of a count in 22 ms, the width of the av
 _TORQUE = 8.5e-4  # N m: a count of motor 7's current, 14.93 / 17474
 _FORCE = 4e-3  # N: 1/256 N, a count of the finest gauges that are supported
 _MOMENT = 2.5e-4  # N m: 1/4096 N m, the same
-_PLACE = 3.6e-5  # m: a count of a joint at a reach of 1 m
+_POSITION = 3.6e-5  # m: a count of a joint at a reach of 1 m
 _SPEED = 1.6e-4  # m/s: as of the joints; the slowest velocity that counts is 5e-3
 _Recorded = Callable[[RecordedTrial], Values]
 
@@ -54,12 +54,12 @@ def _cycle(field: str) -> _Recorded:
     return lambda trial: trial.cycles[field]
 
 
-def _traction(place: int) -> _Recorded:
-    return lambda trial: trial.traction[:, place]
+def _traction(column: int) -> _Recorded:
+    return lambda trial: trial.traction[:, column]
 
 
-def _raw(of: slice) -> _Recorded:
-    return lambda trial: trial.cycles["wrench_raw"][:, of]
+def _raw(columns: slice) -> _Recorded:
+    return lambda trial: trial.cycles["wrench_raw"][:, columns]
 
 
 def _flag(flag: Flag) -> _Recorded:
@@ -168,7 +168,11 @@ QUANTITIES: tuple[TrialQuantity, ...] = (
         _MOMENT,
     ),
     _number(
-        _of_axes("sole_"), ("m", _BASE), "centre of the sole", lambda x: x.sole, _PLACE
+        _of_axes("sole_"),
+        ("m", _BASE),
+        "centre of the sole",
+        lambda x: x.sole,
+        _POSITION,
     ),
     _number(
         _of_axes("v_"),
@@ -189,7 +193,7 @@ QUANTITIES: tuple[TrialQuantity, ...] = (
         ("m", _TERRAIN),
         "distance of the sole from the far end",
         lambda x: x.displacement,
-        _PLACE,
+        _POSITION,
     ),
     Quantity(
         ("v_t",),
@@ -220,10 +224,16 @@ QUANTITIES: tuple[TrialQuantity, ...] = (
 
 def _kept(name: str, values: Callable[[PreparedTrial], Values]) -> KeptQuantity:
     """Return a column of the kept samples: as of the whole trial, but smoothed."""
-    (of,) = (each for each in QUANTITIES if each.names == (name,))
-    meaning = of.meaning if name == "t" else f"{of.meaning}; smoothed"
+    (quantity,) = (each for each in QUANTITIES if each.names == (name,))
+    meaning = quantity.meaning if name == "t" else f"{quantity.meaning}; smoothed"
     return Quantity(
-        of.names, of.unit, of.frame, meaning, values, of.resolution, of.kind
+        quantity.names,
+        quantity.unit,
+        quantity.frame,
+        meaning,
+        values,
+        quantity.resolution,
+        quantity.kind,
     )
 
 

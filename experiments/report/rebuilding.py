@@ -24,7 +24,7 @@ from experiments.session.store import list_sessions
 TOLERANCE = 1e-9  # relative
 _ABSOLUTE = 1e-12  # of values that are nothing but rounding
 _LARGEST = 64_000_000  # bytes of a table
-_PLACES = ("terrain", "model", "fold", "quantity", "unit")
+_KEY_COLUMNS = ("terrain", "model", "fold", "quantity", "unit")
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,19 +87,19 @@ def compare_tables(published: str, again: str) -> TableComparison:
             continue
         scale = max(abs(one), abs(other))
         if not math.isclose(one, other, rel_tol=TOLERANCE, abs_tol=_ABSOLUTE):
-            place = " ".join(filter(None, ours[0]))
-            different.append(f"{place}: {other!r}, published is {one!r}")
+            label = " ".join(filter(None, ours[0]))
+            different.append(f"{label}: {other!r}, published is {one!r}")
         if scale > _ABSOLUTE / TOLERANCE:
             worst = max(worst, abs(one - other) / scale)
     return TableComparison(count, worst, different)
 
 
 def _rows(text: str) -> Iterator[tuple[tuple[str, ...], float]]:
-    """Give (place, value) of every row."""
+    """Give (key, value) of every row."""
     for row in csv.DictReader(text.splitlines()):
         try:
             value = float(row["value"])
-            yield tuple(row[name] for name in _PLACES), value
+            yield tuple(row[name] for name in _KEY_COLUMNS), value
         except (KeyError, TypeError, ValueError) as error:
             raise SettingsError(
                 f"{TABLE} is not a table of results ({error!r}).",

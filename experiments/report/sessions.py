@@ -73,8 +73,8 @@ class ReportRequest:
 
     def sorted(self, names: Iterable[str]) -> list[str]:
         """Return `names` in the matrix's order, others last by name."""
-        place = {name: i for i, name in enumerate(self.terrains)}
-        return sorted(names, key=lambda name: (place.get(name, len(place)), name))
+        rank = {name: i for i, name in enumerate(self.terrains)}
+        return sorted(names, key=lambda name: (rank.get(name, len(rank)), name))
 
 
 def _load_trials(
@@ -125,7 +125,7 @@ class StudySession:
     @property
     def files(self) -> dict[str, TrialFiles]:
         """The trials on disk, by terrain."""
-        return {name: TrialFiles(of) for name, of in self.trials.items()}
+        return {name: TrialFiles(group) for name, group in self.trials.items()}
 
 
 def results_below(data: Path) -> ResultStore:
@@ -160,7 +160,9 @@ def study_sessions(
         scheduler=order.scheduler,
     )
     series = {name: [t.series for t in group] for name, group in trials.items()}
-    kinds = {n: terrain_kind(n, [t.stones for t in of]) for n, of in series.items()}
+    kinds = {
+        n: terrain_kind(n, [t.stones for t in group]) for n, group in series.items()
+    }
     store = results_below(data)
 
     def beside(prepared: Prepared) -> list[Batch]:

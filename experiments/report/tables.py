@@ -60,13 +60,13 @@ def summary_table(study: Study) -> tuple[list[str], list[list[str]]]:
     rows: list[list[str]] = []
     for name, result in study.terrains.items():
         errors = [result.maes(model) for _, model in shown]
-        numbers = [[mae for mae in of if mae is not None] for of in errors]
+        numbers = [[mae for mae in maes if mae is not None] for maes in errors]
         rows.append(
             [
                 name,
                 str(len(result.trials)),
                 traction_ratio(result),
-                *(f"{np.mean(of):.2f}" if of else "–" for of in numbers),
+                *(f"{np.mean(maes):.2f}" if maes else "–" for maes in numbers),
                 f"{result.constant_mae:.2f}" if result.folds else "–",
             ]
         )

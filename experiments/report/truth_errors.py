@@ -128,7 +128,9 @@ def z_scores(trials: Sequence[RecordedTrial]) -> NDArray[np.float64]:
     One row per trial that has a truth file and a session with two tares, shape (n, 2).
     """
     found = {trial.path: compare_with_truth(trial) for trial in trials}
-    return _scores(trials, {path: of for path, of in found.items() if of is not None})
+    return _scores(
+        trials, {path: errors for path, errors in found.items() if errors is not None}
+    )
 
 
 def _scores(

@@ -1,4 +1,4 @@
-"""The seam between the console and the devices, in this process or in others."""
+"""The interface between the console and the devices, in this process or in others."""
 
 import os
 from collections.abc import Callable, Sequence

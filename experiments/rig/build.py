@@ -14,7 +14,7 @@ from acquisition.devices import WrenchSample, WrenchSensor
 from acquisition.errors import SettingsError
 from acquisition.ipc.frame_tape import FrameTape
 from acquisition.ipc.layout import SharedLayout
-from acquisition.ipc.loop_server import LoopHooks, LoopServer, no_bell
+from acquisition.ipc.loop_server import LoopHooks, LoopServer, no_signal
 from acquisition.ipc.shared_sensor import SharedSensor, publish
 from acquisition.sample import Flag
 from acquisition.settings import read_text
@@ -26,7 +26,7 @@ from ft_sensor.payload import LiveFoot, TerrainFrame, payload_of
 from ft_sensor.serial_line.link import SerialLink, SerialPort
 from ft_sensor.serial_line.sensor import SerialSensor
 from ft_sensor.vendors.barrett import BarrettSensor
-from wam.bus.link import CanLink, Door
+from wam.bus.link import CanLink, Transport
 from wam.control.controller import FootController
 from wam.control.friction_compensation import FrictionCompensation
 from wam.control.joint_lock import LockGains
@@ -103,9 +103,9 @@ def build_safety_limits(rig: RigSettings) -> SafetyLimits:
     return SafetyLimits(speed, safety.speed_fault, torque, safety.torque_fault_units)
 
 
-def build_link(door: Door, shared: SharedLayout, clock: Clock) -> CanLink:
-    """Return the link through a door; every frame goes into the shared memory too."""
-    return CanLink(door, FrameTape(shared.frames, clock).add)
+def build_link(transport: Transport, shared: SharedLayout, clock: Clock) -> CanLink:
+    """Return the link over a transport; every frame goes into the shared memory too."""
+    return CanLink(transport, FrameTape(shared.frames, clock).add)
 
 
 def read_properties(settings: Settings) -> str:
@@ -205,7 +205,7 @@ class LoopConfig:
         shared: the memory that the processes share.
         clock: the loop's time.
         is_simulated: the devices are simulated.
-        ring: rings a bell for a person.
+        signal: sounds a bell for a person.
     """
 
     rig: RigSettings
@@ -216,7 +216,7 @@ class LoopConfig:
     shared: SharedLayout
     clock: Clock
     is_simulated: bool
-    ring: Callable[[], None] = no_bell
+    signal: Callable[[], None] = no_signal
 
 
 def build_loop_server(parts: LoopConfig) -> LoopServer:
@@ -227,7 +227,7 @@ def build_loop_server(parts: LoopConfig) -> LoopServer:
     is_shared = isinstance(parts.sensor, SharedSensor)
 
     def on_wrench(samples: list[WrenchSample]) -> None:
-        if not is_shared:  # those of a shared sensor are on the board already
+        if not is_shared:  # those of a shared sensor are in the shared memory already
             publish(samples, shared.wrenches)
 
     def metadata() -> dict[str, str]:
@@ -264,5 +264,5 @@ def build_loop_server(parts: LoopConfig) -> LoopServer:
             extra_flags=Flag.SIMULATED if parts.is_simulated else 0,
         ),
     )
-    around = LoopHooks(parts.clock.now_ns, metadata, parts.ring)
+    around = LoopHooks(parts.clock.now_ns, metadata, parts.signal)
     return LoopServer(cycle, parts.arm, shared, around)

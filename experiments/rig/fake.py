@@ -131,7 +131,7 @@ def stepped(
     shared: SharedLayout,
 ) -> tuple[Clock, RigBackend, SimulationControl]:
     """Return (clock, backend, handle) of a simulation in this thread, under `law`."""
-    from fakes.bus.in_process import InProcessDoor
+    from fakes.bus.in_process import InProcessTransport
     from fakes.clock import SteppedClock
     from fakes.world.plain_world import simulated_rig
 
@@ -140,7 +140,7 @@ def stepped(
     simulation = simulated_rig(world.metadata(), constants, clock)
     simulated = simulation.rig
     clock.attach(simulated)
-    link = build_link(InProcessDoor(simulated.bus, clock), shared, clock)
+    link = build_link(InProcessTransport(simulated.bus, clock), shared, clock)
     arm = build_arm(settings.rig, constants, link, clock)
 
     def sensor() -> WrenchSensor:

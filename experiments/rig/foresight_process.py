@@ -49,7 +49,7 @@ def main(context: ChildContext) -> None:
 
 
 class ForesightWorker:
-    """Foresees what the ring of samples gets, while a trial is recorded."""
+    """Foresees what the buffer of samples gets, while a trial is recorded."""
 
     def __init__(
         self, shared: SharedLayout, foresight: Foresight, along: Sequence[float]
@@ -57,7 +57,7 @@ class ForesightWorker:
         """Begin at rest.
 
         Args:
-            shared: rings of samples and of what is foreseen.
+            shared: buffers of samples and of what is foreseen.
             foresight: takes the samples.
             along: x_T in the base frame, three numbers.
         """

@@ -34,8 +34,8 @@ from experiments.settings.rig import RigSettings
 from ft_sensor.serial_line.link import open_port
 from ft_sensor.serial_line.reconnect import ReconnectingSensor, stream_metadata
 from ft_sensor.serial_line.sensor import SerialSensor
-from wam.bus.doors import open_door
 from wam.bus.link import CanLink
+from wam.bus.transports import open_transport
 from wam.driver.arm import WamArm
 
 CONTROL_PRIORITY = 80
@@ -129,8 +129,8 @@ class ControlWorker:
         if self._arm is None:
             can = self._context.settings["can"]
             address = can["interface"], can["channel"], can["bitrate"]
-            door = open_door(*address, self._clock)
-            link = self._link = build_link(door, self._context.shared, self._clock)
+            transport = open_transport(*address, self._clock)
+            link = self._link = build_link(transport, self._context.shared, self._clock)
             properties = self._context.settings["properties"]
             self._arm = build_arm(
                 self._rig, self._constants, link, self._clock, properties
@@ -149,7 +149,7 @@ class ControlWorker:
             shared=self._context.shared,
             clock=self._clock,
             is_simulated=self._is_simulated,
-            ring=self._ring_bell,
+            signal=self._signal,
         )
         self._loop_server = build_loop_server(parts)
 
@@ -173,8 +173,8 @@ class ControlWorker:
             release(self._arm, self._link)
         self._arm = self._link = None
 
-    def _ring_bell(self) -> None:
-        """Ring the bell of the console's terminal, if it has one."""
+    def _signal(self) -> None:
+        """Sound the bell of the console's terminal, if it has one."""
         path = self._context.settings.get("terminal")
         if not path:
             return

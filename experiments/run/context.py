@@ -90,7 +90,7 @@ class RunServices:
         metadata: of the session.
         journal: events and state.
         archive: the trials' files.
-        feedback: bells and speech.
+        feedback: sounds and speech.
         camera: where photos of the bed come from.
         opened_ns: when it was opened [ns].
         kept_before: how many trials were kept until then.

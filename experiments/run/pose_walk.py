@@ -44,7 +44,7 @@ def guided(console_loop: ConsoleLoop, work: Callable[[], None], command: str) ->
         return INTERRUPTED
     except ArmFaultError as fault:
         loop_client = console_loop.loop_client
-        place = FaultContext(
+        context = FaultContext(
             "The calibration",
             bus=loop_client.loop.bus_condition,
             prompt=None,
@@ -53,7 +53,7 @@ def guided(console_loop: ConsoleLoop, work: Callable[[], None], command: str) ->
         )
         was_moving = isinstance(fault, MoveStoppedError)
         result = f"{_STOPPED} {_NOTHING}" if was_moving else _NOTHING
-        console.problem(fault_text(fault.verdict, place, result))
+        console.problem(fault_text(fault.verdict, context, result))
         return 4
     except TractionError as error:
         console.problem(f"{error} {_NOTHING}")

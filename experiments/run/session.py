@@ -8,9 +8,6 @@ from pathlib import Path
 from acquisition.errors import TractionError, UnfitDeviceError
 from acquisition.trial_file.data_files import is_there
 from experiments.arguments import data_option
-from experiments.board.board_cache import row_of
-from experiments.board.session_summaries import glance_sessions
-from experiments.board.upcoming import next_steps
 from experiments.fault_injection.host_faults import HostFaults
 from experiments.fault_injection.plan import plan_faults
 from experiments.operator.console import WARNING, Console
@@ -47,6 +44,9 @@ from experiments.session.states import Event
 from experiments.session.store import create_session, session_utc_ns
 from experiments.settings.load import Settings
 from experiments.settings.matrix import TerrainRow
+from experiments.status_table.session_summaries import glance_sessions
+from experiments.status_table.summary_cache import row_of
+from experiments.status_table.upcoming import next_steps
 from experiments.trial.files import SessionMetadata, collect_metadata
 
 

@@ -61,7 +61,7 @@ def fresh_models(
     """
     kinds = {row.name: row.stones for row in rig.settings.matrix.terrains}
     pushes = stance_pushes(data, but=but)
-    known = {name: of for name, of in pushes.items() if name in kinds}
+    known = {name: trials for name, trials in pushes.items() if name in kinds}
     return fit_pushes(known, kinds, BreakAwayOptions(draws=1))
 
 

@@ -84,8 +84,8 @@ def _parse(path: Path, counts: range) -> PoseFile:
         return PoseFile.model_validate(table)
     except ValidationError as error:
         first = error.errors()[0]
-        place = ".".join(map(str, first["loc"]))
-        raise _unread(path, f"{place}: {first['msg']}") from error
+        location = ".".join(map(str, first["loc"]))
+        raise _unread(path, f"{location}: {first['msg']}") from error
 
 
 def _unread(path: Path, why: str) -> SettingsError:

@@ -176,8 +176,8 @@ def _write_note(services: RunServices, name: TrialName | None, text: str) -> Non
     services.append(
         Event.NOTED, trial=name.number, attempt=name.attempt, text=text, who=who
     )
-    place = add_remark(services.metadata.folder, name, text, who)
-    services.say(f"Noted on {place}: {text}")
+    sidecar = add_remark(services.metadata.folder, name, text, who)
+    services.say(f"Noted on {sidecar}: {text}")
 
 
 def _later(services: RunServices, name: TrialName) -> str:

@@ -116,13 +116,13 @@ def change_verdict(
             )
         remarks = _check_file(journal, name) if verdict == KEEP else []
         journal.append(Event.VERDICT, **fields)
-        place = f"trials/{name.kept}"
+        path = f"trials/{name.kept}"
         if verdict != KEEP:
-            place = f"rejected/{name.rejected}"
+            path = f"rejected/{name.rejected}"
         kept, wanted = len(journal.state.kept), journal.state.wanted
         return [
             *remarks,
-            f"{place}: {verdict}. {folder.id} has {kept} of {wanted} kept.",
+            f"{path}: {verdict}. {folder.id} has {kept} of {wanted} kept.",
         ]
 
 

@@ -111,11 +111,11 @@ def _truth(partial: Path) -> Path:
 
 def _sweep(folder: SessionFolder) -> None:
     """Take away what a kill in the middle of a replacement has left."""
-    for place in (folder.path, folder.trials, folder.rejected):
-        for path in list_folder(place, "*.*.tmp"):
+    for directory in (folder.path, folder.trials, folder.rejected):
+        for path in list_folder(directory, "*.*.tmp"):
             if path.with_suffix("").suffix in REPLACED:
                 remove_file(path)
-        remove_abandoned(ROOM, place)
+        remove_abandoned(ROOM, directory)
     for path in list_folder(folder.trials, "*.mcap.partial"):
         finished = path.with_suffix("")
         for other in (path, recovered_path(path)):

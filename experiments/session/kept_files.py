@@ -213,11 +213,12 @@ def enough_of(sessions: Sequence[SessionFolder], row: WantedRow) -> str:
     texts = [json.dumps(push.plain()) for s in sessions for push in kept_pushes(s)]
     if len(texts) >= row.trials:
         return ""
-    told = _stopping(tuple(texts), row.kind, row.target)
-    if told is None or not told.is_enough:
+    stopping = _stopping(tuple(texts), row.kind, row.target)
+    if stopping is None or not stopping.is_enough:
         return ""
     return (
-        f"{row.name}: enough after {told.trials}: {told.text}; {row.trials} are wanted."
+        f"{row.name}: enough after {stopping.trials}: {stopping.text}; "
+        f"{row.trials} are wanted."
     )
 
 

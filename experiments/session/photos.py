@@ -71,8 +71,8 @@ class Camera:
             except OSError as error:
                 raise PhotoError(f"{words[0]}: {error.strerror}") from error
             if done.returncode:
-                told = done.stderr.decode(errors="replace").strip().splitlines()
-                last = f": {told[-1][:120]}" if told else ""
+                messages = done.stderr.decode(errors="replace").strip().splitlines()
+                last = f": {messages[-1][:120]}" if messages else ""
                 raise PhotoError(f"{words[0]} ended with {done.returncode}{last}")
             return _read(path)
 

@@ -212,9 +212,9 @@ def _checked(model: type[_M], values: object) -> _M:
         return model.model_validate(values)
     except ValidationError as error:
         first = error.errors()[0]
-        place = ".".join(map(str, first["loc"]))
+        location = ".".join(map(str, first["loc"]))
         raise SettingsError(
-            f"A calibration makes {place} = {first['input']!r}: {first['msg']}.",
+            f"A calibration makes {location} = {first['input']!r}: {first['msg']}.",
             hint="Calibrate again, or remove the line. Nothing was started.",
         ) from error
 

@@ -17,7 +17,7 @@ _HEADER = re.compile(r"^\s*(\[\[|\[)\s*([\w.\" -]+?)\s*\]")
 _KEY = re.compile(r"""^\s*["']?([\w-]+)["']?\s*[=.]""")
 
 
-def line_of(text: str, place: str) -> int | None:
+def line_of(text: str, name: str) -> int | None:
     """Return the number of the line of a TOML text where a setting stands.
 
     That is the line of its key, or of the table that should have it; None where neither
@@ -25,7 +25,7 @@ def line_of(text: str, place: str) -> int | None:
 
     Args:
         text: the TOML.
-        place: dotted name, e.g. "terrains[3].trials".
+        name: dotted name, e.g. "terrains[3].trials".
     """
     lines: dict[str, int] = {}
     counts: dict[str, int] = {}
@@ -39,9 +39,9 @@ def line_of(text: str, place: str) -> int | None:
             lines.setdefault(table, number)
         elif key := _KEY.match(line):
             lines.setdefault(f"{table}.{key[1]}".lstrip("."), number)
-    while place and place not in lines:
-        place = place[: max(place.rfind("."), place.rfind("["), 0)]
-    return lines.get(place)
+    while name and name not in lines:
+        name = name[: max(name.rfind("."), name.rfind("["), 0)]
+    return lines.get(name)
 
 
 def explain(
@@ -81,44 +81,44 @@ def explain(
 def _sentence(model: type[BaseModel], text: str, error: ErrorDetails) -> str:
     """Return one error without its full stop, its line at the end."""
     location = _locate(model, error["loc"])
-    line = line_of(text, location.place)
+    line = line_of(text, location.name)
     return _reason(location, error) + (f" (line {line})" if line else "")
 
 
 def _reason(location: "_Location", error: ErrorDetails) -> str:
-    place = location.place
+    name = location.name
     if error["type"] == "missing":
-        return f"{place} is missing{location.example}"
+        return f"{name} is missing{location.example}"
     if error["type"] == "extra_forbidden":
         option = str(error["loc"][-1])
         meant = nearest(option, location.siblings)
         asked = "" if meant is None else f" - did you mean {meant}?"
-        return f"{place} {_refusal(location, option)}{asked}"
+        return f"{name} {_refusal(location, option)}{asked}"
     if error["type"] == "union_tag_not_found":
-        return f"{place}.kind is missing, e.g. {_kinds(location.kinds)}"
+        return f"{name}.kind is missing, e.g. {_kinds(location.kinds)}"
     if error["type"] == "union_tag_invalid":
         got = error.get("ctx", {}).get("tag")
-        return f'{place}.kind = "{got}" - expected {_kinds(location.kinds)}'
+        return f'{name}.kind = "{got}" - expected {_kinds(location.kinds)}'
     is_table = isinstance(error["input"], Mapping)
     got = cast("object", error["input"])
     shown = f'"{got:.80}"' if isinstance(got, str) else f"{got!r:.80}"
     what = error["msg"].removeprefix("Value error, ")
     if is_table and error["type"] == "value_error":
-        return f"{place}: {what}" if place else what
+        return f"{name}: {what}" if name else what
     number = number_at(location.field, location.item)
     if number is None:
         expected = what.removeprefix("Input should be ")
-        return f"{place} = {shown} - expected {expected}{location.example}"
+        return f"{name} = {shown} - expected {expected}{location.example}"
     expected, meant = number_words(number, got)
-    return f"{place} = {shown} - expected {expected}{location.example}{meant}"
+    return f"{name} = {shown} - expected {expected}{location.example}{meant}"
 
 
 @dataclass(frozen=True, slots=True)
 class _Location:
-    """A place in a settings file.
+    """A setting in a settings file.
 
     Attributes:
-        place: its dotted name as a person writes it.
+        name: its dotted name as a person writes it.
         field: what should stand there; None where nothing is known.
         kinds: the sections that a `kind` chooses between, on the way to it; or none.
         kind: the chosen one.
@@ -126,7 +126,7 @@ class _Location:
         item: which one of the field's numbers; None = the field is no list.
     """
 
-    place: str
+    name: str
     field: FieldInfo | None
     kinds: Mapping[str, type[BaseModel]]
     kind: str
@@ -145,25 +145,25 @@ def _locate(model: type[BaseModel], location: tuple[int | str, ...]) -> _Locatio
     current: type[BaseModel] | None = model
     field: FieldInfo | None = None
     kinds: Mapping[str, type[BaseModel]] = {}
-    place = kind = ""
+    name = kind = ""
     siblings: Sequence[str] = ()
     item: int | None = None
     for part in location:
         siblings = tuple(current.model_fields) if current else siblings
         if isinstance(part, int):
-            place += f"[{part}]"
+            name += f"[{part}]"
             item = part
         elif current is None and part in kinds and not kind:
             kind, current = part, kinds[part]
         else:
-            place += f".{part}"
+            name += f".{part}"
             item = None
             field = current.model_fields.get(part) if current else None
             sections = _sections_of(field.annotation) if field else []
             current = sections[0] if len(sections) == 1 else None
             if len(sections) > 1:
                 kinds = {_kind_of(section): section for section in sections}
-    return _Location(place.lstrip("."), field, kinds, kind, siblings, item)
+    return _Location(name.lstrip("."), field, kinds, kind, siblings, item)
 
 
 def _sections_of(annotation: Any) -> list[type[BaseModel]]:  # noqa: ANN401

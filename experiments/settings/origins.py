@@ -8,7 +8,7 @@ from experiments.settings.explaining import line_of
 from experiments.settings.load import SHIPPED, Settings
 
 
-def flatten(value: object, place: str = "") -> dict[str, object]:
+def flatten(value: object, prefix: str = "") -> dict[str, object]:
     """Return the values of nested tables by dotted name, e.g. feet.tread.mass.
 
     A list of numbers or words is one value; a list of tables is numbered.
@@ -16,17 +16,17 @@ def flatten(value: object, place: str = "") -> dict[str, object]:
     if isinstance(value, Mapping):
         values: dict[str, object] = {}
         for key, inner in cast("Mapping[str, object]", value).items():
-            values |= flatten(inner, f"{place}.{key}" if place else key)
+            values |= flatten(inner, f"{prefix}.{key}" if prefix else key)
         return values
     if isinstance(value, list | tuple):
         items = cast("Sequence[object]", value)
         if items and all(isinstance(item, Mapping) for item in items):
             values = {}
             for number, item in enumerate(items):
-                values |= flatten(item, f"{place}[{number}]")
+                values |= flatten(item, f"{prefix}[{number}]")
             return values
-        return {place: list(items)}
-    return {place: value}
+        return {prefix: list(items)}
+    return {prefix: value}
 
 
 def origin_lines(settings: Settings) -> list[str]:
@@ -41,8 +41,8 @@ def origin_lines(settings: Settings) -> list[str]:
         origin = _origin(settings, file)
         for name, value in flatten(model.model_dump()).items():
             line = line_of(text, name) if name in given else None
-            place = f"{origin}, line {line}" if line else origin
-            source = place if name in given else f"default, not in {file}"
+            location = f"{origin}, line {line}" if line else origin
+            source = location if name in given else f"default, not in {file}"
             lines.append(f"{name} = {_shown(value)}   ({source})")
     return lines
 

@@ -99,17 +99,17 @@ def calibrate_arm(plan: AcceptancePlan, data: Path) -> AcceptancePlan:
     if plan.config is not None or plan.is_twin or plan.friction < _RUBS:
         return plan
     data.mkdir(parents=True, exist_ok=True)
-    folder, place = data / "rig", data / "calibration"
+    folder, calibration = data / "rig", data / "calibration"
     config = folder / "rig.toml"
     simulated = ["--fake", "--fast", "--operator-script", "auto", "--no-color"]
     simulated += ["--seed", str(plan.seed), *_arm(plan)]
-    simulated += ["--config", str(config), "--data", str(place)]
+    simulated += ["--config", str(config), "--data", str(calibration)]
     steps = (["init", str(folder)], ["calibrate", "friction", *simulated])
     for step in steps:
-        if code := _record(step, place):
+        if code := _record(step, calibration):
             raise SessionError(
                 f"traction {step[0]} ended with exit code {code}.",
-                hint=f"What it said: {place}.log",
+                hint=f"What it said: {calibration}.log",
             )
     section = r'(\[friction\][^\[]*?model = )"none"([^\[]*?file = )"friction.toml"'
     used = r'\1"calibrated"\2"friction.fake.toml"'
@@ -153,7 +153,9 @@ def analyse(plan: AcceptancePlan, data: Path) -> list[BandResult]:
     With fewer than ten trials only the bands on slips, samples and truth are returned.
     """
     trials = _load(plan, data)
-    series = {name: [trial.series() for trial in of] for name, of in trials.items()}
+    series = {
+        name: [trial.series() for trial in group] for name, group in trials.items()
+    }
     is_whole = plan.trials >= WHOLE
     options = StudyOptions(
         prepare=PrepareOptions(container_travel=plan.travel),
@@ -190,10 +192,10 @@ def as_plain(plan: AcceptancePlan, results: Sequence[BandResult]) -> dict[str, o
     }
 
 
-def _record(arguments: list[str], place: Path) -> int:
+def _record(arguments: list[str], folder: Path) -> int:
     """Run one command of its own; what it says goes beside the data."""
     command = [sys.executable, "-m", "experiments", *arguments]
-    with place.with_name(place.name + ".log").open("w") as log:
+    with folder.with_name(folder.name + ".log").open("w") as log:
         return subprocess.run(
             command, stdin=subprocess.DEVNULL, stdout=log, stderr=log, check=False
         ).returncode
@@ -268,17 +270,17 @@ def _grounds(
 
 def _truth(trials: dict[str, list[RecordedTrial]]) -> list[BandResult]:
     errors = {
-        name: [e for trial in of if (e := compare_with_truth(trial)) is not None]
-        for name, of in trials.items()
+        name: [e for trial in group if (e := compare_with_truth(trial)) is not None]
+        for name, group in trials.items()
     }
-    every = [error for of in errors.values() for error in of]
+    every = [error for group in errors.values() for error in group]
     if not every:
         return [BandResult(band, ()) for band in TRUTH_BANDS]
     values = (
-        tuple(1e3 * max(e.v_t for e in of) for of in errors.values() if of),
+        tuple(1e3 * max(e.v_t for e in group) for group in errors.values() if group),
         (float(np.mean([e.F_t for e in every])),),
         (float(np.mean([e.F_n for e in every])),),
-        _predicted([trial for of in trials.values() for trial in of]),
+        _predicted([trial for group in trials.values() for trial in group]),
     )
     return [BandResult(*pair) for pair in zip(TRUTH_BANDS, values, strict=True)]
 

@@ -146,7 +146,7 @@ class _Trials:
 
 
 class _Collector:
-    """Reads the ring of timings as it fills; it holds a minute only."""
+    """Reads the buffer of timings as it fills; it holds a minute only."""
 
     def __init__(self, rig: Rig, seconds: float) -> None:
         self._timings = rig.backend.loop_client.timings()

@@ -8,7 +8,7 @@ from pathlib import Path
 from acquisition.clock import SystemClock
 from acquisition.errors import LinkError, SettingsError
 from fakes.bus.client import FRAME_SIZE, open_socket, pack_frame, unpack_frame
-from wam.bus.doors import open_door
+from wam.bus.transports import open_transport
 
 CLIENTS = 32
 _PACKETS_AT_A_TIME = 64  # of one client, before the next one is heard
@@ -188,10 +188,10 @@ class CanPort:
         self.name = f"{interface}:{channel}"
         self.ignored = 0
         self.lost = 0
-        self._door = open_door(interface, channel, bitrate, SystemClock())
+        self._transport = open_transport(interface, channel, bitrate, SystemClock())
         self._inbox: list[Frame] = []
         self._is_open = True
-        self._descriptor = self._door.fileno()
+        self._descriptor = self._transport.fileno()
 
     def fileno(self) -> int:
         """Return the bus's descriptor, -1 if it has none."""
@@ -216,7 +216,7 @@ class CanPort:
     def send(self, can_id: int, data: bytes) -> None:
         """Send a frame of the network."""
         try:
-            self._door.send(can_id, data)
+            self._transport.send(can_id, data)
         except LinkError:
             self.lost += 1  # as on a wire without an acknowledgement
 
@@ -224,11 +224,11 @@ class CanPort:
         """Give the bus back; a second call does nothing."""
         if self._is_open:
             self._is_open = False
-            self._door.close()
+            self._transport.close()
 
     def _drain(self) -> None:
         try:
-            arrived = self._door.receive()
+            arrived = self._transport.receive()
         except LinkError as error:
             raise LinkError(
                 f"CAN {self.name} broke: {error.message}",

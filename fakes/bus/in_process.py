@@ -10,9 +10,9 @@ from acquisition.clock import NS_PER_S, Clock
 from fakes.pucks.event_queue import OutFrame
 from fakes.pucks.network import PuckNetwork
 from fakes.pucks.wire import WiredNetwork
-from wam.bus.doors import PythonCanDoor
 from wam.bus.link import DRAIN_AT_MOST, as_frame
-from wam.bus.link import Frame as DoorFrame
+from wam.bus.link import Frame as TransportFrame
+from wam.bus.transports import PythonCanTransport
 
 _PATIENCE_NS = NS_PER_S
 _QUEUE = 11  # frames: txqueuelen 10, and one in the driver
@@ -170,8 +170,8 @@ class FakeCanBus(can.BusABC):
         raise can.CanOperationError("Network is down", errno.ENETDOWN)
 
 
-class InProcessDoor(PythonCanDoor):
-    """The door of python-can to a `FakeCanBus`, without a message for every frame.
+class InProcessTransport(PythonCanTransport):
+    """The transport of python-can for a `FakeCanBus`, without a message per frame.
 
     Only where nothing is out of the ordinary: a bus that is disturbed, and frames that
     have waited long, take python-can's way. What comes and goes is the same on both.
@@ -189,7 +189,7 @@ class InProcessDoor(PythonCanDoor):
         else:
             super().send(can_id, data)
 
-    def receive(self) -> list[DoorFrame]:
+    def receive(self) -> list[TransportFrame]:
         """Return what has arrived, oldest first; raises LinkError."""
         fake = self._fake
         if not fake.is_undisturbed or self._error is not None:

@@ -1,4 +1,4 @@
-"""The ground of one trial: a plate or a bed of stones, and the boards around it."""
+"""The ground of one trial: a plate or a bed of stones, and the planks around it."""
 
 import math
 from dataclasses import dataclass
@@ -140,15 +140,15 @@ def make_terrain(
     return StoneBed(STONES[stones], incline, rng)
 
 
-FREE = 0.045  # from the centre line until the sole's edge meets a board [m]
-_RIM = 0.04  # height of the boards above the plane [m]
-_BOARD_K = 5000.0  # N/m
-_BOARD_B = 2.0 * 0.4 * math.sqrt(_BOARD_K * DAMPING_MASS)  # N s/m
-_BOARD_MU = 0.3  # of a foot that slips along them
+FREE = 0.045  # from the centre line until the sole's edge meets a plank [m]
+_RIM = 0.04  # height of the planks above the plane [m]
+_PLANK_K = 5000.0  # N/m
+_PLANK_B = 2.0 * 0.4 * math.sqrt(_PLANK_K * DAMPING_MASS)  # N s/m
+_PLANK_MU = 0.3  # of a foot that slips along them
 
 
 class Container:
-    """A ground between two boards; both push, neither pulls."""
+    """A ground between two planks; both push, neither pulls."""
 
     def __init__(self, ground: Terrain) -> None:
         self.ground = ground
@@ -171,7 +171,7 @@ class Container:
         return self.ground.capacity(x, F_n)
 
     def step(self, dt: float, motion: Motion) -> Contact:
-        """Advance the ground by `dt` [s]; return what it and the boards do."""
+        """Advance the ground by `dt` [s]; return what it and the planks do."""
         contact = self.ground.step(dt, motion)
         if -FREE <= motion[1] <= FREE:
             return contact
@@ -180,7 +180,7 @@ class Container:
             return contact
         depth = abs(y) - FREE
         side = math.copysign(1.0, y)
-        shared = max(0.0, _BOARD_K * depth + _BOARD_B * side * vy)
-        friction = _BOARD_MU * shared * math.tanh(vx / 0.01)
+        shared = max(0.0, _PLANK_K * depth + _PLANK_B * side * vy)
+        friction = _PLANK_MU * shared * math.tanh(vx / 0.01)
         F_t, F_y, F_n, M_x, M_y, M_z = contact
         return F_t + friction, F_y - side * shared, F_n, M_x, M_y, M_z

@@ -168,8 +168,8 @@ class JointDrives:
     def _bear(self, rows: Array, speeds: Sequence[float], t_ns: int) -> None:
         if t_ns % BEARING_NS == 0:
             against = zip(self.sent(), self._bristles.torques(speeds), strict=True)
-            borne = [sent + friction for sent, friction in against]
-            self._bristles.bear(self._j2mp.dot(rows[0]).tolist(), borne)
+            net = [sent + friction for sent, friction in against]
+            self._bristles.bear(self._j2mp.dot(rows[0]).tolist(), net)
 
     def _stop(self, rows: Array) -> None:
         self._stopping = self.stops.at(*rows[:2].tolist())

@@ -69,8 +69,8 @@ class ArmPlant:
         parts = arm_and_hand(constants, tool, frame, forearm, options.down)
         self._substeps = options.substeps
         self._substep_ns = PERIOD_NS // options.substeps
-        borne = motor_weights(parts.model, constants, q)
-        drawn = draw_friction(constants, options.friction, options.seed, borne)
+        weights = motor_weights(parts.model, constants, q)
+        drawn = draw_friction(constants, options.friction, options.seed, weights)
         self.friction = drawn if options.motors is None else options.motors
         up = -frame.axes().dot(options.down)
         self._up: list[float] = (up * forearm * GRAVITY).tolist()

@@ -60,10 +60,10 @@ class FrameScanner(Generic[F]):
         if self._held:
             # A frame that begins in the held bytes ends before this many more.
             held = len(self._held)
-            seam = self._held + data[: self._size - 1]
-            reached = self._scan(seam, 0, held, frames)
+            boundary = self._held + data[: self._size - 1]
+            reached = self._scan(boundary, 0, held, frames)
             if reached < held:
-                self._held = seam[reached:]
+                self._held = boundary[reached:]
                 return frames
             start = reached - held
         self._held = data[self._scan(data, start, len(data), frames) :]

@@ -1,4 +1,4 @@
-"""The door to pyserial: ports that are drained, never waited on."""
+"""Serial ports that are drained, never waited on; the only importer of pyserial."""
 
 import termios
 from dataclasses import dataclass

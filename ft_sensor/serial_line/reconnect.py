@@ -10,7 +10,7 @@ from ft_sensor.serial_line.sensor import SerialSensor
 LOST_NS = 250_000_000  # without one sample that can be trusted
 FIRST_PAUSE_NS = NS_PER_S // 2  # before it is looked for; doubled every time
 LONGEST_PAUSE_NS = 4 * NS_PER_S
-_UNTOLD = "unknown"
+_UNKNOWN = "unknown"
 
 
 class ReconnectingSensor:
@@ -110,10 +110,10 @@ class ReconnectingSensor:
         self.reopened += 1
 
     def _refuse_another(self, sensor: SerialSensor) -> None:
-        before = self._facts.get("serial_number", _UNTOLD)
-        now = sensor.describe().get("serial_number", _UNTOLD)
+        before = self._facts.get("serial_number", _UNKNOWN)
+        now = sensor.describe().get("serial_number", _UNKNOWN)
         # A sensor found streaming may not tell.
-        if before == now or before.startswith(_UNTOLD) or now.startswith(_UNTOLD):
+        if before == now or before.startswith(_UNKNOWN) or now.startswith(_UNKNOWN):
             return
         sensor.close()
         raise DeviceFaultError(

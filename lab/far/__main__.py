@@ -68,14 +68,14 @@ class FarSide:
         t_ns, frames, data = self._exchange.asked()
         self._clock.t_ns = t_ns
         if call is Call.SERVE:
-            self._served = self._made(json.loads(self._exchange.said()))
+            self._served = self._made(json.loads(self._exchange.message()))
         elif self._served is None:
             raise ValueError("nothing is served yet.")
         elif call is Call.DO:
-            self._served.do(self._exchange.said())
+            self._served.do(self._exchange.message())
         else:
-            left_ns, sent, said = self._served.advance(frames, data)
-            self._exchange.answer(t_ns + left_ns, sent, said)
+            left_ns, sent, written = self._served.advance(frames, data)
+            self._exchange.answer(t_ns + left_ns, sent, written)
 
     def _made(self, wanted: dict[str, str]) -> Served:
         settings = _settings(wanted["rig"], wanted["matrix"])
@@ -88,8 +88,8 @@ class FarSide:
 
 def _settings(rig: str, matrix: str) -> Settings:
     """Return the settings from the text of two files."""
-    with tempfile.TemporaryDirectory(prefix="lab") as place:
-        folder = Path(place)
+    with tempfile.TemporaryDirectory(prefix="lab") as scratch:
+        folder = Path(scratch)
         (folder / "rig.toml").write_text(rig, encoding="utf-8")
         (folder / "matrix.toml").write_text(matrix, encoding="utf-8")
         return load_settings(folder / "rig.toml")

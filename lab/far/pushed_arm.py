@@ -75,10 +75,10 @@ class PushedArm:
                 wired.send(now_ns, can_id, payload)
         sent = [(can_id, payload) for _, can_id, payload in wired.advance(now_ns)]
         self._plant.advance(now_ns)
-        said = b"" if self._line is None else self._line.advance(now_ns, data)
+        written = b"" if self._line is None else self._line.advance(now_ns, data)
         event_ns = wired.next_event_ns()
         left = TICK_NS if event_ns is None else max(event_ns - now_ns, _TOGETHER_NS)
-        return min(left, TICK_NS), sent, said
+        return min(left, TICK_NS), sent, written
 
     def _switch(self, *, is_on: bool) -> None:
         if self._line is not None:

@@ -6,7 +6,7 @@ import sys
 import traceback
 
 from lab.guest.commands import ScenarioError, seconds, wait
-from lab.guest.machine_room import PLACE, MachineRoom
+from lab.guest.machine_room import LAB_FOLDER, MachineRoom
 from lab.guest.scenarios.registry import Scenario, chosen
 from lab.results import (
     Begun,
@@ -52,10 +52,10 @@ def main(names: list[str]) -> None:
 
     "--echo" among them: what is run and said goes to the console as it comes.
     """
-    os.environ["TMPDIR"] = str(PLACE / "tmp")
-    os.environ["HOME"] = str(PLACE)
+    os.environ["TMPDIR"] = str(LAB_FOLDER / "tmp")
+    os.environ["HOME"] = str(LAB_FOLDER)
     os.environ.update(_GIT)
-    (PLACE / "tmp").mkdir(parents=True, exist_ok=True)
+    (LAB_FOLDER / "tmp").mkdir(parents=True, exist_ok=True)
     # Guest time jumps while the host's files are read: read them before it counts.
     for name in _WARM:
         importlib.import_module(name)

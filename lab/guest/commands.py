@@ -99,9 +99,9 @@ class Program:
         """
         end = seconds() + patience
         while True:
-            place = self.output.find(text, self._seen)
-            if place >= 0:
-                before, self._seen = self._seen, place + len(text)
+            index = self.output.find(text, self._seen)
+            if index >= 0:
+                before, self._seen = self._seen, index + len(text)
                 return self.output[before : self._seen]
             is_over = not self.is_running
             self._read(_SLICE)

@@ -14,7 +14,7 @@ from lab.guest import relay
 from lab.guest.commands import Program, ScenarioError, Shell, read_text
 from lab.guest.warm_start import Run
 
-PLACE = Path("/run/lab")
+LAB_FOLDER = Path("/run/lab")
 ROOT = Path(__file__).parents[2]
 CAN, FAR_CAN = "can0", "can1"  # the program's card, and the simulated arm's
 BITRATE = 1_000_000
@@ -69,7 +69,7 @@ class MachineRoom:
         """Name its folder; `is_echoed`: the log goes to stdout as it grows, too."""
         self.log: list[str] = EchoedLog() if is_echoed else []
         self.shell = Shell(self.log)
-        self.folder = PLACE / name.replace(" ", "-")
+        self.folder = LAB_FOLDER / name.replace(" ", "-")
         self._stack = ExitStack()
 
     def __enter__(self) -> Self:

@@ -61,7 +61,7 @@ class FarSide:
         if value == DONE:
             return
         if value == 0:
-            raise FarSideError(self.exchange.said())
+            raise FarSideError(self.exchange.message())
         raise FarSideError("the host's process that simulates the arm has ended.")
 
     def say(self, call: Call, t_ns: int, text: str) -> None:
@@ -160,11 +160,11 @@ def _mapped(wanted: tuple[int, int], resource: str, size: int) -> mmap.mmap:
     Raises:
         FarSideError: the machine has no such device.
     """
-    for place in _DEVICES.iterdir():
-        pair = ((place / name).read_text(encoding="ascii") for name in _PAIR)
+    for device in _DEVICES.iterdir():
+        pair = ((device / name).read_text(encoding="ascii") for name in _PAIR)
         if tuple(int(text, 16) for text in pair) == wanted:
-            (place / "enable").write_text("1", encoding="ascii")
-            file = os.open(place / resource, os.O_RDWR | os.O_SYNC)
+            (device / "enable").write_text("1", encoding="ascii")
+            file = os.open(device / resource, os.O_RDWR | os.O_SYNC)
             try:
                 return mmap.mmap(file, size)
             finally:

@@ -67,9 +67,9 @@ def with_chunk(payload, size, compression="zstd"):
     changed = bytearray(data)
     at = span_of(data, CHUNK_INDEX).body
     struct.pack_into("<Q", changed, at + 24, len(record))
-    place = at + HEAD_TO_OFFSETS + 2
-    (offset,) = struct.unpack_from("<Q", data, place)
-    struct.pack_into("<Q", changed, place, offset + shift)
+    position = at + HEAD_TO_OFFSETS + 2
+    (offset,) = struct.unpack_from("<Q", data, position)
+    struct.pack_into("<Q", changed, position, offset + shift)
     sizes = at + HEAD_TO_OFFSETS + OFFSET_ENTRY + 8 + 4 + len(name)
     struct.pack_into("<QQ", changed, sizes, len(payload), size)
     footer = len(data) - 8 - 29 + 9

@@ -45,35 +45,35 @@ def mutated(data: bytes, seed: int) -> bytes:
     return data
 
 
-def _place(data: bytes, rng: np.random.Generator) -> int:
+def _offset(data: bytes, rng: np.random.Generator) -> int:
     return int(rng.integers(len(data) + 1))
 
 
 def _flip(data: bytes, rng: np.random.Generator) -> bytes:
     if not data:
         return b"\xff"
-    place = _place(data[1:], rng)
-    spoilt = data[place] ^ 1 << int(rng.integers(8))
-    return data[:place] + bytes((spoilt,)) + data[place + 1 :]
+    offset = _offset(data[1:], rng)
+    spoilt = data[offset] ^ 1 << int(rng.integers(8))
+    return data[:offset] + bytes((spoilt,)) + data[offset + 1 :]
 
 
 def _cut(data: bytes, rng: np.random.Generator) -> bytes:
-    first, last = sorted((_place(data, rng), _place(data, rng)))
+    first, last = sorted((_offset(data, rng), _offset(data, rng)))
     return data[:first] + data[last:]
 
 
 def _end(data: bytes, rng: np.random.Generator) -> bytes:
-    return data[: _place(data, rng)]
+    return data[: _offset(data, rng)]
 
 
 def _repeat(data: bytes, rng: np.random.Generator) -> bytes:
-    first, last = sorted((_place(data, rng), _place(data, rng)))
+    first, last = sorted((_offset(data, rng), _offset(data, rng)))
     return data[:last] + data[first:last] + data[last:]
 
 
 def _insert(data: bytes, rng: np.random.Generator) -> bytes:
-    place = _place(data, rng)
-    return data[:place] + _TOKENS[rng.integers(len(_TOKENS))] + data[place:]
+    offset = _offset(data, rng)
+    return data[:offset] + _TOKENS[rng.integers(len(_TOKENS))] + data[offset:]
 
 
 def _other_number(data: bytes, rng: np.random.Generator) -> bytes:

@@ -14,8 +14,6 @@ from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.recover import recover_file
 from analysis.data.tables import load_tables
 from analysis.terrains import database as terrain_db
-from experiments.board.board_cache import BoardCache, row_of
-from experiments.board.matrix_board import count_board, see_sessions
 from experiments.operator.scripted import ScriptedOperator
 from experiments.report.checksums import SUMS, changed_files
 from experiments.report.rebuilding import compare_tables
@@ -28,6 +26,8 @@ from experiments.session.store import list_sessions
 from experiments.session.unfinished import find_unfinished
 from experiments.settings.load import load_settings
 from experiments.settings.rig import FrictionSettings
+from experiments.status_table.summary_cache import SummaryCache, row_of
+from experiments.status_table.table import count_rows, see_sessions
 from experiments.tools.pendant import read_script
 from ft_sensor.calibration.files import payload_from_toml, terrain_from_toml
 from ft_sensor.calibration.sensor_file import sensor_from_toml
@@ -78,7 +78,7 @@ def _session(folder: Path, name: str, data: bytes, journal: bytes = b"") -> None
     (path / name).write_bytes(data)
     find_unfinished(folder)
     rows = [row_of(row) for row in load_settings(None).matrix.terrains]
-    count_board(see_sessions(folder, {}, BoardCache()), rows)
+    count_rows(see_sessions(folder, {}, SummaryCache()), rows)
     (session,) = list_sessions(folder)
     with session_lock(session):
         recover_session(open_journal(session, SystemClock()))

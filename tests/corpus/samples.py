@@ -143,8 +143,8 @@ def _foreseen() -> bytes:
     states = np.frombuffer(bytearray(FORESIGHT.template * 12), FORESIGHT.dtype)
     states["cycle"] = 1000 + 5 * np.arange(12)
     states["terrains"][:, :2] = 0.5
-    with tempfile.TemporaryDirectory(prefix="corpus-") as place:
-        path = Path(place) / "T01.mcap"
+    with tempfile.TemporaryDirectory(prefix="corpus-") as scratch:
+        path = Path(scratch) / "T01.mcap"
         writer = write_trial(path, make_cycles(60), header, topics=FORESEEN_TOPICS)
         writer.write_foresight(states)
         writer.finish("travel")

@@ -80,9 +80,9 @@ def sparse(path, size):
 @pytest.fixture
 def data(tmp_path):
     for path, content in session_files().items():
-        place = tmp_path / "data" / path
-        place.parent.mkdir(parents=True, exist_ok=True)
-        place.write_bytes(content)
+        target = tmp_path / "data" / path
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_bytes(content)
     return tmp_path / "data"
 
 

@@ -34,8 +34,8 @@ class GuardVerdict:
 
 def read(name: str, data: bytes) -> GuardVerdict:
     """Read `data` by the reader `name` in a folder of its own."""
-    with tempfile.TemporaryDirectory(prefix="corpus-") as place:
-        outside = Path(place)
+    with tempfile.TemporaryDirectory(prefix="corpus-") as scratch:
+        outside = Path(scratch)
         folder = outside / "deep" / "down" / "here"
         folder.mkdir(parents=True)
         before = Path.cwd()

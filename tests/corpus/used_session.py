@@ -36,8 +36,8 @@ class HalfDoneError(Exception):
 @cache
 def session_files() -> dict[str, bytes]:
     """Return the files of the data folder of the session, by their path below it."""
-    with tempfile.TemporaryDirectory(prefix="corpus-") as place:
-        data = Path(place)
+    with tempfile.TemporaryDirectory(prefix="corpus-") as scratch:
+        data = Path(scratch)
         folder = create_session(data, "TF", is_simulated=True, utc_ns=1_800 * 10**15)
         journal = Journal(folder, SystemClock())
         journal.append(Event.STARTED, terrain="TF", trials=2)
@@ -80,9 +80,9 @@ def use(name: str, data: bytes, folder: Path) -> None:
         HalfDoneError: one ended as a bug, or data and sidecar of a trial are apart.
     """
     for path, content in session_files().items():
-        place = folder / path
-        place.parent.mkdir(parents=True, exist_ok=True)
-        place.write_bytes(data if path.endswith(name) else content)
+        target = folder / path
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_bytes(data if path.endswith(name) else content)
     before = _sums(folder)
     for command in COMMANDS:
         _run(command)
@@ -108,8 +108,8 @@ def _sums(folder: Path) -> list[str]:
 
 def _check_pairs(folder: Path, command: str) -> None:
     """Require a sidecar beside every recording, and none without one."""
-    for place in ("trials", "rejected"):
-        files = list(folder.glob(f"sessions/*/{place}/T*"))
+    for name in ("trials", "rejected"):
+        files = list(folder.glob(f"sessions/*/{name}/T*"))
         recordings = {path.stem for path in files if path.suffix == ".mcap"}
         sidecars = {path.stem for path in files if path.suffix == ".json"}
         if recordings != sidecars:

@@ -13,8 +13,8 @@ from tests.crash.power_cuts import record_session, survive
 
 def main(what: str, count: int, seed: int) -> int:
     """Return how many things went wrong."""
-    with tempfile.TemporaryDirectory(prefix="crash-") as place:
-        folder = Path(place)
+    with tempfile.TemporaryDirectory(prefix="crash-") as scratch:
+        folder = Path(scratch)
         if what != "power-cuts":
             kinds = KINDS if what == "io-errors" else (what,)
             wrong = fail(folder, count, seed, kinds)

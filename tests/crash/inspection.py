@@ -80,8 +80,8 @@ def problems(root: Path, wanted: Journals, recorded: int) -> list[str]:
     wrong, data = [], root / "data"
     commands = [("status",), ("verify", "--all"), ("recover", data), ("status",)]
     for words in commands if data.exists() else commands[:2]:
-        place = () if words[0] == "recover" else ("--data", data)
-        wrong += _bug(words[0], traction(*words, *place))
+        options = () if words[0] == "recover" else ("--data", data)
+        wrong += _bug(words[0], traction(*words, *options))
     find_unfinished(data)
     sessions = {session.path: session for session in list_sessions(data)}
     wrong += [f"{path} is gone" for path in wanted if root / path not in sessions]

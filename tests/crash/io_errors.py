@@ -112,12 +112,12 @@ def fail(folder: Path, runs: int, seed: int, kinds: Sequence[str] = KINDS) -> li
 
 def use(config: Path, data: Path) -> list[Done]:
     """Run a session and change it; return how each command ended."""
-    place = ("--data", data)
+    options = ("--data", data)
     done = [run_session(config, data)]
     if done[0].code == 0:
         done += [
-            traction("verdict", "S001", "T01", "reject", "tilted", *place),
-            traction("redo", "S001", "T02", "--reason", "wet", *AUTO, *place),
+            traction("verdict", "S001", "T01", "reject", "tilted", *options),
+            traction("redo", "S001", "T02", "--reason", "wet", *AUTO, *options),
         ]
     return done
 

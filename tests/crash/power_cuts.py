@@ -42,12 +42,12 @@ def record_session(folder: Path) -> Recording:
 
     with recorded(data.parent) as recording:
         assert run_watched(config, data, 2, press=press).done.code == 0
-        place = ("--data", data)
+        options = ("--data", data)
         for command in (
-            ("note", "S001", "T01", "wet", *place),
-            ("verdict", "S001", "T01", "reject", "tilted", *place),
-            ("verdict", "S001", "T01b", "keep", "was fine", *place),
-            ("redo", "S001", "T02", "--reason", "wet", *AUTO, *place),
+            ("note", "S001", "T01", "wet", *options),
+            ("verdict", "S001", "T01", "reject", "tilted", *options),
+            ("verdict", "S001", "T01b", "keep", "was fine", *options),
+            ("redo", "S001", "T02", "--reason", "wet", *AUTO, *options),
         ):
             done = traction(*command)
             assert done.code == 0, done.err
@@ -65,15 +65,15 @@ def survive(recording: Recording, folder: Path, cuts: int, seed: int) -> list[st
         length = int(rng.integers(len(recording.operations) + 1))
         operations = recording.operations[:length]
         wanted = acknowledged(operations)
-        place = folder / f"cut{number}"
-        after_power_cut(operations, rng).write(place)
+        root = folder / f"cut{number}"
+        after_power_cut(operations, rng).write(root)
         if number % 3 == 0:
-            with recorded(place) as second:
-                put_in_order(place / "data")
-            shutil.rmtree(place)
+            with recorded(root) as second:
+                put_in_order(root / "data")
+            shutil.rmtree(root)
             until = int(rng.integers(second.start, len(second.operations) + 1))
-            after_power_cut(second.operations[:until], rng).write(place)
-        found = problems(place, wanted, recordings(operations))
+            after_power_cut(second.operations[:until], rng).write(root)
+        found = problems(root, wanted, recordings(operations))
         wrong += [f"{number} after {length} operations: {text}" for text in found]
-        shutil.rmtree(place)
+        shutil.rmtree(root)
     return wrong

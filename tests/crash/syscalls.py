@@ -154,17 +154,19 @@ class Recording:
         """Return `path` relative to the root, None outside of it."""
         if not isinstance(path, str | os.PathLike):
             return None
-        place = Path(os.fspath(path))
+        location = Path(os.fspath(path))
         if folder is not None:
-            place = Path(f"/proc/self/fd/{folder}").readlink() / place
-        place = place.parent.resolve() / place.name
-        inside = place == self.root or self.root in place.parents
-        return place.relative_to(self.root) if inside else None
+            location = Path(f"/proc/self/fd/{folder}").readlink() / location
+        location = location.parent.resolve() / location.name
+        inside = location == self.root or self.root in location.parents
+        return location.relative_to(self.root) if inside else None
 
     def is_inside(self, file: object) -> bool:
         """Return whether a path or a descriptor is one below the root."""
-        place = Path(f"/proc/self/fd/{file}").readlink() if type(file) is int else file
-        return self.below(place) is not None
+        location = (
+            Path(f"/proc/self/fd/{file}").readlink() if type(file) is int else file
+        )
+        return self.below(location) is not None
 
     def opened(self, path: Path, descriptor: int, flags: int, *, was_there: bool):
         """Note a file that was opened, and that it is new or was emptied."""
@@ -186,7 +188,7 @@ class Recording:
         if descriptor in self._open:
             self.operations.append(Write(self._open[descriptor], offset, data))
 
-    def place(self, descriptor: int) -> int:
+    def write_offset(self, descriptor: int) -> int:
         """Return where the next write of a descriptor goes."""
         if descriptor in self._appending:
             return os.fstat(descriptor).st_size
@@ -230,7 +232,7 @@ class _RecordedFile(io.FileIO):
     recording: Recording
 
     def write(self, data) -> int:
-        offset = self.recording.place(self.fileno())
+        offset = self.recording.write_offset(self.fileno())
         allowed = self.recording.limit("write", len(data))
         count = super().write(bytes(data[:allowed]))
         self.recording.written(self.fileno(), offset, bytes(data[:count]))
@@ -357,7 +359,7 @@ def _recorded_calls(recording: Recording):
         return called
 
     def write(descriptor, data):
-        offset = recording.place(descriptor) if descriptor > 2 else 0
+        offset = recording.write_offset(descriptor) if descriptor > 2 else 0
         count = real["write"](descriptor, data)
         recording.written(descriptor, offset, bytes(data[:count]))
         return count
@@ -403,10 +405,10 @@ def _reading_calls(recording: Recording):
     def on_read(name, what):
         real = getattr(os, name)
 
-        def called(place=".", *arguments):
-            if recording.is_inside(place):
+        def called(path=".", *arguments):
+            if recording.is_inside(path):
                 recording.limit(what, 0)
-            return real(place, *arguments)
+            return real(path, *arguments)
 
         return called
 

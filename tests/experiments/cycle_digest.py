@@ -53,8 +53,8 @@ def record(folder: Path) -> Path:
     script = folder / "script"
     script.write_text("keep\nlast\nkeep\n")
     options = ("--fake", "--fast", "--trials", 3, "--seed", 5)
-    places = ("--config", config, "--data", folder, "--operator-script", script)
-    traction("run", "TF", *options, *places)
+    paths = ("--config", config, "--data", folder, "--operator-script", script)
+    traction("run", "TF", *options, *paths)
     return only_session(folder)
 
 

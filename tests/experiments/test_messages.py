@@ -97,8 +97,8 @@ def test_the_numbers_of_a_fault_fill_its_message(fault):
 def test_a_fault_that_ends_what_is_done_names_the_command_that_goes_on(fault):
     detail = FAULTS[fault].detail
     numbers = () if detail is CircuitCauses else (7 for _ in fields(detail))
-    place = FaultContext(prompt=None, command="traction zero")
-    text = fault_text(verdict_for(fault, detail(*numbers)), place)
+    context = FaultContext(prompt=None, command="traction zero")
+    text = fault_text(verdict_for(fault, detail(*numbers)), context)
     assert "{" not in text
     assert "resume" not in text
     do = CATALOGUE[fault.value].do

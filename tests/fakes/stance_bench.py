@@ -77,8 +77,8 @@ class StanceBench:
 
     def cycle(self) -> None:
         """Advance by 2 ms."""
-        place, speed = (self.x, self.z), (self.vx, self.vz)
-        f_x, f_z = self.axes.force(place, speed, self.now_ns)
+        position, speed = (self.x, self.z), (self.vx, self.vz)
+        f_x, f_z = self.axes.force(position, speed, self.now_ns)
         F_t = F_n = 0.0
         for _ in range(SUBSTEPS):
             vx, vz = self.vx, self.vz

@@ -8,8 +8,8 @@ from fakes.bus.in_process import FakeCanBus
 from fakes.pucks.ft_puck import Load
 from fakes.pucks.network import PuckNetwork
 from fakes.pucks.options import NetworkOptions
-from wam.bus.doors import PythonCanDoor
 from wam.bus.link import CanLink
+from wam.bus.transports import PythonCanTransport
 
 
 class SteppedClock:
@@ -81,7 +81,7 @@ class Rig:
         self.bus = FakeCanBus(self.network, self.clock)
         self.clock.world = self.bus
         self.sent: list[tuple[int, int, bytes]] = []
-        self.link = CanLink(PythonCanDoor(self.bus, self.clock))
+        self.link = CanLink(PythonCanTransport(self.bus, self.clock))
         finalize(self, self.bus.shutdown)
         send = self.link.send
 

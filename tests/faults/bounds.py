@@ -84,12 +84,14 @@ def main(part: str) -> None:
     rows = {
         f: {p: list(astuple(b)) for p, b in r.items()} for f, r in read_bounds().items()
     }
-    with tempfile.TemporaryDirectory(prefix="bounds-") as place:
-        config = write_config(Path(place))
+    with tempfile.TemporaryDirectory(prefix="bounds-") as scratch:
+        config = write_config(Path(scratch))
         for number, (fault, phase, _) in enumerate(cells_of_all()):
             if phase not in BOUND_PHASES or part not in f"{fault}-{phase}":
                 continue
-            seen = run_with(strike_of(fault), phase, config, Path(place, f"d{number}"))
+            seen = run_with(
+                strike_of(fault), phase, config, Path(scratch, f"d{number}")
+            )
             motion = seen.truth.since(seen.scene.struck_ns, fault)
             rows.setdefault(fault, {})[phase] = _rounded(motion)
             print(fault, phase, *rows[fault][phase], flush=True)  # noqa: T201

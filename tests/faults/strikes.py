@@ -196,9 +196,9 @@ def _long_heartbeat_and_silence(scene: SimulatedScene) -> None:
 
 def _second_command(_: SimulatedScene) -> None:
     """Start another command for an arm that this process has: it has to be refused."""
-    with tempfile.TemporaryDirectory(prefix="second-") as place:
-        config = write_config(Path(place), rig=('"socketcan" ', '"traction-fake" '))
-        channel = f"{place}/bus"
+    with tempfile.TemporaryDirectory(prefix="second-") as scratch:
+        config = write_config(Path(scratch), rig=('"socketcan" ', '"traction-fake" '))
+        channel = f"{scratch}/bus"
         config.write_text(config.read_text().replace('"can0"', f'"{channel}"'))
         lock = ArmLock("traction-fake", channel)
         try:

@@ -167,8 +167,8 @@ class TruthLog:
         joint = int(shares.max(axis=0).argmax())
         model = ArmModel(load_constants(), self.tool)
         near = q[after_ns <= WINDOW_NS]
-        places = model.sole_path(near if len(near) else q[:1]).position
-        travel = np.linalg.norm(places - places[0], axis=1).max()
+        positions = model.sole_path(near if len(near) else q[:1]).position
+        travel = np.linalg.norm(positions - positions[0], axis=1).max()
         return TrueMotion(
             speed=float(shares.max()),
             joint=joint + 1,

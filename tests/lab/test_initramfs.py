@@ -7,18 +7,18 @@ from lab.initramfs import Entry, build, cpio
 
 def unpack(archive):
     """Return {name: (mode, content, device)} of an archive in the form "newc"."""
-    files, place = {}, 0
+    files, offset = {}, 0
     while True:
-        head = archive[place : place + 110]
+        head = archive[offset : offset + 110]
         assert head[:6] == b"070701"
         fields = [int(head[6 + 8 * n : 14 + 8 * n], 16) for n in range(13)]
         mode, size, device, length = fields[1], fields[6], fields[9:11], fields[11]
-        name_end = place + 110 + length
-        name = archive[place + 110 : name_end - 1].decode()
+        name_end = offset + 110 + length
+        name = archive[offset + 110 : name_end - 1].decode()
         start = name_end + -name_end % 4
-        place = start + size + -(start + size) % 4
+        offset = start + size + -(start + size) % 4
         if name == "TRAILER!!!":
-            assert place == len(archive)
+            assert offset == len(archive)
             return files
         files[name] = (mode, archive[start : start + size], tuple(device))
 

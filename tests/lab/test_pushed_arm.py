@@ -97,25 +97,25 @@ def test_seven_positions_leave_together_within_a_cycle(caller):
 @pytest.mark.parametrize("line", ["nonsense", "prepare a trial", "break nothing"])
 def test_a_line_that_is_not_known_is_refused_in_words(caller, line):
     assert caller.say(Call.DO, line) != DONE
-    assert "Error" in caller.exchange.said()
+    assert "Error" in caller.exchange.message()
     assert caller.say(Call.DO, "lift") == DONE
 
 
 def test_a_call_of_an_offset_that_means_nothing_is_refused(caller):
     assert caller.far.call(4) != DONE
-    assert "4 is not a valid Call" in caller.exchange.said()
+    assert "4 is not a valid Call" in caller.exchange.message()
 
 
 def test_a_call_with_more_frames_than_there_is_room_for_is_refused(caller):
     caller.exchange.ask(caller.t_ns, MOST_FRAMES + 1, b"")
     assert caller.far.call(Call.ADVANCE) != DONE
-    assert f"{MOST_FRAMES + 1} frames" in caller.exchange.said()
+    assert f"{MOST_FRAMES + 1} frames" in caller.exchange.message()
 
 
 def test_a_call_before_anything_is_served_is_refused():
     caller = Caller()
     assert caller.say(Call.DO, "lift") != DONE
-    assert "nothing is served" in caller.exchange.said()
+    assert "nothing is served" in caller.exchange.message()
 
 
 def test_a_sensor_alone_says_what_is_due(files):
@@ -123,14 +123,14 @@ def test_a_sensor_alone_says_what_is_due(files):
     rig = files["rig"].replace('kind = "barrett" ', 'kind = "bota" ')
     rig = rig.replace("[ft_sensor]", '[ft_sensor]\nport = "/dev/ttyUSB0"\nsinc = 64')
     wanted = {**files, "rig": rig, "row": "", "seed": "1", "line": "a port"}
-    assert caller.say(Call.SERVE, json.dumps(wanted)) == DONE, caller.exchange.said()
-    said = b""
+    assert caller.say(Call.SERVE, json.dumps(wanted)) == DONE, caller.exchange.message()
+    written = b""
     for _ in range(500):
         caller.t_ns += PERIOD_NS
         caller.exchange.ask(caller.t_ns, 0, b"")
         assert caller.far.call(Call.ADVANCE) == DONE
-        said += caller.exchange.answered()[2]
-    assert len(said) > 500
+        written += caller.exchange.answered()[2]
+    assert len(written) > 500
     assert caller.say(Call.DO, "off") == DONE
     caller.t_ns += PERIOD_NS
     caller.exchange.ask(caller.t_ns, 0, b"")

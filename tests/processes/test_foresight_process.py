@@ -1,4 +1,4 @@
-"""Foresight in a process of its own reads the ring and says what the record gives."""
+"""Foresight in a process of its own reads the buffer and says what the record gives."""
 
 import os
 import signal

@@ -111,7 +111,7 @@ class Session:
 
     def attach(self):
         """Look at the memory that the processes share."""
-        self.shared = SharedLayout(SharedMemory(self._open_board()))
+        self.shared = SharedLayout(SharedMemory(self._open_memory()))
 
     def has_stalled(self):
         """Return whether the arm was stopped because the machine stood still.
@@ -147,7 +147,7 @@ class Session:
         return (self.data / "out.txt").read_text()
 
     def newest_cycle_ns(self):
-        """Return when the newest cycle on the board was measured [monotonic ns]."""
+        """Return when the newest cycle in memory was measured [monotonic ns]."""
         return int(self.shared.cycles.last(1)["host_ns"][0])
 
     def has_trial_ended(self):
@@ -163,7 +163,7 @@ class Session:
     def _is_recording(self):
         return any(entry["event"] == "trial-started" for entry in self.journal())
 
-    def _open_board(self):
+    def _open_memory(self):
         """Open the memory through the process that has the arm."""
         folder = Path(f"/proc/{self.pids['control']}/fd")
         for descriptor in folder.iterdir():
@@ -171,7 +171,7 @@ class Session:
                 descriptor.readlink()
             ).startswith("/memfd:traction ("):
                 return os.open(descriptor, os.O_RDWR)
-        raise AssertionError("the board was not found")
+        raise AssertionError("the shared memory was not found")
 
 
 def patient_config(folder, **options):

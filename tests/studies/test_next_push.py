@@ -27,7 +27,7 @@ def trial(aim, k):
     """Return a trial that comes out at its aim."""
     rng = np.random.default_rng([aim, k])
     F_n, v_t = (
-        place * rng.uniform(0.6, 1.4, 60) for place in (AIMS[aim].F_n, AIMS[aim].v_t)
+        level * rng.uniform(0.6, 1.4, 60) for level in (AIMS[aim].F_n, AIMS[aim].v_t)
     )
     F_t = 2.0 + 0.8 * F_n + rng.normal(0.0, 0.5, 60) + rng.normal(0.0, 0.5)
     t = np.linspace(0.0, 12.0, ROWS)
@@ -64,7 +64,7 @@ def test_the_emptiest_cells_are_chosen_by_what_pushes_reach(pool):
     choose = emptiest(pool)
     rng = np.random.default_rng(0)
     assert choose([], rng) == FIRST
-    fast = [of[0].record for of in (pool[8], pool[8])]
+    fast = [trials[0].record for trials in (pool[8], pool[8])]
     assert int(np.argmax(choose(fast, rng))) != 8
 
 
@@ -80,9 +80,9 @@ def test_trials_for_a_level_lie_between_those_around_it():
 
 
 def made(levels, nlpd, enough=10):
-    of = {t: curve(*levels) for t in ("grid", "corner", "break-away")}
-    score = {t: curve(*nlpd) for t in of}
-    return Session(of, score, dict.fromkeys(of, enough))
+    sd = {t: curve(*levels) for t in ("grid", "corner", "break-away")}
+    score = {t: curve(*nlpd) for t in sd}
+    return Session(sd, score, dict.fromkeys(sd, enough))
 
 
 @pytest.fixture
@@ -113,7 +113,7 @@ def test_worse_scores_and_a_dear_stop_are_missed(every):
 def test_a_pool_comes_back_from_the_disk(tmp_path, monkeypatch):
     monkeypatch.setattr("studies.next_push.AIMS", AIMS[:2])
     new, again = (make_pool(tmp_path, "TF", 1) for _ in range(2))
-    assert [len(of) for of in new] == [1, 1]
+    assert [len(trials) for trials in new] == [1, 1]
     for a, b in zip(new, again, strict=True):
         assert (a[0].rows == b[0].rows).all()
         assert a[0].record.plain() == b[0].record.plain()

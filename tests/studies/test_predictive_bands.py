@@ -21,7 +21,7 @@ from studies.predictive_bands import (
 @pytest.fixture(scope="module")
 def slice_outcomes():
     path = Path(__file__).parents[1] / "data" / "rehearsal_slice.npz"
-    trials = {name: list(of) for name, of in load_tables([path]).items()}
+    trials = {name: list(series) for name, series in load_tables([path]).items()}
     return trials, evaluate(trials, 1, 3)
 
 
@@ -54,7 +54,7 @@ def test_fits_of_a_slice_end_at_the_best_of_more_starts(slice_outcomes):
 @pytest.mark.timeout(3600)
 def test_bands_of_a_whole_study_hold(shared_data):
     trials = load_tables([shared_data / "rehearsal_trials.npz"])
-    series = {name: list(of) for name, of in trials.items()}
+    series = {name: list(group) for name, group in trials.items()}
     outcomes = evaluate(series, 2, 20)
     stones, plates = (of_kind(outcomes, series, plates=p) for p in (False, True))
     assert shortfalls(stones, plates) == []

@@ -47,7 +47,7 @@ def test_the_left_out_incline_is_that_between_known_ones():
 @pytest.mark.timeout(3600)
 def test_relatives_of_a_whole_study_are_worth_six_trials(shared_data):
     tables = load_tables([shared_data / "rehearsal_trials.npz"])
-    figures = compare({name: list(of) for name, of in tables.items()}, 2, 3)
+    figures = compare({name: list(series) for name, series in tables.items()}, 2, 3)
     stones = [f for f in figures if not f.is_plate]
     assert np.mean([f.joint - f.nine for f in stones]) <= MOST_BEHIND_OWN
     assert min(f.gain for f in stones) >= -0.03

@@ -17,7 +17,7 @@ _NO_WAIT = int(socket.MSG_DONTWAIT)
 _CONTROL_BYTES = 128  # ancillary data of one datagram
 _HEADER = struct.Struct("@PIPNPNi0PI0P")  # struct mmsghdr
 _SIZES = struct.Struct(f"@{struct.calcsize('@PIPNP')}xN4x0PI0P")  # what is read of it
-_PLACE = struct.Struct("@PN")  # struct iovec
+_IOVEC = struct.Struct("@PN")  # struct iovec
 _CONTROL = struct.Struct("@Nii")  # struct cmsghdr
 _ALIGN = struct.calcsize("@N")
 
@@ -58,15 +58,15 @@ class DatagramBatch:
         self._call = receive_many
         self.payload = bytearray(AT_ONCE * room)
         self.control = bytearray(AT_ONCE * _CONTROL_BYTES)
-        self._places = bytearray(AT_ONCE * _PLACE.size)
+        self._iovecs = bytearray(AT_ONCE * _IOVEC.size)
         self._headers = bytearray(AT_ONCE * _HEADER.size)
-        payload, control, places = map(
-            _address, (self.payload, self.control, self._places)
+        payload, control, iovecs = map(
+            _address, (self.payload, self.control, self._iovecs)
         )
         for i in range(AT_ONCE):
-            at = _PLACE.size * i
-            _PLACE.pack_into(self._places, at, payload + room * i, room)
-            header = (0, 0, places + at, 1, control + _CONTROL_BYTES * i)
+            at = _IOVEC.size * i
+            _IOVEC.pack_into(self._iovecs, at, payload + room * i, room)
+            header = (0, 0, iovecs + at, 1, control + _CONTROL_BYTES * i)
             _HEADER.pack_into(
                 self._headers, _HEADER.size * i, *header, _CONTROL_BYTES, 0, 0
             )

@@ -56,7 +56,7 @@ _PLAIN = (
     (ErrorClass.BUS_OFF, "bus-off"),
     (ErrorClass.RESTARTED, "restarted"),
 )
-_CRC = frozenset({0x08, 0x18})  # places in data[3]
+_CRC = frozenset({0x08, 0x18})  # locations in data[3]
 
 
 def error_names(can_id: int, data: Payload) -> frozenset[str]:

@@ -28,8 +28,8 @@ class Frame(NamedTuple):
     """A frame as received or sent.
 
     Attributes:
-        can_id: 11-bit identifier; at a door also Linux's flags, of which an error, an
-            extended or a remote frame has one.
+        can_id: 11-bit identifier; as a transport gives it also Linux's flags, of
+            which an error, an extended or a remote frame has one.
         data: payload.
         t_ns: when the bus had it, on the host's monotonic clock [ns], 0 = not known.
     """
@@ -43,7 +43,7 @@ as_frame = partial(tuple[int | bytes].__new__, Frame)  # without the words of a 
 Tap = Callable[[Sequence[tuple[int, bytes, int]]], None]  # each like a Frame
 
 
-class Door(Protocol):
+class Transport(Protocol):
     """Frames of all kinds, out and in; what a link needs of an adapter.
 
     Attributes:
@@ -99,7 +99,7 @@ class Link(Protocol):
         ...
 
     def metadata(self) -> dict[str, str]:
-        """Return which door this is and what it lost, as text for a recording."""
+        """Return which transport this is and what it lost, as text for a recording."""
         ...
 
     def send(self, can_id: int, data: bytes) -> None:
@@ -111,7 +111,7 @@ class Link(Protocol):
         ...
 
     def has_unsent(self) -> bool:
-        """Return whether frames wait in this host, as far as the door can tell."""
+        """Return whether frames wait in this host, as far as the transport can tell."""
         ...
 
     def fileno(self) -> int:
@@ -142,11 +142,11 @@ class CanLink:
         foreign_id: the first of them; None = none has.
     """
 
-    def __init__(self, door: Door, tap: Tap | None = None) -> None:
-        """Take a door over.
+    def __init__(self, transport: Transport, tap: Tap | None = None) -> None:
+        """Take over a transport.
 
         Args:
-            door: to the bus.
+            transport: to the bus.
             tap: takes every data frame with an 11-bit identifier, sent or received;
                 all that have arrived at once together.
         """
@@ -155,14 +155,17 @@ class CanLink:
         self.errors = BusErrors()
         self.foreign_ids: set[int] = set()
         self.foreign_id: int | None = None
-        self._door = door
+        self._transport = transport
         self._inbox: list[Frame] = []
         self._error: LinkError | None = None  # looking came across it
         self._is_open = True
 
     def metadata(self) -> dict[str, str]:
-        """Return which door this is and what it lost, as text for a recording."""
-        return {"link:door": self._door.name, "link:lost_frames": str(self._door.lost)}
+        """Return which transport this is and what it lost, as text for a recording."""
+        return {  # "door" is the word that recordings have had from the first
+            "link:door": self._transport.name,
+            "link:lost_frames": str(self._transport.lost),
+        }
 
     def send(self, can_id: int, data: bytes) -> None:
         """Queue a data frame with an 11-bit identifier.
@@ -172,7 +175,7 @@ class CanLink:
         """
         if not self._is_open:
             raise LinkError("The CAN bus is closed.", hint="Start again.")
-        self._door.send(can_id, data)
+        self._transport.send(can_id, data)
         if self._tap is not None:
             self._tap(((can_id, data, 0),))
 
@@ -190,12 +193,12 @@ class CanLink:
         return frames
 
     def has_unsent(self) -> bool:
-        """Return whether frames wait in this host, as far as the door can tell."""
-        return self._is_open and self._door.has_unsent()
+        """Return whether frames wait in this host, as far as the transport can tell."""
+        return self._is_open and self._transport.has_unsent()
 
     def fileno(self) -> int:
         """Return the bus's descriptor, -1 if it has none."""
-        return self._door.fileno() if self._is_open else -1
+        return self._transport.fileno() if self._is_open else -1
 
     def is_readable(self) -> bool:
         """Return whether a device frame has arrived; a dead bus has none."""
@@ -211,12 +214,12 @@ class CanLink:
         """Give the bus back; a second call does nothing."""
         if self._is_open:
             self._is_open = False
-            self._door.close()
+            self._transport.close()
 
     def _drain(self) -> None:
         if not self._is_open:
             return
-        arrived = self._door.receive()
+        arrived = self._transport.receive()
         if arrived:
             self._sort(arrived)
 

@@ -135,14 +135,14 @@ def _centres(model: ArmModel, space: FreeSpace) -> list[Array]:
             hint="Calibrate with a lower container: --terrain NAME.",
         )
     to_motors = np.linalg.inv(model.constants.j2mp)
-    borne = [np.abs(model.gravity(q) @ to_motors) for q in roomy]
-    return [roomy[i] for i in _most_different(borne)]
+    loads = [np.abs(model.gravity(q) @ to_motors) for q in roomy]
+    return [roomy[i] for i in _most_different(loads)]
 
 
-def _most_different(borne: Sequence[Array]) -> list[int]:
+def _most_different(loads: Sequence[Array]) -> list[int]:
     """Return which poses differ most in the torques that the motors bear."""
-    scale = np.max(borne, axis=0) + 1e-9
-    shares = [torques / scale for torques in borne]
+    scale = np.max(loads, axis=0) + 1e-9
+    shares = [torques / scale for torques in loads]
     chosen = [0]
     while len(chosen) < CENTRES:
         apart = [

@@ -192,7 +192,7 @@ def check_friction(fit: FrictionFit) -> None:
 
 def _fit_motor(rows: SlidingRows, turns: float, gravity: Array) -> _MotorFit:
     """Return the best of the grid, refined once around it."""
-    load_at = float(np.abs(rows.borne).mean())
+    load_at = float(np.abs(rows.load).mean())
     scale = float(np.median(np.abs(rows.friction)))
     coarse = _search(rows, turns * _STRIBECK, _EXCESS, load_at, scale, gravity)
     stribeck, excess = _search(
@@ -270,7 +270,7 @@ def _columns(
     columns = [
         along,
         weakening,
-        along * (np.abs(rows.borne) - load_at),
+        along * (np.abs(rows.load) - load_at),
         along * np.sin(rows.angle),
         along * np.cos(rows.angle),
         rows.speed,

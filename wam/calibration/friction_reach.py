@@ -112,14 +112,16 @@ def poses_along(model: ArmModel, q: Array, x: Array, travel: float) -> list[Arra
         x: direction along the ground in the base frame, shape (3,).
         travel: how far [m].
     """
-    place, turn = model.sole_pose(q)
+    position, turn = model.sole_pose(q)
     count = max(round(travel / _STEP), 1)
     poses = [q]
     for way in np.linspace(0.0, travel, count + 1)[1:]:
         here = poses[-1]
         for _ in range(_CORRECTIONS):
             at, turned = model.sole_pose(here)
-            error = np.concatenate((place + way * x - at, _turn_between(turned, turn)))
+            error = np.concatenate(
+                (position + way * x - at, _turn_between(turned, turn))
+            )
             here = here + np.linalg.pinv(model.sole_jacobian(here)) @ error
         poses.append(here)
     return poses

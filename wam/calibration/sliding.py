@@ -52,7 +52,7 @@ class SlidingRows:
         angle: [rad].
         speed: [rad/s]; 0 where it broke away.
         sense: of the motion, +1 or -1.
-        borne: torque that the weight puts on it [N m].
+        load: torque that the weight puts on it [N m].
         friction: torque that neither weight nor inertia explains [N m].
         inertia: torque that accelerates the arm by its model [N m].
         gravity: torque by first moments of 1 kg m, shape (n, 21).
@@ -64,7 +64,7 @@ class SlidingRows:
     angle: Array
     speed: Array
     sense: Array
-    borne: Array
+    load: Array
     friction: Array
     inertia: Array
     gravity: Array
@@ -81,7 +81,7 @@ class _Motion:
 
     angle: Array
     speed: Array
-    borne: Array
+    load: Array
     friction: Array
     inertia: Array
     q: Array
@@ -144,7 +144,7 @@ def _motion(model: ArmModel, weighed: ArmModel, leg: RecordedLeg) -> _Motion:
     return _Motion(
         angle=q @ j2mp.T,
         speed=qd @ j2mp.T,
-        borne=weights @ to_motors,
+        load=weights @ to_motors,
         friction=(tau - inertial - weights) @ to_motors,
         inertia=inertial @ to_motors,
         q=q,
@@ -201,7 +201,7 @@ def _of_motor(
         angle=angle[rows],
         speed=v,
         sense=sense,
-        borne=motion.borne[rows, motor],
+        load=motion.load[rows, motor],
         friction=friction,
         inertia=motion.inertia[rows, motor],
         gravity=np.array(weighing).reshape(-1, 21),

@@ -105,7 +105,7 @@ class FrictionCompensation:
         self._to_joints = np.ascontiguousarray(self._j2mp.T)
         self._of_torques = np.linalg.inv(self._to_joints)
         self._rows: list[list[float]] = rows.T.tolist()
-        self._borne = [0.0] * 7
+        self._load_torques = [0.0] * 7
         self._fading = np.zeros(7)
         self._rested_ns = -_FADE_NS
         self._begin([])
@@ -127,13 +127,13 @@ class FrictionCompensation:
         return self._fading * share if share > 0.0 else None
 
     def torque(
-        self, reading: ArmReading, borne: Array, depth: Array | None = None
+        self, reading: ArmReading, load_torque: Array, depth: Array | None = None
     ) -> Array:
         """Return joint torques [N m], shape (7,), after the step of this cycle.
 
         Args:
             reading: of this cycle; a motor that did not answer goes no step.
-            borne: torques of the joints without compensation [N m], shape (7,).
+            load_torque: torques of the joints without compensation [N m], shape (7,).
             depth: how far each joint is inside its soft wall [rad], shape (7,); None =
                 no joint is.
         """
@@ -145,7 +145,7 @@ class FrictionCompensation:
             self.rest(now)
             fading = self.resting(now)
             return np.zeros(7) if fading is None else fading
-        self._borne = self._of_torques.dot(borne).tolist()
+        self._load_torques = self._of_torques.dot(load_torque).tolist()
         return self._push(depth)
 
     def _begin(self, counts: list[int]) -> None:
@@ -184,10 +184,10 @@ class FrictionCompensation:
     def _push(self, depth: Array | None = None) -> Array:
         # Plain numbers: seven of them are done before numpy has looked at an array.
         push: list[float] = []
-        state = zip(self._z, self._borne, self._rows, strict=True)
-        for z, borne, (_, forward, backward, load, load_at) in state:
+        state = zip(self._z, self._load_torques, self._rows, strict=True)
+        for z, load_torque, (_, forward, backward, load, load_at) in state:
             level = forward if z > 0.0 else backward
-            if load and (less := load_at - abs(borne)) > 0.0:
+            if load and (less := load_at - abs(load_torque)) > 0.0:
                 level = max(level - load * less, 0.0)
             push.append(z * level)
         tau = np.array(push)

@@ -83,16 +83,16 @@ class SoleAxes:
             self._F_t = 0.0
 
     def force(
-        self, place: tuple[float, float], speed: tuple[float, float], now_ns: int
+        self, position: tuple[float, float], speed: tuple[float, float], now_ns: int
     ) -> tuple[float, float]:
         """Return the force on the sole along x and z [N] after one more period.
 
         Args:
-            place: x and z of the sole [m].
+            position: x and z of the sole [m].
             speed: of it along x and z [m/s].
             now_ns: time of the reading [ns].
         """
-        goal, (x, z), (vx, vz) = self._goal, place, speed
+        goal, (x, z), (vx, vz) = self._goal, position, speed
         is_stale = now_ns - self._aimed_ns > STALE_NS
         step = 0.0 if is_stale else goal.speed * self._dt
         if isnan(goal.F_t):

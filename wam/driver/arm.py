@@ -128,7 +128,7 @@ class WamArm:
             info,
             pucks=pucks,
             late_replies=self._properties.late_replies,
-            door=self._link.metadata()["link:door"],
+            transport=self._link.metadata()["link:door"],
         )
 
     def read(self, now_ns: int) -> ArmReading:

@@ -44,7 +44,7 @@ class LinkCounters:
         malformed: frames that contradict the protocol.
         link_errors: times the bus refused.
         withheld: torques not sent because earlier frames had not left.
-        link: the bus, which says what its door is and what was lost there.
+        link: the bus, which says what its transport is and what was lost there.
     """
 
     link: Link
@@ -150,7 +150,7 @@ class CycleTraffic:
             self.bus_ns = 0
             self._link.send(_ARM_ID, self._get_p)
             self._asked_ns = now_ns
-            self._ask_companion()
+            self._ask_bus_device()
             self._await_replies(now_ns)
             refused = BusCondition.SOUND
         except LinkFullError:
@@ -189,7 +189,7 @@ class CycleTraffic:
         try:
             self.counters.stale += self._collect()
             self.received = [None] * MOTORS
-            self._ask_companion()
+            self._ask_bus_device()
             settings, clock = self._settings, self._clock
             usual_ns = max(settings.first_look_ns, self.took_ns + _MARGIN_NS)
             deadline_ns = now_ns + min(usual_ns, settings.give_up_ns)
@@ -253,8 +253,8 @@ class CycleTraffic:
         except LinkError:
             self.counters.link_errors += 1
 
-    def _ask_companion(self) -> None:
-        """Send the companion's question; a refusal does not cost the positions."""
+    def _ask_bus_device(self) -> None:
+        """Ask the other device on the bus; a refusal does not cost the positions."""
         if self.bus_device is None:
             return
         can_id, data = self.bus_device.poll_frame(self._clock.now_ns())

@@ -73,7 +73,7 @@ class ArmInfo:
         pendant: what the pendant shows.
         is_zeroed: positions have been defined since power-up.
         late_replies: replies that came after their question was given up.
-        door: how the bus was reached, for people.
+        transport: how the bus was reached, for people.
         warnings: what is not as documented and does not keep the arm from being driven.
     """
 
@@ -84,7 +84,7 @@ class ArmInfo:
     pendant: PendantWord
     is_zeroed: bool
     late_replies: int
-    door: str = ""
+    transport: str = ""
     warnings: tuple[str, ...] = ()
 
     def metadata(self) -> dict[str, str]:

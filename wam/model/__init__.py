@@ -1,5 +1,6 @@
 """The arm as a model: constants, kinematics, gravity, the tool on its wrist.
 
-`arm_model` is the door to Pinocchio, `constants` reads the table of the arm, `tool` the
-sensor and foot, `gravity` and `moments` what the arm weighs. Begin with `arm_model`.
+`arm_model` and `clearance` import Pinocchio, `constants` reads the table of the arm,
+`tool` the sensor and foot, `gravity` and `moments` what the arm weighs. Begin with
+`arm_model`.
 """

@@ -88,8 +88,8 @@ class ArmClearance:
         indices[_FLOOR] = self._add(_FLOOR, 0, slab, _at(0.0, 0.0, floor - 0.5))
         reached_by = {**_REACHED_BY, _FLOOR: _MOVING}
         for box in obstacles:
-            place = pin.SE3(box.rotation, box.center)
-            indices[box.name] = self._add(box.name, 0, coal.Box(*box.size), place)
+            placement = pin.SE3(box.rotation, box.center)
+            indices[box.name] = self._add(box.name, 0, coal.Box(*box.size), placement)
             reached_by[box.name] = _MOVING
         for name, others in reached_by.items():
             for other in others:
@@ -135,9 +135,9 @@ class ArmClearance:
         return BodyGap(*self._names[closest], float(distances[closest]))
 
     def _add(
-        self, name: str, joint: int, shape: "coal.ShapeBase", place: "pin.SE3"
+        self, name: str, joint: int, shape: "coal.ShapeBase", placement: "pin.SE3"
     ) -> int:
-        body = pin.GeometryObject(name, joint, place, shape)
+        body = pin.GeometryObject(name, joint, placement, shape)
         return self._shapes.addGeometryObject(body)
 
     def _name(self, index: int) -> str:

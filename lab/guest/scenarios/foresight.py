@@ -60,8 +60,8 @@ def _recorded(session: LedSession, number: int) -> Lateness:
 def _pids(name: str) -> list[int]:
     """Return the processes of a name."""
     found: list[int] = []
-    for place in Path("/proc").glob("[0-9]*/comm"):
+    for path in Path("/proc").glob("[0-9]*/comm"):
         with suppress(OSError):  # it has ended since
-            if place.read_text().strip() == name:
-                found.append(int(place.parent.name))
+            if path.read_text().strip() == name:
+                found.append(int(path.parent.name))
     return found

@@ -143,5 +143,5 @@ def _lose(room: MachineRoom, losses: tuple[Loss, ...]) -> Figures:
     session.whole_trial()
     verify_kept(room, 1)
     put_away = require_rejected(room, len(losses))
-    said = figure(output, r"(?m)^((?!.*floating).*ARM: .*)$")
-    return {"said": said, "rejected": str(put_away), **cycle_figures(room)}
+    message = figure(output, r"(?m)^((?!.*floating).*ARM: .*)$")
+    return {"said": message, "rejected": str(put_away), **cycle_figures(room)}

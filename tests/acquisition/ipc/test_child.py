@@ -122,8 +122,8 @@ def test_the_memory_is_shared(remote, shared):
 
 
 def test_a_child_inherits_nothing_but_what_it_needs(remote):
-    # stdin and stdout; the board (a mapping keeps one of its own) and the last words;
-    # the channel
+    # stdin and stdout; the shared memory (a mapping keeps one of its own) and the last
+    # words; the channel
     expected = ["/dev/null"] * 2 + ["/memfd"] * 3 + ["socket"]
     assert remote.descriptors() == expected
     assert remote.is_session_leader()

@@ -3,7 +3,7 @@ import struct
 import pytest
 
 from acquisition.ipc.frame_tape import FRAME_DTYPE, FrameTape, last_frames
-from acquisition.ipc.ring_buffer import Ring
+from acquisition.ipc.ring_buffer import RingBuffer
 from acquisition.trial_file.views import encode_can_batch
 from tests.acquisition.ros import decode
 from tests.fakes.stepped import SteppedClock
@@ -12,9 +12,9 @@ S = 1_000_000_000
 
 
 @pytest.fixture
-def ring():
-    size = Ring.size_of(FRAME_DTYPE, 6)
-    return Ring(memoryview(bytearray(size)), FRAME_DTYPE, 6)
+def buffer():
+    size = RingBuffer.size_of(FRAME_DTYPE, 6)
+    return RingBuffer(memoryview(bytearray(size)), FRAME_DTYPE, 6)
 
 
 def clock_at(t_ns):
@@ -23,8 +23,8 @@ def clock_at(t_ns):
     return clock
 
 
-def tape_of(ring, times_ns):
-    tape = FrameTape(ring, clock_at(0))
+def tape_of(buffer, times_ns):
+    tape = FrameTape(buffer, clock_at(0))
     tape.add((1, b"", t_ns) for t_ns in times_ns)
 
 
@@ -32,46 +32,48 @@ def times(frames):
     return frames["t_ns"].tolist()
 
 
-def test_the_last_two_seconds_are_found(ring):
-    tape_of(ring, (0, S, 3 * S - 1, 3 * S, 5 * S))
-    assert times(last_frames(ring)) == [3 * S, 5 * S]
+def test_the_last_two_seconds_are_found(buffer):
+    tape_of(buffer, (0, S, 3 * S - 1, 3 * S, 5 * S))
+    assert times(last_frames(buffer)) == [3 * S, 5 * S]
 
 
-def test_the_span_can_be_chosen(ring):
-    tape_of(ring, (0, S, 2 * S))
-    assert times(last_frames(ring, 1.0)) == [S, 2 * S]
+def test_the_span_can_be_chosen(buffer):
+    tape_of(buffer, (0, S, 2 * S))
+    assert times(last_frames(buffer, 1.0)) == [S, 2 * S]
 
 
-def test_a_frame_is_of_its_own_time_or_of_now_in_the_order_of_arrival(ring):
+def test_a_frame_is_of_its_own_time_or_of_now_in_the_order_of_arrival(buffer):
     frames = [(0x423, b"\x01\x02\x03", S - 9), (0x443, b"", 0), (1, bytes(8), 8)]
-    FrameTape(ring, clock_at(S)).add(frames)
-    kept = ring.last(5)
+    FrameTape(buffer, clock_at(S)).add(frames)
+    kept = buffer.last(5)
     assert kept["can_id"].tolist() == [0x423, 0x443, 1]
     assert kept["length"].tolist() == [3, 0, 8]
     assert times(kept) == [S - 9, S, 8]
 
 
-def test_an_empty_tape_gives_nothing(ring):
-    assert len(last_frames(ring)) == 0
+def test_an_empty_tape_gives_nothing(buffer):
+    assert len(last_frames(buffer)) == 0
 
 
-def test_the_tape_does_not_grow(ring):
-    tape_of(ring, range(50))
-    assert times(last_frames(ring)) == [45, 46, 47, 48, 49]
+def test_the_tape_does_not_grow(buffer):
+    tape_of(buffer, range(50))
+    assert times(last_frames(buffer)) == [45, 46, 47, 48, 49]
 
 
-def test_a_frame_replaces_all_of_the_one_before(ring):
+def test_a_frame_replaces_all_of_the_one_before(buffer):
     for _ in range(6):
-        ring.write(b"\xff" * FRAME_DTYPE.itemsize)
-    FrameTape(ring, clock_at(7)).add([(0x404, b"\x30", 0)])
-    assert ring.last(1).tobytes() == struct.pack("<QIB3x8s", 7, 0x404, 1, b"\x30")
+        buffer.write(b"\xff" * FRAME_DTYPE.itemsize)
+    FrameTape(buffer, clock_at(7)).add([(0x404, b"\x30", 0)])
+    assert buffer.last(1).tobytes() == struct.pack("<QIB3x8s", 7, 0x404, 1, b"\x30")
 
 
 def frames_of(*frames):
-    ring = Ring(memoryview(bytearray(Ring.size_of(FRAME_DTYPE, 9))), FRAME_DTYPE, 9)
-    tape = FrameTape(ring, clock_at(0))
+    buffer = RingBuffer(
+        memoryview(bytearray(RingBuffer.size_of(FRAME_DTYPE, 9))), FRAME_DTYPE, 9
+    )
+    tape = FrameTape(buffer, clock_at(0))
     tape.add((can_id, data, t_ns) for t_ns, can_id, data in frames)
-    return ring.last(9)
+    return buffer.last(9)
 
 
 @pytest.mark.parametrize("size", range(9))

@@ -10,7 +10,7 @@ from acquisition.ipc.shared_sensor import pack_wrench, unpack_wrenches
 from acquisition.schema import CYCLE
 
 finite = st.floats(allow_nan=False)
-BOARD = SharedLayout.create()
+SHARED = SharedLayout.create()
 
 
 def test_two_who_map_the_same_memory_see_the_same():
@@ -27,22 +27,22 @@ def test_two_who_map_the_same_memory_see_the_same():
 
 def test_areas_do_not_overlap():
     shared = SharedLayout.create()
-    rings = (
+    buffers = (
         shared.commands,
         shared.cycles,
         shared.wrenches,
         shared.frames,
         shared.timings,
     )
-    for number, ring in enumerate(rings, 1):
-        size = ring.last(0).dtype.itemsize
-        for _ in range(ring.slots):
-            ring.write(bytes([number]) * size)
+    for number, buffer in enumerate(buffers, 1):
+        size = buffer.last(0).dtype.itemsize
+        for _ in range(buffer.slots):
+            buffer.write(bytes([number]) * size)
     for slot in (shared.status, shared.recorder, shared.health):
         slot.write(b"\xff" * 8192)
-    for number, ring in enumerate(rings, 1):
-        records = ring.last(ring.slots)
-        assert len(records) == ring.slots - 1
+    for number, buffer in enumerate(buffers, 1):
+        records = buffer.last(buffer.slots)
+        assert len(records) == buffer.slots - 1
         assert set(records.tobytes()) == {number}
     assert all(shared.heartbeats.last_ns(role) == 0 for role in ProcessRole)
 
@@ -57,11 +57,11 @@ def test_areas_do_not_overlap():
 )
 def test_a_sample_survives_the_ring(t_ns, counter, wrench, status, valid, saturated):
     sample = WrenchSample(t_ns, counter, wrench, status, valid, saturated)
-    ring = BOARD.wrenches
-    ring.write(pack_wrench(sample))
-    assert unpack_wrenches(ring.last(1)) == [sample]
+    buffer = SHARED.wrenches
+    buffer.write(pack_wrench(sample))
+    assert unpack_wrenches(buffer.last(1)) == [sample]
 
 
 def test_the_memory_has_no_name_that_could_be_left_behind():
-    descriptor = BOARD.memory.descriptor
+    descriptor = SHARED.memory.descriptor
     assert "memfd" in str(Path(f"/proc/self/fd/{descriptor}").readlink())

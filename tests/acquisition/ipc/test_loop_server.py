@@ -55,14 +55,14 @@ class Loop:
         self.shared = SharedLayout.create()
         self.cycle = Cycle()
         self.now_ns = START_NS
-        self.rung = 0
+        self.signals = 0
         self.console = CommandQueue(self.shared.commands)
-        around = LoopHooks(lambda: self.now_ns, lambda: {"puck": "warm"}, self.ring)
+        around = LoopHooks(lambda: self.now_ns, lambda: {"puck": "warm"}, self.signal)
         self.loop_server = LoopServer(self.cycle, Arm(), self.shared, around)
         self.number = 0
 
-    def ring(self):
-        self.rung += 1
+    def signal(self):
+        self.signals += 1
 
     def run(self, seconds, *, beating=(ProcessRole.CONSOLE, ProcessRole.RECORDER)):
         for _ in range(max(1, round(seconds * 500))):
@@ -135,9 +135,9 @@ def test_a_console_that_comes_back_is_believed(loop):
 def test_an_arm_left_alone_for_a_minute_rings_every_second(loop):
     loop.run(0.1)
     loop.run(59.9, beating=())
-    assert loop.rung == 0
+    assert loop.signals == 0
     loop.run(3.2, beating=())
-    assert loop.rung == 3
+    assert loop.signals == 3
     assert not loop.loop_server.is_over
 
 
@@ -184,9 +184,9 @@ def test_what_the_devices_say_is_published_once_a_second(loop):
 def test_the_bell_rings_first_when_a_minute_has_passed(loop):
     loop.run(0.1)
     loop.run(60.0, beating=())
-    before = loop.rung
+    before = loop.signals
     loop.run(1.0, beating=())
-    assert (before, loop.rung) == (0, 1)
+    assert (before, loop.signals) == (0, 1)
 
 
 def test_what_the_devices_say_is_published_as_a_trial_begins(loop):

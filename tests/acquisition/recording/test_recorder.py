@@ -21,12 +21,12 @@ MS = 1_000_000
 
 
 class LoopClient:
-    """A recorder, its ring and its clock, with a loop that runs when told."""
+    """A recorder, its ring buffer and its clock, with a loop that runs when told."""
 
     def __init__(self, folder):
         self.clock = SteppedClock()
         self.shared = SharedLayout.create()
-        self.ring = self.shared.cycles
+        self.buffer = self.shared.cycles
         self.recorder = Recorder(self.shared, self.clock)
         self.path = folder / "T01.mcap"
         self.cycle = 0
@@ -36,7 +36,7 @@ class LoopClient:
         records["host_ns"] = self.clock.now_ns() + PERIOD_NS * np.arange(cycles)
         data = memoryview(records.tobytes())
         for i in range(cycles):
-            self.ring.write(data[i * CYCLE.size : (i + 1) * CYCLE.size])
+            self.buffer.write(data[i * CYCLE.size : (i + 1) * CYCLE.size])
             self.clock.sleep_until(self.clock.now_ns() + PERIOD_NS)
             if drain_every and (i + 1) % drain_every == 0:
                 self.recorder.drain()
@@ -167,7 +167,7 @@ def test_a_fast_drain_does_not_flush_more_often(loop_client, flushes):
 
 def test_what_the_ring_lost_is_in_the_result(loop_client):
     loop_client.start()
-    slots = loop_client.ring.slots
+    slots = loop_client.buffer.slots
     loop_client.run(slots + 99)
     loop_client.recorder.finish("end")
     result = TrialReader(loop_client.path).metadata["result"]
@@ -176,7 +176,7 @@ def test_what_the_ring_lost_is_in_the_result(loop_client):
 
 
 def test_a_long_wait_before_the_trigger_is_not_a_loss(loop_client):
-    loop_client.run(loop_client.ring.slots + 200)
+    loop_client.run(loop_client.buffer.slots + 200)
     loop_client.start()
     loop_client.recorder.drain()
     loop_client.run(10)
@@ -293,7 +293,7 @@ def test_what_was_measured_before_a_trial_is_abandoned_is_on_the_disk(loop_clien
 
 
 def foreseen(loop_client, cycle, since):
-    """Put a state into the ring, as the process of foresight does."""
+    """Put a state into the ring buffer, as the process of foresight does."""
     record = np.frombuffer(bytearray(FORESIGHT.template), FORESIGHT.dtype)
     record["cycle"], record["since"] = cycle, since
     record["host_ns"] = loop_client.clock.now_ns()

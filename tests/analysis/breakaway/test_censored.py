@@ -148,8 +148,8 @@ def test_the_survival_curve_is_that_of_an_independent_one():
     curve = kaplan_meier(peak, table.is_held)
     data = stats.CensoredData(peak[~table.is_held], right=peak[table.is_held])
     expected = stats.ecdf(data).cdf
-    places = np.linspace(0.0, 30.0, 61) + 0.01
-    assert curve.share_below(places) == pytest.approx(expected.evaluate(places))
+    points = np.linspace(0.0, 30.0, 61) + 0.01
+    assert curve.share_below(points) == pytest.approx(expected.evaluate(points))
 
 
 def test_uniform_transforms_are_within_the_limit_and_shifted_ones_are_not():

@@ -177,11 +177,11 @@ def test_words_in_the_place_of_numbers_are_refused(tmp_path):
         load_tables([parquet(tmp_path / "a.parquet", content)])
 
 
-@pytest.mark.parametrize("place", [0.1, 0.5, 0.9])
-def test_a_parquet_file_that_was_cut_is_refused(tmp_path, place):
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
+def test_a_parquet_file_that_was_cut_is_refused(tmp_path, share):
     path = parquet(tmp_path / "a.parquet")
     content = path.read_bytes()
-    path.write_bytes(content[: int(place * len(content))])
+    path.write_bytes(content[: int(share * len(content))])
     with pytest.raises(SettingsError, match="not a readable Parquet"):
         load_tables([path])
 

@@ -73,8 +73,8 @@ def shaken(tmp_path_factory):
     tared = PAYLOAD.tared(BIAS, np.eye(3))
     path = [MODEL.sole_pose(q) for q in cycles["position"]]
     from_sole = tared.rotation @ tared.com - TOOL.sole
-    places = np.array([position + turn @ from_sole for position, turn in path])
-    acceleration = np.gradient(np.gradient(places, t, axis=0), t, axis=0)
+    positions = np.array([position + turn @ from_sole for position, turn in path])
+    acceleration = np.gradient(np.gradient(positions, t, axis=0), t, axis=0)
     for row, (_, turn), a in zip(cycles, path, acceleration, strict=True):
         felt = np.zeros(6)
         felt[:3] = (turn @ tared.rotation).T @ (FORCE - tared.mass * a)

@@ -228,12 +228,12 @@ def test_any_bytes_are_read_or_refused_but_never_crash(tmp_path, noise, start):
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60)
-@given(place=st.integers(0, 600), value=st.integers(0, 255))
-def test_npz_with_a_wrong_byte_is_read_or_refused(tmp_path, place, value):
+@given(index=st.integers(0, 600), value=st.integers(0, 255))
+def test_npz_with_a_wrong_byte_is_read_or_refused(tmp_path, index, value):
     stream = io.BytesIO()
     np.savez(stream, **{"S0/00": rows()})
     content = bytearray(stream.getvalue())
-    content[place % len(content)] = value
+    content[index % len(content)] = value
     path = write(tmp_path, bytes(content), "flipped.npz")
     try:
         trials = load_tables([path])

@@ -11,7 +11,7 @@ from analysis.report.new_trial_tables import new_trial_tables
 from analysis.study.fits import to_plain
 from analysis.study.models import GP_SE, GP_SE_TRIAL, FitOptions
 from analysis.study.study import StudyOptions, run_study
-from analysis.study.trial_components import TOLD_APART
+from analysis.study.trial_components import LEAST_GAIN
 
 pytestmark = pytest.mark.slow  # a whole study
 
@@ -58,10 +58,10 @@ def results(make_series, moving):
 
 
 def test_shares_of_a_terrain_add_up(results):
-    assert [of.terrain for of in results.shares] == ["S0", "TF"]
-    for of in results.shares:
-        assert of.trials == 4
-        assert of.density.sum() == pytest.approx(10.0)
+    assert [share.terrain for share in results.shares] == ["S0", "TF"]
+    for share in results.shares:
+        assert share.trials == 4
+        assert share.density.sum() == pytest.approx(10.0)
 
 
 def test_components_of_every_terrain_are_in_the_study(results):
@@ -77,8 +77,8 @@ def test_the_report_states_family_worth_and_oracle(results):
     assert [row[0] for row in families.rows] == ["S0", "TF"]
     assert [row[0] for row in oracle.rows] == ["S0", "S0", "TF", "TF"]
     for row, result in zip(worth.rows, results.study.terrains.values(), strict=True):
-        is_told_apart = result.components.gain >= TOLD_APART
-        assert ("not distinguishable" in row[1]) != is_told_apart
+        is_distinguishable = result.components.gain >= LEAST_GAIN
+        assert ("not distinguishable" in row[1]) != is_distinguishable
 
 
 @pytest.mark.parametrize("draw", [draw_shares, draw_new_trial])

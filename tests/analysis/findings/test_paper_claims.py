@@ -30,8 +30,10 @@ def evidence(small_study):
     return gather_evidence(small_study, None, [])
 
 
-def claim_at(evidence: PaperEvidence, place: str):
-    return next(claim for claim in paper_claims(evidence) if claim.place == place)
+def claim_at(evidence: PaperEvidence, reference: str):
+    return next(
+        claim for claim in paper_claims(evidence) if claim.reference == reference
+    )
 
 
 def test_holms_p_values_are_those_of_the_step_down():

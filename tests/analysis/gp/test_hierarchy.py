@@ -28,9 +28,9 @@ def drawn(per_trial=4, trials=3, seed=0):
 
 def covariance(rows, theta):
     """Return what the rows' covariance is by its definition, element by element."""
-    of = dict(zip(NAMES, np.exp(theta), strict=True))
+    value = dict(zip(NAMES, np.exp(theta), strict=True))
     rho, own = (
-        of[k] / (1.0 + of[k]) for k in ("logit_rho", "logit_own")
+        value[k] / (1.0 + value[k]) for k in ("logit_rho", "logit_own")
     )  # exp of a logit is the odds
     n, X = rows.y.size, rows.inputs
     C = np.zeros((n, n))
@@ -38,21 +38,21 @@ def covariance(rows, theta):
         for j in range(n):
             g, h = rows.grounds[rows.ground[i]], rows.grounds[rows.ground[j]]
             gap = (X[i] - X[j]) ** 2
-            lengths = np.array([of["log_l1"], of["log_l2"]])
-            C[i, j] = of["log_s0"] ** 2 * np.exp(-0.5 * (gap / lengths**2).sum())
+            lengths = np.array([value["log_l1"], value["log_l2"]])
+            C[i, j] = value["log_s0"] ** 2 * np.exp(-0.5 * (gap / lengths**2).sum())
             if g.is_plate is h.is_plate:
                 T = float(g == h)
                 if not g.is_plate:
-                    far = (g.incline_deg - h.incline_deg) / of["log_la"]
+                    far = (g.incline_deg - h.incline_deg) / value["log_la"]
                     near = np.exp(-0.5 * far**2) * (1.0 if g.size == h.size else rho)
                     T = (1.0 - own) * near + own * T
                 kind = "plate" if g.is_plate else "stones"
-                lengths = np.array([of["log_m1"], of["log_m2"]])
-                deviates = of[f"log_A_{kind}"] ** 2 * T
+                lengths = np.array([value["log_m1"], value["log_m2"]])
+                deviates = value[f"log_A_{kind}"] ** 2 * T
                 C[i, j] += deviates * np.exp(-0.5 * (gap / lengths**2).sum())
                 if rows.trial[i] == rows.trial[j]:
-                    C[i, j] += of[f"log_sc_{kind}"] ** 2
-                C[i, j] += of[f"log_sn_{kind}"] ** 2 * (i == j)
+                    C[i, j] += value[f"log_sc_{kind}"] ** 2
+                C[i, j] += value[f"log_sn_{kind}"] ** 2 * (i == j)
     return C
 
 
@@ -90,17 +90,17 @@ def test_posterior_adds_the_normal_priors():
     assert posterior(moved)[0] == pytest.approx(bare - 0.5 * 0.25 * mean.size)
 
 
-@pytest.mark.parametrize("place", [1, 3])
-def test_prediction_has_the_closed_form_of_conditioning(place):
+@pytest.mark.parametrize("index", [1, 3])
+def test_prediction_has_the_closed_form_of_conditioning(index):
     rows = drawn(per_trial=2)
     process = GroundPosterior(rows).climbed(CENTRE)
     inputs = np.random.default_rng(3).normal(size=(3, 2))
-    predicted = process.given(rows).predict(GROUNDS[place], inputs)
+    predicted = process.given(rows).predict(GROUNDS[index], inputs)
     # the three points as a further trial of that ground, their noise taken off
     both = GroundRows(
         np.vstack([rows.inputs, inputs]),
         np.concatenate([rows.y, np.zeros(3)]),
-        np.concatenate([rows.ground, np.full(3, place)]),
+        np.concatenate([rows.ground, np.full(3, index)]),
         np.concatenate([rows.trial, [90, 91, 92]]),
         GROUNDS,
     )

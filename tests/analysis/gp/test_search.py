@@ -19,7 +19,7 @@ KERNELS = {
 
 
 class Hills:
-    """A likelihood with a top of given place, height and width at every hill.
+    """A likelihood with a top of given centre, height and width at every hill.
 
     `rough` is what a part of the rows makes of it; `hole` where it has no value.
     """
@@ -34,8 +34,8 @@ class Hills:
         if self.hole(theta):
             raise SettingsError("none")
         total, slope = 0.0, np.zeros(theta.size)
-        for place, height, width in self.tops:
-            step = (theta - place) / width
+        for centre, height, width in self.tops:
+            step = (theta - centre) / width
             part = height * np.exp(-0.5 * step @ step)
             total, slope = total + part, slope - part * step / width
         return total - 1e-3 * theta @ theta, slope - 2e-3 * theta

@@ -17,7 +17,7 @@ EVERYTHING = TrialNoise(LogLinearNoise(2), True, True, True, (1.0, 0.4))
 
 
 def drawn(trials, rows, seed=0):
-    """Return inputs, outputs and places of so many rows of each of the trials."""
+    """Return inputs, outputs and trials of so many rows of each of the trials."""
     rng = np.random.default_rng(seed)
     X, y = rng.normal(size=(trials * rows, 2)), rng.normal(size=trials * rows)
     t = np.tile(np.cumsum(rng.uniform(0.1, 0.5, rows)), trials)
@@ -27,8 +27,8 @@ def drawn(trials, rows, seed=0):
 @pytest.mark.parametrize("kernel", [SE, Arcsine(2), Arcsine(2, as_printed=True)])
 @pytest.mark.parametrize("rows", [6, 38])  # the larger is inverted block by block
 def test_gradient_agrees_with_differences(kernel, rows):
-    X, y, places = drawn(5, rows)
-    likelihood = Likelihood(kernel, EVERYTHING, X, y, places)
+    X, y, trials = drawn(5, rows)
+    likelihood = Likelihood(kernel, EVERYTHING, X, y, trials)
     shape = np.linspace(0.3, -0.2, len(kernel.names))
     theta = np.concatenate([shape, [-0.5, 0.2, -0.1, -0.3, -0.6, -0.2, 0.1]])
     slope = likelihood(theta)[1]
@@ -41,17 +41,17 @@ def test_gradient_agrees_with_differences(kernel, rows):
 def test_likelihood_has_the_closed_form_of_a_mixed_model():
     from scipy.stats import multivariate_normal
 
-    X, y, places = drawn(4, 5)
+    X, y, trials = drawn(4, 5)
     sc, sp, so, tau = 0.7, 0.4, 0.5, 0.8
     theta = np.concatenate([[0.1, 0.2, -0.3], np.log([0.6, sc, sp, so, tau])])
     noise = TrialNoise(ConstantNoise(), True, True, True, (1.0, 0.4))
-    same = (places.trial[:, None] == places.trial).astype(float)
+    same = (trials.trial[:, None] == trials.trial).astype(float)
     f = 1.0 + 0.4 * X[:, 0]
-    gap = np.abs(places.t[:, None] - places.t)
+    gap = np.abs(trials.t[:, None] - trials.t)
     C = SE.matrix(theta[:3], X, X) + 0.6**2 * np.eye(y.size)
     C += same * (sc**2 + sp**2 * np.outer(f, f) + so**2 * np.exp(-gap / tau))
     expected = multivariate_normal(np.zeros(y.size), C).logpdf(y)
-    found = Likelihood(SE, noise, X, y, places).value(theta)
+    found = Likelihood(SE, noise, X, y, trials).value(theta)
     assert found == pytest.approx(expected, rel=1e-10)
 
 
@@ -60,9 +60,9 @@ def test_likelihood_gradient_and_prediction_agree_with_scikit_learn():
     from sklearn.gaussian_process.kernels import RBF, ConstantKernel, Matern
     from sklearn.gaussian_process.kernels import WhiteKernel as White
 
-    X, y, places = drawn(6, 8, seed=3)
+    X, y, trials = drawn(6, 8, seed=3)
     any_, same = 1e9, 1e-3  # lengths: a column that does not count; one that must agree
-    known = np.column_stack([X, places.trial, places.t])
+    known = np.column_stack([X, trials.trial, trials.t])
     smooth = ConstantKernel(1.3**2) * RBF([0.9, 1.7, any_, any_])
     level = ConstantKernel(0.6**2) * RBF([any_, any_, same, any_])
     drift = ConstantKernel(0.5**2) * RBF([any_, any_, same, any_])
@@ -75,12 +75,12 @@ def test_likelihood_gradient_and_prediction_agree_with_scikit_learn():
     )
     noise = TrialNoise(ConstantNoise(), has_drift=True)
     theta = np.log([1.3, 0.9, 1.7, 0.4, 0.6, 0.5, 0.8])
-    lml, slope = Likelihood(SE, noise, X, y, places)(theta)
+    lml, slope = Likelihood(SE, noise, X, y, trials)(theta)
     assert lml == pytest.approx(value, rel=1e-10)
     # theirs: sf^2, l1, l2, -, -, sc^2, 4 of E, so^2, 4 of E, -, -, -, tau, sn^2
-    places_of_ours = [0, 1, 2, 19, 5, 10, 18]
+    indices_of_ours = [0, 1, 2, 19, 5, 10, 18]
     factors = [2.0, 1.0, 1.0, 2.0, 2.0, 2.0, 1.0]  # ours is by sf, theirs by sf^2
-    np.testing.assert_allclose(slope, gradient[places_of_ours] * factors, rtol=1e-6)
+    np.testing.assert_allclose(slope, gradient[indices_of_ours] * factors, rtol=1e-6)
 
     at = np.random.default_rng(1).normal(size=(5, 2))
     new = np.column_stack([at, np.full(5, 99.0), np.zeros(5)])  # a trial of its own
@@ -89,18 +89,18 @@ def test_likelihood_gradient_and_prediction_agree_with_scikit_learn():
     ours, variance = GaussianProcess(
         kernel=SE, noise=noise, theta=theta, X=X, alpha=C @ y, offset=0.0,
         centre=np.zeros(2), scale=np.ones(2), lml=0.0, starts=(), jitter=0.0,
-        at_bound=(), trials=places,
+        at_bound=(), trials=trials,
     ).predict(at)  # fmt: skip
     np.testing.assert_allclose(ours, mean, rtol=1e-8)
     np.testing.assert_allclose(np.sqrt(variance), sd, rtol=1e-8)
 
 
 def test_the_search_recovers_the_spread_between_trials():
-    X, _, places = drawn(40, 8, seed=1)
+    X, _, trials = drawn(40, 8, seed=1)
     rng = np.random.default_rng(2)
-    y = np.sin(X[:, 0]) + rng.normal(0, 0.7, 40)[places.trial]
+    y = np.sin(X[:, 0]) + rng.normal(0, 0.7, 40)[trials.trial]
     y += rng.normal(0, 0.3, y.size)
-    model = fit_gp(X, y, SE, LEVEL, trials=places)
+    model = fit_gp(X, y, SE, LEVEL, trials=trials)
     theta = dict(zip(("log_sn", "log_sc"), model.theta[3:], strict=True))
     # 40 trials show a spread to 1/sqrt(80) = 11 %, 320 rows the noise to 4 %
     assert np.exp(theta["log_sc"]) == pytest.approx(0.7, rel=0.35)
@@ -108,10 +108,10 @@ def test_the_search_recovers_the_spread_between_trials():
 
 
 def test_a_new_trial_is_as_uncertain_as_trials_differ():
-    X, _, places = drawn(10, 20, seed=4)
+    X, _, trials = drawn(10, 20, seed=4)
     rng = np.random.default_rng(5)
-    y = rng.normal(0, 2.0, 10)[places.trial] + rng.normal(0, 0.1, 200)
-    with_level = fit_gp(X, y, SE, LEVEL, trials=places).predict(X[:5])[1]
+    y = rng.normal(0, 2.0, 10)[trials.trial] + rng.normal(0, 0.1, 200)
+    with_level = fit_gp(X, y, SE, LEVEL, trials=trials).predict(X[:5])[1]
     pooled = fit_gp(X, y).predict(X[:5])[1]
     level = y.reshape(10, 20).mean(axis=1).std()
     assert np.sqrt(with_level) == pytest.approx(np.full(5, level), rel=0.35)
@@ -127,22 +127,22 @@ def test_trials_that_are_not_named_share_nothing():
 
 
 def test_other_outputs_are_fitted_from_where_the_first_ended():
-    X, _, places = drawn(8, 20, seed=6)
+    X, _, trials = drawn(8, 20, seed=6)
     rng = np.random.default_rng(7)
     y = 5.0 + np.sin(X[:, 0]) + rng.normal(0, 0.4, 160)
-    first = fit_gp(X, y, SE, LEVEL, trials=places)
+    first = fit_gp(X, y, SE, LEVEL, trials=trials)
     z = 3.0 * np.log(y + 3.0)
     near = refit_gp(first, z, float(z.std() / y.std()))
-    anew = fit_gp(X, z, SE, LEVEL, trials=places)
+    anew = fit_gp(X, z, SE, LEVEL, trials=trials)
     assert near.lml == pytest.approx(anew.lml, abs=1e-2)
 
 
 def test_rows_left_out_are_predicted_by_the_others():
-    X, _, places = drawn(6, 12, seed=8)
-    y = np.random.default_rng(9).normal(0, 1.0, 6)[places.trial] + X[:, 0]
-    model = fit_gp(X, y, SE, LEVEL, trials=places)
-    keep = places.trial != 2
-    others = TrialRows(places.trial[keep], places.t[keep])
+    X, _, trials = drawn(6, 12, seed=8)
+    y = np.random.default_rng(9).normal(0, 1.0, 6)[trials.trial] + X[:, 0]
+    model = fit_gp(X, y, SE, LEVEL, trials=trials)
+    keep = trials.trial != 2
+    others = TrialRows(trials.trial[keep], trials.t[keep])
     without = model.given(X[keep], y[keep], others)
     # nothing of the trial left out is in it: its own rows change nothing
     changed = np.where(keep, y, 99.0)

@@ -72,5 +72,5 @@ def test_figures_of_one_section_stand_together_and_keys_are_unique():
     assert len(PAGE_ORDER) == len(set(PAGE_ORDER)) == 25
     assert set(figure_specs()) == set(PAGE_ORDER)
     sections = [figure_specs()[key].section for key in PAGE_ORDER]
-    places = [list(ReportSection).index(section) for section in sections]
-    assert places == sorted(places)
+    positions = [list(ReportSection).index(section) for section in sections]
+    assert positions == sorted(positions)

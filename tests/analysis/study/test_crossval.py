@@ -14,7 +14,7 @@ from analysis.gp.kernels import SquaredExponential
 from analysis.gp.likelihood import Likelihood
 from analysis.gp.noise import ConstantNoise
 from analysis.gp.search import posterior_search
-from analysis.study.crossval import choose_rows, met_trials, plan_folds, run_fold
+from analysis.study.crossval import choose_rows, paired_trials, plan_folds, run_fold
 from analysis.study.metrics import mean_absolute_error
 from analysis.study.models import GP_SE, TUSTIN, FitOptions
 from analysis.study.store import task_key
@@ -62,8 +62,8 @@ def test_model_of_fold_k_meets_trial_k_of_the_other_terrains(trials):
     ],
 )
 def test_trials_pair_by_number_and_wrap_where_they_cannot(models, tests, pairs):
-    met = [(k, trial) for k in models for trial in met_trials(k, models, tests)]
-    assert met == pairs
+    paired = [(k, trial) for k in models for trial in paired_trials(k, models, tests)]
+    assert paired == pairs
 
 
 def test_chosen_rows_are_distinct_and_depend_on_seed_terrain_and_fold(trials):
@@ -198,7 +198,10 @@ def test_a_fold_is_another_one_where_any_of_its_samples_is(trials):
     touched = [
         any(
             np.array_equal(rows.F_t, changed.F_t)
-            for rows in (task.own, *(r for of in task.others.values() for r in of))
+            for rows in (
+                task.own,
+                *(r for group in task.others.values() for r in group),
+            )
         )
         or task.terrain == "B0"
         for task in after
@@ -211,7 +214,9 @@ def test_a_fold_is_another_one_where_any_of_its_samples_is(trials):
 
 def test_folds_of_other_targets_have_other_outlines(trials):
     before, _ = plan_folds(trials, SMALL_FIT)
-    moved = {n: [replace(t, F_t=t.F_t + 1) for t in of] for n, of in trials.items()}
+    moved = {
+        n: [replace(t, F_t=t.F_t + 1) for t in group] for n, group in trials.items()
+    }
     after, _ = plan_folds(trials, SMALL_FIT, moved)
     assert before.outline(0)[3] == after.outline(0)[3]
     assert before.outline(0)[4:6] != after.outline(0)[4:6]

@@ -142,7 +142,7 @@ def test_batches_come_back_each_in_its_own_order_and_are_counted_together(n_jobs
     ]
     seen, store = [], Memory()
     found = run_batches(
-        batches, n_jobs, lambda done, of: seen.append((done, of)), store
+        batches, n_jobs, lambda done, count: seen.append((done, count)), store
     )
     squares, sums, nothing, texts = found
     assert (squares, nothing, texts) == ([9, 4], [], ["7"])

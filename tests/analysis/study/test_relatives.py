@@ -33,8 +33,8 @@ def drawn(rng, level=0.0, rows=40, noise=0.25):
 def terrain(ground, trials=5, level=0.0, seed=0, noise=0.25):
     rng = np.random.default_rng(seed)
     effects = rng.normal(0.0, 0.2, trials)
-    of = tuple(drawn(rng, level + effect, noise=noise) for effect in effects)
-    return TerrainRows(ground, of)
+    samples = tuple(drawn(rng, level + effect, noise=noise) for effect in effects)
+    return TerrainRows(ground, samples)
 
 
 KNOWN = tuple(terrain(ground, 4, seed=k) for k, ground in enumerate(STONES))
@@ -88,10 +88,10 @@ def test_enough_relatives_are_used_and_one_is_few(alike):
 @pytest.mark.slow
 def test_a_lone_plate_has_no_relatives_and_relies_on_its_own_trials():
     plate = terrain(PLATE, level=-3.0, seed=9, noise=0.02)
-    of = run_relatives(task(plate, KNOWN))
-    assert (of.relatives, of.has_few) == ((), True)
-    assert of.uses_relatives is (of.inner_joint < of.inner_alone + 0.05)
-    assert nlpd(of.chosen) <= nlpd(of.alone) + 0.05
+    outcome = run_relatives(task(plate, KNOWN))
+    assert (outcome.relatives, outcome.has_few) == ((), True)
+    assert outcome.uses_relatives is (outcome.inner_joint < outcome.inner_alone + 0.05)
+    assert nlpd(outcome.chosen) <= nlpd(outcome.alone) + 0.05
 
 
 def test_an_outcome_comes_back_from_the_disk(alike):
@@ -140,15 +140,15 @@ def test_three_trials_are_known_and_no_fewer_than_four_compared(slice_trials):
     from analysis.data.prepare import PrepareOptions, prepare_trial
 
     prepared = {
-        name: [prepare_trial(s, PrepareOptions()) for s in of]
-        for name, of in slice_trials.items()
+        name: [prepare_trial(s, PrepareOptions()) for s in group]
+        for name, group in slice_trials.items()
     }
     grounds = grounds_of(slice_trials)
     assert plan_relatives(prepared, grounds, OPTIONS) == []  # three trials each
     prepared["S0"] = [*prepared["S0"], *prepared["B0"]]
     (only,) = plan_relatives(prepared, grounds, OPTIONS)
     assert len(only.own.trials) == len(only.tested) == 3
-    assert {of.ground.terrain for of in only.others} == {"B0", "TF"}
+    assert {rows.ground.terrain for rows in only.others} == {"B0", "TF"}
     other = plan_relatives(prepared, grounds, OPTIONS, draw=1)[0]
     assert sorted([*only.numbers, *other.numbers]) != sorted(2 * only.numbers)
     assert plan_relatives(prepared, grounds, FitOptions()) == []

@@ -48,7 +48,7 @@ def test_the_components_that_made_the_trials_are_recovered(known):
     assert known.between == pytest.approx(1.5, rel=0.5)
     assert known.within == pytest.approx(1.0, rel=0.3)
     assert known.tau == pytest.approx(0.3, rel=0.5)
-    assert known.is_told_apart
+    assert known.is_distinguishable
     assert known.trials == 20
     assert known.seconds == pytest.approx(8.0)
 
@@ -63,7 +63,7 @@ def test_every_component_has_an_interval_around_it(known, name):
 def test_trials_that_do_not_differ_are_not_told_apart():
     same = fit_components(drawn(8, 0.0, 1.0, 0.3, 0.2, seed=3, draws=0))
     assert same.intervals == {}
-    assert not same.is_told_apart
+    assert not same.is_distinguishable
     assert same.gain < 1.4
 
 
@@ -78,10 +78,10 @@ def test_two_trials_show_no_spread_between_them():
 
 def test_more_trials_show_the_level_better_by_the_root_of_their_number():
     ends = Interval(0.0, 1.0)
-    of = TrialComponents(
+    components = TrialComponents(
         10, 8.0, between=0.6, within=1.0, tau=0.5, measurement=0.1,
         intervals={"between": ends}, gain=3.0,
     )  # fmt: skip
-    assert of.independent == pytest.approx(8.0)
-    assert of.level_sd(1) == pytest.approx(np.sqrt(0.36 + 1.0 / 8.0))
-    assert of.level_sd(9) == pytest.approx(of.level_sd(1) / 3.0)
+    assert components.independent == pytest.approx(8.0)
+    assert components.level_sd(1) == pytest.approx(np.sqrt(0.36 + 1.0 / 8.0))
+    assert components.level_sd(9) == pytest.approx(components.level_sd(1) / 3.0)

@@ -190,42 +190,42 @@ KINDS = {
 }  # fmt: skip
 
 
-def problems(value, schema, root, place="$"):
+def problems(value, schema, root, location="$"):
     """Yield where a value breaks a schema of the keywords above."""
     unknown = set(schema) - CHECKED
     assert not unknown, f"keywords that this check does not know: {unknown}"
     if "$ref" in schema:
         name = schema["$ref"].removeprefix("#/$defs/")
-        yield from problems(value, root["$defs"][name], root, place)
+        yield from problems(value, root["$defs"][name], root, location)
     if "const" in schema and value != schema["const"]:
-        yield f"{place} is not {schema['const']}"
+        yield f"{location} is not {schema['const']}"
     if "type" in schema and not isinstance(value, KINDS[schema["type"]]):
-        yield f"{place} is no {schema['type']}"
+        yield f"{location} is no {schema['type']}"
         return
     if isinstance(value, dict):
         yield from (
-            f"{place}.{n} is missing"
+            f"{location}.{n} is missing"
             for n in schema.get("required", ())
             if n not in value
         )
         others = schema.get("additionalProperties", {})
         for name, item in value.items():
             inner = schema.get("properties", {}).get(name, others)
-            yield from problems(item, inner, root, f"{place}.{name}")
+            yield from problems(item, inner, root, f"{location}.{name}")
     sizes = (("minItems", "maxItems"), ("minProperties", "maxProperties"))
     if isinstance(value, list | dict):
         least, most = sizes[isinstance(value, dict)]
         if not schema.get(least, 0) <= len(value) <= schema.get(most, inf):
-            yield f"{place} has {len(value)} entries"
+            yield f"{location} has {len(value)} entries"
     if isinstance(value, list) and "items" in schema:
         for k, item in enumerate(value):
-            yield from problems(item, schema["items"], root, f"{place}[{k}]")
+            yield from problems(item, schema["items"], root, f"{location}[{k}]")
     if isinstance(value, int | float) and (
         value < schema.get("minimum", -inf)
         or value <= schema.get("exclusiveMinimum", -inf)
         or value >= schema.get("exclusiveMaximum", inf)
     ):
-        yield f"{place} = {value} is out of range"
+        yield f"{location} = {value} is out of range"
 
 
 def broken(content):
@@ -238,7 +238,7 @@ def test_what_is_written_follows_the_schema_that_is_shipped():
 
 
 @pytest.mark.parametrize(
-    ("changes", "place"),
+    ("changes", "location"),
     [
         ({"version": 1}, "$.version"),
         ({"shares": [0.1, 1.0]}, "$.shares[1]"),
@@ -248,9 +248,9 @@ def test_what_is_written_follows_the_schema_that_is_shipped():
         ({"simulated": "yes"}, "$.simulated"),
     ],
 )
-def test_the_schema_refuses_what_the_reader_refuses(tmp_path, changes, place):
+def test_the_schema_refuses_what_the_reader_refuses(tmp_path, changes, location):
     content = changed(**changes)
-    assert any(problem.startswith(place) for problem in broken(content))
+    assert any(problem.startswith(location) for problem in broken(content))
     if "simulated" not in changes:  # the reader takes any truth value
         with pytest.raises(SettingsError):
             load(saved(tmp_path, content))

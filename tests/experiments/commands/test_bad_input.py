@@ -60,12 +60,12 @@ def test_a_run_that_cannot_be_is_refused(tmp_path, arguments, text):
 
 @pytest.mark.parametrize("below", ["", "deeper"])
 def test_a_data_folder_that_is_a_file_is_refused(config, tmp_path, below):
-    place = tmp_path / "occupied"
-    place.write_text("precious")
-    done = run_short(config, place / below)
+    occupied = tmp_path / "occupied"
+    occupied.write_text("precious")
+    done = run_short(config, occupied / below)
     assert "occupied" in refusal(done)
     assert "cannot be written" in done.err
-    assert place.read_text() == "precious"
+    assert occupied.read_text() == "precious"
 
 
 @pytest.mark.parametrize(
@@ -379,11 +379,11 @@ def test_a_fit_of_a_table_without_its_columns_names_them(tmp_path):
 
 
 def test_a_fit_into_a_folder_that_is_a_file_is_refused(tmp_path):
-    place = tmp_path / "occupied"
-    place.write_text("precious")
-    done = traction("fit", table(tmp_path / "t.csv"), "--to", place)
+    occupied = tmp_path / "occupied"
+    occupied.write_text("precious")
+    done = traction("fit", table(tmp_path / "t.csv"), "--to", occupied)
     assert "cannot be written" in refusal(done)
-    assert place.read_text() == "precious"
+    assert occupied.read_text() == "precious"
 
 
 def test_a_fit_with_a_strange_list_of_columns_is_refused(tmp_path):

@@ -18,8 +18,8 @@ from tests.experiments.commands.test_check_bus import listen
 from tests.experiments.program import traction
 from tests.fakes.stepped import Rig
 from wam.bus.decoder import BusReader, describe_id
-from wam.bus.kernel_door import setup_command
 from wam.bus.log import parse_log
+from wam.bus.socketcan import setup_command
 from wam.driver.arm import WamArm
 from wam.driver.transmission import Transmission
 from wam.model.constants import load_constants

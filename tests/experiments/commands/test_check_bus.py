@@ -11,8 +11,8 @@ from acquisition.errors import LinkError
 from fakes.bus.hub import SocketHub
 from tests.experiments.program import traction, write_config
 from wam.bus.decoder import describe_id
-from wam.bus.doors import PythonCanDoor
 from wam.bus.log import BusTraffic
+from wam.bus.transports import PythonCanTransport
 
 
 @pytest.mark.parametrize(
@@ -129,8 +129,8 @@ class DeafBus(can.BusABC):
 @pytest.fixture
 def served_by(monkeypatch):
     def serve(bus):
-        door = PythonCanDoor(bus, SystemClock())
-        monkeypatch.setattr("wam.bus.doors.open_door", lambda *_: door)
+        transport = PythonCanTransport(bus, SystemClock())
+        monkeypatch.setattr("wam.bus.transports.open_transport", lambda *_: transport)
 
     return serve
 

@@ -35,10 +35,10 @@ class InThisThread:
         return done
 
 
-def in_this_process(arguments, place):
+def in_this_process(arguments, folder):
     """Run a session here instead of in a process of its own, which starts slowly."""
     done = traction(*arguments)
-    place.with_name(place.name + ".log").write_text(done.out + done.err)
+    folder.with_name(folder.name + ".log").write_text(done.out + done.err)
     return done.code
 
 
@@ -137,13 +137,13 @@ def test_an_arm_that_rubs_is_calibrated_first_and_compensated(tmp_path, monkeypa
     assert load_settings(plan.config).matrix == load_settings(None).matrix
 
 
-def calibrated_at_once(arguments, place):
+def calibrated_at_once(arguments, folder):
     """Write what `calibrate` was asked for; do everything else."""
     if arguments[0] != "calibrate":
-        return in_this_process(arguments, place)
+        return in_this_process(arguments, folder)
     asked = dict(itertools.pairwise(arguments))
     text = " ".join(f"{name} {asked[name]}" for name in ("--friction", "--seed"))
-    (place.with_name("rig") / "friction.fake.toml").write_text(text)
+    (folder.with_name("rig") / "friction.fake.toml").write_text(text)
     return 0
 
 

@@ -1,4 +1,4 @@
-"""An empty board says why it is empty; a session that is open elsewhere says so."""
+"""An empty table says why it is empty; a session that is open elsewhere says so."""
 
 import json
 import shutil

@@ -40,7 +40,7 @@ class Words:
         self.is_closed = True
 
 
-def rung(stream, *, bell=True):
+def heard(stream, *, bell=True):
     with contextlib.redirect_stdout(stream):
         feedback = build_feedback(OperatorSection(bell=bell), Console())
         for cue in FeedbackSignal:
@@ -49,20 +49,20 @@ def rung(stream, *, bell=True):
 
 
 def test_start_too_fast_and_done_ring_differently():
-    assert rung(Terminal()) == "\a" + "\a\a\a" + "\a\a"
+    assert heard(Terminal()) == "\a" + "\a\a\a" + "\a\a"
 
 
 def test_without_a_terminal_nothing_rings():
-    assert rung(io.StringIO()) == ""
+    assert heard(io.StringIO()) == ""
 
 
 def test_the_bell_can_be_switched_off():
-    assert rung(Terminal(), bell=False) == ""
+    assert heard(Terminal(), bell=False) == ""
 
 
 def test_cues_are_spoken_in_fixed_words_and_end_with_the_session():
     words = Words()
-    feedback = OperatorFeedback(Console(), words, rings=False)
+    feedback = OperatorFeedback(Console(), words, has_sound=False)
     for cue in FeedbackSignal:
         feedback.give(cue)
     feedback.close()

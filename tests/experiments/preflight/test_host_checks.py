@@ -23,9 +23,9 @@ NOW_NS = 10**12
 
 def governed(folder, *names):
     for number, name in enumerate(names):
-        place = folder / f"cpu{number}" / "cpufreq"
-        place.mkdir(parents=True)
-        (place / "scaling_governor").write_text(name + "\n")
+        cpufreq = folder / f"cpu{number}" / "cpufreq"
+        cpufreq.mkdir(parents=True)
+        (cpufreq / "scaling_governor").write_text(name + "\n")
     return folder
 
 

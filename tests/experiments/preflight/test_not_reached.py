@@ -5,7 +5,7 @@ import pytest
 from acquisition.errors import LinkError, LinkFullError, PreflightError
 from experiments.preflight import connecting
 from experiments.settings.load import load_settings
-from wam.bus.kernel_door import setup_command
+from wam.bus.socketcan import setup_command
 
 
 def refusal(error, monkeypatch):

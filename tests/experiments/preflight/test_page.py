@@ -6,7 +6,7 @@ from experiments.operator.console import BAD, GOOD, WARNING
 from experiments.preflight import host_checks
 from experiments.preflight.host_checks import check_interface
 from tests.experiments.program import run_short, write_config
-from wam.bus.kernel_door import LONGEST_QUEUE, InterfaceState
+from wam.bus.socketcan import LONGEST_QUEUE, InterfaceState
 
 
 def marks(done):
@@ -42,7 +42,7 @@ def test_no_loop_runs_after_a_refusal(tmp_path):
     assert "loop" not in marks(refused(tmp_path, "ft-silent"))
 
 
-def test_the_bus_is_named_with_its_door(tmp_path):
+def test_the_bus_is_named_with_its_transport(tmp_path):
     done = refused(tmp_path, "not-zeroed")
     assert "simulated, python-can" in done.out
 

@@ -23,10 +23,10 @@ def test_an_untouched_folder_has_no_changes(folder):
     assert changed_files(folder) == []
 
 
-@pytest.mark.parametrize("place", [0, 100, 255])
-def test_one_changed_byte_is_named(folder, place):
+@pytest.mark.parametrize("index", [0, 100, 255])
+def test_one_changed_byte_is_named(folder, index):
     content = bytearray((folder / "a.txt").read_bytes())
-    content[place] ^= 1
+    content[index] ^= 1
     (folder / "a.txt").write_bytes(content)
     assert texts(folder) == ["a.txt is changed"]
 

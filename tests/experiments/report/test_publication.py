@@ -301,8 +301,8 @@ def test_a_result_that_the_recordings_do_not_give_is_named(published, tmp_path):
 def test_a_publication_is_a_data_folder_and_its_tables_are_read(published, config):
     done = traction("verify", "--all", "--data", published)
     assert done.code == 0
-    board = traction("status", "--json", "--data", published, "--config", config)
-    (row,) = [row for row in json.loads(board.out) if row["kept"]]
+    status = traction("status", "--json", "--data", published, "--config", config)
+    (row,) = [row for row in json.loads(status.out) if row["kept"]]
     assert (row["terrain"], row["kept"], row["sessions"]) == ("TF", 2, ["S001"])
     import traction as tr
 

@@ -10,9 +10,9 @@ from fakes.bus.hub import SocketHub
 from fakes.pucks.options import NetworkOptions
 from tests.fakes.stepped import Rig, SteppedClock
 from tests.wam.bus.test_link import message
-from wam.bus.doors import PythonCanDoor
 from wam.bus.error_frames import BusErrors
 from wam.bus.link import CanLink
+from wam.bus.transports import PythonCanTransport
 from wam.driver.arm import WamArm
 
 HOST_ASKS = 0x404  # positions of all pucks, asked by node 0
@@ -26,7 +26,7 @@ class SharedBus(SteppedClock):
         super().__init__()
         self.hub = SocketHub(folder / "bus")
         self.other = SocketBus(str(folder / "bus"))
-        self.link = CanLink(PythonCanDoor(SocketBus(str(folder / "bus")), self))
+        self.link = CanLink(PythonCanTransport(SocketBus(str(folder / "bus")), self))
         self.talk = {}
         self.hub.receive()
 

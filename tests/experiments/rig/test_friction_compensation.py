@@ -92,8 +92,8 @@ def test_friction_that_no_arm_has_is_refused_with_its_joint(folder):
 def test_deviations_below_0_are_refused(folder, name):
     text = calibration()
     lines = text.splitlines()
-    place = next(i for i, line in enumerate(lines) if line.startswith(f"{name} ="))
-    lines[place] = f"{name} = [-0.1, 0, 0, 0, 0, 0, 0]"
+    index = next(i for i, line in enumerate(lines) if line.startswith(f"{name} ="))
+    lines[index] = f"{name} = [-0.1, 0, 0, 0, 0, 0, 0]"
     (folder / "friction.toml").write_text("\n".join(lines))
     with pytest.raises(SettingsError, match="below 0"):
         compensation(folder)

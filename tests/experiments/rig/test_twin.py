@@ -148,8 +148,10 @@ def test_a_rehearsal_of_a_twin_takes_no_second_rig_toml(folder):
 )
 def test_a_twin_that_rubs_as_calibrated_takes_no_other_share(command, folder):
     *words, option = command
-    place = folder if option == "--twin" else folder / "rig.toml"
-    done = traction(*words, option, place, "--friction", 0.5, "--data", folder / "data")
+    argument = folder if option == "--twin" else folder / "rig.toml"
+    done = traction(
+        *words, option, argument, "--friction", 0.5, "--data", folder / "data"
+    )
     assert done.code == 2
     assert "--friction and --twin" in done.err
 

@@ -9,7 +9,7 @@ from acquisition.control_loop.faults import Action, Fault, GuardVerdict
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import WrenchSample
 from acquisition.errors import PreflightError
-from acquisition.ipc.ring_buffer import Ring
+from acquisition.ipc.ring_buffer import RingBuffer
 from acquisition.ipc.shared_sensor import WRENCH_DTYPE, pack_wrench
 from acquisition.sample import Sample
 from experiments.fault_injection.plan import FaultTrigger
@@ -92,8 +92,10 @@ class LiftedFoot(StubClient):
         self.speed = (0.0,) * 6
         self.is_valid = True
         self.bias = None
-        self.ring = Ring(
-            memoryview(bytearray(Ring.size_of(WRENCH_DTYPE, 4096))), WRENCH_DTYPE, 4096
+        self.buffer = RingBuffer(
+            memoryview(bytearray(RingBuffer.size_of(WRENCH_DTYPE, 4096))),
+            WRENCH_DTYPE,
+            4096,
         )
         self.on_advance.append(self._stream)
 
@@ -102,7 +104,7 @@ class LiftedFoot(StubClient):
         for t_ns in range(now - 20_000_000, now, 2_000_000):
             wrench = (self.force(self.advanced), 0.0, 0.0, 0.0, 0.0, 0.0)
             sample = WrenchSample(t_ns, 0, wrench, 0, self.is_valid, 0)
-            self.ring.write(pack_wrench(sample))
+            self.buffer.write(pack_wrench(sample))
 
     def latest(self):
         sample = Sample()
@@ -111,7 +113,7 @@ class LiftedFoot(StubClient):
         return sample.data
 
     def wrenches(self):
-        return self.ring.reader()
+        return self.buffer.reader()
 
     def set_bias(self, bias):
         self.bias = bias

@@ -97,8 +97,8 @@ def test_board_journal_and_files_of_an_eventful_session_agree(
     assert {n: now[n] for n in safe if n[:3] in kept_before} == {
         n: d for n, d in safe.items() if n[:3] in kept_before
     }
-    board = json.loads(traction("status", "--json", *where).out)
-    (line,) = [row for row in board if row["sessions"]]
+    status = json.loads(traction("status", "--json", *where).out)
+    (line,) = [row for row in status if row["sessions"]]
     assert (line["terrain"], line["kept"], line["rejected"]) == ("S10", trials, 4)
     assert line["trials"] == [1] * trials + [0] * (10 - trials)
 

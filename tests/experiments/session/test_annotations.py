@@ -11,10 +11,10 @@ import pytest
 
 from acquisition.clock import SystemClock
 from analysis.data.load import load_trial
-from experiments.board.upcoming import confounding, suggest_order
 from experiments.session.annotations import parse_trial
 from experiments.session.reducer import replay
 from experiments.settings.load import load_settings
+from experiments.status_table.upcoming import confounding, suggest_order
 from tests.experiments.program import (
     digest,
     journal,
@@ -238,8 +238,8 @@ def test_the_board_shows_which_trials_are_kept(recorded, config):
     assert (line["terrain"], line["kept"], line["trials"]) == (
         *("TF", 2, [1, 1] + [0] * 8),
     )
-    board = traction("status", *options).out
-    assert "██········" in board
+    status = traction("status", *options).out
+    assert "██········" in status
 
 
 @pytest.mark.parametrize(

@@ -44,8 +44,8 @@ def folder(tmp_path):
 
 def keep(folder, pushes, **changed):
     """Write a sidecar per trial; the changes are those of the last one."""
-    for k, of in enumerate(pushes):
-        details = {"verdict": "keep", "coverage": SPARSE, "push": of.plain()}
+    for k, record in enumerate(pushes):
+        details = {"verdict": "keep", "coverage": SPARSE, "push": record.plain()}
         details |= changed if k == len(pushes) - 1 else {}
         path = folder.trials / f"T{k + 1:02d}.json"
         path.write_text(json.dumps(details))
@@ -79,9 +79,9 @@ def test_enough_is_said_with_what_the_matrix_wants(folder, row):
     row = row.model_copy(update={"trials": 20})
     keep(folder, everywhere(12))
     assert next_push(folder, row).enough.endswith("; 20 are wanted")
-    board = enough_of([folder], row)
-    assert board.startswith("S0: enough after 12: two more trials would move the grid")
-    assert board.endswith("; 20 are wanted.")
+    line = enough_of([folder], row)
+    assert line.startswith("S0: enough after 12: two more trials would move the grid")
+    assert line.endswith("; 20 are wanted.")
 
 
 def test_nothing_is_said_of_a_terrain_that_is_complete(folder, row):

@@ -14,8 +14,8 @@ from acquisition.clock import SystemClock
 from acquisition.errors import SettingsError
 from fakes.bus.client import SocketBus, open_socket, pack_frame, unpack_frame
 from fakes.bus.hub import CLIENTS, SocketHub
-from wam.bus.doors import open_door
 from wam.bus.link import CanLink
+from wam.bus.transports import open_transport
 
 QUESTION = pack_frame(0x404, b"\x30")
 
@@ -218,7 +218,7 @@ def test_the_driver_opens_the_bus_as_any_other(hub, path, monkeypatch):
     backend = ("fakes.bus.client", "SocketBus")
     monkeypatch.setitem(can.interfaces.BACKENDS, "traction-fake", backend)
     monkeypatch.setattr(can.util, "VALID_INTERFACES", {"traction-fake"})
-    link = CanLink(open_door("traction-fake", str(path), 1_000_000, SystemClock()))
+    link = CanLink(open_transport("traction-fake", str(path), 1_000_000, SystemClock()))
     hub.receive()
     link.send(0x404, b"\x30")
     assert hub.receive() == [(0x404, b"\x30")]

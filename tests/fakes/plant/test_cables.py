@@ -68,8 +68,8 @@ def test_the_arm_swings_in_the_modes_of_its_cables(resonance):
     list(float_for(plant, 1.0))
     plant.qd[:] = 0.02 * modes[:, 0] / np.abs(modes[:, 0]).max()
     most = int(np.argmax(np.abs(modes[:, 0])))
-    rings = [plant.qd[most] for _ in float_for(plant, 0.6)]
-    ups = np.flatnonzero(np.diff(np.sign(rings)) > 0)
+    speeds = [plant.qd[most] for _ in float_for(plant, 0.6)]
+    ups = np.flatnonzero(np.diff(np.sign(speeds)) > 0)
     seen = 1.0 / (np.diff(ups).mean() * CYCLE_NS * 1e-9)
     assert seen == pytest.approx(np.sqrt(rates[0]) / (2.0 * np.pi), rel=0.03)
     assert seen < resonance

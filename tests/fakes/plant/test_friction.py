@@ -211,13 +211,13 @@ def test_a_held_arm_does_not_creep_under_half_of_its_friction():
     plant = make_plant(friction=1.0)
     release(plant)
     plant.hand.let_go()
-    places = []
+    positions = []
     for k in range(2_000):
         send(plant, MODEL.gravity(plant.q) + 0.5 * CONSTANTS.coulomb)
         plant.advance(plant.t_ns + CYCLE_NS)
         if k % 500 == 499:
-            places.append(plant.q.copy())
-    assert np.abs(places[-1] - places[0]).max() < 2e-6
+            positions.append(plant.q.copy())
+    assert np.abs(positions[-1] - positions[0]).max() < 2e-6
 
 
 def test_one_motor_of_a_differential_sticks_while_the_other_one_slides():

@@ -13,8 +13,8 @@ from fakes.plant.model import PlantOptions
 from fakes.world.rig import FakeRig, SimulatedScene
 from tests.acquisition.control_loop.limits import guard_limits
 from tests.fakes.scenes import CONSTANTS, FRAME, START_Q, TOOL
-from wam.bus.doors import PythonCanDoor
 from wam.bus.link import CanLink
+from wam.bus.transports import PythonCanTransport
 from wam.control.controller import FootController
 from wam.control.soft_walls import SoftWalls, Walls
 from wam.driver.arm import WamArm
@@ -82,7 +82,9 @@ class HoldBench:
         self.plant.terrain = None
         self.plant.hand.let_go()
         self.braked_q = self.plant.q.copy()
-        self.arm = WamArm(CanLink(PythonCanDoor(self.rig.bus, self.clock)), self.clock)
+        self.arm = WamArm(
+            CanLink(PythonCanTransport(self.rig.bus, self.clock)), self.clock
+        )
         self.arm.start()
         self.sent = []
         usual = self.arm.send

@@ -8,8 +8,8 @@ from fakes.clock import SteppedClock
 from fakes.plant.model import PlantOptions
 from fakes.world.rig import FakeRig, SimulatedScene, solve_start
 from ft_sensor.payload import TerrainFrame
-from wam.bus.doors import PythonCanDoor
 from wam.bus.link import CanLink
+from wam.bus.transports import PythonCanTransport
 from wam.control.controller import FootController
 from wam.driver.arm import WamArm
 from wam.driver.settings import ArmSettings
@@ -46,7 +46,7 @@ class ClosedLoop:
         self.model = ArmModel(CONSTANTS, tool)
         self.law = FootController(self.model, virtual_mass)
         self.arm = WamArm(
-            CanLink(PythonCanDoor(self.rig.bus, self.clock)),
+            CanLink(PythonCanTransport(self.rig.bus, self.clock)),
             self.clock,
             ArmSettings(j2mp=CONSTANTS.j2mp),
         )

@@ -9,9 +9,9 @@ from acquisition.control_loop.loop import Loop
 from acquisition.control_loop.states import ArmState
 from tests.acquisition.control_loop.limits import guard_limits
 from tests.fakes.scenes import CONSTANTS, MODEL, make_rig
-from wam.bus.doors import PythonCanDoor
 from wam.bus.frames import decode_position, encode_position, position_reply_id
 from wam.bus.link import CanLink
+from wam.bus.transports import PythonCanTransport
 from wam.control.controller import FootController
 from wam.driver.arm import WamArm
 from wam.driver.settings import ArmSettings
@@ -46,7 +46,7 @@ class Bench:
     def __init__(self, state):
         self.rig, self.clock = make_rig()
         self.rig.plant.hand.let_go()
-        link = CanLink(PythonCanDoor(self.rig.bus, self.clock))
+        link = CanLink(PythonCanTransport(self.rig.bus, self.clock))
         self.arm = WamArm(link, self.clock)
         self.arm.start()
         self.lie = None  # (motor, counts)

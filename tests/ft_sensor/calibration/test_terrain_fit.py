@@ -17,12 +17,12 @@ def frame(incline_deg=10.0, heading_deg=0.0):
     return TerrainFrame(float(angles[0]), float(angles[1]), (0.7, 0.05, 0.19), LENGTH)
 
 
-def corners(of, more=()):
+def corners(terrain, more=()):
     """Return the corners in the order of the prompts, then `more` (x, y) on top."""
-    axes = of.axes()
-    places = [(0, 1), (0, -1), (LENGTH, 1), (LENGTH, -1)]
-    flat = [(x, y * HALF_WIDTH) for x, y in places] + list(more)
-    return np.array([of.far_end + x * axes[0] + y * axes[1] for x, y in flat])
+    axes = terrain.axes()
+    outline = [(0, 1), (0, -1), (LENGTH, 1), (LENGTH, -1)]
+    flat = [(x, y * HALF_WIDTH) for x, y in outline] + list(more)
+    return np.array([terrain.far_end + x * axes[0] + y * axes[1] for x, y in flat])
 
 
 @given(st.floats(0, 30), st.floats(-170, 170))

@@ -289,8 +289,8 @@ def test_hostile_bytes_raise_nothing_and_grow_nothing(kind, chunk):
     bench = SensorBench(kind).opened()
     good = b"".join(data for _, data in bench.device.due(bench.clock.now_ns() + S))
     noise = bytearray(good)
-    for place in rng.integers(0, len(noise), 400):
-        noise[place] = rng.integers(0, 256)
+    for index in rng.integers(0, len(noise), 400):
+        noise[index] = rng.integers(0, 256)
     scanner = bench.driver.scanner()
     for start in range(0, len(noise), chunk):
         scanner.feed(bytes(noise[start : start + chunk]))
@@ -317,8 +317,8 @@ def damaged_seconds(kind, seconds):
     rng = np.random.default_rng(5)
     faults = [ByteFault.FLIP, ByteFault.DROP]
     for second in range(seconds):
-        place = int(rng.integers(bench.driver.timing.frame_size))
-        bench.device.damage_next(faults[second % 2], place)
+        index = int(rng.integers(bench.driver.timing.frame_size))
+        bench.device.damage_next(faults[second % 2], index)
         bench.run(S, 10 * MS)
     return bench
 

@@ -7,10 +7,10 @@ from acquisition.clock import Readable
 from acquisition.devices import BusCondition
 from acquisition.errors import LinkError, LinkFullError
 from tests.fakes.stepped import Rig, SteppedClock
-from wam.bus import doors
-from wam.bus.doors import PythonCanDoor, open_bus
-from wam.bus.kernel_door import InterfaceState, setup_command
+from wam.bus import transports
 from wam.bus.link import CanLink
+from wam.bus.socketcan import InterfaceState, setup_command
+from wam.bus.transports import PythonCanTransport, open_bus
 
 
 class ScriptedBus(can.BusABC):
@@ -41,7 +41,7 @@ class ScriptedBus(can.BusABC):
 
 
 def opened_link(bus, tap=None):
-    return CanLink(PythonCanDoor(bus, SteppedClock()), tap)
+    return CanLink(PythonCanTransport(bus, SteppedClock()), tap)
 
 
 def message(can_id, data=b"\x85\x00\x02\x00", **flags):
@@ -53,14 +53,14 @@ def message(can_id, data=b"\x85\x00\x02\x00", **flags):
 def opened(monkeypatch):
     def make(bus, is_up=True):
         state = InterfaceState(is_up, has_carrier=True, queue_length=10)
-        monkeypatch.setattr(doors, "interface_state", lambda _: state)
+        monkeypatch.setattr(transports, "interface_state", lambda _: state)
 
         def factory(**_):
             if isinstance(bus, Exception):
                 raise bus
             return bus
 
-        monkeypatch.setattr(doors.can, "Bus", factory)
+        monkeypatch.setattr(transports.can, "Bus", factory)
         return lambda: open_bus("socketcan", "can0", 1_000_000)
 
     return make

@@ -67,20 +67,20 @@ def rows_of(friction, seed, *, noise=0.02, correlated=False, count=2000):
     )
     speed = np.where(rng.random((count, 7)) < 0.03, 1e-9 * speed, speed * TURNS)
     angle = rng.uniform(-20.0, 20.0, (count, 7))
-    borne = rng.uniform(-0.4, 0.4, (count, 7))
+    load = rng.uniform(-0.4, 0.4, (count, 7))
     inertia = 0.05 * friction.coulomb * rng.standard_normal((count, 7))
     gravity = rng.standard_normal((count, 7, 21)) / TURNS[:, None]
     error = rng.standard_normal((count, 7))
     if correlated:
         error = np.repeat(error[:: BLOCK // 2], BLOCK // 2, axis=0)
-    shown = friction.steady(angle, borne, speed) + gravity @ HEAVIER
+    shown = friction.steady(angle, load, speed) + gravity @ HEAVIER
     shown += noise * friction.coulomb * error
     return [
         SlidingRows(
             angle=angle[:, i],
             speed=np.where(np.abs(speed[:, i]) < 1e-6, 0.0, speed[:, i]),
             sense=np.where(speed[:, i] < 0.0, -1.0, 1.0),
-            borne=borne[:, i],
+            load=load[:, i],
             friction=shown[:, i],
             inertia=inertia[:, i],
             gravity=gravity[:, i],
@@ -162,7 +162,7 @@ def test_presliding_is_what_gives_way_up_to_the_torque_that_breaks_away():
 def test_a_friction_of_another_form_is_refused():
     held_out = rows_of(truth(), 2)
     other = [
-        replace(r, friction=r.friction * (1 + 0.5 * np.sin(r.borne * 9)))
+        replace(r, friction=r.friction * (1 + 0.5 * np.sin(r.load * 9)))
         for r in held_out
     ]
     with pytest.raises(SettingsError, match="not of this form"):

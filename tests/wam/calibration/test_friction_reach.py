@@ -91,12 +91,12 @@ def test_a_sliding_foot_bears_what_balances_friction_against_its_way(model):
 
 def test_the_foot_goes_along_the_ground_without_turning(model):
     poses = poses_along(model, START, LEVEL[0], TRAVEL)
-    places = [model.sole_pose(q) for q in poses]
-    start, turn = places[0]
-    ways = np.array([place - start for place, _ in places])
+    soles = [model.sole_pose(q) for q in poses]
+    start, turn = soles[0]
+    ways = np.array([position - start for position, _ in soles])
     assert ways[-1] == pytest.approx(TRAVEL * LEVEL[0], abs=1e-6)
     assert np.abs(ways @ LEVEL[1:].T).max() < 1e-6
-    assert max(np.abs(turned - turn).max() for _, turned in places) < 1e-6
+    assert max(np.abs(turned - turn).max() for _, turned in soles) < 1e-6
 
 
 def test_half_of_the_friction_leaves_half_as_much_open(model):

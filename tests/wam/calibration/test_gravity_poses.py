@@ -205,8 +205,8 @@ def test_a_pose_that_cannot_be_reached_from_the_one_before_is_reached_by_upright
     halts = plan_halts(
         model, np.array(UPRIGHT), [low, other], Space(-5.0), is_two_sided=False
     )
-    places = ["upright" if (halt.q == UPRIGHT).all() else halt.pose for halt in halts]
-    assert places == ["upright", 0, "upright", 1, "upright", "upright"]
+    labels = ["upright" if (halt.q == UPRIGHT).all() else halt.pose for halt in halts]
+    assert labels == ["upright", 0, "upright", 1, "upright", "upright"]
 
 
 def test_a_leg_is_as_fast_as_the_sole_may_be(model):

@@ -123,10 +123,10 @@ def test_a_motor_that_bears_less_gets_less_as_its_friction_does(share):
     friction = replace(TRUE, load=np.full(7, 0.04), load_at=at)
     known = known_friction(friction, NOTHING, NOTHING)
     compensation = FrictionCompensation(CONSTANTS, known, 0.7)
-    borne = np.array([0.0, share * 20.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    load_torque = np.array([0.0, share * 20.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     for number, angles in enumerate(turning(1, 0.3)):
-        tau = compensation.torque(reading(number, angles), borne)
-    motors = np.linalg.inv(CONSTANTS.j2mp).T @ borne
+        tau = compensation.torque(reading(number, angles), load_torque)
+    motors = np.linalg.inv(CONSTANTS.j2mp).T @ load_torque
     rubs = friction.dry(angles, motors, np.sign(angles))
     assert tau[1] <= 0.7 * joint_coulomb(CONSTANTS, rubs)[1] + 1e-9
     if share <= 1.0:

@@ -215,7 +215,7 @@ def test_the_bus_time_of_a_reading_is_that_of_its_last_reply(bench):
     assert bench.cycle().bus_ns == 0
 
 
-def test_a_recording_says_through_which_door_the_bus_was_reached(bench):
+def test_a_recording_says_through_which_transport_the_bus_was_reached(bench):
     fields = bench.arm.counters.metadata()
     assert (fields["link:door"], fields["link:lost_frames"]) == ("python-can", "0")
 

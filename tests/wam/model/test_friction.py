@@ -40,13 +40,15 @@ def test_figures_of_joints_come_back_from_the_motors_that_share_them():
 
 def test_steady_friction_is_against_the_motion_and_falls_from_breakaway():
     friction, still = example(), np.zeros(7)
-    borne = np.full(7, 0.1)
-    slow = friction.steady(still, borne, np.full(7, 1e-6))
-    fast = friction.steady(still, borne, np.full(7, 50.0)) - 50.0 * friction.viscous
+    load_torque = np.full(7, 0.1)
+    slow = friction.steady(still, load_torque, np.full(7, 1e-6))
+    fast = (
+        friction.steady(still, load_torque, np.full(7, 50.0)) - 50.0 * friction.viscous
+    )
     level = (friction.coulomb + friction.asymmetry) * (1.0 + friction.ripple_cos)
     assert slow == pytest.approx(1.3 * level)
     assert fast == pytest.approx(level, rel=1e-3)
-    back = friction.steady(still, borne, np.full(7, -1e-6))
+    back = friction.steady(still, load_torque, np.full(7, -1e-6))
     other = (friction.coulomb - friction.asymmetry) * (1.0 + friction.ripple_cos)
     assert back == pytest.approx(-1.3 * other)
 
@@ -62,9 +64,9 @@ def test_a_motor_that_bears_more_rubs_more():
 
 def test_half_of_the_excess_is_gone_at_the_stribeck_speed():
     friction, still = example(), np.zeros(7)
-    borne = np.full(7, 0.1)
+    load_torque = np.full(7, 0.1)
     slow, half, fast = (
-        friction.steady(still, borne, np.full(7, v)) - v * friction.viscous
+        friction.steady(still, load_torque, np.full(7, v)) - v * friction.viscous
         for v in (1e-9, 0.5, 1e6)
     )
     assert half == pytest.approx(0.5 * (slow + fast))

@@ -1,10 +1,11 @@
-"""What the 13 frames of a cycle cost through each door to the bus, side by side.
+"""What the 13 frames of a cycle cost through each transport, side by side.
 
-Four frames leave and nine arrive in every cycle of 2 ms. Each door does so in turns and
-pauses in between, so that neither finds warm caches. Linux's CAN needs an interface;
-here datagrams on the loopback device carry the same 16 bytes, stamped by the kernel,
-and the sockets' options are the same. Processor time of this thread is measured, and no
-processor sleeps, as while the arm is driven: waking up would count as work.
+Four frames leave and nine arrive in every cycle of 2 ms. Each transport does so in
+turns and pauses in between, so that neither finds warm caches. Linux's CAN needs an
+interface; here datagrams on the loopback device carry the same 16 bytes, stamped by the
+kernel, and the sockets' options are the same. Processor time of this thread is
+measured, and no processor sleeps, as while the arm is driven: waking up would count as
+work.
 """
 
 import argparse
@@ -26,7 +27,6 @@ from acquisition.clock import SystemClock
 from acquisition.control_loop.realtime import RealtimeRequest, request
 from benchmarks.rows import BenchRow
 from wam.bus.datagrams import system_call
-from wam.bus.doors import PythonCanDoor
 from wam.bus.frames import (
     MOTOR_NODES,
     SENSOR_NODE,
@@ -39,9 +39,10 @@ from wam.bus.frames import (
     group_id,
     position_reply_id,
 )
-from wam.bus.kernel_door import KernelDoor
-from wam.bus.link import CanLink, Door
+from wam.bus.link import CanLink, Transport
 from wam.bus.properties import MODERN, Device, property_number
+from wam.bus.socketcan import SocketcanTransport
+from wam.bus.transports import PythonCanTransport
 
 GOAL_US = 45.0  # of the kernel's socket, per cycle
 _PERIOD_NS = 2_000_000
@@ -56,11 +57,11 @@ _ARRIVING = [
 
 
 @dataclass(frozen=True, slots=True)
-class DoorCost:
+class TransportCost:
     """Processor time of one cycle's frames.
 
     Attributes:
-        name: the door.
+        name: the transport.
         median_us: over cycles [us].
         p99_us: 99th percentile [us].
     """
@@ -71,9 +72,9 @@ class DoorCost:
 
 
 class Ends:
-    """A door and the far end of its bus."""
+    """A transport and the far end of its bus."""
 
-    def __init__(self, near: socket.socket, door: Door) -> None:
+    def __init__(self, near: socket.socket, transport: Transport) -> None:
         self.far = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.far.bind(("127.0.0.1", 0))
         near.bind(("127.0.0.1", 0))
@@ -81,7 +82,7 @@ class Ends:
         self.far.connect(near.getsockname())
         self.far.setblocking(False)
         self.near = near
-        self.link = CanLink(door)
+        self.link = CanLink(transport)
         self.times: list[int] = []
         self._p = encode_get(property_number(Device.MOTOR, "P", MODERN))
         self._t = property_number(Device.MOTOR, "T", MODERN)
@@ -108,38 +109,38 @@ class Ends:
 
 
 def kernel_ends() -> Ends:
-    """Return our door onto the kernel's socket."""
+    """Return our transport over the kernel's socket."""
     near = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    door = KernelDoor(near, "loopback", SystemClock(), system_call())
-    return Ends(near, door)
+    transport = SocketcanTransport(near, "loopback", SystemClock(), system_call())
+    return Ends(near, transport)
 
 
 def library_ends() -> Ends:
-    """Return python-can's own bus for SocketCAN behind our door to it."""
+    """Return python-can's own bus for SocketCAN behind our transport."""
     near = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     library: Any = socketcan
     library.create_socket = lambda: near
     library.bind_socket = lambda *_: None
     bus = socketcan.SocketcanBus("loopback")
-    return Ends(near, PythonCanDoor(bus, SystemClock()))
+    return Ends(near, PythonCanTransport(bus, SystemClock()))
 
 
-def measure(cycles: int) -> list[DoorCost]:
-    """Return what each door costs in `cycles` paced cycles."""
+def measure(cycles: int) -> list[TransportCost]:
+    """Return what each transport costs in `cycles` paced cycles."""
     request(RealtimeRequest(is_awake=True))
-    doors = {"kernel socket": kernel_ends(), "python-can": library_ends()}
+    transports = {"kernel socket": kernel_ends(), "python-can": library_ends()}
     next_ns = time.monotonic_ns()
     gc.collect()
     gc.disable()
     for number in range(_WARM_UP + cycles):
-        for ends in doors.values():
+        for ends in transports.values():
             next_ns = max(next_ns + _PERIOD_NS, time.monotonic_ns())
             time.sleep(max(0.0, (next_ns - time.monotonic_ns()) * 1e-9))
             spent = ends.cycle()
             if number >= _WARM_UP:
                 ends.times.append(spent)
     gc.enable()
-    return [_cost(name, ends.times) for name, ends in doors.items()]
+    return [_cost(name, ends.times) for name, ends in transports.items()]
 
 
 def rows() -> list[BenchRow]:
@@ -156,15 +157,17 @@ def rows() -> list[BenchRow]:
     ]
 
 
-def _cost(name: str, times: list[int]) -> DoorCost:
+def _cost(name: str, times: list[int]) -> TransportCost:
     late = sorted(times)[math.ceil(0.99 * len(times)) - 1]
-    return DoorCost(name, statistics.median(times) / 1e3, late / 1e3)
+    return TransportCost(name, statistics.median(times) / 1e3, late / 1e3)
 
 
 def main() -> int:
     """Measure and print; the exit code says nothing about the figures."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--cycles", type=int, default=3000, help="of each door (3000)")
+    parser.add_argument(
+        "--cycles", type=int, default=3000, help="of each transport (3000)"
+    )
     parser.add_argument("--json", action="store_true", help="print JSON instead")
     args = parser.parse_args()
     logging.disable()  # python-can: datagrams have no options of CAN

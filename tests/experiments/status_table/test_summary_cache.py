@@ -8,12 +8,12 @@ import sys
 import pytest
 
 from benchmarks.made_sessions import make_sessions
-from experiments.board.board_cache import BoardCache, cache_path, row_of
-from experiments.board.matrix_board import compare_board, count_board, see_sessions
-from experiments.board.session_summaries import summarise
 from experiments.session.kept_files import compare_kept
 from experiments.session.store import find_session, list_sessions
 from experiments.settings.load import load_settings
+from experiments.status_table.session_summaries import summarise
+from experiments.status_table.summary_cache import SummaryCache, cache_path, row_of
+from experiments.status_table.table import count_rows, find_deviations, see_sessions
 from tests.experiments.program import traction
 
 LATER_NS = 10**12
@@ -30,7 +30,7 @@ def data(tmp_path):
 @pytest.fixture(autouse=True)
 def settled(monkeypatch):
     """Let every file be old enough for a change of it to have another time."""
-    monkeypatch.setattr("experiments.board.board_cache._SETTLED_NS", -LATER_NS)
+    monkeypatch.setattr("experiments.status_table.summary_cache._SETTLED_NS", -LATER_NS)
 
 
 @pytest.fixture
@@ -42,17 +42,17 @@ def hashed(monkeypatch):
         read.append(folder.id)
         return summarise(folder)
 
-    monkeypatch.setattr("experiments.board.board_cache.summarise", look)
+    monkeypatch.setattr("experiments.status_table.summary_cache.summarise", look)
     return read
 
 
-def board(data, path):
+def status(data, path):
     """Return the kept trials by session and the deviations, as a new run sees them."""
-    cache = BoardCache(path)
+    cache = SummaryCache(path)
     seen = see_sessions(data, {}, cache)
     cache.save()
     kept = {s.folder.id: s.summary.kept for s in seen}
-    return kept, [d.text() for d in compare_board(seen, {})]
+    return kept, [d.text() for d in find_deviations(seen, {})]
 
 
 def recording(data):
@@ -60,8 +60,8 @@ def recording(data):
 
 
 def test_sessions_are_read_once(data, tmp_path, hashed):
-    first = board(data, tmp_path / "cache.json")
-    assert board(data, tmp_path / "cache.json") == first
+    first = status(data, tmp_path / "cache.json")
+    assert status(data, tmp_path / "cache.json") == first
     assert first == ({"S001": ("T01", "T02"), "S002": ("T01", "T02")}, [])
     assert hashed == ["S001", "S002"]
 
@@ -100,9 +100,9 @@ def turn_into_link(path):
     "change", [overwrite, replace_by_another, lengthen, remove, turn_into_link]
 )
 def test_a_changed_recording_is_noticed(data, tmp_path, hashed, change):
-    board(data, tmp_path / "cache.json")
+    status(data, tmp_path / "cache.json")
     change(recording(data))
-    kept, deviations = board(data, tmp_path / "cache.json")
+    kept, deviations = status(data, tmp_path / "cache.json")
     assert kept["S001"] != ("T01", "T02")
     assert any("S001" in text for text in deviations)
     assert hashed == ["S001", "S002", "S001"]
@@ -110,27 +110,28 @@ def test_a_changed_recording_is_noticed(data, tmp_path, hashed, change):
 
 def test_a_deviation_is_looked_at_each_time(data, tmp_path, hashed):
     lengthen(recording(data))
-    first = board(data, tmp_path / "cache.json")
-    assert board(data, tmp_path / "cache.json") == first
+    first = status(data, tmp_path / "cache.json")
+    assert status(data, tmp_path / "cache.json") == first
     assert hashed == ["S001", "S002", "S001"]
 
 
 def test_a_file_that_has_just_changed_is_read_again(
     data, tmp_path, hashed, monkeypatch
 ):
-    monkeypatch.setattr("experiments.board.board_cache._SETTLED_NS", LATER_NS)
+    monkeypatch.setattr("experiments.status_table.summary_cache._SETTLED_NS", LATER_NS)
     for _ in range(2):
-        board(data, tmp_path / "cache.json")
+        status(data, tmp_path / "cache.json")
     assert hashed == ["S001", "S002"] * 2
 
 
 def test_bytes_that_rot_without_a_sign_are_seen_by_verify(data, tmp_path, monkeypatch):
     monkeypatch.setattr(
-        "experiments.board.board_cache.signature_of", lambda _: ("as before", 0)
+        "experiments.status_table.summary_cache.signature_of",
+        lambda _: ("as before", 0),
     )
-    before = board(data, tmp_path / "cache.json")
+    before = status(data, tmp_path / "cache.json")
     overwrite(recording(data))
-    assert board(data, tmp_path / "cache.json") == before
+    assert status(data, tmp_path / "cache.json") == before
     assert compare_kept(find_session(data, "S001")) != []
     assert traction("verify", "S001", "--data", data).code == 6
 
@@ -189,9 +190,9 @@ def pipe(path):
 )
 def test_a_cache_that_is_not_its_own_is_ignored(data, tmp_path, hashed, spoil):
     path = tmp_path / "cache.json"
-    first = board(data, path)
+    first = status(data, path)
     spoil(path)
-    assert board(data, path) == first
+    assert status(data, path) == first
     assert hashed == ["S001", "S002"] * 2
 
 
@@ -209,23 +210,23 @@ def test_a_cache_that_is_not_its_own_is_ignored(data, tmp_path, hashed, spoil):
 )
 def test_an_entry_of_another_form_is_ignored(data, tmp_path, hashed, change):
     path = tmp_path / "cache.json"
-    first = board(data, path)
+    first = status(data, path)
     content = json.loads(path.read_bytes().partition(b"\n")[2])
     for entry in content["sessions"].values():
         entry[1] |= change
     forge(json.dumps(content))(path)
-    assert board(data, path) == first
+    assert status(data, path) == first
     assert hashed == ["S001", "S002"] * 2
 
 
 def test_a_cache_that_cannot_be_written_costs_only_time(data, tmp_path):
     (tmp_path / "file").write_text("")
-    assert board(data, tmp_path / "file" / "cache.json") == board(data, None)
+    assert status(data, tmp_path / "file" / "cache.json") == status(data, None)
 
 
 def test_a_cache_file_is_its_users_alone(data, tmp_path):
     path = tmp_path / "a" / "cache.json"
-    board(data, path)
+    status(data, path)
     assert path.stat().st_mode & 0o077 == 0
     assert [p.name for p in path.parent.iterdir()] == ["cache.json"]
 
@@ -247,7 +248,7 @@ def test_rows_are_read_again_when_the_settings_change(tmp_path):
         return terrains
 
     for texts in ([b"a", b"b"], [b"a", b"b"], [b"ab", b""], None, None):
-        cache = BoardCache(tmp_path / "cache.json")
+        cache = SummaryCache(tmp_path / "cache.json")
         assert cache.rows(texts, reader) == tuple(map(row_of, terrains))
         cache.save()
     assert len(read) == 4
@@ -265,9 +266,9 @@ def test_a_wrong_matrix_is_refused_again(tmp_path, config):
 
 
 def test_conditions_hash_no_other_session(data, hashed):
-    seen = see_sessions(data, {"session": "S002"}, BoardCache())
+    seen = see_sessions(data, {"session": "S002"}, SummaryCache())
     rows = [row_of(row) for row in load_settings(None).matrix.terrains]
-    (line,) = count_board(seen, rows, {"session": "S002"})
+    (line,) = count_rows(seen, rows, {"session": "S002"})
     assert (line.sessions, line.kept) == (("S002",), 2)
     assert hashed == ["S002"]
 

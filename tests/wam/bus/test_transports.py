@@ -11,16 +11,16 @@ import pytest
 from acquisition.errors import LinkError, LinkFullError
 from tests.fakes.stepped import SteppedClock
 from tests.wam.bus.test_link import ScriptedBus, message
-from wam.bus import datagrams, doors
+from wam.bus import datagrams, transports
 from wam.bus.datagrams import AT_ONCE, system_call
-from wam.bus.doors import PythonCanDoor, open_door
-from wam.bus.kernel_door import (
+from wam.bus.link import CanLink
+from wam.bus.socketcan import (
     AdapterClock,
     InterfaceState,
-    KernelDoor,
+    SocketcanTransport,
     interface_state,
 )
-from wam.bus.link import CanLink
+from wam.bus.transports import PythonCanTransport, open_transport
 
 NS_PER_S = 1_000_000_000
 MS = 1_000_000
@@ -40,11 +40,11 @@ class Apart(SteppedClock):
 
 @pytest.fixture
 def pair():
-    """A door, and the far end of the datagrams that it takes for a bus."""
+    """A transport, and the far end of the datagrams that it takes for a bus."""
     near, far = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
-    door = KernelDoor(near, "can0", SteppedClock(), system_call())
-    yield door, far
-    door.close()
+    transport = SocketcanTransport(near, "can0", SteppedClock(), system_call())
+    yield transport, far
+    transport.close()
     far.close()
 
 
@@ -91,11 +91,11 @@ class ScriptedCalls:
     @staticmethod
     def _give(header, frame, ancillary):
         fields = struct.unpack("@PIPNPNi0P", ctypes.string_at(header, 56))
-        _, _, places, _, control, control_room, _ = fields
+        _, _, iovec, _, control, control_room, _ = fields
         assert control_room == 128  # the last call's sizes are gone
-        place, room = struct.unpack("@PN", ctypes.string_at(places, 16))
+        address, room = struct.unpack("@PN", ctypes.string_at(iovec, 16))
         size = min(len(frame), room)
-        ctypes.memmove(place, frame, size)
+        ctypes.memmove(address, frame, size)
         ctypes.memmove(control, ancillary, len(ancillary))
         ctypes.memmove(header + 40, struct.pack("@N", len(ancillary)), 8)
         ctypes.memmove(header + 56, struct.pack("@I", size), 4)
@@ -122,19 +122,19 @@ class OldSocket:
 
 def scripted(*script, clock=None):
     calls = ScriptedCalls(*script)
-    return KernelDoor(OldSocket(), "can0", clock or Apart(), calls)
+    return SocketcanTransport(OldSocket(), "can0", clock or Apart(), calls)
 
 
 def test_what_is_sent_is_a_can_frame_of_linux(pair):
-    door, far = pair
-    door.send(0x404, b"\x30")
-    door.send(0x408, bytes(range(8)))
+    transport, far = pair
+    transport.send(0x404, b"\x30")
+    transport.send(0x408, bytes(range(8)))
     assert far.recv(99) == bytes.fromhex("04040000 01000000 3000000000000000")
     assert far.recv(99) == bytes.fromhex("08040000 08000000 0001020304050607")
 
 
 def test_what_arrives_keeps_its_order_its_length_and_its_flags(pair):
-    door, far = pair
+    transport, far = pair
     for frame in (
         can_frame(0x426, b"\x00\x01\x02"),
         can_frame(0x20000040, bytes(8)),
@@ -142,18 +142,18 @@ def test_what_arrives_keeps_its_order_its_length_and_its_flags(pair):
         can_frame(0x40000426),
     ):
         far.send(frame)
-    assert [(f.can_id, f.data) for f in door.receive()] == [
+    assert [(f.can_id, f.data) for f in transport.receive()] == [
         (0x426, b"\x00\x01\x02"),
         (0x20000040, bytes(8)),
         (0x80000426, b"\x01"),
         (0x40000426, b""),
     ]
-    assert door.receive() == []
+    assert transport.receive() == []
 
 
 def test_a_link_sorts_what_the_kernel_hands_out(pair):
-    door, far = pair
-    link = CanLink(door)
+    transport, far = pair
+    link = CanLink(transport)
     for frame in (
         can_frame(0x20000004, bytes((0, 4, 0, 0, 0, 0, 0, 0))),
         can_frame(0x80000426, b"\x01"),
@@ -182,25 +182,25 @@ def test_a_flood_of_error_frames_is_sorted_once_and_hides_no_frame():
 
 @pytest.mark.parametrize("size", [0, 1, 15])
 def test_a_datagram_that_is_no_frame_is_dropped(pair, size):
-    door, far = pair
+    transport, far = pair
     far.send(bytes(size))
     far.send(can_frame(0x426, b"\x07"))
-    assert [frame.can_id for frame in door.receive()] == [0x426]
+    assert [frame.can_id for frame in transport.receive()] == [0x426]
 
 
 def test_a_length_beyond_eight_bytes_takes_no_more_than_there_are(pair):
-    door, far = pair
+    transport, far = pair
     far.send(can_frame(0x426, bytes(8), length=200))
-    assert [len(frame.data) for frame in door.receive()] == [8]
+    assert [len(frame.data) for frame in transport.receive()] == [8]
 
 
 def test_frames_that_have_not_left_are_known(pair):
-    door, far = pair
-    assert not door.has_unsent()
-    door.send(0x404, b"\x30")
-    assert door.has_unsent()
+    transport, far = pair
+    assert not transport.has_unsent()
+    transport.send(0x404, b"\x30")
+    assert transport.has_unsent()
     far.recv(99)
-    assert not door.has_unsent()
+    assert not transport.has_unsent()
 
 
 def test_a_kernel_that_does_not_tell_what_has_left_stops_no_torque():
@@ -208,41 +208,41 @@ def test_a_kernel_that_does_not_tell_what_has_left_stops_no_torque():
 
 
 def test_a_queue_that_is_full_is_told_from_a_bus_that_broke(pair):
-    door, far = pair
+    transport, far = pair
     with pytest.raises(LinkFullError):
-        flood(door)
+        flood(transport)
     far.close()
     with pytest.raises(LinkError) as broke:
-        door.send(0x404, b"\x30")
+        transport.send(0x404, b"\x30")
     assert not isinstance(broke.value, LinkFullError)
 
 
-def flood(door):
+def flood(transport):
     for _ in range(10_000):
-        door.send(0x404, b"\x30")
+        transport.send(0x404, b"\x30")
 
 
 def test_a_flood_does_not_hold_the_reader():
     arrived = (can_frame(0x426, b"\x07"), b"")
-    door = scripted(*[arrived] * 2000)
-    assert 0 < len(door.receive()) < 1000
+    transport = scripted(*[arrived] * 2000)
+    assert 0 < len(transport.receive()) < 1000
 
 
 @pytest.mark.parametrize("make", ["kernel", "python-can"])
 def test_what_came_before_an_error_is_not_lost_and_the_error_neither(make):
     if make == "kernel":
         down = OSError(errno.ENETDOWN, "Network is down")
-        door = scripted((can_frame(0x426, b"\x07"), b""), down)
+        transport = scripted((can_frame(0x426, b"\x07"), b""), down)
     else:
         bus = ScriptedBus([message(0x426)])
         down = can.CanOperationError("Network is down", errno.ENETDOWN)
         bus.recv = lambda _: breaking(bus, down)
-        door = PythonCanDoor(bus, SteppedClock())
-    assert [frame.can_id for frame in door.receive()] == [0x426]
+        transport = PythonCanTransport(bus, SteppedClock())
+    assert [frame.can_id for frame in transport.receive()] == [0x426]
     with pytest.raises(LinkError, match="Network is down"):
-        door.receive()
+        transport.receive()
     if make == "kernel":
-        assert door.receive() == []  # Linux says it once
+        assert transport.receive() == []  # Linux says it once
     else:
         bus.shutdown()
 
@@ -254,16 +254,18 @@ def breaking(bus, error):
 
 
 def test_frames_lost_on_the_socket_are_counted():
-    door = scripted((can_frame(1), b""), (can_frame(2), lost(7)), (can_frame(3), b""))
-    assert door.lost == 0
-    door.receive()
-    assert door.lost == 7
-    assert CanLink(door).metadata()["link:lost_frames"] == "7"
+    transport = scripted(
+        (can_frame(1), b""), (can_frame(2), lost(7)), (can_frame(3), b"")
+    )
+    assert transport.lost == 0
+    transport.receive()
+    assert transport.lost == 7
+    assert CanLink(transport).metadata()["link:lost_frames"] == "7"
 
 
 def test_the_kernels_stamp_is_of_the_hosts_clock():
     clock = Apart()
-    door = scripted(
+    transport = scripted(
         (can_frame(1), stamps(clock.utc_ns() - 3 * MS)),
         (can_frame(2), b""),
         (can_frame(3), stamps()),
@@ -272,19 +274,19 @@ def test_the_kernels_stamp_is_of_the_hosts_clock():
         (can_frame(6), stamps(clock.utc_ns() - 60 * NS_PER_S)),
         clock=clock,
     )
-    assert [f.t_ns for f in door.receive()] == [clock.t_ns - 3 * MS, 0, 0, 0, 0, 0]
-    assert door.name == "kernel socket"
+    assert [f.t_ns for f in transport.receive()] == [clock.t_ns - 3 * MS, 0, 0, 0, 0, 0]
+    assert transport.name == "kernel socket"
 
 
 def test_a_stamp_and_a_count_of_lost_frames_come_together():
     clock = Apart()
-    door = scripted(
+    transport = scripted(
         (can_frame(1), stamps(clock.utc_ns() - 3 * MS) + lost(9)),
         (can_frame(2), lost(11) + stamps(clock.utc_ns() - 2 * MS)),
         clock=clock,
     )
-    ages = [clock.t_ns - frame.t_ns for frame in door.receive()]
-    assert (ages, door.lost) == ([3 * MS, 2 * MS], 11)
+    ages = [clock.t_ns - frame.t_ns for frame in transport.receive()]
+    assert (ages, transport.lost) == ([3 * MS, 2 * MS], 11)
 
 
 @pytest.mark.parametrize(
@@ -300,14 +302,14 @@ def test_a_stamp_and_a_count_of_lost_frames_come_together():
     ],
 )
 def test_ancillary_data_of_another_kind_says_nothing(damaged):
-    door = scripted((can_frame(1, b"\x07"), damaged), (can_frame(2), b""))
-    frames = [(f.can_id, f.data, f.t_ns) for f in door.receive()]
+    transport = scripted((can_frame(1, b"\x07"), damaged), (can_frame(2), b""))
+    frames = [(f.can_id, f.data, f.t_ns) for f in transport.receive()]
     assert frames == [(1, b"\x07", 0), (2, b"", 0)]
-    assert door.lost == 0
+    assert transport.lost == 0
 
 
 def test_more_frames_than_one_call_takes_keep_their_order(pair):
-    door, far = pair
+    transport, far = pair
     far.setblocking(False)
     sent = []
     with contextlib.suppress(BlockingIOError):  # where few may wait
@@ -315,7 +317,7 @@ def test_more_frames_than_one_call_takes_keep_their_order(pair):
             far.send(can_frame(0x426, bytes([number])))
             sent.append(number)
     arrived = []
-    while frames := door.receive():
+    while frames := transport.receive():
         arrived += [frame.data[0] for frame in frames]
     assert arrived == sent
 
@@ -323,26 +325,26 @@ def test_more_frames_than_one_call_takes_keep_their_order(pair):
 def test_an_error_behind_a_full_call_is_not_lost():
     down = OSError(errno.ENETDOWN, "Network is down")
     frames = [(can_frame(i), b"") for i in range(AT_ONCE)]
-    door = scripted(*frames, down, (can_frame(77), b""))
-    assert [frame.can_id for frame in door.receive()] == list(range(AT_ONCE))
+    transport = scripted(*frames, down, (can_frame(77), b""))
+    assert [frame.can_id for frame in transport.receive()] == list(range(AT_ONCE))
     with pytest.raises(LinkError, match="Network is down"):
-        door.receive()
-    assert [frame.can_id for frame in door.receive()] == [77]
+        transport.receive()
+    assert [frame.can_id for frame in transport.receive()] == [77]
 
 
 def test_a_call_that_took_all_there_is_is_not_followed_by_another():
     calls = ScriptedCalls(*[(can_frame(i), b"") for i in range(9)])
-    door = KernelDoor(OldSocket(), "can0", Apart(), calls)
-    assert len(door.receive()) == 9
+    transport = SocketcanTransport(OldSocket(), "can0", Apart(), calls)
+    assert len(transport.receive()) == 9
     assert calls.calls == 1
 
 
-def test_a_door_that_is_closed_reads_nobody_elses_socket(pair):
-    door, far = pair
+def test_a_transport_that_is_closed_reads_nobody_elses_socket(pair):
+    transport, far = pair
     far.send(can_frame(0x426))
-    door.close()
+    transport.close()
     with pytest.raises(LinkError):
-        door.receive()
+        transport.receive()
 
 
 def test_a_c_library_without_the_call_is_told(monkeypatch):
@@ -359,11 +361,11 @@ def test_the_adapters_own_stamps_keep_the_distances_of_the_frames():
         (can_frame(i), stamps(utc_ns + i * MS + delay, own_ns + i * MS))
         for i, delay in enumerate(delays)
     ]
-    door = scripted(*rows, clock=clock)
-    times = [frame.t_ns for frame in door.receive()]
+    transport = scripted(*rows, clock=clock)
+    times = [frame.t_ns for frame in transport.receive()]
     assert times[2] - times[1] == pytest.approx(MS, abs=1000)
     assert times[3] - times[2] == pytest.approx(MS, abs=1000)
-    assert "adapter" in door.name
+    assert "adapter" in transport.name
 
 
 def test_an_adapters_clock_that_drifts_is_followed():
@@ -401,8 +403,10 @@ def test_a_stamp_of_the_adapter_alone_needs_one_of_the_kernel_before():
     ],
 )
 def test_a_stamp_of_python_can_counts_where_it_is_plausible(stamp, expected_ns):
-    door = PythonCanDoor(ScriptedBus([message(0x426, timestamp=stamp)]), Apart())
-    (frame,) = door.receive()
+    transport = PythonCanTransport(
+        ScriptedBus([message(0x426, timestamp=stamp)]), Apart()
+    )
+    (frame,) = transport.receive()
     # A double holds UTC seconds to a quarter of a microsecond.
     assert frame.t_ns == pytest.approx(expected_ns, abs=1000)
 
@@ -413,7 +417,7 @@ def test_an_interface_that_is_not_there_is_refused(channel):
         interface_state(channel)
     assert refused.value.errno == errno.ENODEV
     with pytest.raises(LinkError, match="does not exist"):
-        open_door("socketcan", channel, 1_000_000, SteppedClock())
+        open_transport("socketcan", channel, 1_000_000, SteppedClock())
 
 
 def test_an_interface_that_is_there_has_a_state():
@@ -427,15 +431,15 @@ def test_an_interface_that_is_there_has_a_state():
 
 def test_an_interface_that_is_down_is_not_opened(monkeypatch):
     down = InterfaceState(is_up=False, has_carrier=False, queue_length=10)
-    monkeypatch.setattr(doors, "interface_state", lambda _: down)
+    monkeypatch.setattr(transports, "interface_state", lambda _: down)
     with pytest.raises(LinkError, match="can0 is down"):
-        open_door("socketcan", "can0", 1_000_000, SteppedClock())
+        open_transport("socketcan", "can0", 1_000_000, SteppedClock())
 
 
 def test_other_adapters_go_through_python_can(monkeypatch):
     bus = ScriptedBus()
-    monkeypatch.setattr(doors.can, "Bus", lambda **_: bus)
-    door = open_door("pcan", "PCAN_USBBUS1", 1_000_000, SteppedClock())
-    assert door.name == "python-can"
-    door.close()
+    monkeypatch.setattr(transports.can, "Bus", lambda **_: bus)
+    transport = open_transport("pcan", "PCAN_USBBUS1", 1_000_000, SteppedClock())
+    assert transport.name == "python-can"
+    transport.close()
     assert bus.shutdowns == 1

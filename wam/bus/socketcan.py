@@ -100,8 +100,8 @@ def open_socket(channel: str) -> socket.socket:
     return opened
 
 
-class KernelDoor:
-    """A raw CAN socket of Linux; implements `Door`.
+class SocketcanTransport:
+    """A raw CAN socket of Linux; implements `Transport`.
 
     Attributes:
         name: what it is, for people.

@@ -1,35 +1,35 @@
-"""The door without messages: the same frames and errors as by way of python-can."""
+"""Transport without messages: the same frames and errors as by way of python-can."""
 
 import pytest
 
 from acquisition.errors import LinkError
-from fakes.bus.in_process import InProcessDoor
+from fakes.bus.in_process import InProcessTransport
 from tests.fakes.stepped import Rig
-from wam.bus.doors import PythonCanDoor
+from wam.bus.transports import PythonCanTransport
 
 MS = 1_000_000
 POSITIONS, VERS, PUCK = 0x404, b"\x00", 1
 
 
 class Ends:
-    """A network of its own behind a door; what happened at it, in order."""
+    """A network of its own behind a transport; what happened at it, in order."""
 
     def __init__(self, make):
         self.rig = Rig()
-        self.door = make(self.rig.bus, self.rig.clock)
+        self.transport = make(self.rig.bus, self.rig.clock)
         self.faults = self.rig.network.faults
         self.log = []
 
     def say(self, can_id=POSITIONS, data=b"\x30"):
         try:
-            self.door.send(can_id, data)
+            self.transport.send(can_id, data)
         except LinkError as error:
             self.log.append((type(error), str(error)))
 
     def hear(self, wait_ns=2 * MS):
         self.rig.rest(wait_ns)
         try:
-            self.log.append([tuple(frame) for frame in self.door.receive()])
+            self.log.append([tuple(frame) for frame in self.transport.receive()])
         except LinkError as error:
             self.log.append((type(error), str(error)))
 
@@ -119,7 +119,7 @@ def filters(ends):
 
 
 def a_bus_that_was_shut_down(ends):
-    ends.door.close()
+    ends.transport.close()
     ends.say()
     ends.hear()
 
@@ -139,8 +139,8 @@ def a_bus_that_was_shut_down(ends):
         a_bus_that_was_shut_down,
     ],
 )
-def test_a_door_without_messages_is_python_cans_door(happen):
-    short, long = Ends(InProcessDoor), Ends(PythonCanDoor)
+def test_a_transport_without_messages_is_python_cans_transport(happen):
+    short, long = Ends(InProcessTransport), Ends(PythonCanTransport)
     happen(short)
     happen(long)
     assert short.log == long.log
@@ -148,7 +148,7 @@ def test_a_door_without_messages_is_python_cans_door(happen):
 
 
 def test_a_sound_bus_is_not_asked_for_messages(monkeypatch):
-    ends = Ends(InProcessDoor)
+    ends = Ends(InProcessTransport)
     for way in ("send", "recv"):
         monkeypatch.setattr(ends.rig.bus, way, None)
     a_cycle(ends)

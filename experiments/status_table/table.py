@@ -1,4 +1,4 @@
-"""The matrix board: kept trials per terrain, counted from verified files only."""
+"""The status table: kept trials per terrain, counted from verified files only."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
 from acquisition.errors import SettingsError
-from experiments.board.session_summaries import SeenSession, facts_of
 from experiments.session.store import list_sessions
+from experiments.status_table.session_summaries import SeenSession, facts_of
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from experiments.board.board_cache import BoardCache, BoardRow
     from experiments.session.kept_files import Deviation
+    from experiments.status_table.summary_cache import StatusRow, SummaryCache
 
 KEYS = ("terrain", "stones", "incline_deg", "foot", "kind", "session", "operator")
 
 
 def see_sessions(
-    data: Path, where: Mapping[str, str], cache: BoardCache
+    data: Path, where: Mapping[str, str], cache: SummaryCache
 ) -> list[SeenSession]:
     """Return all sessions below `data`, each read once, oldest number first.
 
@@ -69,9 +69,9 @@ class MatrixRow:
         return "".join(signs.get(n, str(min(n, 9))) for n in self.trials)
 
 
-def count_board(
+def count_rows(
     seen: Sequence[SeenSession],
-    rows: Sequence[BoardRow],
+    rows: Sequence[StatusRow],
     where: Mapping[str, str] | None = None,
 ) -> list[MatrixRow]:
     """Return a line per terrain of the matrix, live first, simulated where there is.
@@ -107,20 +107,20 @@ def counted_of(
     ]
 
 
-def is_of(session: SeenSession, row: BoardRow, *, is_simulated: bool) -> bool:
+def is_of(session: SeenSession, row: StatusRow, *, is_simulated: bool) -> bool:
     """Return whether a session is of this terrain, and live or simulated as asked."""
     folder = session.folder
     return folder.terrain == row.name and folder.is_simulated is is_simulated
 
 
-def compare_board(
+def find_deviations(
     seen: Sequence[SeenSession], where: Mapping[str, str]
 ) -> list[Deviation]:
-    """Return what is missing or changed of the kept trials on the board.
+    """Return what is missing or changed of the kept trials in the table.
 
     Args:
         seen: the sessions.
-        where: only sessions with these values, as in `count_board`; what cannot be
+        where: only sessions with these values, as in `count_rows`; what cannot be
             read is named of every session.
     """
     asked = [s for s in seen if s.summary.problem or matches(s.facts, where)]
@@ -147,7 +147,7 @@ def parse_where(text: str) -> dict[str, str]:
     return conditions
 
 
-def facts_of_row(row: BoardRow) -> dict[str, str]:
+def facts_of_row(row: StatusRow) -> dict[str, str]:
     """Return what conditions can ask of a row of the matrix."""
     incline = f"{row.incline_deg:g}"
     return {
@@ -164,7 +164,7 @@ def matches(fields: Mapping[str, str], where: Mapping[str, str]) -> bool:
 
 
 def _line(
-    row: BoardRow, sessions: Sequence[SeenSession], *, is_simulated: bool
+    row: StatusRow, sessions: Sequence[SeenSession], *, is_simulated: bool
 ) -> MatrixRow:
     kept = [name for s in sessions for name in s.summary.kept]
     names = [f"T{number:02d}" for number in range(1, row.trials + 1)]

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING
 
 from acquisition.errors import TrialFileError
 from experiments.arguments import data_option
-from experiments.board.matrix_board import counted_of, facts_of_row, is_of, matches
 from experiments.session.lock import owner_of
+from experiments.status_table.table import counted_of, facts_of_row, is_of, matches
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from experiments.board.board_cache import BoardRow
-    from experiments.board.session_summaries import SeenSession
+    from experiments.status_table.session_summaries import SeenSession
+    from experiments.status_table.summary_cache import StatusRow
 
 _DRAWS = 400  # orders
 _SEED = 1  # the same data give the same advice
@@ -28,7 +28,7 @@ _SEED = 1  # the same data give the same advice
 def next_steps(
     data: Path,
     seen: Sequence[SeenSession],
-    rows: Sequence[BoardRow],
+    rows: Sequence[StatusRow],
     *,
     is_simulated: bool,
 ) -> list[str]:
@@ -71,7 +71,7 @@ def _left(session: SeenSession) -> str:
 
 
 def enough_lines(
-    seen: Sequence[SeenSession], rows: Sequence[BoardRow], where: Mapping[str, str]
+    seen: Sequence[SeenSession], rows: Sequence[StatusRow], where: Mapping[str, str]
 ) -> list[str]:
     """Return the terrains whose kept trials are enough for their target.
 
@@ -80,7 +80,7 @@ def enough_lines(
     Args:
         seen: the sessions.
         rows: the terrains and their targets.
-        where: only these, as in `count_board`.
+        where: only these, as in `count_rows`.
     """
     lines: list[str] = []
     sessions = counted_of(seen, where)
@@ -94,19 +94,19 @@ def enough_lines(
     return [text for text in lines if text]
 
 
-def _enough(own: Sequence[SeenSession], row: BoardRow) -> str:
+def _enough(own: Sequence[SeenSession], row: StatusRow) -> str:
     from experiments.session.kept_files import enough_of
 
     return enough_of([s.folder for s in own], row)
 
 
-def suggest_order(rows: Sequence[BoardRow], done: Sequence[str]) -> list[str]:
+def suggest_order(rows: Sequence[StatusRow], done: Sequence[str]) -> list[str]:
     """Return the terrains still to be recorded in a good order.
 
     A foot that wears, a sensor that drifts and a person who learns change with time.
     If the inclines came in rising order, these could not be told from the incline. So
     of many random orders that one is taken in which inclination, size of the stones
-    and tread go least with the place in the whole sequence.
+    and tread go least with the position in the whole sequence.
 
     Args:
         rows: the matrix.
@@ -120,13 +120,16 @@ def suggest_order(rows: Sequence[BoardRow], done: Sequence[str]) -> list[str]:
     columns = _columns([*begun, *rest], factors, len(begun))
     dice = random.Random(_SEED)
     orders = [dice.sample(rest, len(rest)) for _ in range(_DRAWS)]
-    return min(orders, key=lambda order: max((c.of(order) for c in columns), default=0))
+    return min(
+        orders,
+        key=lambda order: max((c.correlation(order) for c in columns), default=0),
+    )
 
 
 def confounding(order: Sequence[str], factors: Mapping[str, Sequence[float]]) -> float:
-    """Return the largest |correlation| of a factor with the place in `order`."""
+    """Return the largest |correlation| of a factor with the position in `order`."""
     columns = _columns(order, factors, 0)
-    return max((column.of(order) for column in columns), default=0.0)
+    return max((column.correlation(order) for column in columns), default=0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,43 +138,43 @@ class _Column:
 
     Attributes:
         centred: the factor less its mean, by the name of the terrain.
-        size: its spread times that of the places in the sequence.
-        places: those that are still to be filled, less the mean of all.
-        begun: sum of the products of place and factor at the beginning.
+        size: its spread times that of the positions in the sequence.
+        positions: those that are still to be filled, less the mean of all.
+        begun: sum of the products of position and factor at the beginning.
     """
 
     centred: Mapping[str, float]
     size: float
-    places: Sequence[float]
+    positions: Sequence[float]
     begun: float
 
-    def of(self, order: Sequence[str]) -> float:
-        """Return |correlation| with the place if the rest comes in this order."""
-        own = [p * self.centred[n] for p, n in zip(self.places, order, strict=True)]
+    def correlation(self, order: Sequence[str]) -> float:
+        """Return |correlation| with the position if the rest comes in this order."""
+        own = [p * self.centred[n] for p, n in zip(self.positions, order, strict=True)]
         return abs(math.fsum((self.begun, *own))) / self.size
 
 
 def _columns(
     order: Sequence[str], factors: Mapping[str, Sequence[float]], begun: int
 ) -> list[_Column]:
-    """Return the factors that vary; the first `begun` terrains keep their places."""
+    """Return the factors that vary; the first `begun` terrains keep their positions."""
     count = len(order)
-    places = [place - (count - 1) / 2 for place in range(count)]
-    squares = math.fsum(p * p for p in places)
+    positions = [position - (count - 1) / 2 for position in range(count)]
+    squares = math.fsum(p * p for p in positions)
     columns: list[_Column] = []
     for values in zip(*(factors[name] for name in order), strict=True):
         mean = math.fsum(values) / count
         centred = [value - mean for value in values]
         size = math.sqrt(math.fsum(c * c for c in centred) * squares)
         if size > 0.0:
-            pairs = zip(places[:begun], centred[:begun], strict=True)
+            pairs = zip(positions[:begun], centred[:begun], strict=True)
             first = math.fsum(p * c for p, c in pairs)
             named = dict(zip(order, centred, strict=True))
-            columns.append(_Column(named, size, places[begun:], first))
+            columns.append(_Column(named, size, positions[begun:], first))
     return columns
 
 
-def _factors(row: BoardRow) -> tuple[float, ...]:
+def _factors(row: StatusRow) -> tuple[float, ...]:
     """Return inclination and, as 0 or 1: big stones, a plate, a bare foot."""
     signs = (row.stones == "big", row.stones == "none", row.foot == "bare")
     return (row.incline_deg, *map(float, signs))

@@ -25,7 +25,7 @@ from acquisition.files import (
     open_regular,
     replace_file,
 )
-from experiments.board.session_summaries import (
+from experiments.status_table.session_summaries import (
     SessionSummary,
     glance,
     signature_of,
@@ -43,8 +43,8 @@ _TRIAL = re.compile(r"T\d\d[a-z]*")
 
 
 @dataclass(frozen=True, slots=True)
-class BoardRow:
-    """A row of the matrix as the board needs it; names are those of TerrainRow."""
+class StatusRow:
+    """A row of the matrix as the table needs it; names are those of TerrainRow."""
 
     name: str
     stones: str
@@ -55,9 +55,9 @@ class BoardRow:
     target: str
 
 
-def row_of(row: TerrainRow) -> BoardRow:
-    """Return what the board needs of a row of the matrix."""
-    return BoardRow(*(getattr(row, field.name) for field in fields(BoardRow)))
+def row_of(row: TerrainRow) -> StatusRow:
+    """Return what the table needs of a row of the matrix."""
+    return StatusRow(*(getattr(row, field.name) for field in fields(StatusRow)))
 
 
 def cache_path(data: Path) -> Path:
@@ -66,10 +66,10 @@ def cache_path(data: Path) -> Path:
     if not home.is_absolute():
         home = Path.home() / ".cache"
     name = hashlib.sha256(os.fsencode(data.absolute())).hexdigest()[:32]
-    return home / "traction" / f"board-{name}.json"
+    return home / "traction" / f"board-{name}.json"  # the file's name stays
 
 
-class BoardCache:
+class SummaryCache:
     """Summaries of sessions and rows of a matrix, read again only where they changed.
 
     Args:
@@ -119,7 +119,7 @@ class BoardCache:
 
     def rows(
         self, texts: Sequence[bytes] | None, read: Callable[[], Sequence[TerrainRow]]
-    ) -> tuple[BoardRow, ...]:
+    ) -> tuple[StatusRow, ...]:
         """Return the rows of a matrix, read only if the texts of the settings changed.
 
         Args:
@@ -218,13 +218,13 @@ def _summary_of(entry: object, signature: str) -> SessionSummary | None:
     return SessionSummary(**values)
 
 
-def _rows_of(value: object) -> tuple[BoardRow, ...] | None:
+def _rows_of(value: object) -> tuple[StatusRow, ...] | None:
     """Return the rows in an entry, None where it holds anything else."""
     if not isinstance(value, list) or not value:
         return None
     rows = [_mapping(row) for row in cast("list[object]", value)]
-    kinds = dict.fromkeys((field.name for field in fields(BoardRow)), str)
+    kinds = dict.fromkeys((field.name for field in fields(StatusRow)), str)
     kinds |= {"incline_deg": float, "trials": int}
     if any({k: type(v) for k, v in row.items()} != kinds for row in rows):
         return None
-    return tuple(BoardRow(**row) for row in rows)
+    return tuple(StatusRow(**row) for row in rows)

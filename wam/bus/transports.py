@@ -1,7 +1,7 @@
-"""The doors to a CAN bus: the kernel's own socket, and python-can for the rest.
+"""The transports of a CAN bus: the kernel's own socket, and python-can for the rest.
 
-A door sends and drains and never waits. Frames carry Linux's flags in their identifier,
-and the time at which the bus had them on the host's monotonic clock.
+A transport sends and drains and never waits. Frames carry Linux's flags in their
+identifier, and the time at which the bus had them on the host's monotonic clock.
 """
 
 import errno
@@ -13,19 +13,19 @@ from acquisition.clock import NS_PER_S, Clock
 from acquisition.errors import LinkError
 from wam.bus.datagrams import system_call
 from wam.bus.error_frames import ERROR_FLAG, EXTENDED_FLAG, REMOTE_FLAG
-from wam.bus.kernel_door import (
-    KernelDoor,
-    interface_state,
-    open_socket,
-    setup_command,
-)
 from wam.bus.link import (
     DRAIN_AT_MOST,
-    Door,
     Frame,
+    Transport,
     broken_link,
     error_number,
     plausible_times,
+)
+from wam.bus.socketcan import (
+    SocketcanTransport,
+    interface_state,
+    open_socket,
+    setup_command,
 )
 
 CanBus = can.BusABC
@@ -51,8 +51,10 @@ def open_bus(interface: str, channel: str, bitrate: int) -> CanBus:
         raise _cannot_open(interface, channel, bitrate, error) from error
 
 
-def open_door(interface: str, channel: str, bitrate: int, clock: Clock) -> Door:
-    """Return an open door: the kernel's socket for "socketcan", else python-can.
+def open_transport(
+    interface: str, channel: str, bitrate: int, clock: Clock
+) -> Transport:
+    """Return an open transport: the kernel's socket for "socketcan", else python-can.
 
     Args:
         interface: python-can's name of the adapter.
@@ -64,16 +66,16 @@ def open_door(interface: str, channel: str, bitrate: int, clock: Clock) -> Door:
         LinkError: the adapter is missing, down or unknown.
     """
     if interface != SOCKETCAN:
-        return PythonCanDoor(open_bus(interface, channel, bitrate), clock)
+        return PythonCanTransport(open_bus(interface, channel, bitrate), clock)
     try:
         _require_up(channel)
-        return KernelDoor(open_socket(channel), channel, clock, system_call())
+        return SocketcanTransport(open_socket(channel), channel, clock, system_call())
     except OSError as error:
         raise _cannot_open(interface, channel, bitrate, error) from error
 
 
-class PythonCanDoor:
-    """A bus of python-can; implements `Door`.
+class PythonCanTransport:
+    """A bus of python-can; implements `Transport`.
 
     An adapter stamps what it receives by UTC or by the monotonic clock [s], or not at
     all; a stamp of neither is none.

@@ -1,4 +1,4 @@
-"""What the board needs to know of one session, and a sign that its files changed."""
+"""What the status table needs of one session, and a sign that its files changed."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _FOLDERS = ("", "trials", "rejected", "faults")
 
 @dataclass(frozen=True, slots=True)
 class SessionSummary:
-    """One session as the board counts it.
+    """One session as the table counts it.
 
     Attributes:
         kept: names of the kept trials whose checksum is right, "T01".
@@ -61,7 +61,7 @@ class SeenSession:
 
     Attributes:
         folder: the session.
-        summary: what the board needs of it.
+        summary: what the table needs of it.
     """
 
     folder: SessionFolder
