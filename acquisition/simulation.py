@@ -26,6 +26,10 @@ class SimulationControl(Protocol):
         """Let the hand stop pushing and lie on the arm."""
         ...
 
+    def take(self) -> None:
+        """Let the hand take the arm where it is and hold it there."""
+        ...
+
     def let_go(self) -> None:
         """Let the hand let go of the arm."""
         ...

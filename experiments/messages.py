@@ -15,6 +15,7 @@ from acquisition.control_loop.faults import (
     LateReplies,
     ReplySilence,
 )
+from acquisition.control_loop.states import ArmState
 from acquisition.devices import BusCondition, SafetyMode
 from acquisition.errors import PreflightError, UnfitDeviceError
 from experiments.operator.keys import AFTER_FAULT
@@ -206,7 +207,12 @@ _OF_TIME = {
 }
 
 
-_UNKNOWN = "UNKNOWN - support it"
+_UNKNOWN, _SINKS = "UNKNOWN - support it", "idle; it sinks slowly, support it"
+# (what a message says of the arm, what is asked of it by now, what it does then)
+_ARM_BY_NOW = (
+    ("idle", ArmState.UNKNOWN, _UNKNOWN),
+    ("damped", ArmState.IDLE, _SINKS),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -221,7 +227,7 @@ class FaultContext:
         command: with which the work goes on once it has ended.
         load: of a computer that simulates on the wall clock; None = it does not, or a
             fault was asked for.
-        is_unconfirmed: idle was asked for, and not confirmed.
+        state: what the loop asks of the arm by now; None = what the message says.
     """
 
     trial: str = "The session"
@@ -230,7 +236,7 @@ class FaultContext:
     prompt: Prompt | None = Prompt.READY
     command: str = RESUME
     load: ComputerLoad | None = None
-    is_unconfirmed: bool = False
+    state: ArmState | None = None
 
 
 def fault_text(verdict: GuardVerdict, context: FaultContext, saved: str = "") -> str:
@@ -270,8 +276,9 @@ def fault_text(verdict: GuardVerdict, context: FaultContext, saved: str = "") ->
     if context.load is not None and is_of_time:
         values |= {**asdict(context.load), "what": message.what.format_map(values)}
         message = replace(CATALOGUE["too-busy"], arm=message.arm)
-    if context.is_unconfirmed and message.arm.startswith("idle"):
-        message = replace(message, arm=_UNKNOWN)
+    for said, state, arm in _ARM_BY_NOW:
+        if context.state is state and message.arm.startswith(said):
+            message = replace(message, arm=arm)
     return message.text(values, saved)
 
 
@@ -281,7 +288,7 @@ def rest_text(mode: SafetyMode, *, is_confirmed: bool) -> str:
         return f"ARM: {_UNKNOWN}."
     if mode is SafetyMode.E_STOP:
         return "ARM: stopped by its hardware, without power; it sinks, support it."
-    return "ARM: idle; it sinks slowly, support it."
+    return f"ARM: {_SINKS}."
 
 
 def pucks_have(silent: int) -> str:

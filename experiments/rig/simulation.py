@@ -69,5 +69,7 @@ class SimulatedHand:
                 self._simulation.stand()
             else:
                 self._simulation.push()
-        elif state.prompt in (Prompt.REVIEW, Prompt.LAY_DOWN):
+        elif state.prompt is Prompt.LAY_DOWN:
+            self._simulation.take()
+        elif state.prompt is Prompt.REVIEW:
             self._simulation.rest()

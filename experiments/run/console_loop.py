@@ -42,6 +42,7 @@ _LED_ASTRAY = frozenset(
 _DRIVEN = frozenset({ArmState.FLOAT, ArmState.HOLD, ArmState.DAMP, ArmState.GUIDE})
 LAY_DOWN_SECONDS = 60.0  # the arm waits so long for a hand before it goes idle
 _ON_STAND = 0.1  # rad
+_STANDS = 0.3  # s, in which an arm that holds has come to rest
 _SUPPORT = "Support the arm: it goes idle and sinks slowly. [space]"
 _LAY_DOWN = "Lay the foot onto its stand: the arm goes idle and sinks slowly. [space]"
 _NOBODY = f"No answer for {LAY_DOWN_SECONDS:.0f} s: the arm goes idle. Support it."
@@ -258,6 +259,7 @@ class ConsoleLoop:
         verdict = loop_client.status.verdict
         self._reported = "" if verdict is None else verdict.reason
         try:
+            loop_client.advance(_STANDS)
             if loop_client.status.state is ArmState.DAMP:
                 self.console.say(_DAMPED)
                 if not self._await_hand(Prompt.DAMPED, lambda: True):

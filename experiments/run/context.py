@@ -208,7 +208,7 @@ class RunContext(RunServices):
             self.state.fault_context,
             bus=bus,
             load=load,
-            is_unconfirmed=self.loop_client.status.state is ArmState.UNKNOWN,
+            state=self.loop_client.status.state,
         )
         if self.journal.state.is_complete:  # neither a trial nor `resume` follows
             prompt = None if context.prompt is Prompt.READY else context.prompt

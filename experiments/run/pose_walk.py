@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from acquisition.control_loop.states import ArmState
+from acquisition.control_loop.faults import Action
 from acquisition.errors import PreflightError, TractionError
 from acquisition.ipc.shared_sensor import unpack_wrenches
 from experiments.messages import FaultContext, fault_text, rest_text
@@ -43,15 +43,19 @@ def guided(console_loop: ConsoleLoop, work: Callable[[], None], command: str) ->
         console.say(f"Stopped as asked. {_NOTHING}")
         return INTERRUPTED
     except ArmFaultError as fault:
+        was_moving = isinstance(fault, MoveStoppedError)
+        if was_moving and fault.verdict.action is Action.DAMP:
+            # No hand is on it: what it is too fast by may be its own encoder.
+            console_loop.make_safe()
         loop_client = console_loop.loop_client
+        loop_client.advance(TICK)
         context = FaultContext(
             "The calibration",
             bus=loop_client.loop.bus_condition,
             prompt=None,
             command=command,
-            is_unconfirmed=loop_client.status.state is ArmState.UNKNOWN,
+            state=loop_client.status.state,
         )
-        was_moving = isinstance(fault, MoveStoppedError)
         result = f"{_STOPPED} {_NOTHING}" if was_moving else _NOTHING
         console.problem(fault_text(fault.verdict, context, result))
         return 4

@@ -235,6 +235,10 @@ class LocalSimulation:
         """Let the hand stop pushing and lie on the arm."""
         self.rig.plant.hand.rest()
 
+    def take(self) -> None:
+        """Let the hand take the arm where it is and hold it there."""
+        self.rig.plant.hand.carry()
+
     def let_go(self) -> None:
         """Let the hand let go of the arm."""
         self.rig.plant.hand.let_go()

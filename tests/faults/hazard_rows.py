@@ -15,6 +15,9 @@ _PROCESSES = "tests/faults/test_process_faults.py::test_what_befalls_the_compute
 _MOTORS = range(1, 8)
 _LIES = tuple(f"lie-of-motor-{motor}" for motor in _MOTORS)
 _CREEPS = tuple(f"creep-of-motor-{motor}" for motor in _MOTORS)
+_DEAD = tuple(f"dead-motor-{motor}" for motor in _MOTORS)
+_REVERSED = tuple(f"reversed-motor-{motor}" for motor in _MOTORS)
+_SAID = ("wrong-pidx", "wrong-mt", "wrong-grp", "wrong-ipnm", "wrong-cts")
 _STUCK = tuple(f"stuck-motor-{motor}" for motor in _MOTORS)
 
 Fields = tuple[str, str, str, str, tuple[str, ...], str, tuple[str, ...]]
@@ -68,8 +71,16 @@ ROWS: dict[str, dict[str, Fields]] = {
             "an old position is taken for a new one",
             "busy bus, slow adapter",
             "replies that come after their cycle, or twice, are counted. One cycle in 250, and one in 20 at the preflight, asks for none: what comes then is late by whole cycles",
-            "they are thrown away; the next cycle waits for both. Late by whole cycles: hold, the third time in a row brakes; at the preflight refused",
-            ("reply-late", "reply-doubled", "reply-swapped"),
+            "they are thrown away; the next cycle waits for both. Late by whole cycles: hold, and idle when it is proved twice more, within 20 ms; refused at the start",
+            (
+                "reply-late",
+                "reply-doubled",
+                "reply-swapped",
+                "replies-late",
+                "replies-late-2",
+                "replies-late-3",
+                "puck-late",
+            ),
             "",
             (
                 _LOST + "test_a_late_reply_never_answers_the_next_question",
@@ -98,21 +109,21 @@ ROWS: dict[str, dict[str, Fields]] = {
         ),
         "drifting": (
             "the arm sinks or rises by itself",
-            "wrong mass of the foot, wrong calibration of gravity",
-            "the residual force at the tare; speed limits",
-            "the tare is refused; damp",
-            ("torque-limit",),
-            "",
+            "wrong mass of the foot, wrong calibration of gravity; a motor without torque, with a turned plug, or half of one",
+            "the residual force at the tare; speed limits; energy, speed and way of an arm that holds, is guided, floats or is damped; a motor that a move turns in vain. Not detected where a person who holds the arm bears what a motor does not",
+            "the tare is refused; damp, or idle where damping does not slow it",
+            ("torque-limit", *_DEAD, *_REVERSED),
+            "what 22 wrong rigs do that nobody holds: `python -m studies.wrong_rigs`",
             (
                 "tests/experiments/run/test_tare.py::test_a_wrong_mass_of_the_foot_shows_as_its_weight",
             ),
         ),
         "implausible": (
             "a blow of the motors",
-            "no number, or beyond a limit",
-            "every command against limit and finiteness, also the one after a verdict",
-            "idle for what is no number; damp; as sent a torque is always within its limit",
-            ("not-a-number", "torque-limit"),
+            "no number, or beyond a limit; a puck to which a torque means something else",
+            "every command against limit and finiteness, also the one after a verdict; at every start the properties of each puck against a table, and one asked again every 0.1 s",
+            "idle for what is no number, or for a puck that changed; damp; as sent a torque is always within its limit; at the start refused",
+            ("not-a-number", "torque-limit", "puck-changed", *_SAID),
             "",
             (
                 _GUARD + "test_what_is_no_number_ends_in_idle",
@@ -166,9 +177,9 @@ ROWS: dict[str, dict[str, Fields]] = {
         "implausible": (
             "a wrong mode is believed",
             "unknown firmware",
-            "a mode that does not exist is no answer",
-            "as lost",
-            ("safety-silent",),
+            "a mode that does not exist is no answer; IDLE is none either where puck 2 says that it obeys torques",
+            "as lost; positions are asked for no more, and the module's heartbeat idles the arm",
+            ("safety-silent", "safety-false-idle"),
             "",
             (_POLLER + "test_a_mode_that_does_not_exist_is_no_answer",),
         ),
@@ -202,11 +213,11 @@ ROWS: dict[str, dict[str, Fields]] = {
             (_CYCLE + "test_a_stop_is_told_before_the_arm_was_ever_active",),
         ),
         "drifting": (
-            "idle is pressed between activation and the first cycle",
+            "idle is pressed between activation and the first cycle; activate is pressed before the program asks for it: torques are zero, the arm would fall",
             "a person",
-            "idle after a state that may drive",
+            "idle after a state that may drive; ACTIVE while no torques are sent, in every cycle",
             "idle, the session ends",
-            ("pendant-idle",),
+            ("pendant-idle", "early-activation"),
             "",
             (
                 _CYCLE
@@ -447,7 +458,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "nothing more is kept",
             "read-only after an error",
             "every write is checked",
-            "the session ends, the arm is idle",
+            "the session ends; the arm is supported, then idle",
             ("disk-read-only",),
             "",
             (_MATRIX,),

@@ -77,7 +77,7 @@ def measured(hazard: Hazard) -> str:
     bounds = [
         bound
         for fault in hazard.faults
-        for phase, bound in read_bounds()[fault].items()
+        for phase, bound in read_bounds().get(fault, {}).items()
         if phase in BOUND_PHASES
     ]
     words = [hazard.bound] if hazard.bound else []
@@ -85,13 +85,13 @@ def measured(hazard: Hazard) -> str:
 
 
 def _worst(bounds: list[PrintedBound]) -> str:
-    usual = read_bounds()[NOTHING].values()
-    is_usual = all(
-        any(is_within(bound, each.with_margin()) for each in usual) for bound in bounds
-    )
-    if is_usual:
-        return f"as without it: {_largest(list(usual))}"
-    return _largest(bounds)
+    usual = list(read_bounds()[NOTHING].values())
+    unusual = [
+        bound
+        for bound in bounds
+        if not any(is_within(bound, each.with_margin()) for each in usual)
+    ]
+    return _largest(unusual) if unusual else f"as without it: {_largest(usual)}"
 
 
 def _largest(bounds: list[PrintedBound]) -> str:

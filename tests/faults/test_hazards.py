@@ -60,6 +60,9 @@ def test_every_fault_of_the_matrix_is_a_cause_of_some_hazard():
     assert named <= set(TABLE)
     # What only warns, or comes from the person who leads the arm, is no lost signal.
     assert set(TABLE) - named == {
+        "nothing",
+        "hand-gone",
+        "hold-dragged",
         "puck-hot",
         "puck-error",
         "reply-lost-3",

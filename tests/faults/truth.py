@@ -89,6 +89,11 @@ DEAD = Promise(
     why="a motor without torque leaves its joints to the hand, which bears them, or "
     "they sink until the arm is idle",
 )
+LATE = Promise(
+    travel=0.1,
+    drive=70.0,
+    why="the arm holds by positions of three cycles ago for the 20 ms that prove it",
+)
 STUCK = Promise(
     speed=1.75,
     why="a motor whose encoder stands still in a move is pulled until its torque would "
@@ -106,6 +111,8 @@ def promise_of(fault: str, cell: Cell) -> Promise:
     own = {"joint7-slip": TWISTED, "puck-reboot": LIMP}
     if fault in own:
         return own[fault]
+    if fault.startswith(("replies-late", "puck-late")):
+        return LATE
     if fault.startswith("stuck"):
         return STUCK
     if fault.startswith(("dead", "reversed")):
