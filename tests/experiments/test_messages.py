@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from acquisition.control_loop.details import ReplySilence
+from acquisition.control_loop.details import JointExcess, ReplySilence
 from acquisition.control_loop.faults import (
     FAULTS,
     Action,
@@ -11,6 +11,7 @@ from acquisition.control_loop.faults import (
     Fault,
     verdict_for,
 )
+from acquisition.control_loop.states import ArmState
 from acquisition.errors import LinkTimeoutError, PreflightError, UnfitDeviceError
 from experiments.messages import (
     CATALOGUE,
@@ -159,3 +160,21 @@ def test_a_computer_is_too_busy_where_programs_wait_for_a_core():
     now = ComputerLoad.now()
     assert now.load >= 1.0  # this one runs
     assert now.cores >= 1
+
+
+@pytest.mark.parametrize(
+    ("fault", "state", "arm"),
+    [
+        (Fault.PENDANT_IDLE, ArmState.UNKNOWN, "UNKNOWN - support it"),
+        (Fault.PENDANT_IDLE, ArmState.IDLE, "idle; it sinks slowly, support it"),
+        (Fault.OVERSPEED, ArmState.IDLE, "idle; it sinks slowly, support it"),
+        (Fault.OVERSPEED, ArmState.DAMP, "damped where it is, until you let it hold"),
+    ],
+)
+def test_a_message_says_what_the_arm_does_by_now(fault, state, arm):
+    details = {
+        Fault.PENDANT_IDLE: CircuitCauses(),
+        Fault.OVERSPEED: JointExcess(6, 5.0, 4.0),
+    }
+    text = fault_text(verdict_for(fault, details[fault]), FaultContext(state=state))
+    assert f"ARM: {arm}." in text

@@ -1,5 +1,6 @@
 """Print the fault matrix as tables in Markdown: `python -m tests.faults`."""
 
+from tests.faults import choice
 from tests.faults.bounds import BOUND_PHASES, COLUMNS, PrintedBound, read_bounds
 from tests.faults.expected import TABLE, Cell, End
 from tests.faults.moving import MOVING_CELLS
@@ -98,7 +99,8 @@ def _words(
 
 def page() -> str:
     """Return docs/faults.md."""
-    return "\n".join([HEAD, *lines(), TRUTH, *truth_lines()]) + "\n"
+    parts = [HEAD, *lines(), choice.HEAD, *choice.choice_lines(), TRUTH]
+    return "\n".join([*parts, *truth_lines()]) + "\n"
 
 
 if __name__ == "__main__":
