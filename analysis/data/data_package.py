@@ -17,6 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from acquisition.errors import SettingsError
 from acquisition.files import UnfitFileError, open_regular, read_regular
+from acquisition.settings import first_problem
 
 DESCRIPTOR = "datapackage.json"
 _LARGEST = 16_000_000  # bytes of a descriptor; a study of 80 trials has 2 million
@@ -256,9 +257,7 @@ def _read(path: Path) -> DataPackage:
             hint="Give tables, or a folder of traction export.",
         ) from error
     except ValidationError as error:
-        first = error.errors(include_url=False, include_input=False)[0]
-        location = ".".join(str(part) for part in first["loc"])
         raise SettingsError(
-            f"{path}: it is not a data package of tables ({location}: {first['msg']}).",
+            f"{path}: it is not a data package of tables ({first_problem(error)}).",
             hint="Make it with: traction export SESSION --to DIR.",
         ) from error

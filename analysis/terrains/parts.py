@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from acquisition.errors import SettingsError
+from acquisition.settings import first_problem
 from analysis.breakaway.model import BreakAwayModel
 from analysis.foresight.model import ForesightModel
 from analysis.terrains.classifier import SurfaceClassifier
@@ -34,8 +35,11 @@ def checked_parts(content: object) -> dict[str, Any]:
         raise TypeError("parts are no mapping")
     parts = {str(name): part for name, part in content.items()}
     for name, read in _READERS.items():
-        if name in parts:
-            read(parts)
+        try:
+            if name in parts:
+                read(parts)
+        except ValueError as error:
+            raise ValueError(f"{name}: {first_problem(error)}") from error
     return parts
 
 

@@ -7,7 +7,13 @@ import numpy as np
 from pydantic import ValidationError
 
 from acquisition.errors import SettingsError
-from acquisition.settings import Near, SettingsSection, parse_toml, read_text
+from acquisition.settings import (
+    Near,
+    SettingsSection,
+    first_problem,
+    parse_toml,
+    read_text,
+)
 from experiments.rig.build import build_tool, terrain_frame
 from experiments.settings.load import Settings
 from experiments.settings.matrix import TerrainRow
@@ -83,9 +89,7 @@ def _parse(path: Path, counts: range) -> PoseFile:
     try:
         return PoseFile.model_validate(table)
     except ValidationError as error:
-        first = error.errors()[0]
-        location = ".".join(map(str, first["loc"]))
-        raise _unread(path, f"{location}: {first['msg']}") from error
+        raise _unread(path, first_problem(error)) from error
 
 
 def _unread(path: Path, why: str) -> SettingsError:

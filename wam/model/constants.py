@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 from pydantic import (
     Field,
     PositiveInt,
-    ValidationError,
     model_validator,
 )
 
 from acquisition.errors import SettingsError
-from acquisition.settings import SettingsSection, parse_toml
+from acquisition.settings import SettingsSection, first_problem, parse_toml
 
 GRAVITY = 9.81  # m/s^2
 Array = NDArray[np.float64]
@@ -183,14 +182,6 @@ class ArmConstants:
     text: str
 
 
-def _reason(error: Exception) -> str:
-    """Return in a line what is wrong with the file."""
-    if not isinstance(error, ValidationError):
-        return str(error)
-    first = error.errors(include_url=False)[0]
-    return ": ".join(filter(None, (".".join(map(str, first["loc"])), first["msg"])))
-
-
 @lru_cache(maxsize=8)  # every trial of a study carries the same
 def _parsed(text: str) -> ConstantsFile:
     return ConstantsFile.model_validate(parse_toml(text))
@@ -208,7 +199,7 @@ def load_constants(text: str | None = None) -> ArmConstants:
         file = _parsed(text)
     except ValueError as error:
         raise SettingsError(
-            f"The arm model cannot be read: {_reason(error)}.",
+            f"The arm model cannot be read: {first_problem(error)}.",
             hint="Use the model shipped with Traction as a pattern.",
         ) from error
     links = tuple(
