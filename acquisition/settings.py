@@ -110,7 +110,7 @@ class SettingsSection(BaseModel):
 
 
 def first_problem(error: ValueError) -> str:
-    """Return what is wrong with a file; of several problems the first, by where it stands."""
+    """Return what is wrong with a file; of several the first, and where."""
     if not isinstance(error, ValidationError):
         return str(error)
     first = error.errors(include_url=False, include_input=False)[0]
