@@ -10,7 +10,7 @@ import pytest
 
 from acquisition.control_loop.states import ArmState
 from tests.experiments.program import write_config
-from tests.faults.expected import TABLE
+from tests.faults.expected import NOTHING, TABLE, End
 from tests.faults.phases import PHASES, STANDING
 from tests.faults.rehearse import run_with
 from tests.faults.strikes import strike_of
@@ -80,6 +80,10 @@ FAULTS = (
     "second-command",
     "disk-full",
     "disk-read-only",
+    NOTHING,
+    "hand-gone",
+    "safety-false-idle",
+    *(f"dead-motor-{motor}" for motor in range(1, 8)),
 )
 PRESSED = Promise(
     speed=5.0,
@@ -102,6 +106,16 @@ STOPPED = {
         for motor in range(1, 8)
     },
 }
+# What ends the session, and the reason with which the stance is put away.
+ENDED = {
+    "replies-late": "replies-late",
+    "replies-late-2": "replies-late",
+    "replies-late-3": "replies-late",
+    "puck-late": "replies-late",
+    "hold-dragged": "pendant-idle",  # the module sees how fast the person is
+}
+LATER = ("puck-changed",)  # asked for in turn, found after the stance
+ABSENT = tuple(f for f, row in TABLE.items() if row[_RECORDING].end is End.ABSENT)
 SLOWEST_MS = 1000  # a creeping encoder takes as long to be seen
 UNSEEN = tuple(f"stuck-motor-{motor}" for motor in (2, 3, 5, 6))
 MOST_TRAVEL = 0.001  # m of a sole that stands
@@ -138,8 +152,8 @@ def test_a_fault_in_a_stance_comes_to_what_it_does_in_a_trial(tmp_path, fault):
 
 
 def test_every_fault_has_its_place():
-    assert sorted({*FAULTS, *STOPPED, *UNSEEN}) == sorted(TABLE)
-    assert len(FAULTS) + len(STOPPED) + len(UNSEEN) == len(TABLE)
+    places = [*FAULTS, *STOPPED, *ENDED, *UNSEEN, *LATER, *ABSENT]
+    assert sorted(places) == sorted(TABLE)
 
 
 @pytest.mark.long
@@ -155,6 +169,31 @@ def test_a_fault_that_a_pressed_foot_feels_stops_the_stance(tmp_path, fault):
     assert reached is not None, seen.scene.seen_since()
     assert reached <= SLOWEST_MS
     assert seen.scene.arm == "idle"
+    motion = seen.truth.since(seen.scene.struck_ns, fault)
+    assert is_within(motion, PRESSED), motion
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("fault", ENDED)
+def test_a_fault_that_takes_the_arm_away_ends_the_session(tmp_path, fault):
+    seen = strike(tmp_path, fault)
+
+    assert seen.done.code == 4, seen.done.err
+    assert "Traceback" not in seen.done.err
+    assert seen.rejected == [f"interrupted: {ENDED[fault]}"]
+    assert seen.scene.reached_ms("idle", None) is not None
+    assert seen.scene.arm == "idle"
+    motion = seen.truth.since(seen.scene.struck_ns, fault)
+    assert is_within(motion, PRESSED), motion
+    check_resume(seen, TABLE[fault][_RECORDING])
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("fault", LATER)
+def test_a_puck_that_changes_in_a_stance_is_found_after_it(tmp_path, fault):
+    seen = strike(tmp_path, fault)
+
+    assert (seen.done.code, seen.rejected) == (0, [])
     motion = seen.truth.since(seen.scene.struck_ns, fault)
     assert is_within(motion, PRESSED), motion
 

@@ -210,14 +210,14 @@ def test_every_cycle_but_the_first_has_the_sample_of_the_one_before():
 
 
 def test_a_sample_is_dated_with_the_instant_at_which_it_was_taken():
-    # The load tells the time: 1 N for each 0.1 s.
+    # The load tells the time: 7.3 N a second, no step of it in time with the cycles.
     begin_ns = SteppedClock().t_ns
-    bench = Bench(lambda t_ns: ((t_ns - begin_ns) * 1e-8, 0, 0, 0, 0, 0)).started()
+    bench = Bench(lambda t_ns: ((t_ns - begin_ns) * 7.3e-9, 0, 0, 0, 0, 0)).started()
     samples = [sample for _, samples in bench.run(500) for sample in samples]
     assert len(samples) == 500  # the skipped cycle has two
     shown = np.array([sample.wrench[0] for sample in samples])
-    true = np.array([(sample.t_ns - begin_ns) * 1e-8 for sample in samples])
-    # Steps of 0.05 N and counts of 4 mN, which average to nothing; 1 mN is 0.1 ms.
+    true = np.array([(sample.t_ns - begin_ns) * 7.3e-9 for sample in samples])
+    # Steps of 0.05 N and counts of 4 mN, which average to nothing; 1 mN is 0.14 ms.
     assert np.abs(shown - true).max() < 0.028
     assert np.mean(shown - true) == pytest.approx(0.0, abs=0.001)
 
