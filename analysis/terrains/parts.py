@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from acquisition.errors import SettingsError
-from acquisition.settings import first_problem
+from acquisition.validation import first_problem
 from analysis.breakaway.model import BreakAwayModel
 from analysis.foresight.model import ForesightModel
 from analysis.terrains.classifier import SurfaceClassifier
