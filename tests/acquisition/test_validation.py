@@ -5,8 +5,11 @@ import json
 import pytest
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
+from acquisition.errors import SettingsError
 from acquisition.validation import Entries, Many, first_problem
 from analysis.data.data_package import DataPackage
+from analysis.terrains.database import load
+from tests.corpus.samples import samples
 
 
 class Row(BaseModel):
@@ -65,3 +68,31 @@ def test_a_package_of_a_million_wrong_files_has_one_problem():
     with pytest.raises(ValidationError) as caught:
         DataPackage.model_validate_json(text)
     assert caught.value.error_count() == 1
+
+
+@pytest.mark.parametrize(
+    ("place", "value"),
+    [
+        (("shares",), ["a"] * 1000),
+        (("axes", "F_n"), ["a"] * 1000),
+        (("terrains",), {str(k): 1 for k in range(1000)}),
+        (("terrains", "S0", "limits"), {str(k): "a" for k in range(1000)}),
+        (("terrains", "S0", "models"), {str(k): 1 for k in range(1000)}),
+        (("terrains", "S0", "models", "gp", "quantiles"), [["a"] * 1000] * 1000),
+        (("terrains", "S0", "parts", "break_away", "draws"), [1] * 1000),
+        (("terrains", "S0", "parts", "roughness"), {str(k): "a" for k in range(1000)}),
+    ],
+)
+def test_a_database_of_a_thousand_wrong_values_has_few_problems(tmp_path, place, value):
+    content = json.loads(samples()["database"])
+    where = content
+    for key in place[:-1]:
+        where = where[key]
+    where[place[-1]] = value
+    path = tmp_path / "terrains.json"
+    path.write_text(json.dumps(content))
+    with pytest.raises(SettingsError, match="not a terrain database") as caught:
+        load(path)
+    cause = caught.value.__cause__
+    assert isinstance(cause, ValidationError)
+    assert cause.error_count() <= 2  # a value and the length
