@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, cast
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from acquisition.files import NotRegularError, UnfitFileError, read_regular
 
@@ -42,7 +42,6 @@ _DEEPEST = 20  # tables in tables; a settings file has four
 _PARTS = re.compile(r"[,=\n]")
 _DOTTED = re.compile(r"""\.\s*[\w"'-]""")
 _LARGEST_WHOLE = 2**63 - 1  # of TOML
-_LONGEST_KEY = 60  # of a key in a message
 _LARGEST = 1_000_000  # bytes; what a person writes has a few thousand
 
 
@@ -107,21 +106,3 @@ class SettingsSection(BaseModel):
     """A table of a settings file: unknown keys and infinite numbers are mistakes."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-def first_problem(error: ValueError) -> str:
-    """Return what is wrong with a file; of several the first, and where."""
-    if not isinstance(error, ValidationError):
-        return str(error)
-    first = error.errors(include_url=False, include_input=False)[0]
-    place = ".".join(_shown(part) for part in first["loc"])
-    if first["type"] == "missing":
-        return f"{place} is missing"
-    what = first["msg"].removeprefix("Value error, ")
-    return f"{place}: {what}" if place else what
-
-
-def _shown(part: int | str) -> str:
-    """Return a part of a place; a key of a hostile file is not printed as it is."""
-    text = str(part)
-    return (text if text.isprintable() else ascii(text))[:_LONGEST_KEY]

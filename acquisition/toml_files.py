@@ -6,7 +6,8 @@ from typing import Self, cast
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from acquisition.settings import SettingsSection, first_problem, parse_toml
+from acquisition.settings import SettingsSection, parse_toml
+from acquisition.validation import first_problem
 
 _FEW = 3  # rows of a matrix that stay in one line
 

@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
+from acquisition.validation import Many
 from analysis.breakaway.answers import (
     AvailableForce,
     BreakAwayRisk,
@@ -235,7 +236,7 @@ class _BreakAwayFile(BaseModel):
     kind: Literal["break-away", "sliding"]
     family: Family
     law: _Law
-    draws: tuple[_Law, ...] = Field(max_length=_MOST_DRAWS)
+    draws: Many[_Law] = Field(max_length=_MOST_DRAWS)
     v_slip: _Positive
     slips: _Count
     held: _Count

@@ -18,6 +18,7 @@ from typing import Annotated, Final
 
 from pydantic import AfterValidator, Field
 
+from acquisition.validation import Many
 from analysis.foresight.ground_window import FASTEST, SLOWEST, WINDOWS, GroundWindow
 from analysis.foresight.logistic import RidgeLogistic
 from analysis.foresight.stored import Number, Range, Word, increasing
@@ -30,7 +31,7 @@ _FAR = 16.0  # z^2 beyond which a tick says no more
 _UNUSUAL = 0.04  # two-sided share of a terrain's own windows below which it is doubted
 _LogSd = Annotated[Number, Field(ge=-100.0, le=100.0)]
 _Densities = Annotated[
-    tuple[Number, ...],
+    Many[Number],
     Field(min_length=len(SHARES), max_length=len(SHARES)),
     AfterValidator(increasing),
 ]

@@ -15,6 +15,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from pydantic import Field, TypeAdapter
 
+from acquisition.validation import Many
 from analysis.data.series import Array
 
 _REACH = 5.0  # standard deviations beyond which a feature says no more
@@ -25,7 +26,7 @@ _SMALL = 1e-9
 _LARGEST_NUMBER = 1e9  # of a stored number
 _MOST_PAIRS = 600
 
-Pairs = Annotated[tuple[tuple[int, int], ...], Field(max_length=_MOST_PAIRS)]
+Pairs = Annotated[Many[tuple[int, int]], Field(max_length=_MOST_PAIRS)]
 _Number = Annotated[
     float, Field(ge=-_LARGEST_NUMBER, le=_LARGEST_NUMBER, allow_inf_nan=False)
 ]
@@ -43,10 +44,10 @@ class RidgeLogistic:
         weights: bias, features, pairs; shape (1 + n + k,).
     """
 
-    mean: tuple[_Number, ...]
-    scale: tuple[_Scale, ...]
+    mean: Many[_Number]
+    scale: Many[_Scale]
     pairs: Pairs
-    weights: tuple[_Number, ...]
+    weights: Many[_Number]
 
     def probability(self, features: Sequence[float]) -> float:
         """Return the probability of one row of features, shape (n,)."""

@@ -14,6 +14,7 @@ from pydantic import (
 )
 
 from acquisition.schema import MOST_TERRAINS
+from acquisition.validation import Entries, Many
 from analysis.foresight.ground import GroundLaw, GroundModel
 from analysis.foresight.ground_window import GROUND_FEATURES, WINDOWS
 from analysis.foresight.logistic import RidgeLogistic
@@ -22,7 +23,7 @@ from analysis.foresight.stored import Number, Word
 
 VERSION = 1
 _MOST_RIGS, _MOST_NAMES = 100, 5000
-_Names = Annotated[tuple[Word, ...], Field(max_length=_MOST_NAMES)]
+_Names = Annotated[Many[Word], Field(max_length=_MOST_NAMES)]
 
 
 def _is_for(features: Sequence[str]) -> AfterValidator:
@@ -76,7 +77,7 @@ class Provenance:
         seeds: of the simulations, empty where there was none.
     """
 
-    rigs: Annotated[tuple[RigIdentity, ...], Field(max_length=_MOST_RIGS)]
+    rigs: Annotated[Many[RigIdentity], Field(max_length=_MOST_RIGS)]
     trials: _Names
     seeds: _Names
 
@@ -155,13 +156,11 @@ class _ForesightFile(BaseModel):
     """Foresight as it is stored."""
 
     version: Literal[1]
-    features: tuple[str, ...]
-    ground_features: tuple[str, ...]
+    features: Many[str]
+    ground_features: Many[str]
     slip: SlipModel | None
-    laws: Annotated[
-        tuple[GroundLaw, ...], Field(min_length=1, max_length=MOST_TERRAINS)
-    ]
-    surfaces: dict[int, Annotated[RidgeLogistic, _is_for(GROUND_FEATURES)]]
+    laws: Annotated[Many[GroundLaw], Field(min_length=1, max_length=MOST_TERRAINS)]
+    surfaces: Entries[int, Annotated[RidgeLogistic, _is_for(GROUND_FEATURES)]]
     provenance: Provenance
 
     @field_validator("features", "ground_features")

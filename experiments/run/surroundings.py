@@ -7,13 +7,8 @@ import numpy as np
 from pydantic import ValidationError
 
 from acquisition.errors import SettingsError
-from acquisition.settings import (
-    Near,
-    SettingsSection,
-    first_problem,
-    parse_toml,
-    read_text,
-)
+from acquisition.settings import Near, SettingsSection, parse_toml, read_text
+from acquisition.validation import first_problem
 from experiments.rig.build import build_tool, terrain_frame
 from experiments.settings.load import Settings
 from experiments.settings.matrix import TerrainRow

@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 from acquisition.errors import SettingsError
 from acquisition.settings import Number, Whole
 from acquisition.toml_files import TomlFile, TomlTable
+from acquisition.validation import Many
 from wam.calibration.arm_identity import SerialNumbers
 from wam.model.constants import ArmConstants, Array, Body
 from wam.model.moments import (
@@ -86,10 +87,10 @@ class _GravityFile(TomlFile):
     residual: Number
     rank: Whole
     mus: Annotated[
-        tuple[tuple[_Moment, _Moment, _Moment], ...], Field(min_length=7, max_length=7)
+        Many[tuple[_Moment, _Moment, _Moment]], Field(min_length=7, max_length=7)
     ]
-    poses: tuple[_Seven, ...] = Field(min_length=1)
-    torques: tuple[_Seven, ...]
+    poses: Many[_Seven] = Field(min_length=1)
+    torques: Many[_Seven]
     tool: _ToolTable
 
     @model_validator(mode="after")

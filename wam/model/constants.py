@@ -14,7 +14,8 @@ from pydantic import (
 )
 
 from acquisition.errors import SettingsError
-from acquisition.settings import SettingsSection, first_problem, parse_toml
+from acquisition.settings import SettingsSection, parse_toml
+from acquisition.validation import Many, first_problem
 
 GRAVITY = 9.81  # m/s^2
 Array = NDArray[np.float64]
@@ -106,7 +107,7 @@ class GravityConstantsSection(SettingsSection):
     """First moments [kg m] as the maker calibrates them."""
 
     mus: tuple[_Vector3, _Vector3, _Vector3, _Vector3, _Vector3, _Vector3, _Vector3]
-    poses: tuple[_Vector7, ...]
+    poses: Many[_Vector7]
 
 
 class ConstantsFile(SettingsSection):
@@ -118,7 +119,7 @@ class ConstantsFile(SettingsSection):
     transmission: TransmissionSection
     pucks: PucksSection
     motors: MotorsSection
-    links: tuple[LinkSection, ...] = Field(min_length=7, max_length=7)
+    links: Many[LinkSection] = Field(min_length=7, max_length=7)
     gravity: GravityConstantsSection
     friction: FrictionSection
     control: ConstantsControlSection

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from sklearn.linear_model import LogisticRegression
 
-from acquisition.settings import first_problem
+from acquisition.validation import first_problem
 from analysis.foresight.logistic import RidgeLogistic, all_pairs, fit_logistic
 
 

@@ -3,7 +3,7 @@ import json
 import numpy as np
 import pytest
 
-from acquisition.settings import first_problem
+from acquisition.validation import first_problem
 from analysis.foresight.held_out import foresee
 from analysis.foresight.model import ForesightModel
 from analysis.foresight.scores import score_slips
