@@ -7,6 +7,7 @@ from typing import Self, cast
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from acquisition.settings import SettingsSection, parse_toml
+from acquisition.validation import first_problem
 
 _FEW = 3  # rows of a matrix that stay in one line
 
@@ -34,7 +35,7 @@ class TomlFile(TomlTable):
         try:
             return cls.model_validate(table)
         except ValidationError as error:
-            raise ValueError(_first_problem(error)) from error
+            raise ValueError(first_problem(error)) from error
 
     def text(self, comment: str) -> str:
         """Return the text of the file; floats keep every bit.
@@ -43,15 +44,6 @@ class TomlFile(TomlTable):
             comment: its first line.
         """
         return f"# {comment}\n{_lines(self, '').lstrip()}"
-
-
-def _first_problem(error: ValidationError) -> str:
-    first = error.errors(include_url=False, include_input=False)[0]
-    location = ".".join(map(str, first["loc"]))
-    if first["type"] == "missing":
-        return f"{location} is missing"
-    what = first["msg"].removeprefix("Value error, ")
-    return f"{location}: {what}" if location else what
 
 
 def _lines(table: BaseModel | Mapping[str, object], name: str) -> str:

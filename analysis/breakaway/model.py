@@ -8,10 +8,12 @@ Two kinds of answer. "break-away": the distribution of the peak of a push, see
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
+from acquisition.validation import Many
 from analysis.breakaway.answers import (
     AvailableForce,
     BreakAwayRisk,
@@ -31,6 +33,12 @@ _LARGEST_PARAMETER, _LEAST_SPREAD = 1e4, 1e-6
 _DIGITS = 6  # of a stored number
 _MOST_DRAWS = 2000
 _MOST = 10_000_000  # slips, held pushes or trials
+
+_Parameter = Annotated[float, Field(ge=-_LARGEST_PARAMETER, le=_LARGEST_PARAMETER)]
+_Spread = Annotated[_Parameter, Field(ge=_LEAST_SPREAD)]
+_Positive = Annotated[float, Field(ge=0.0)]
+_Count = Annotated[int, Field(ge=0, le=_MOST)]
+_Law = tuple[_Parameter, _Parameter, _Spread, Annotated[_Parameter, Field(ge=0.0)]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,52 +203,55 @@ class BreakAwayModel:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the model as plain values, for JSON."""
-        return {
-            "kind": self.kind,
-            "family": self.family.value,
+        values = {name: getattr(self, name) for name in self.__slots__} | {
             "law": _rounded(self.law.values),
-            "draws": [_rounded(row) for row in self.draws.tolist()],
-            "v_slip": self.v_slip,
-            "slips": self.slips,
-            "held": self.held,
-            "trials": self.trials,
+            "draws": tuple(map(_rounded, self.draws.tolist())),
             "loads": _rounded(self.loads),
             "forces": _rounded(self.forces),
             "distance": None if math.isnan(self.distance) else self.distance,
-            "is_trial_seen": self.is_trial_seen,
         }
+        return _BreakAwayFile.model_construct(**values).model_dump(mode="json")
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> "BreakAwayModel":
         """Return the model of plain values; everything is checked.
 
         Raises:
-            ValueError: a value is not what it should be.
-            KeyError: one is missing.
-            TypeError: one is of another type.
+            ValueError: a value is missing or not what it should be.
         """
-        kind = str(content["kind"])
-        if kind not in (BREAK_AWAY, SLIDING):
-            raise ValueError(f"{kind!r} is not a kind of break-away model")
-        draws = np.array(content["draws"], dtype=np.float64).reshape(-1, 4)
-        if len(draws) > _MOST_DRAWS:
-            raise ValueError(f"more than {_MOST_DRAWS} draws")
-        distance = content["distance"]
-        (law,) = _laws([content["law"]]).tolist()
-        return cls(
-            kind=kind,
-            family=Family(content["family"]),
-            law=PushLaw(*law),
-            draws=_laws(draws),
-            v_slip=_positive(content["v_slip"]),
-            slips=_count(content["slips"]),
-            held=_count(content["held"]),
-            trials=_count(content["trials"]),
-            loads=_range(content["loads"]),
-            forces=_range(content["forces"]),
-            distance=float("nan") if distance is None else _positive(distance),
-            is_trial_seen=bool(content["is_trial_seen"]),
-        )
+        file = _BreakAwayFile.model_validate(content)
+        values = dict(file) | {
+            "law": PushLaw(*file.law),
+            "draws": np.array(file.draws).reshape(-1, 4),
+            "distance": math.nan if file.distance is None else file.distance,
+        }
+        return cls(**values)
+
+
+class _BreakAwayFile(BaseModel):
+    """A model as it is stored."""
+
+    model_config = ConfigDict(allow_inf_nan=False)
+
+    kind: Literal["break-away", "sliding"]
+    family: Family
+    law: _Law
+    draws: Many[_Law] = Field(max_length=_MOST_DRAWS)
+    v_slip: _Positive
+    slips: _Count
+    held: _Count
+    trials: _Count
+    loads: tuple[float, float]
+    forces: tuple[float, float]
+    distance: _Positive | None
+    is_trial_seen: bool
+
+    @field_validator("loads", "forces")
+    @classmethod
+    def _is_increasing(cls, ends: tuple[float, float]) -> tuple[float, float]:
+        if ends[0] > ends[1]:
+            raise ValueError("a range is not two increasing numbers")
+        return ends
 
 
 def _mixed(family: Family, laws: Array, above: Array) -> Array:
@@ -266,35 +277,5 @@ def _interval(values: Array) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def _rounded(values: Sequence[float]) -> list[float]:
-    return [float(f"{value:.{_DIGITS}g}") for value in values]
-
-
-def _laws(rows: Any) -> Array:  # noqa: ANN401
-    laws = np.array(rows, dtype=np.float64).reshape(-1, 4)
-    if not bool((np.abs(laws) <= _LARGEST_PARAMETER).all()):  # nor is NaN
-        raise ValueError("a parameter is not a number that a force can have")
-    if bool((laws[:, 2] < _LEAST_SPREAD).any() or (laws[:, 3] < 0.0).any()):
-        raise ValueError("a spread is not positive")
-    return laws
-
-
-def _positive(value: Any) -> float:  # noqa: ANN401
-    number = float(value)
-    if not 0.0 <= number < math.inf:
-        raise ValueError(f"{number} is not a positive number")
-    return number
-
-
-def _count(value: Any) -> int:  # noqa: ANN401
-    number = int(value)
-    if not 0 <= number <= _MOST:
-        raise ValueError(f"{number} pushes or trials")
-    return number
-
-
-def _range(values: Any) -> tuple[float, float]:  # noqa: ANN401
-    low, high = (float(value) for value in values)
-    if not (math.isfinite(low) and math.isfinite(high) and low <= high):
-        raise ValueError("a range is not two increasing numbers")
-    return low, high
+def _rounded(values: Sequence[float]) -> tuple[float, ...]:
+    return tuple(float(f"{value:.{_DIGITS}g}") for value in values)

@@ -17,6 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from acquisition.errors import SettingsError
 from acquisition.files import UnfitFileError, open_regular, read_regular
+from acquisition.validation import Many, first_problem
 
 DESCRIPTOR = "datapackage.json"
 _LARGEST = 16_000_000  # bytes of a descriptor; a study of 80 trials has 2 million
@@ -87,8 +88,8 @@ class TableSchema(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="ignore")
 
-    fields: tuple[PackageField, ...]
-    missingValues: tuple[str, ...] = _ABSENT
+    fields: Many[PackageField]
+    missingValues: Many[str] = _ABSENT
 
 
 class PackageFile(BaseModel):
@@ -142,7 +143,7 @@ class DataPackage(BaseModel):
     description: str = ""
     created: str = ""
     profile: str = "tabular-data-package"
-    resources: tuple[PackageFile, ...] = Field(max_length=_MOST)
+    resources: Many[PackageFile] = Field(max_length=_MOST)
 
     def text(self) -> str:
         """Return it as JSON."""
@@ -256,9 +257,7 @@ def _read(path: Path) -> DataPackage:
             hint="Give tables, or a folder of traction export.",
         ) from error
     except ValidationError as error:
-        first = error.errors(include_url=False, include_input=False)[0]
-        location = ".".join(str(part) for part in first["loc"])
         raise SettingsError(
-            f"{path}: it is not a data package of tables ({location}: {first['msg']}).",
+            f"{path}: it is not a data package of tables ({first_problem(error)}).",
             hint="Make it with: traction export SESSION --to DIR.",
         ) from error

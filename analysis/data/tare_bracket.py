@@ -1,18 +1,31 @@
 """The two tares around a trial: what the sensor's zero did meanwhile."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Annotated
 
 import numpy as np
+from pydantic import BaseModel, Field, TypeAdapter
 
+from acquisition.settings import Number
 from acquisition.trial_file.data_files import read_data
 from analysis.data.series import Array
 
-_AXES = 6
 _LARGEST = 1e6  # N, N m: beyond every sensor
+_Axis = Annotated[Number, Field(gt=-_LARGEST, lt=_LARGEST)]
+_Time = Annotated[int, Field(ge=0, lt=10**19)]  # ns
+_TIME = TypeAdapter(_Time)
+
+
+class _NextTare(BaseModel):
+    t_ns: _Time
+    bias: tuple[_Axis, _Axis, _Axis, _Axis, _Axis, _Axis]
+
+
+class _Sidecar(BaseModel):
+    next_tare: _NextTare
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,33 +67,13 @@ def read_bracket(
         bias: reading without load that the file carries, shape (6,).
         start_ns: host time of the first cycle [ns].
     """
-    before = _whole(trial.get("tared_ns"))
     try:
-        sidecar: Any = json.loads(read_data(path.with_suffix(".json")))
+        before = _TIME.validate_python(trial.get("tared_ns"))
+        sidecar = json.loads(read_data(path.with_suffix(".json")))
+        tare = _Sidecar.model_validate(sidecar).next_tare
     except (OSError, ValueError, RecursionError):
         return None
-    entry = sidecar.get("next_tare") if isinstance(sidecar, dict) else None
-    if before is None or not isinstance(entry, dict):
+    if not before < start_ns < tare.t_ns:
         return None
-    fields = cast("dict[str, object]", entry)
-    after, next_bias = _whole(fields.get("t_ns")), _wrench(fields.get("bias"))
-    if after is None or next_bias is None or not before < start_ns < after:
-        return None
-    times = ((before - start_ns) * 1e-9, (after - start_ns) * 1e-9)
-    return TareBracket(times, np.stack([bias, next_bias]))
-
-
-def _whole(value: object) -> int | None:
-    """Return a number of nanoseconds, None for anything else."""
-    if isinstance(value, str) and value.isdecimal() and len(value) < 20:
-        return int(value)
-    return value if type(value) is int and value > 0 else None
-
-
-def _wrench(value: object) -> Array | None:
-    """Return six finite numbers, None for anything else."""
-    if not isinstance(value, list) or len(cast("Sequence[object]", value)) != _AXES:
-        return None
-    numbers = [x for x in cast("list[object]", value) if isinstance(x, int | float)]
-    is_sound = len(numbers) == _AXES and all(abs(x) < _LARGEST for x in numbers)
-    return np.array(numbers, dtype=np.float64) if is_sound else None
+    times = ((before - start_ns) * 1e-9, (tare.t_ns - start_ns) * 1e-9)
+    return TareBracket(times, np.array([bias, tare.bias]))

@@ -14,10 +14,14 @@ from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import exp, log
-from typing import Final
+from typing import Annotated, Final
 
+from pydantic import AfterValidator, Field
+
+from acquisition.validation import Many
 from analysis.foresight.ground_window import FASTEST, SLOWEST, WINDOWS, GroundWindow
 from analysis.foresight.logistic import RidgeLogistic
+from analysis.foresight.stored import Number, Range, Word, increasing
 
 JUDGED: Final = 50  # sliding ticks over which a density is judged
 SHARES: Final = (0.002, 0.01, 0.02, 0.5, 0.98, 0.99, 0.998)  # of the densities' limits
@@ -25,6 +29,12 @@ _TEMPER = 0.1
 _BOUND = 7.0
 _FAR = 16.0  # z^2 beyond which a tick says no more
 _UNUSUAL = 0.04  # two-sided share of a terrain's own windows below which it is doubted
+_LogSd = Annotated[Number, Field(ge=-100.0, le=100.0)]
+_Densities = Annotated[
+    Many[Number],
+    Field(min_length=len(SHARES), max_length=len(SHARES)),
+    AfterValidator(increasing),
+]
 
 
 def log_speed(v_t: float) -> float:
@@ -47,12 +57,12 @@ class GroundLaw:
         densities: mean log density of its own windows at `SHARES`, increasing.
     """
 
-    name: str
-    surface: str
-    mean: tuple[float, ...]
-    log_sd: tuple[float, ...]
-    loads: tuple[float, float]
-    densities: tuple[float, ...]
+    name: Word
+    surface: Word
+    mean: tuple[Number, Number, Number, Number, Number, Number]
+    log_sd: tuple[_LogSd, _LogSd, _LogSd]
+    loads: Range
+    densities: _Densities
 
     def at(self, F_n: float, v_t: float) -> tuple[float, float]:
         """Return mean and ln of the standard deviation of F_t [N]."""

@@ -10,10 +10,12 @@ it runs.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import exp
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
+from pydantic import Field, TypeAdapter
 
+from acquisition.validation import Many
 from analysis.data.series import Array
 
 _REACH = 5.0  # standard deviations beyond which a feature says no more
@@ -22,9 +24,13 @@ _STEPS, _HALVINGS = 25, 14
 _CONVERGED = 1e-4
 _SMALL = 1e-9
 _LARGEST_NUMBER = 1e9  # of a stored number
-_MOST_FEATURES, _MOST_PAIRS = 64, 600
+_MOST_PAIRS = 600
 
-Pairs = tuple[tuple[int, int], ...]
+Pairs = Annotated[Many[tuple[int, int]], Field(max_length=_MOST_PAIRS)]
+_Number = Annotated[
+    float, Field(ge=-_LARGEST_NUMBER, le=_LARGEST_NUMBER, allow_inf_nan=False)
+]
+_Scale = Annotated[_Number, Field(ge=1.0 / _LARGEST_NUMBER)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,10 +44,10 @@ class RidgeLogistic:
         weights: bias, features, pairs; shape (1 + n + k,).
     """
 
-    mean: tuple[float, ...]
-    scale: tuple[float, ...]
+    mean: Many[_Number]
+    scale: Many[_Scale]
     pairs: Pairs
-    weights: tuple[float, ...]
+    weights: Many[_Number]
 
     def probability(self, features: Sequence[float]) -> float:
         """Return the probability of one row of features, shape (n,)."""
@@ -74,12 +80,7 @@ class RidgeLogistic:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the regression as plain values; floats keep all their digits."""
-        return {
-            "mean": list(self.mean),
-            "scale": list(self.scale),
-            "pairs": [list(pair) for pair in self.pairs],
-            "weights": list(self.weights),
-        }
+        return _PLAIN.dump_python(self, mode="json")
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any], count: int) -> "RidgeLogistic":
@@ -90,24 +91,26 @@ class RidgeLogistic:
             count: number of features that it has to be for.
 
         Raises:
-            ValueError: a number or the count of them is not what it should be.
-            TypeError: one is of another type.
-            KeyError: some are missing.
+            ValueError: a value is missing or is not what it should be.
         """
-        pairs = tuple((int(i), int(j)) for i, j in content["pairs"])
-        if len(pairs) > _MOST_PAIRS or count > _MOST_FEATURES:
-            raise ValueError("a regression has too many terms")
-        if any(not 0 <= k < count for pair in pairs for k in pair):
+        return _PLAIN.validate_python(content).checked(count)
+
+    def checked(self, count: int) -> "RidgeLogistic":
+        """Return the regression itself.
+
+        Raises:
+            ValueError: it is not for `count` features.
+        """
+        if any(not 0 <= k < count for pair in self.pairs for k in pair):
             raise ValueError("a regression multiplies features that there are not")
-        sizes = {"mean": count, "scale": count, "weights": 1 + count + len(pairs)}
-        rows = {name: tuple(map(float, content[name])) for name in sizes}
+        sizes = {"mean": count, "scale": count, "weights": 1 + count + len(self.pairs)}
         for name, size in sizes.items():
-            is_usual = all(-_LARGEST_NUMBER <= v <= _LARGEST_NUMBER for v in rows[name])
-            if len(rows[name]) != size or not is_usual:
+            if len(getattr(self, name)) != size:
                 raise ValueError(f"{name} of a regression is not {size} numbers")
-        if min(rows["scale"], default=1.0) < 1.0 / _LARGEST_NUMBER:
-            raise ValueError("a scale of a regression is not positive")
-        return cls(rows["mean"], rows["scale"], pairs, rows["weights"])
+        return self
+
+
+_PLAIN = TypeAdapter(RidgeLogistic)
 
 
 def fit_logistic(

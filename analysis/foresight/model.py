@@ -1,19 +1,34 @@
 """What foresight has learnt, and on which rig: plain values in and out."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from math import isfinite
-from typing import Any
+from dataclasses import asdict, dataclass
+from operator import methodcaller
+from typing import Annotated, Any, Literal
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    Field,
+    ValidationInfo,
+    field_validator,
+)
 
 from acquisition.schema import MOST_TERRAINS
-from analysis.foresight.ground import SHARES, GroundLaw, GroundModel
+from acquisition.validation import Entries, Many
+from analysis.foresight.ground import GroundLaw, GroundModel
 from analysis.foresight.ground_window import GROUND_FEATURES, WINDOWS
 from analysis.foresight.logistic import RidgeLogistic
 from analysis.foresight.signals import FEATURES
+from analysis.foresight.stored import Number, Word
 
 VERSION = 1
-_LARGEST = 1e6  # of a number in a law
-_MOST_RIGS, _MOST_NAMES, _LONGEST = 100, 5000, 200
+_MOST_RIGS, _MOST_NAMES = 100, 5000
+_Names = Annotated[Many[Word], Field(max_length=_MOST_NAMES)]
+
+
+def _is_for(features: Sequence[str]) -> AfterValidator:
+    """Return the check that a regression is one on these features."""
+    return AfterValidator(methodcaller("checked", len(features)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,10 +42,10 @@ class RigIdentity:
         foot_mass_kg: of the foot.
     """
 
-    simulated: str
-    tread: str
-    effective_mass_kg: str
-    foot_mass_kg: str
+    simulated: Word = ""
+    tread: Word = ""
+    effective_mass_kg: Word = ""
+    foot_mass_kg: Word = ""
 
     @classmethod
     def of(cls, trial: Mapping[str, str]) -> "RigIdentity":
@@ -39,7 +54,7 @@ class RigIdentity:
 
     def to_dict(self) -> dict[str, str]:
         """Return it as a mapping, as in a trial's metadata."""
-        return {name: str(getattr(self, name)) for name in RigIdentity.__slots__}
+        return asdict(self)
 
     @property
     def text(self) -> str:
@@ -62,9 +77,9 @@ class Provenance:
         seeds: of the simulations, empty where there was none.
     """
 
-    rigs: tuple[RigIdentity, ...]
-    trials: tuple[str, ...]
-    seeds: tuple[str, ...]
+    rigs: Annotated[Many[RigIdentity], Field(max_length=_MOST_RIGS)]
+    trials: _Names
+    seeds: _Names
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,17 +87,17 @@ class SlipModel:
     """Probability of a slip within 200 ms.
 
     Attributes:
-        regression: on the features of `signals`.
         threshold: probability at which an alarm begins, set on trials that the
             regression of their fold had not seen.
         slips: number of slips that it was learnt from.
         reach: F_n and F_t [N] beyond which nothing was learnt.
+        regression: on the features of `signals`.
     """
 
-    regression: RidgeLogistic
-    threshold: float
-    slips: int
-    reach: tuple[float, float]
+    threshold: Annotated[float, Field(gt=0.0, lt=1.0)]
+    slips: Annotated[int, Field(ge=0, lt=10**9)]
+    reach: tuple[Number, Number]
+    regression: Annotated[RidgeLogistic, _is_for(FEATURES)]
 
     def covers(self, F_n: float, F_t: float) -> bool:
         """Return whether a load [N] and a traction [N] are among those learnt from."""
@@ -114,123 +129,53 @@ class ForesightModel:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the model as plain values, for JSON."""
-        source = self.provenance
-        return {
-            "version": VERSION,
-            "features": list(FEATURES),
-            "ground_features": list(GROUND_FEATURES),
-            "slip": None if self.slip is None else _plain_slip(self.slip),
-            "laws": [_plain_law(law) for law in self.ground.laws],
-            "surfaces": {str(n): one.to_dict() for n, one in self.ground.surfaces},
-            "provenance": {
-                "rigs": [rig.to_dict() for rig in source.rigs],
-                "trials": list(source.trials),
-                "seeds": list(source.seeds),
-            },
-        }
+        return _ForesightFile.model_construct(
+            version=VERSION,
+            features=FEATURES,
+            ground_features=GROUND_FEATURES,
+            slip=self.slip,
+            laws=self.ground.laws,
+            surfaces=dict(self.ground.surfaces),
+            provenance=self.provenance,
+        ).model_dump(mode="json")
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> "ForesightModel":
         """Return the model of plain values; everything is checked.
 
         Raises:
-            ValueError: a value is not what it should be, or of another version.
-            TypeError: one is of another type.
-            KeyError: one is missing.
+            ValueError: a value is missing or not what it should be, or it is of
+                another version.
         """
-        if content["version"] != VERSION:
-            raise ValueError(f"foresight of version {content['version']!r}"[:60])
-        names = (tuple(content["features"]), tuple(content["ground_features"]))
-        if names != (FEATURES, GROUND_FEATURES):
+        file = _ForesightFile.model_validate(content)
+        ground = GroundModel(file.laws, tuple(sorted(file.surfaces.items())))
+        return cls(file.slip, ground, file.provenance)
+
+
+class _ForesightFile(BaseModel):
+    """Foresight as it is stored."""
+
+    version: Literal[1]
+    features: Many[str]
+    ground_features: Many[str]
+    slip: SlipModel | None
+    laws: Annotated[Many[GroundLaw], Field(min_length=1, max_length=MOST_TERRAINS)]
+    surfaces: Entries[int, Annotated[RidgeLogistic, _is_for(GROUND_FEATURES)]]
+    provenance: Provenance
+
+    @field_validator("features", "ground_features")
+    @classmethod
+    def _are_ours(cls, names: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
+        ours = {"features": FEATURES, "ground_features": GROUND_FEATURES}
+        if names != ours[info.field_name or ""]:
             raise ValueError("foresight was trained on other features")
-        slip = content["slip"]
-        laws = tuple(_law(dict(one)) for one in content["laws"])
-        if not 0 < len(laws) <= MOST_TERRAINS:
-            raise ValueError(f"foresight of {len(laws)} terrains")
-        count = len(GROUND_FEATURES)
-        surfaces = {
-            int(size): RidgeLogistic.from_dict(dict(one), count)
-            for size, one in dict(content["surfaces"]).items()
-        }
+        return names
+
+    @field_validator("surfaces")
+    @classmethod
+    def _are_of_our_windows(
+        cls, surfaces: dict[int, RidgeLogistic]
+    ) -> dict[int, RidgeLogistic]:
         if not set(surfaces) <= set(WINDOWS):
             raise ValueError("foresight has other windows")
-        return cls(
-            slip=None if slip is None else _slip(dict(slip)),
-            ground=GroundModel(laws, tuple(sorted(surfaces.items()))),
-            provenance=_provenance(dict(content["provenance"])),
-        )
-
-
-def _plain_slip(slip: SlipModel) -> dict[str, Any]:
-    regression = slip.regression.to_dict()
-    return {
-        "threshold": slip.threshold,
-        "slips": slip.slips,
-        "reach": list(slip.reach),
-        "regression": regression,
-    }
-
-
-def _slip(content: Mapping[str, Any]) -> SlipModel:
-    threshold, slips = float(content["threshold"]), int(content["slips"])
-    if not 0.0 < threshold < 1.0 or not 0 <= slips < 10**9:
-        raise ValueError("a threshold is not between 0 and 1")
-    regression = RidgeLogistic.from_dict(dict(content["regression"]), len(FEATURES))
-    most_load, most_force = _numbers(content["reach"], 2)
-    return SlipModel(regression, threshold, slips, (most_load, most_force))
-
-
-def _plain_law(law: GroundLaw) -> dict[str, Any]:
-    return {
-        "name": law.name,
-        "surface": law.surface,
-        "mean": list(law.mean),
-        "log_sd": list(law.log_sd),
-        "loads": list(law.loads),
-        "densities": list(law.densities),
-    }
-
-
-def _law(content: Mapping[str, Any]) -> GroundLaw:
-    low, high = _numbers(content["loads"], 2)
-    densities = _numbers(content["densities"], len(SHARES))
-    if low > high or list(densities) != sorted(densities):
-        raise ValueError("loads or densities of a terrain do not increase")
-    log_sd = _numbers(content["log_sd"], 3)
-    if max(map(abs, log_sd)) > 100.0:
-        raise ValueError("a spread of a terrain is impossible")
-    return GroundLaw(
-        name=_word(content["name"]),
-        surface=_word(content["surface"]),
-        mean=_numbers(content["mean"], 6),
-        log_sd=log_sd,
-        loads=(low, high),
-        densities=densities,
-    )
-
-
-def _provenance(content: Mapping[str, Any]) -> Provenance:
-    rigs, trials, seeds = content["rigs"], content["trials"], content["seeds"]
-    if len(rigs) > _MOST_RIGS or max(len(trials), len(seeds)) > _MOST_NAMES:
-        raise ValueError("foresight names too many rigs or trials")
-    identities = [
-        RigIdentity.of({str(k): _word(v) for k, v in dict(rig).items()}) for rig in rigs
-    ]
-    return Provenance(
-        tuple(identities), tuple(map(_word, trials)), tuple(map(_word, seeds))
-    )
-
-
-def _numbers(values: Sequence[Any], count: int) -> tuple[float, ...]:
-    numbers = tuple(map(float, values))
-    if len(numbers) != count or not all(
-        isfinite(n) and abs(n) <= _LARGEST for n in numbers
-    ):
-        raise ValueError(f"a law of a terrain is not {count} numbers")
-    return numbers
-
-
-def _word(value: object) -> str:
-    if not isinstance(value, str) or len(value) > _LONGEST or not value.isprintable():
-        raise ValueError("a name of foresight is not a short text")
-    return value
+        return surfaces

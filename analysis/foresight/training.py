@@ -90,7 +90,7 @@ def _fit_slip(trials: Sequence[WatchedTrial]) -> SlipModel | None:
                 needless.append(regression.probabilities(trial.features[rows]))
     judged = np.concatenate(needless)
     threshold = float(np.quantile(judged, 1.0 - ALARM_SHARE))
-    return SlipModel(every, threshold, int(slips), _reach(trials))
+    return SlipModel(threshold, int(slips), _reach(trials), every)
 
 
 def _reach(trials: Sequence[WatchedTrial]) -> tuple[float, float]:

@@ -4,13 +4,15 @@ Rows come in runs of neighbours: single rows lie several correlation times apart
 the residual along a trial and the noise of a sample look alike.
 """
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, cast
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
+from pydantic import BaseModel, Field, ValidationError
 
+from acquisition.settings import Number
+from acquisition.validation import Many
 from analysis.breakaway.pushes import find_pushes
 from analysis.data.prepare import PreparedTrial
 from analysis.data.series import Array
@@ -21,6 +23,8 @@ _DIGITS = 4
 _MOST_SLIPS = 200
 _LARGEST = 1e6  # of any number in a record
 _LEAST = (0.1, 0.001)  # N, m/s
+_Number = Annotated[Number, Field(gt=-_LARGEST, lt=_LARGEST)]
+_Column = Annotated[Many[_Number], Field(min_length=1, max_length=ROWS)]
 
 
 class Aim(NamedTuple):
@@ -31,8 +35,8 @@ class Aim(NamedTuple):
         v_t: mean velocity while it moves [m/s].
     """
 
-    F_n: float
-    v_t: float
+    F_n: _Number
+    v_t: _Number
 
     @property
     def log(self) -> Array:
@@ -77,18 +81,27 @@ class PushRecord:
     @classmethod
     def from_plain(cls, value: object) -> "PushRecord | None":
         """Return a record from a sidecar; None where there is none or it is damaged."""
-        if not isinstance(value, dict):
+        try:
+            told = _StoredRecord.model_validate(value)
+        except ValidationError:
             return None
-        fields = cast("Mapping[str, object]", value)
-        columns = [_numbers(fields.get(key)) for key in ("F_n", "v_t", "F_t", "t")]
-        slips, mean = _numbers(fields.get("slips")), _aim(fields.get("mean"))
-        if any(c is None for c in columns) or slips is None or mean is None:
+        columns = (told.F_n, told.v_t, told.F_t, told.t)
+        if len(set(map(len, columns))) > 1:
             return None
-        F_n, v_t, F_t, t = (np.array(column) for column in columns)
-        is_even = F_n.size == v_t.size == F_t.size == t.size > 0
-        if not is_even or F_n.size > ROWS or slips.size > _MOST_SLIPS:
-            return None
-        return cls(F_n, v_t, F_t, t, slips, mean, _aim(fields.get("aim")))
+        F_n, v_t, F_t, t = map(np.array, columns)
+        return cls(F_n, v_t, F_t, t, np.array(told.slips), told.mean, told.aim)
+
+
+class _StoredRecord(BaseModel):
+    """A record as it stands in a sidecar."""
+
+    F_n: _Column
+    v_t: _Column
+    F_t: _Column
+    t: _Column
+    slips: Annotated[Many[_Number], Field(max_length=_MOST_SLIPS)]
+    mean: Aim
+    aim: Aim | None = None
 
 
 def push_record(trial: PreparedTrial, aim: Aim | None = None) -> PushRecord | None:
@@ -113,25 +126,3 @@ def push_record(trial: PreparedTrial, aim: Aim | None = None) -> PushRecord | No
 
 def _short(values: Sequence[float] | Array) -> list[float]:
     return [round(float(value), _DIGITS) for value in values]
-
-
-def _numbers(value: object) -> Array | None:
-    """Return a list of finite numbers as an array, None for anything else."""
-    if not isinstance(value, list):
-        return None
-    items = cast("list[object]", value)
-    if not all(isinstance(item, int | float) for item in items):
-        return None
-    try:
-        numbers = np.array(items, dtype=np.float64)
-    except (ValueError, OverflowError):
-        return None
-    is_sound = np.isfinite(numbers).all() and (np.abs(numbers) < _LARGEST).all()
-    return numbers if is_sound else None
-
-
-def _aim(value: object) -> Aim | None:
-    pair = _numbers(value)
-    if pair is None or pair.size != 2 or not math.isfinite(float(pair.sum())):
-        return None
-    return Aim(float(pair[0]), float(pair[1]))

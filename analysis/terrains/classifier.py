@@ -9,6 +9,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from pydantic import BaseModel
+
+from acquisition.validation import Entries, Many
 from analysis.data.series import Array
 from analysis.foresight.logistic import RidgeLogistic, fit_balanced, squares
 from analysis.terrains.windows import FEATURES, WINDOWS
@@ -40,21 +43,28 @@ class SurfaceClassifier:
         """Return the classifier of plain values.
 
         Raises:
-            ValueError: a value is not what it should be, or features have changed.
-            KeyError: one is missing.
-            TypeError: one is of another type.
+            ValueError: a value is missing or not what it should be, or features have
+                changed.
         """
-        if tuple(content["features"]) != FEATURES:
+        file = _ClassifierFile.model_validate(content)
+        if file.features != FEATURES:
             raise ValueError("a classifier was made for other features")
-        models = {
-            int(size): RidgeLogistic.from_dict(
-                {**model, "pairs": squares(len(FEATURES))}, len(FEATURES)
-            )
-            for size, model in dict(content["models"]).items()
-        }
-        if not set(models) <= set(WINDOWS):
+        if not set(file.models) <= set(WINDOWS):
             raise ValueError("a classifier has other windows")
-        return cls(models)
+        pairs, count = squares(len(FEATURES)), len(FEATURES)
+        return cls(
+            {
+                size: RidgeLogistic.from_dict({**model, "pairs": pairs}, count)
+                for size, model in file.models.items()
+            }
+        )
+
+
+class _ClassifierFile(BaseModel):
+    """A classifier as it is stored; pairs of a regression are always the squares."""
+
+    features: Many[str]
+    models: Entries[int, dict[str, Any]]
 
 
 def _plain(model: RidgeLogistic) -> dict[str, list[float]]:

@@ -1,17 +1,7 @@
 """The terrain database on disk: fitted models of terrains in one file.
 
-A JSON object, nothing that is executed; `terrain_db.schema.json` beside this module is
-its JSON Schema:
-
-    format "traction-terrain-db", version 2, made_utc, simulated,
-    default (the model that answers), recogniser (the model of rho and limits)
-    shares of the quantiles, increasing
-    axes   F_n [N] and v_t [m/s], increasing, the points of every table
-    terrains NAME: kind, trials, samples, rho (correlation of neighbouring residuals),
-        limits {window: mean strain that 99 % of its own windows stay below},
-        models MODEL: title, parameters, quantiles [N]: per share one row per F_n
-        parts  NAME: anything else that is known of the terrain
-    parts NAME: anything else that is known of all
+A JSON object, nothing that is executed. `_File` is its model; what every key means
+stands in `terrain_db.schema.json` beside this module, its JSON Schema.
 
 Between the points of a table values are linear; outside of it they are those of its
 edge. Version 1 had one mean and sd [N] for the quantiles of a model: it is still read,
@@ -19,19 +9,20 @@ as normal distributions.
 """
 
 import json
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from pydantic import AfterValidator, BaseModel, Field, model_validator
 
 from acquisition.errors import SettingsError
 from acquisition.files import UnfitFileError, read_regular
+from acquisition.validation import Entries, Many, first_problem
 from analysis.data.series import Array
 from analysis.study.distribution import SHARES
 from analysis.terrains.known import KnownTerrain, TerrainDatabase
-from analysis.terrains.parts import checked_parts
-from analysis.terrains.table import Rows, Table, rows_of
+from analysis.terrains.parts import Parts, checked_parts
+from analysis.terrains.table import Rows, Table
 
 FORMAT, VERSION = "traction-terrain-db", 2
 _OLD = 1  # mean and sd instead of quantiles
@@ -39,8 +30,77 @@ _LARGEST = 6_000_000  # bytes; in memory it takes thirty times as much
 _MOST = 1_000_000_000  # trials or samples
 _MOST_POINTS = 400  # of an axis
 _MOST_SHARES = 99
-_MOST_TERRAINS = 200
 _DIGITS = 5  # of a tabulated force
+
+
+def _increasing(values: tuple[float, ...]) -> tuple[float, ...]:
+    if not bool((np.diff(values) > 0.0).all()):
+        raise ValueError("it does not increase")
+    return values
+
+
+_Finite = Annotated[float, Field(allow_inf_nan=False)]
+_Axis = Annotated[
+    Many[_Finite],
+    Field(min_length=2, max_length=_MOST_POINTS),
+    AfterValidator(_increasing),
+]
+_Shares = Annotated[
+    Many[Annotated[float, Field(gt=0.0, lt=1.0)]],
+    Field(min_length=2, max_length=_MOST_SHARES),
+    AfterValidator(_increasing),
+]
+_Rows = Many[Many[_Finite]]
+_Count = Annotated[int, Field(ge=0, le=_MOST)]
+_Parts = Annotated[Parts, AfterValidator(checked_parts)]
+
+
+class _Model(BaseModel):
+    """A model of a terrain; mean and sd stand in files of version 1 alone."""
+
+    title: str | None = None
+    parameters: Any
+    quantiles: Many[_Rows] = ()
+    mean: _Rows = Field(default=(), exclude=True)
+    sd: _Rows = Field(default=(), exclude=True)
+
+
+class _Terrain(BaseModel):
+    kind: str
+    trials: _Count
+    samples: _Count
+    rho: float = Field(ge=0.0, lt=1.0)
+    limits: Entries[int, float]
+    models: Entries[str, _Model]
+    parts: _Parts = Field(default_factory=dict[str, Any])
+
+
+class _Axes(BaseModel):
+    F_n: _Axis
+    v_t: _Axis
+
+
+class _File(BaseModel):
+    """A database in the order of its file; units are for people."""
+
+    format: Literal["traction-terrain-db"]
+    version: Literal[1, 2]
+    made_utc: str
+    simulated: bool
+    default: str
+    recogniser: str
+    units: Any = None
+    shares: _Shares
+    axes: _Axes
+    terrains: Entries[str, _Terrain] = Field(min_length=1)
+    parts: _Parts = Field(default_factory=dict[str, Any])
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_version_1(cls, content: Any) -> Any:  # noqa: ANN401
+        if isinstance(content, dict) and content.get("version") == _OLD:
+            return {**content, "recogniser": content.get("default"), "shares": SHARES}
+        return content
 
 
 def load(path: Path | str) -> TerrainDatabase:
@@ -52,7 +112,7 @@ def load(path: Path | str) -> TerrainDatabase:
     path = Path(path)
     try:
         content = read_regular(path, _LARGEST, is_link_followed=True)
-        return _database(json.loads(content))
+        return _database(_File.model_validate(json.loads(content)))
     except UnfitFileError as error:
         raise _no_database(path, f"it {error}") from error
     except OSError as error:
@@ -60,9 +120,10 @@ def load(path: Path | str) -> TerrainDatabase:
             f"{path} cannot be read ({error.strerror}).",
             hint="Make it with: traction export --terrain-db FILE.",
         ) from error
-    except (ValueError, TypeError, KeyError, RecursionError, OverflowError) as error:
-        what = f"{error} is missing" if isinstance(error, KeyError) else str(error)
-        raise _no_database(path, what) from error
+    except RecursionError as error:
+        raise _no_database(path, str(error)) from error
+    except ValueError as error:
+        raise _no_database(path, first_problem(error)) from error
 
 
 def _no_database(path: Path, what: str) -> SettingsError:
@@ -72,122 +133,56 @@ def _no_database(path: Path, what: str) -> SettingsError:
     )
 
 
-class _Header(NamedTuple):
-    """What all tables of a file share.
-
-    Attributes:
-        version: of the format.
-        axes: F_n [N] and v_t [m/s].
-        shares: of the quantiles.
-        default: name of the model that answers.
-        recogniser: name of the model of rho and limits.
-    """
-
-    version: int
-    axes: tuple[tuple[float, ...], ...]
-    shares: tuple[float, ...]
-    default: str
-    recogniser: str
-
-
-def _database(content: Any) -> TerrainDatabase:  # noqa: ANN401
-    version = content["version"]
-    if content["format"] != FORMAT or version not in (_OLD, VERSION):
-        raise ValueError("it is of another format or version")
-    default = str(content["default"])
-    header = _Header(
-        version=version,
-        axes=tuple(_axis(content["axes"][name]) for name in ("F_n", "v_t")),
-        shares=SHARES if version == _OLD else _shares(content["shares"]),
-        default=default,
-        recogniser=default if version == _OLD else str(content["recogniser"]),
-    )
-    terrains = dict(content["terrains"])
-    if not 0 < len(terrains) <= _MOST_TERRAINS:
-        raise ValueError(f"{len(terrains)} terrains")
+def _database(file: _File) -> TerrainDatabase:
     return TerrainDatabase(
-        {str(n): _terrain(str(n), t, header) for n, t in terrains.items()},
-        bool(content["simulated"]),
-        str(content["made_utc"]),
-        checked_parts(content.get("parts", {})),
+        {
+            name: _terrain(name, terrain, file)
+            for name, terrain in file.terrains.items()
+        },
+        file.simulated,
+        file.made_utc,
+        file.parts,
     )
 
 
-def _terrain(
-    name: str,
-    content: Any,  # noqa: ANN401
-    header: _Header,
-) -> KnownTerrain:
-    models = {str(key): dict(model) for key, model in dict(content["models"]).items()}
-    for wanted in (header.default, header.recogniser):
+def _terrain(name: str, terrain: _Terrain, file: _File) -> KnownTerrain:
+    models = terrain.models
+    for wanted in (file.default, file.recogniser):
         if wanted not in models:
-            raise ValueError(f"{name} lacks the model {wanted}")
+            raise ValueError(f"{name} lacks the model {wanted!r:.80}")
     return KnownTerrain(
         name=name,
-        kind=str(content["kind"]),
-        trials=_count(content["trials"]),
-        samples=_count(content["samples"]),
-        rho=_share(content["rho"]),
-        limits={int(k): float(v) for k, v in dict(content["limits"]).items()},
-        tables={key: _table(model, header) for key, model in models.items()},
-        parameters={key: model["parameters"] for key, model in models.items()},
-        default=header.default,
-        titles={key: str(model.get("title", key)) for key, model in models.items()},
-        recogniser=header.recogniser,
-        parts=checked_parts(content.get("parts", {})),
+        kind=terrain.kind,
+        trials=terrain.trials,
+        samples=terrain.samples,
+        rho=terrain.rho,
+        limits=terrain.limits,
+        tables={key: _table(model, file) for key, model in models.items()},
+        parameters={key: model.parameters for key, model in models.items()},
+        default=file.default,
+        titles={key: model.title or key for key, model in models.items()},
+        recogniser=file.recogniser,
+        parts=terrain.parts,
     )
 
 
-def _table(model: Mapping[str, Any], header: _Header) -> Table:
-    axes = header.axes
-    shape = (len(axes[0]), len(axes[1]))
-    if header.version == _OLD:
-        mean, sd = (_array(model[key], shape) for key in ("mean", "sd"))
+def _table(model: _Model, file: _File) -> Table:
+    F_n, v_t = file.axes.F_n, file.axes.v_t
+    shape = (len(F_n), len(v_t))
+    if file.version == _OLD:
+        mean, sd = _array(model.mean, shape), _array(model.sd, shape)
         if bool((sd < 0.0).any()):
             raise ValueError("a standard deviation is negative")
-        return Table.normal(axes[0], axes[1], mean, sd)
-    forces = _array(model["quantiles"], (len(header.shares), *shape))
+        return Table.normal(F_n, v_t, mean, sd)
+    forces = _array(model.quantiles, (len(file.shares), *shape))
     if bool((np.diff(forces, axis=0) < 0.0).any()):
         raise ValueError("a larger share has a smaller quantile")
-    return Table(axes[0], axes[1], header.shares, tuple(map(rows_of, forces)))
+    return Table(F_n, v_t, file.shares, model.quantiles)
 
 
-def _count(value: Any) -> int:  # noqa: ANN401
-    number = int(value)
-    if not 0 <= number <= _MOST:
-        raise ValueError(f"trials or samples are not within 0..{_MOST}")
-    return number
-
-
-def _share(value: Any) -> float:  # noqa: ANN401
-    number = float(value)
-    if not 0.0 <= number < 1.0:
-        raise ValueError(f"a correlation of {number}")
-    return number
-
-
-def _shares(values: Any) -> tuple[float, ...]:  # noqa: ANN401
-    shares = np.array(values, dtype=np.float64)
-    if shares.ndim != 1 or not 2 <= shares.size <= _MOST_SHARES:
-        raise ValueError("there are no 2 to 99 shares")
-    ends = np.concatenate([[0.0], shares, [1.0]])
-    if not bool((np.diff(ends) > 0.0).all()):
-        raise ValueError("the shares do not increase between 0 and 1")
-    return tuple(shares.tolist())
-
-
-def _axis(values: Any) -> tuple[float, ...]:  # noqa: ANN401
-    axis = np.array(values, dtype=np.float64)
-    if axis.ndim != 1 or not 2 <= axis.size <= _MOST_POINTS:
-        raise ValueError("an axis needs 2 to 400 points")
-    if not bool(np.isfinite(axis).all()) or not bool((np.diff(axis) > 0).all()):
-        raise ValueError("an axis does not increase")
-    return tuple(axis.tolist())
-
-
-def _array(values: Any, shape: tuple[int, ...]) -> Array:  # noqa: ANN401
-    table = np.array(values, dtype=np.float64)
-    if table.shape != shape or not bool(np.isfinite(table).all()):
+def _array(rows: tuple[Any, ...], shape: tuple[int, ...]) -> Array:
+    table = np.array(rows, dtype=np.float64)
+    if table.shape != shape:
         size = " x ".join(map(str, shape))
         raise ValueError(f"a table is not {size} finite numbers")
     return table
@@ -208,20 +203,20 @@ def to_text(database: TerrainDatabase) -> str:
             hint="Fit the terrains together, so that their tables agree.",
         )
     ((F_n, v_t, shares),) = grids
-    content = {
-        "format": FORMAT,
-        "version": VERSION,
-        "made_utc": database.made_utc,
-        "simulated": database.is_simulated,
-        "default": known[0].default,
-        "recogniser": known[0].recogniser or known[0].default,
-        "units": {"F_n": "N", "v_t": "m/s", "quantiles": "N", "shares": "1"},
-        "shares": list(shares),
-        "axes": {"F_n": list(F_n), "v_t": list(v_t)},
-        "terrains": {terrain.name: _plain(terrain) for terrain in known},
-        "parts": dict(database.parts),
-    }
-    text = json.dumps(content, default=str)
+    file = _File.model_construct(
+        format=FORMAT,
+        version=VERSION,
+        made_utc=database.made_utc,
+        simulated=database.is_simulated,
+        default=known[0].default,
+        recogniser=known[0].recogniser or known[0].default,
+        units={"F_n": "N", "v_t": "m/s", "quantiles": "N", "shares": "1"},
+        shares=shares,
+        axes=_Axes.model_construct(F_n=F_n, v_t=v_t),
+        terrains={terrain.name: _stored(terrain) for terrain in known},
+        parts=database.parts,
+    )
+    text = json.dumps(file.model_dump(), default=str)
     if len(text.encode()) > _LARGEST:
         raise SettingsError(
             f"{len(known)} terrains make a file of {len(text) / 1e6:.1f} MB, larger "
@@ -231,24 +226,24 @@ def to_text(database: TerrainDatabase) -> str:
     return text
 
 
-def _plain(terrain: KnownTerrain) -> dict[str, Any]:
-    return {
-        "kind": terrain.kind,
-        "trials": terrain.trials,
-        "samples": terrain.samples,
-        "rho": terrain.rho,
-        "limits": {str(size): limit for size, limit in terrain.limits.items()},
-        "models": {
-            name: {
-                "title": terrain.titles.get(name, name),
-                "parameters": terrain.parameters.get(name, {}),
-                "quantiles": [_rounded(rows) for rows in table.forces],
-            }
+def _stored(terrain: KnownTerrain) -> _Terrain:
+    return _Terrain.model_construct(
+        kind=terrain.kind,
+        trials=terrain.trials,
+        samples=terrain.samples,
+        rho=terrain.rho,
+        limits=terrain.limits,
+        models={
+            name: _Model.model_construct(
+                title=terrain.titles.get(name, name),
+                parameters=terrain.parameters.get(name, {}),
+                quantiles=tuple(map(_rounded, table.forces)),
+            )
             for name, table in terrain.tables.items()
         },
-        "parts": dict(terrain.parts),
-    }
+        parts=terrain.parts,
+    )
 
 
-def _rounded(rows: Rows) -> list[list[float]]:
-    return [[float(f"{value:.{_DIGITS}g}") for value in row] for row in rows]
+def _rounded(rows: Rows) -> Rows:
+    return tuple(tuple(float(f"{v:.{_DIGITS}g}") for v in row) for row in rows)

@@ -8,11 +8,13 @@
 A part that this program does not know is kept as it is.
 """
 
-import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import Field, TypeAdapter
 
 from acquisition.errors import SettingsError
+from acquisition.validation import Entries, first_problem
 from analysis.breakaway.model import BreakAwayModel
 from analysis.foresight.model import ForesightModel
 from analysis.terrains.classifier import SurfaceClassifier
@@ -20,22 +22,21 @@ from analysis.terrains.classifier import SurfaceClassifier
 BREAK_AWAY_PART, ROUGHNESS_PART, SURFACES_PART = "break_away", "roughness", "surfaces"
 FORESIGHT_PART = "foresight"
 Parts = Mapping[str, Any]
+_ROUGHNESS = TypeAdapter(Entries[int, Annotated[float, Field(allow_inf_nan=False)]])
 
 
-def checked_parts(content: object) -> dict[str, Any]:
+def checked_parts(parts: Parts) -> Parts:
     """Return the parts in a file after reading every one that is known.
 
     Raises:
         ValueError: a part is not what it should be.
-        TypeError: one is of another type.
-        KeyError: a part lacks something.
     """
-    if not isinstance(content, Mapping):
-        raise TypeError("parts are no mapping")
-    parts = {str(name): part for name, part in content.items()}
     for name, read in _READERS.items():
-        if name in parts:
-            read(parts)
+        try:
+            if name in parts:
+                read(parts)
+        except ValueError as error:
+            raise ValueError(f"{name}: {first_problem(error)}") from error
     return parts
 
 
@@ -55,10 +56,7 @@ def break_away_in(parts: Parts, terrain: str) -> BreakAwayModel:
 
 def roughness_in(parts: Parts) -> dict[int, float]:
     """Return the least roughness by window [kept samples], empty where not known."""
-    limits = {int(k): float(v) for k, v in dict(parts.get(ROUGHNESS_PART, {})).items()}
-    if not all(math.isfinite(limit) for limit in limits.values()):
-        raise ValueError("a roughness is not a finite number")
-    return limits
+    return _ROUGHNESS.validate_python(parts.get(ROUGHNESS_PART, {}))
 
 
 def surfaces_in(parts: Parts) -> SurfaceClassifier | None:

@@ -8,6 +8,7 @@ from pydantic import ValidationError
 
 from acquisition.errors import SettingsError
 from acquisition.settings import Near, SettingsSection, parse_toml, read_text
+from acquisition.validation import first_problem
 from experiments.rig.build import build_tool, terrain_frame
 from experiments.settings.load import Settings
 from experiments.settings.matrix import TerrainRow
@@ -83,9 +84,7 @@ def _parse(path: Path, counts: range) -> PoseFile:
     try:
         return PoseFile.model_validate(table)
     except ValidationError as error:
-        first = error.errors()[0]
-        location = ".".join(map(str, first["loc"]))
-        raise _unread(path, f"{location}: {first['msg']}") from error
+        raise _unread(path, first_problem(error)) from error
 
 
 def _unread(path: Path, why: str) -> SettingsError:

@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 from acquisition.errors import SettingsError
 from acquisition.settings import Number, Six
 from acquisition.toml_files import TomlFile
+from acquisition.validation import Many
 from ft_sensor.calibration.fit import Floats, SensorFit
 from wam.model.constants import Array
 
@@ -64,8 +65,8 @@ class _SensorFile(TomlFile):
     residual: _Residual
     torque_residual: _Residual
     drift: _Residual
-    rotations: tuple[_Nine, ...] = Field(min_length=1, max_length=_MOST)
-    readings: tuple[Six, ...] = Field(max_length=_MOST)
+    rotations: Many[_Nine] = Field(min_length=1, max_length=_MOST)
+    readings: Many[Six] = Field(max_length=_MOST)
 
     @model_validator(mode="after")
     def _has_a_reading_for_each_rotation(self) -> Self:

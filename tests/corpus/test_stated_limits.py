@@ -254,7 +254,7 @@ def test_a_database_of_the_largest_size_is_read(tmp_path, most):
 
 
 @pytest.mark.parametrize(
-    ("more", "why"), [({"terrains": 201}, "201 terrains"), ({"points": 401}, "400")]
+    ("more", "why"), [({"terrains": 201}, "201 entries"), ({"points": 401}, "400")]
 )
 def test_a_database_with_one_more_is_refused(tmp_path, more, why):
     with pytest.raises(SettingsError, match=why):

@@ -9,6 +9,7 @@ from pydantic import Field, field_validator
 from acquisition.errors import SettingsError
 from acquisition.settings import Number, Whole
 from acquisition.toml_files import TomlFile, TomlTable
+from acquisition.validation import Entries, Many
 from wam.calibration.friction_fit import FrictionFit
 from wam.calibration.joint_friction import (
     joint_asymmetry,
@@ -48,9 +49,9 @@ class _FitTable(TomlTable):
     deviation: _Seven
     asymmetry_deviation: _Seven
     residual: _Seven
-    rows: Annotated[tuple[Whole, ...], Field(min_length=7, max_length=7)]
+    rows: Annotated[Many[Whole], Field(min_length=7, max_length=7)]
     moments: Annotated[
-        tuple[tuple[_Moment, _Moment, _Moment], ...], Field(min_length=7, max_length=7)
+        Many[tuple[_Moment, _Moment, _Moment]], Field(min_length=7, max_length=7)
     ] = Field(
         default=((0.0, 0.0, 0.0),) * 7,
         description="To be added to the first moments whose weight was subtracted "
@@ -80,7 +81,7 @@ class _FrictionFile(TomlFile):
     breakaway: Any = None
     coulomb_deviation: Any = None
     coulomb_lower_bound: Any = None
-    motors: dict[str, _Seven] = Field(description="At the motors 1 to 7.")
+    motors: Entries[str, _Seven] = Field(description="At the motors 1 to 7.")
     fit: _FitTable = Field(
         description="How well the motors are known; residuals are shares of Coulomb "
         "friction."

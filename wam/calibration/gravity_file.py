@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 from acquisition.errors import SettingsError
 from acquisition.settings import Number, Whole
 from acquisition.toml_files import TomlFile, TomlTable
+from acquisition.validation import Many
 from wam.model.constants import Array, Body
 from wam.model.tool import Tool, tool_metadata, tool_of
 
@@ -71,10 +72,10 @@ class _GravityFile(TomlFile):
     residual: Number
     rank: Whole
     mus: Annotated[
-        tuple[tuple[_Moment, _Moment, _Moment], ...], Field(min_length=7, max_length=7)
+        Many[tuple[_Moment, _Moment, _Moment]], Field(min_length=7, max_length=7)
     ]
-    poses: tuple[_Seven, ...] = Field(min_length=1)
-    torques: tuple[_Seven, ...]
+    poses: Many[_Seven] = Field(min_length=1)
+    torques: Many[_Seven]
     tool: _ToolTable
 
     @model_validator(mode="after")

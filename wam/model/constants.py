@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from pydantic import (
     Field,
     PositiveInt,
-    ValidationError,
     model_validator,
 )
 
 from acquisition.errors import SettingsError
 from acquisition.settings import SettingsSection, parse_toml
+from acquisition.validation import Many, first_problem
 
 GRAVITY = 9.81  # m/s^2
 Array = NDArray[np.float64]
@@ -107,7 +107,7 @@ class GravityConstantsSection(SettingsSection):
     """First moments [kg m] as the maker calibrates them."""
 
     mus: tuple[_Vector3, _Vector3, _Vector3, _Vector3, _Vector3, _Vector3, _Vector3]
-    poses: tuple[_Vector7, ...]
+    poses: Many[_Vector7]
 
 
 class ConstantsFile(SettingsSection):
@@ -119,7 +119,7 @@ class ConstantsFile(SettingsSection):
     transmission: TransmissionSection
     pucks: PucksSection
     motors: MotorsSection
-    links: tuple[LinkSection, ...] = Field(min_length=7, max_length=7)
+    links: Many[LinkSection] = Field(min_length=7, max_length=7)
     gravity: GravityConstantsSection
     friction: FrictionSection
     control: ConstantsControlSection
@@ -183,14 +183,6 @@ class ArmConstants:
     text: str
 
 
-def _reason(error: Exception) -> str:
-    """Return in a line what is wrong with the file."""
-    if not isinstance(error, ValidationError):
-        return str(error)
-    first = error.errors(include_url=False)[0]
-    return ": ".join(filter(None, (".".join(map(str, first["loc"])), first["msg"])))
-
-
 @lru_cache(maxsize=8)  # every trial of a study carries the same
 def _parsed(text: str) -> ConstantsFile:
     return ConstantsFile.model_validate(parse_toml(text))
@@ -208,7 +200,7 @@ def load_constants(text: str | None = None) -> ArmConstants:
         file = _parsed(text)
     except ValueError as error:
         raise SettingsError(
-            f"The arm model cannot be read: {_reason(error)}.",
+            f"The arm model cannot be read: {first_problem(error)}.",
             hint="Use the model shipped with Traction as a pattern.",
         ) from error
     links = tuple(

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from sklearn.linear_model import LogisticRegression
 
+from acquisition.validation import first_problem
 from analysis.foresight.logistic import RidgeLogistic, all_pairs, fit_logistic
 
 
@@ -67,16 +68,18 @@ def test_a_model_survives_its_text_bit_for_bit():
 
 
 @pytest.mark.parametrize(
-    "change",
+    ("change", "words"),
     [
-        {"weights": [0.0]},
-        {"mean": [0.0, 0.0, float("nan")]},
-        {"scale": [1.0, 0.0, 1.0]},
-        {"pairs": [[0, 3]]},
-        {"pairs": [[0, -1]]},
-        {"pairs": [[0, 0]] * 601},
+        ({"weights": [0.0]}, "weights of a regression is not 7 numbers"),
+        ({"mean": [0.0, 0.0, float("nan")]}, "mean.2: Input should be a finite number"),
+        ({"mean": [0.0, 0.0, 1e10]}, "mean.2: Input should be less than"),
+        ({"scale": [1.0, 0.0, 1.0]}, "scale.1: Input should be greater than"),
+        ({"pairs": [[0, 3]]}, "a regression multiplies features that there are not"),
+        ({"pairs": [[0, -1]]}, "a regression multiplies features that there are not"),
+        ({"pairs": [[0, 0]] * 601}, "pairs: Tuple should have at most 600 items"),
     ],
 )
-def test_a_model_that_cannot_be_is_refused(change):
-    with pytest.raises(ValueError, match="regression"):
+def test_a_model_that_cannot_be_is_refused(change, words):
+    with pytest.raises(ValueError, match=r".+") as caught:
         RidgeLogistic.from_dict(fitted().to_dict() | change, 3)
+    assert first_problem(caught.value).startswith(words)

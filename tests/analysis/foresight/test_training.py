@@ -3,6 +3,7 @@ import json
 import numpy as np
 import pytest
 
+from acquisition.validation import first_problem
 from analysis.foresight.held_out import foresee
 from analysis.foresight.model import ForesightModel
 from analysis.foresight.scores import score_slips
@@ -86,22 +87,38 @@ def broken():
     plain = json.loads(json.dumps(model().to_dict()))
     laws, slip, source = plain["laws"], plain["slip"], plain["provenance"]
     return [
-        ({"version": 2}, "version"),
-        ({"features": ["x"]}, "other features"),
-        ({"laws": []}, "0 terrains"),
-        ({"laws": laws * 9}, "18 terrains"),
-        ({"laws": [laws[0] | {"mean": [1.0]}]}, "6 numbers"),
-        ({"laws": [laws[0] | {"loads": [5.0, 1.0]}]}, "do not increase"),
-        ({"laws": [laws[0] | {"name": "\x1b[2J"}]}, "short text"),
-        ({"laws": [laws[0] | {"log_sd": [1e5, 0.0, 0.0]}]}, "spread"),
-        ({"slip": slip | {"threshold": 1.5}}, "threshold"),
-        ({"slip": slip | {"reach": [1.0]}}, "2 numbers"),
-        ({"surfaces": {"7": next(iter(plain["surfaces"].values()))}}, "windows"),
-        ({"provenance": source | {"trials": ["x"] * 5001}}, "too many"),
+        ({"version": 2}, "version: Input should be 1"),
+        ({"features": ["x"]}, "features: foresight was trained on other features"),
+        ({"laws": []}, "laws: Tuple should have at least 1 item"),
+        ({"laws": laws * 9}, "laws: Tuple should have at most 16 items"),
+        ({"laws": [laws[0] | {"mean": [1.0]}]}, "laws.0.mean.1 is missing"),
+        (
+            {"laws": [laws[0] | {"loads": [5.0, 1.0]}]},
+            "laws.0.loads: the values do not increase",
+        ),
+        ({"laws": [laws[0] | {"name": "\x1b[2J"}]}, "laws.0.name: it is not printable"),
+        (
+            {"laws": [laws[0] | {"log_sd": [1e5, 0.0, 0.0]}]},
+            "laws.0.log_sd.0: Input should be less than or equal to 100",
+        ),
+        (
+            {"slip": slip | {"threshold": 1.5}},
+            "slip.threshold: Input should be less than 1",
+        ),
+        ({"slip": slip | {"reach": [1.0]}}, "slip.reach.1 is missing"),
+        (
+            {"surfaces": {"7": next(iter(plain["surfaces"].values()))}},
+            "surfaces: foresight has other windows",
+        ),
+        (
+            {"provenance": source | {"trials": ["x"] * 5001}},
+            "provenance.trials: Tuple should have at most 5000 items",
+        ),
     ]
 
 
 @pytest.mark.parametrize(("change", "words"), broken(), ids=lambda part: str(part)[:20])
 def test_a_model_that_cannot_be_is_refused(change, words):
-    with pytest.raises(ValueError, match=words):
+    with pytest.raises(ValueError, match=r".+") as caught:
         ForesightModel.from_dict(model().to_dict() | change)
+    assert first_problem(caught.value).startswith(words)

@@ -138,7 +138,7 @@ def changed(**changes):
 @pytest.mark.parametrize(
     ("changes", "word"),
     [
-        ({"shares": [0.5, 0.1] + [0.9] * 7}, "shares"),
+        ({"shares": [0.5, 0.1] + [0.9] * 7}, "shares: it does not increase"),
         ({"shares": [0.0, *SHARES[1:]]}, "shares"),
         ({"shares": [0.1, 0.9]}, "finite numbers"),
         ({"shares": [nan] * 9}, "shares"),

@@ -259,13 +259,19 @@ def test_an_unknown_terrain_and_an_unknown_model_are_named(path):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"version": 3}, "format or version"),
-        ({"terrains": {}}, "0 terrains"),
-        ({"axes": {"F_n": [1.0, 0.0], "v_t": [0.1, 0.2]}}, "does not increase"),
-        ({"axes": {"F_n": [0.0, float("nan")], "v_t": [0.1, 0.2]}}, "not increase"),
+        ({"version": 3}, "version: Input should be 1 or 2"),
+        ({"terrains": {}}, "terrains: Dictionary should have at least 1 item"),
+        (
+            {"axes": {"F_n": [1.0, 0.0], "v_t": [0.1, 0.2]}},
+            "axes.F_n: it does not increase",
+        ),
+        (
+            {"axes": {"F_n": [0.0, float("nan")], "v_t": [0.1, 0.2]}},
+            "axes.F_n.1: Input should be a finite",
+        ),
         ({"default": "oracle"}, "lacks the model"),
-        ({"terrains": {"S0": {"kind": "small"}}}, "is missing"),
-        ({"terrains": 3}, "not a terrain database"),
+        ({"terrains": {"S0": {"kind": "small"}}}, "terrains.S0.trials is missing"),
+        ({"terrains": 3}, "not a terrain database: terrains: "),
     ],
 )
 def test_a_file_that_is_no_database_is_refused(path, tmp_path, change, said):

@@ -79,7 +79,7 @@ def test_what_is_missing_in_an_arm_model_is_named_in_a_line():
     with pytest.raises(SettingsError) as caught:
         load_constants(text)
     message = str(caught.value)
-    assert "gravity: Field required" in message
+    assert "gravity is missing" in message
     assert "\n" not in message
     assert "http" not in message
 
