@@ -28,20 +28,20 @@ Entries = Annotated[dict[_K, _V], BeforeValidator(_few)]
 
 
 def first_problem(error: ValueError) -> str:
-    """Return what is wrong with a file; of several problems the first, by its place."""
+    """Return what is wrong with a file; of several the first, and where."""
     if not isinstance(error, ValidationError):
         return str(error)
     first = error.errors(include_url=False, include_input=False)[0]
-    place = ".".join(_shown(part) for part in first["loc"])
+    location = ".".join(_shown(part) for part in first["loc"])
     if first["type"] == "missing":
-        return f"{place} is missing"
+        return f"{location} is missing"
     what = first["msg"].removeprefix("Value error, ")
     if first["type"] in {"model_type", "dataclass_type"}:
         what = "Input should be a table"
-    return f"{place}: {what}" if place else what
+    return f"{location}: {what}" if location else what
 
 
 def _shown(part: int | str) -> str:
-    """Return a part of a place; a key of a hostile file is not printed as it is."""
+    """Return a part of a location; a key of a hostile file is not printed as it is."""
     text = str(part)
     return (text if text.isprintable() else ascii(text))[:_LONGEST_KEY]

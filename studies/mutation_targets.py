@@ -411,8 +411,8 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     ): _BELOW,
     (
         "acquisition/ipc/loop_server.py",
-        "if console_ns > LONELY_NS and self._cycles % _SIGNAL_EVERY == 0: -> "
-        "if console_ns >= LONELY_NS and self._cycles % _SIGNAL_EVERY == 0:",
+        "if console_ns > LONELY_NS and self._cycles % _SOUND_EVERY == 0: -> "
+        "if console_ns >= LONELY_NS and self._cycles % _SOUND_EVERY == 0:",
     ): _BELOW,
     (
         "wam/bus/frames.py",

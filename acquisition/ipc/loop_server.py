@@ -23,9 +23,9 @@ from acquisition.ipc.layout import ProcessRole, SharedLayout
 
 MS = 1_000_000
 SILENT_NS = 500 * MS  # of console or recorder: the arm holds
-LONELY_NS = 60_000 * MS  # of the console: the arm signals for help
+LONELY_NS = 60_000 * MS  # of the console: a bell sounds for help
 ORPHAN_NS = 1_000 * MS  # an arm whose console has died holds this long, then goes idle
-_FACTS_EVERY = _SIGNAL_EVERY = RATE_HZ  # cycles, once a second
+_FACTS_EVERY = _SOUND_EVERY = RATE_HZ  # cycles, once a second
 
 # Named once: to look a member of an Enum up takes longer than to compare it.
 _CONSOLE, _CONTROL, _RECORDER = (
@@ -37,8 +37,8 @@ _CONSOLE, _CONTROL, _RECORDER = (
 MetadataSource = Callable[[], Mapping[str, str]]
 
 
-def no_signal() -> None:
-    """Give no signal."""
+def no_sound() -> None:
+    """Make no sound."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,12 +48,12 @@ class LoopHooks:
     Attributes:
         now_ns: tells the monotonic time [ns].
         metadata: what the devices say about themselves; asked once a second.
-        signal: sounds a bell for a person.
+        sound: sounds a bell for a person.
     """
 
     now_ns: Callable[[], int]
     metadata: MetadataSource
-    signal: Callable[[], None] = no_signal
+    sound: Callable[[], None] = no_sound
 
 
 class LoopServer:
@@ -126,8 +126,8 @@ class LoopServer:
         console_ns = now_ns - heartbeats.last_ns(_CONSOLE)
         if console_ns > SILENT_NS:
             self._cycle.report(verdict_for(Fault.CONSOLE_SILENT))
-            if console_ns > LONELY_NS and self._cycles % _SIGNAL_EVERY == 0:
-                self._hooks.signal()
+            if console_ns > LONELY_NS and self._cycles % _SOUND_EVERY == 0:
+                self._hooks.sound()
         if (
             self._cycle.is_recording
             and now_ns - heartbeats.last_ns(_RECORDER) > SILENT_NS

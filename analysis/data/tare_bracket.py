@@ -14,7 +14,7 @@ from acquisition.trial_file.data_files import read_data
 from analysis.data.series import Array
 
 _LARGEST = 1e6  # N, N m: beyond every sensor
-_Axis = Annotated[Number, Field(gt=-_LARGEST, lt=_LARGEST)]
+_Axis = Annotated[Number, Field(strict=True, gt=-_LARGEST, lt=_LARGEST)]
 _Time = Annotated[int, Field(ge=0, lt=10**19)]  # ns
 _TIME = TypeAdapter(_Time)
 

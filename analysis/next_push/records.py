@@ -9,7 +9,13 @@ from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import (
+    BaseModel,
+    Field,
+    ValidationError,
+    ValidatorFunctionWrapHandler,
+    field_validator,
+)
 
 from acquisition.settings import Number
 from acquisition.validation import Many
@@ -23,7 +29,7 @@ _DIGITS = 4
 _MOST_SLIPS = 200
 _LARGEST = 1e6  # of any number in a record
 _LEAST = (0.1, 0.001)  # N, m/s
-_Number = Annotated[Number, Field(gt=-_LARGEST, lt=_LARGEST)]
+_Number = Annotated[Number, Field(strict=True, gt=-_LARGEST, lt=_LARGEST)]
 _Column = Annotated[Many[_Number], Field(min_length=1, max_length=ROWS)]
 
 
@@ -82,18 +88,18 @@ class PushRecord:
     def from_plain(cls, value: object) -> "PushRecord | None":
         """Return a record from a sidecar; None where there is none or it is damaged."""
         try:
-            told = _StoredRecord.model_validate(value)
+            stored = _StoredRecord.model_validate(value)
         except ValidationError:
             return None
-        columns = (told.F_n, told.v_t, told.F_t, told.t)
+        columns = (stored.F_n, stored.v_t, stored.F_t, stored.t)
         if len(set(map(len, columns))) > 1:
             return None
         F_n, v_t, F_t, t = map(np.array, columns)
-        return cls(F_n, v_t, F_t, t, np.array(told.slips), told.mean, told.aim)
+        return cls(F_n, v_t, F_t, t, np.array(stored.slips), stored.mean, stored.aim)
 
 
 class _StoredRecord(BaseModel):
-    """A record as it stands in a sidecar."""
+    """A record as it stands in a sidecar; a damaged aim costs the aim only."""
 
     F_n: _Column
     v_t: _Column
@@ -102,6 +108,16 @@ class _StoredRecord(BaseModel):
     slips: Annotated[Many[_Number], Field(max_length=_MOST_SLIPS)]
     mean: Aim
     aim: Aim | None = None
+
+    @field_validator("aim", mode="wrap")
+    @classmethod
+    def _sound_aim(
+        cls, value: object, validate: ValidatorFunctionWrapHandler
+    ) -> Aim | None:
+        try:
+            return validate(value)
+        except ValidationError:
+            return None
 
 
 def push_record(trial: PreparedTrial, aim: Aim | None = None) -> PushRecord | None:

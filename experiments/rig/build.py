@@ -14,7 +14,7 @@ from acquisition.devices import WrenchSample, WrenchSensor
 from acquisition.errors import SettingsError
 from acquisition.ipc.frame_tape import FrameTape
 from acquisition.ipc.layout import SharedLayout
-from acquisition.ipc.loop_server import LoopHooks, LoopServer, no_signal
+from acquisition.ipc.loop_server import LoopHooks, LoopServer, no_sound
 from acquisition.ipc.shared_sensor import SharedSensor, publish
 from acquisition.sample import Flag
 from acquisition.settings import read_text
@@ -205,7 +205,7 @@ class LoopConfig:
         shared: the memory that the processes share.
         clock: the loop's time.
         is_simulated: the devices are simulated.
-        signal: sounds a bell for a person.
+        sound: sounds a bell for a person.
     """
 
     rig: RigSettings
@@ -216,7 +216,7 @@ class LoopConfig:
     shared: SharedLayout
     clock: Clock
     is_simulated: bool
-    signal: Callable[[], None] = no_signal
+    sound: Callable[[], None] = no_sound
 
 
 def build_loop_server(parts: LoopConfig) -> LoopServer:
@@ -264,5 +264,5 @@ def build_loop_server(parts: LoopConfig) -> LoopServer:
             extra_flags=Flag.SIMULATED if parts.is_simulated else 0,
         ),
     )
-    around = LoopHooks(parts.clock.now_ns, metadata, parts.signal)
+    around = LoopHooks(parts.clock.now_ns, metadata, parts.sound)
     return LoopServer(cycle, parts.arm, shared, around)

@@ -149,7 +149,7 @@ class ControlWorker:
             shared=self._context.shared,
             clock=self._clock,
             is_simulated=self._is_simulated,
-            signal=self._signal,
+            sound=self._sound,
         )
         self._loop_server = build_loop_server(parts)
 
@@ -173,7 +173,7 @@ class ControlWorker:
             release(self._arm, self._link)
         self._arm = self._link = None
 
-    def _signal(self) -> None:
+    def _sound(self) -> None:
         """Sound the bell of the console's terminal, if it has one."""
         path = self._context.settings.get("terminal")
         if not path:

@@ -57,11 +57,11 @@ class Loop:
         self.now_ns = START_NS
         self.signals = 0
         self.console = CommandQueue(self.shared.commands)
-        around = LoopHooks(lambda: self.now_ns, lambda: {"puck": "warm"}, self.signal)
+        around = LoopHooks(lambda: self.now_ns, lambda: {"puck": "warm"}, self.sound)
         self.loop_server = LoopServer(self.cycle, Arm(), self.shared, around)
         self.number = 0
 
-    def signal(self):
+    def sound(self):
         self.signals += 1
 
     def run(self, seconds, *, beating=(ProcessRole.CONSOLE, ProcessRole.RECORDER)):

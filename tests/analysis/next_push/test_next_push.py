@@ -206,6 +206,13 @@ def test_a_record_comes_back_from_its_sidecar():
     assert back.F_t == pytest.approx(record.F_t, abs=1e-4)
 
 
+@pytest.mark.parametrize("aim", [[1.0], "x", [1e300, 0.0], {"F_n": "a"}, [None, 1.0]])
+def test_a_damaged_aim_costs_the_aim_only(aim):
+    back = PushRecord.from_plain(drawn(3).plain() | {"aim": aim})
+    assert back.aim is None
+    assert back.F_n.size
+
+
 DAMAGE = {
     "none": None,
     "a text": "x",
@@ -214,6 +221,8 @@ DAMAGE = {
     "not finite": {"F_t": [float("nan")] * ROWS},
     "enormous": {"t": [1e300] * ROWS},
     "words": {"v_t": ["a"] * ROWS},
+    "numbers as words": {"v_t": ["0.05"] * ROWS},
+    "truths": {"v_t": [True] * ROWS},
     "too many": {n: [1.0] * 99 for n in ("F_n", "v_t", "F_t", "t")},
 }
 

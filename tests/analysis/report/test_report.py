@@ -174,6 +174,7 @@ def test_a_report_without_pdfs_leaves_none_of_an_earlier_one(
         assert (tmp_path / "report" / link).is_file()
 
 
+@pytest.mark.timeout(300)  # two reports on a busy machine
 def test_a_further_figure_stands_on_the_page_until_a_report_has_none(
     small_study, tmp_path, monkeypatch
 ):
