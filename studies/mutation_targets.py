@@ -21,6 +21,11 @@ TESTS = {
         f"{_LOOP_TESTS}/test_guard.py",
         f"{_LOOP_TESTS}/test_cycle.py",
     ),
+    f"{_LOOP}/motion.py": (
+        f"{_LOOP_TESTS}/test_motion.py",
+        f"{_LOOP_TESTS}/test_guard.py",
+        f"{_LOOP_TESTS}/test_cycle.py",
+    ),
     f"{_LOOP}/cycle.py": (
         f"{_LOOP_TESTS}/test_cycle.py",
         f"{_CONTROL_TESTS}/test_move_in_the_cycle.py",
@@ -71,6 +76,13 @@ TESTS = {
         f"{_DRIVER_TESTS}/test_arm.py",
         f"{_DRIVER_TESTS}/test_lost_replies.py",
     ),
+    f"{_DRIVER}/cyclic_io.py": (
+        f"{_DRIVER_TESTS}/test_late_replies.py",
+        f"{_DRIVER_TESTS}/test_lost_replies.py",
+        f"{_DRIVER_TESTS}/test_arm.py",
+    ),
+    f"{_DRIVER}/property_watch.py": (f"{_DRIVER_TESTS}/test_property_watch.py",),
+    f"{_DRIVER}/puck_properties.py": (f"{_DRIVER_TESTS}/test_puck_properties.py",),
     f"{_DRIVER}/startup.py": (
         f"{_DRIVER_TESTS}/test_startup.py",
         f"{_DRIVER_TESTS}/test_generations.py",
@@ -91,6 +103,10 @@ TESTS = {
         f"{_DRIVER_TESTS}/test_lenient_start.py",
         f"{_DRIVER_TESTS}/test_arm.py",
         "tests/experiments/rig/test_build_limits.py",
+    ),
+    "wam/calibration/arm_identity.py": (
+        "tests/experiments/settings/test_calibration_quality.py",
+        "tests/experiments/preflight/test_identity.py",
     ),
     "wam/model/clearance.py": ("tests/wam/model/test_clearance.py",),
     "wam/calibration/free_space.py": _POSES,

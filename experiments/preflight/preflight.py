@@ -233,7 +233,7 @@ def _check_exchange(rig: Rig, add: Add) -> None:
         add(BAD, "exchange", f"{measured.late} of {measured.unasked} not asked for")
         raise preflight_error("exchange-late", **fields)
     p50, p99 = np.percentile(times, (50, 99)) / 1e6
-    text = f"7 positions after {p50:.2f} ms (p99 {p99:.2f}), {lost} incomplete"
+    text = f"7 positions after {p50:.2f} ms (p99 {p99:.2f}), {lost} incomplete, 0 late"
     is_slow = p99 * 1e6 > SLOW_EXCHANGE_NS or lost > 1
     slow = f": slow adapter, limit {SLOW_EXCHANGE_NS / 1e6:.1f} ms" if is_slow else ""
     add(WARNING if is_slow else GOOD, "exchange", text + slow)

@@ -116,6 +116,7 @@ _FLAGS = (
     ("contact", "the foot is on the ground", Flag.CONTACT),
     ("simulated", "the devices are simulated", Flag.SIMULATED),
     ("bus_error", "the bus controller reported an error", Flag.BUS_ERROR),
+    ("arm_unasked", "no position was asked for, on purpose", Flag.ARM_UNASKED),
 )
 QUANTITIES: tuple[TrialQuantity, ...] = (
     _number("t", ("s", "host clock"), "since the first cycle", lambda x: x.t, _CLOCK),
