@@ -3,6 +3,9 @@
 from pathlib import Path
 from typing import Any
 
+# What an arm without brakes does when its windings are shorted.
+IDLE_ARM = "idle; it sinks slowly, support it"
+
 
 class TractionError(Exception):
     """A failure that a person can understand and act on.

@@ -17,7 +17,7 @@ from acquisition.control_loop.faults import (
 )
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import BusCondition, SafetyMode
-from acquisition.errors import PreflightError, UnfitDeviceError
+from acquisition.errors import IDLE_ARM, PreflightError, UnfitDeviceError
 from experiments.operator.keys import AFTER_FAULT
 from experiments.operator.prompts import Prompt
 from ft_sensor.weighing import WeightCause
@@ -207,11 +207,11 @@ _OF_TIME = {
 }
 
 
-_UNKNOWN, _SINKS = "UNKNOWN - support it", "idle; it sinks slowly, support it"
+_UNKNOWN = "UNKNOWN - support it"
 # (what a message says of the arm, what is asked of it by now, what it does then)
 _ARM_BY_NOW = (
     ("idle", ArmState.UNKNOWN, _UNKNOWN),
-    ("damped", ArmState.IDLE, _SINKS),
+    ("damped", ArmState.IDLE, IDLE_ARM),
 )
 
 
@@ -288,7 +288,7 @@ def rest_text(mode: SafetyMode, *, is_confirmed: bool) -> str:
         return f"ARM: {_UNKNOWN}."
     if mode is SafetyMode.E_STOP:
         return "ARM: stopped by its hardware, without power; it sinks, support it."
-    return f"ARM: {_SINKS}."
+    return f"ARM: {IDLE_ARM}."
 
 
 def pucks_have(silent: int) -> str:

@@ -1,6 +1,6 @@
 """Is this the arm that its files were measured on? The pucks' serial numbers tell."""
 
-from acquisition.errors import PreflightError, SettingsError
+from acquisition.errors import IDLE_ARM, PreflightError, SettingsError
 from experiments.operator.console import BAD, GOOD
 from experiments.preflight.page import Add
 from experiments.rig.rig import Rig
@@ -51,6 +51,6 @@ def check_identity(rig: Rig, add: Add) -> None:
         except SettingsError as error:
             add(BAD, "identity", error.message)
             raise PreflightError(
-                error.message, hint=error.hint, arm_state="idle"
+                error.message, hint=error.hint, arm_state=IDLE_ARM
             ) from error
     add(GOOD, "identity", f"pucks {' '.join(map(str, rig.serials))}")

@@ -7,7 +7,7 @@ import numpy as np
 
 from acquisition.control_loop.timing import SLOW_EXCHANGE_NS, loop_report
 from acquisition.devices import SafetyMode
-from acquisition.errors import TractionError
+from acquisition.errors import IDLE_ARM, TractionError
 from experiments import provenance
 from experiments.messages import preflight_error
 from experiments.operator.console import BAD, GOOD, WARNING, Console
@@ -81,7 +81,7 @@ def run_preflight(
     info = page.attempt(lambda: _check_arm(rig, page))
     sensor = None
     if info is not None or not rig.settings.rig.ft_sensor.is_on_bus:
-        arm_state = "not touched" if info is None else "idle"
+        arm_state = "not touched" if info is None else IDLE_ARM
         sensor = page.attempt(lambda: _check_sensor(rig, arm_state, page.add))
     if info is not None:
         page.attempt(lambda: _check_exchange(rig, page.add))

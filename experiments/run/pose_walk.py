@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from acquisition.control_loop.faults import Action
-from acquisition.errors import PreflightError, TractionError
+from acquisition.errors import IDLE_ARM, PreflightError, TractionError
 from acquisition.ipc.shared_sensor import unpack_wrenches
 from experiments.messages import FaultContext, fault_text, rest_text
 from experiments.operator.prompts import Prompt
@@ -184,7 +184,7 @@ class PoseWalk:
             f"Joint {joint + 1} is {apart[joint]:.3f} rad from where it was sent "
             f"(limit {ASTRAY[joint]:g}).",
             hint="Is something in the way, or has an encoder failed?",
-            arm_state="idle; it sinks slowly, support it",
+            arm_state=IDLE_ARM,
         )
 
     def end(self) -> None:

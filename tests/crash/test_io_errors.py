@@ -9,12 +9,12 @@ pytestmark = pytest.mark.slow
 
 @pytest.mark.timeout(240)
 def test_no_failing_disk_loses_a_kept_trial(tmp_path):
-    assert fail(tmp_path, 8, 1) == []
+    assert fail(tmp_path, 4, 1) == []
 
 
 @pytest.mark.timeout(240)
 def test_no_disk_that_cannot_be_read_loses_a_kept_trial(tmp_path):
-    assert fail(tmp_path, 6, 4, ("broken-read",)) == []
+    assert fail(tmp_path, 2, 4, ("broken-read",)) == []
 
 
 @pytest.mark.long

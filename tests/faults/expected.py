@@ -239,6 +239,13 @@ def _late() -> Row:
         _OLD,
         "replies-late",
         preflight=_refused(" not report a position in time: "),
+        ready=Cell(
+            End.ENDED,
+            _PAST,
+            ("interrupted: replies-late",),
+            _OLD,
+            why="the trial has begun before it is proved",
+        ),
         recording=Cell(
             End.ENDED, _PAST, AT_REVIEW, _OLD, why="the recording is shorter than that"
         ),
@@ -265,6 +272,7 @@ _ASKED_IN_TURN = replace(
 )
 _LET_GO = replace(OK, why="the arm holds, or lies with its virtual weight")
 _DRAGGED = replace(OK, why="the person gives way at the next prompt, within 0.2 m")
+_NOT_HELD = Cell(End.ABSENT, why="an idle arm holds against nobody")
 _NEVER_SEEN_ACTIVE = Cell(
     End.NOT_ACTIVATED,
     "The arm was not activated within 120 s.",
@@ -376,7 +384,7 @@ TABLE: dict[str, Row] = {
         for motor in range(1, 8)
     },
     "hand-gone": _row(_LET_GO),
-    "hold-dragged": _row(_DRAGGED),
+    "hold-dragged": _row(_DRAGGED, preflight=_NOT_HELD, idle=_NOT_HELD),
     "estop": _ending(
         "Stop pressed", _STOPPED, "estop", preflight=_IN_STOP, idle=_UNPOWERED
     ),

@@ -104,10 +104,12 @@ class BusReader:
         self._open: dict[_Key, list[int]] = {}  # when asked [ns], the oldest key first
         self._vers: dict[int, int] = {}
         self._asleep: set[int] = set()
+        self._newest_ns = 0
 
     def read(self, frame: LoggedFrame) -> list[DecodedLine]:
         """Return what `frame` says, after the questions it shows to be unanswered."""
         self.tally.frames += 1
+        self._newest_ns = frame.utc_ns
         spoken = self._give_up(frame.utc_ns - _GIVE_UP_NS)
         if not frame.is_of_wam:
             text = self._say_foreign(frame)
@@ -120,9 +122,13 @@ class BusReader:
         return [*spoken, DecodedLine(frame.utc_ns, text)]
 
     def finish(self) -> list[DecodedLine]:
-        """Return the questions still open at the end of the log."""
-        newest = max((t for asked in self._open.values() for t in asked), default=0)
-        return self._give_up(newest)
+        """Return the questions that had their time before the end of the log.
+
+        One that was asked as the log ended is not counted: its answer may have come.
+        """
+        spoken = self._give_up(self._newest_ns - LIMIT_NS)
+        self.tally.questions -= sum(map(len, self._open.values()))
+        return spoken
 
     def _say(
         self, frame: LoggedFrame, address: Address, spoken: list[DecodedLine]

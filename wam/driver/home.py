@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from acquisition.errors import PreflightError
+from acquisition.errors import IDLE_ARM, PreflightError
 from wam.model.constants import ArmConstants, Array
 
 HOME_LIMIT = 0.03  # rad; by eye an arm is put against its stops to about a degree
@@ -41,7 +41,7 @@ def check_home(error: Array) -> None:
         raise PreflightError(
             f"Joint {joint + 1} is {error[joint]:+.3f} rad from where home was last "
             f"time (limit {HOME_LIMIT}), by its motor's absolute encoder.",
-            arm_state="idle",
+            arm_state=IDLE_ARM,
             hint="Put the arm against its stops and zero it again. If a cable was "
             "tensioned or a motor changed, take mech_at_home out of rig.toml.",
         )
@@ -84,6 +84,6 @@ def check_zero(error: Array) -> None:
         raise PreflightError(
             f"Joint {joint + 1} is {error[joint]:+.3f} rad from where its position "
             f"puts it (limit {HOME_LIMIT}), by its motor's absolute encoder.",
-            arm_state="idle",
+            arm_state=IDLE_ARM,
             hint="The zero is wrong: put the arm at home, then: traction zero.",
         )

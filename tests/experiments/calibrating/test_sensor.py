@@ -192,7 +192,14 @@ def record_with(folder, calibrated, angle=ANGLE, sign=-1.0):
         return run_short(config, folder / "data")
 
 
-@pytest.mark.parametrize("off", [90.0, -90.0, 180.0])
+@pytest.mark.parametrize(
+    "off",
+    [
+        90.0,
+        pytest.param(-90.0, marks=pytest.mark.long),
+        pytest.param(180.0, marks=pytest.mark.long),
+    ],
+)
 def test_a_sensor_that_was_turned_since_its_calibration_is_refused(
     tmp_path, calibrated, off
 ):

@@ -24,7 +24,7 @@ from experiments.preflight import preflight
 from experiments.rig.arm_operations import ArmOperations, ExchangeTimes
 from experiments.rig.backend import InProcessBackend
 from experiments.rig.build import build_tool
-from experiments.run import ready
+from experiments.run import ready, runner
 from experiments.run import tare as taring
 from experiments.session.lock import session_lock
 from experiments.session.reducer import replay
@@ -268,7 +268,45 @@ def _lose_recorder(scene):
 
 
 def _swing(scene):
+    """Let a hand swing the arm, and its energy be allowed."""
+    cycle = scene.built.cycle
+    motion = replace(cycle.limits.motion, float_energy=9.0)
+    cycle.limits = replace(cycle.limits, motion=motion)
     scene.rig.plant.qd[1] = 1.45
+
+
+def _swing_hard(scene):
+    scene.rig.plant.qd[1] = 1.45
+
+
+def _allow_no(travel):
+    """Return what lets any way of the sole be too far."""
+
+    def allow(scene):
+        cycle = scene.built.cycle
+        motion = replace(cycle.limits.motion, **{travel: 0.0})
+        cycle.limits = replace(cycle.limits, motion=motion)
+
+    return allow
+
+
+def _damp_in_vain(scene):
+    """Let joint 6 be too fast, and damping not stop it at once."""
+    _allow_no("damp_travel")(scene)
+    scene.rig.faults()["overspeed"]()
+
+
+def _press_early(scene):
+    """Resume; somebody presses Shift-activate before it is asked for."""
+    usual = runner.activate
+
+    def activate(console_loop):
+        scene.rig.network.pendant("activate")
+        console_loop.loop_client.advance(0.2)
+        usual(console_loop)
+
+    scene.patch.setattr(runner, "activate", activate)
+    return resume(scene)
 
 
 def _meet(scene):
@@ -480,6 +518,13 @@ CASES = {
     "overspeed": fault("overspeed@T2+0.1s", words="Joint 6 "),
     "joint7-slip": fault("joint7-slip@T2+0.1s", words="(limit 50)"),
     "foot-speed": acted(Prompt.RECORDING, _swing),
+    "kinetic-energy": acted(Prompt.RECORDING, _swing_hard, 4, "kinetic energy was"),
+    "damp-motion": acted(Prompt.RECORDING, _damp_in_vain, 4, "the sole's way was"),
+    "hold-motion": acted(Prompt.LIFT, _allow_no("hold_travel"), 4, "(limit 0.00)"),
+    "activation-motion": acted(
+        Prompt.SUPPORT, _allow_no("activation_travel"), 4, "(limit 0.00)", since=-1.0
+    ),
+    "not-asked-active": Case(_press_early, 4),
     "joint-limit": acted(Prompt.LIFT, _narrow, 4, words="Joint 6 at "),
     "torque-limit": Case(_weak, 4, words="Joint 2 was asked for"),
     "console-silent": acted(Prompt.READY, _deaf, since=0.0),
@@ -587,7 +632,7 @@ def test_a_message_is_told_with_its_code_and_nothing_earlier_is_touched(scene, n
     if case.mode is not None:
         network = scene.rig.network
         assert network.safety_mode is case.mode
-        assert case.mode is E_STOP or not scene.rig.plant.qd.any()
+        assert scene.rig.plant.is_idle  # all windings are shorted
 
 
 @pytest.mark.parametrize("name", sorted(COMPUTER_FAULTS))

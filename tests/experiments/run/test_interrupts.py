@@ -99,7 +99,7 @@ def test_ctrl_c_ends_every_phase_with_the_arm_at_rest(
     assert (state.phase, state.rejected) == (moment.end, moment.rejected)
     assert state.running is None
     assert session.rig.network.safety_mode is SafetyMode.IDLE
-    assert not session.rig.plant.qd.any()
+    assert session.rig.plant.is_idle
     assert "ARM: idle; it sinks slowly, support it." in session.done.out.splitlines()
     assert session.done.err == ""
     assert not list(session.folder.rglob("*.partial"))

@@ -31,12 +31,16 @@ def test_keys_are_heard_while_a_fault_goes_on(config, tmp_path, built, prompt):
     looks, states = [], set()
 
     def press(asked, _):
-        if asked.prompt is prompt:
+        if asked.prompt is prompt or (looks and asked.prompt is Prompt.DAMPED):
             looks.append(asked)
             states.add(built.backend.loop_client.status.state)
             if len(looks) == 1:
                 narrow(built.cycle)
+            if asked.prompt is Prompt.DAMPED:
+                return " " if len(looks) > MANY else ""
             return "q" if len(looks) > MANY else ""
+        if asked.prompt is Prompt.READY and asked.since < 2.0:
+            return ""  # the foot is led to where it begins
         if asked.prompt is Prompt.READY:
             return "p" if prompt is Prompt.PAUSED else " "
         if asked.prompt is Prompt.RECORDING:
@@ -44,7 +48,7 @@ def test_keys_are_heard_while_a_fault_goes_on(config, tmp_path, built, prompt):
         return None
 
     seen = run_watched(config, tmp_path, 1, press=press)
-    assert len(looks) == MANY + 1
+    assert MANY < len(looks) < MANY + 5
     assert states <= {ArmState.HOLD, ArmState.DAMP}
     assert seen.done.err.count("Joint 6 at ") == 1
     assert (seen.done.code, replay(journal(seen.folder)).phase) == (5, "unfinished")

@@ -113,7 +113,7 @@ def test_signals_are_given_back_after_a_session(once, twice):
 
 def test_a_fault_during_the_review_does_not_cost_the_trial(disturbed):
     assert "Joint 6 " in disturbed.done.err
-    assert "ARM: damping, then holding." in disturbed.done.err
+    assert "ARM: damped where it is, until you let it hold." in disturbed.done.err
     assert (disturbed.folder / "trials" / "T01.mcap").exists()
     assert sidecar(disturbed.folder / "trials" / "T01.mcap")["verdict"] == "keep"
 

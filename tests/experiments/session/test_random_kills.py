@@ -47,8 +47,8 @@ def run_or_resume(config, data):
 
 @pytest.mark.slow
 @pytest.mark.timeout(300)
-def test_twenty_kills_are_survived_and_no_kept_trial_is_lost(tmp_path, config):
-    assert survive(tmp_path, config, 20, np.random.default_rng(7)) >= 1
+def test_eight_kills_are_survived_and_no_kept_trial_is_lost(tmp_path, config):
+    assert survive(tmp_path, config, 8, np.random.default_rng(7)) >= 1
 
 
 @pytest.mark.long

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from acquisition.control_loop.faults import Fault
 from acquisition.control_loop.limits import TORQUE_STEP
 from acquisition.control_loop.states import ArmState
 from tests.fakes.scenes import CONSTANTS
@@ -16,8 +17,9 @@ DRIFT = 0.02  # rad
 STILL = 5e-4  # rad in a second: wrist joints go on creeping by encoder counts
 # What the spring gives back when a person lets go: limit / k; and some swing.
 REACH = np.array([0.018, 0.010, 0.020, 0.024, 0.040, 0.040, 0.065])
-# From nine tenths of the speed limit; joints 2 and 1 carry the whole arm.
-STOPPING = (0.15, 0.25, 0.05, 0.13, 0.08, 0.06)  # rad
+# Share of the speed limit; joints 1 and 2 move the whole arm: no push does it faster.
+FAST = (0.65, 0.6, 0.9, 0.9, 0.9, 0.9)
+STOPPING = (0.10, 0.12, 0.05, 0.13, 0.08, 0.06)  # rad
 
 
 @pytest.mark.parametrize("friction", FRICTION)
@@ -69,9 +71,8 @@ def test_a_foot_that_is_twisted_far_stays_where_it_is_left():
 
 
 @pytest.mark.parametrize("joint", range(6))
-def test_a_joint_at_its_speed_limit_is_stopped_within_bounds(joint):
-    bench = HoldBench()
-    bench.throw(joint, 0.9 * SPEED[joint])
+def test_a_joint_that_was_fast_is_stopped_within_bounds(joint):
+    bench = thrown(joint, FAST[joint])
     begin = bench.plant.q.copy()
     bench.sent.clear()
     bench.cycle.request(ArmState.HOLD)
@@ -81,6 +82,21 @@ def test_a_joint_at_its_speed_limit_is_stopped_within_bounds(joint):
     assert np.ptp(q[-250:], axis=0).max() < 2.0 * STILL
     steps = np.abs(np.diff(bench.sent, axis=0)).max(axis=0)
     assert (steps <= 1.05 * np.array(TORQUE_STEP) * TORQUE).all()
+
+
+@pytest.mark.parametrize("joint", [0, 1])
+def test_a_joint_that_moves_the_whole_arm_at_its_limit_is_no_push(joint):
+    bench = thrown(joint, 0.9)
+    assert bench.cycle.status.verdict.fault is Fault.KINETIC_ENERGY
+    assert bench.plant.is_idle
+
+
+def thrown(joint, share):
+    """Return an arm with a joint at that share of its speed limit, in float."""
+    bench = HoldBench()
+    bench.run(0.6)  # a person may still carry an arm that has just got power
+    bench.throw(joint, share * SPEED[joint])
+    return bench
 
 
 def test_hold_begins_without_a_step_of_torque_in_an_arm_that_stands():

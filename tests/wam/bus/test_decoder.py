@@ -114,8 +114,18 @@ def test_a_question_is_given_up_after_a_second(log):
 
 def test_questions_open_at_the_end_are_told_with_their_time(log):
     log(5 * MS, "001 05")
+    log(6 * MS, "00F 05")
     ((utc_ns, text),) = [(s.utc_ns, s.text) for s in log.reader.finish()]
     assert (utc_ns, text) == (5 * MS, "UNANSWERED puck 1: STAT")
+
+
+def test_a_question_at_the_very_end_of_a_log_is_not_counted(log):
+    log(5 * MS, "001 05")
+    log(5 * MS + 200 * US, "426 85 00 02 00")
+    log(6 * MS, "00F 05")
+    assert log.reader.finish() == []
+    tally = log.reader.tally
+    assert (tally.questions, tally.answers, not tally.silent) == (1, 1, True)
 
 
 def test_two_questions_at_once_have_an_answer_each(log):
