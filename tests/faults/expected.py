@@ -9,6 +9,9 @@ from tests.faults.phases import PHASES
 HOLD, DAMP = ArmState.HOLD, ArmState.DAMP
 
 
+DAMPED_OR_IDLE = "damped or idle"
+
+
 class End(Enum):
     """How the command ends."""
 
@@ -37,7 +40,8 @@ class Arm:
 
     Attributes:
         limit_ms: the limit that the fault reaches; 20 ms are added to it.
-        seen: by the pucks: "driven", "last torques", "idle", "without power".
+        seen: by the pucks: "driven", "last torques", "idle", "without power", or
+            DAMPED_OR_IDLE, in whatever state of the loop.
         state: of the loop; None = whatever it was.
         text: what the message says of it.
     """
@@ -180,10 +184,23 @@ def _creeping(motor: int) -> Row:
 
     Joint 7 turns the foot about its own axis, so only its stop or its lock tell.
     """
-    arm = Arm(1700 if motor == 7 else 400, "driven", DAMP, "")
+    arm = Arm(1700 if motor == 7 else 400, DAMPED_OR_IDLE, None, "")
     stopped = Cell(End.SOMEHOW, arm=arm)
     late = Cell(End.SOMEHOW, why="found when the arm becomes active")
     return _row(stopped, preflight=late, idle=late, end=replace(OK, arm=arm))
+
+
+def _lying(motor: int) -> Row:
+    """Return the row of an encoder that jumps by what the driver believes."""
+    if motor == 4:  # the arm turns too little about its joint
+        return _row(OK)
+    stopped = Cell(
+        End.ENDED,
+        "The arm does not stay where it holds: ",
+        arm=_IDLE,
+        why="the jump seems a motion, and the arm idles",
+    )
+    return _row(OK, tare=stopped, review=replace(stopped, rejected=AT_REVIEW))
 
 
 def _disk(word: str) -> Row:
@@ -443,7 +460,7 @@ TABLE: dict[str, Row] = {
         preflight=_NEVER_SEEN_ACTIVE,
         idle=_NEVER_SEEN_ACTIVE,
     ),
-    **{f"lie-of-motor-{motor}": _row(OK) for motor in range(1, 7)},
+    **{f"lie-of-motor-{motor}": _lying(motor) for motor in range(1, 7)},
     # The lock pushes joint 7 back to where it was, with nearly all that it may have.
     "lie-of-motor-7": _row(
         OK,

@@ -101,11 +101,13 @@ STOPPED = {
     "overspeed": {"overspeed"},
     **{
         f"creep-of-motor-{motor}": {
-            *("overspeed", "foot-speed", "torque-limit", "contact-move")
+            *("overspeed", "foot-speed", "torque-limit", "contact-move"),
+            "kinetic-energy",
         }
         for motor in range(1, 8)
     },
 }
+STOPS = {"contact-move": ("driven", ArmState.HOLD), "kinetic-energy": ("idle", None)}
 # What ends the session, and the reason with which the stance is put away.
 ENDED = {
     "replies-late": "replies-late",
@@ -164,8 +166,7 @@ def test_a_fault_that_a_pressed_foot_feels_stops_the_stance(tmp_path, fault):
     assert "Traceback" not in seen.done.err + seen.done.out
     first = seen.rejected[0].removeprefix("interrupted: ")
     assert first in STOPPED[fault], seen.rejected
-    state = ArmState.HOLD if first == "contact-move" else ArmState.DAMP
-    reached = seen.scene.reached_ms("driven", state)
+    reached = seen.scene.reached_ms(*STOPS.get(first, ("driven", ArmState.DAMP)))
     assert reached is not None, seen.scene.seen_since()
     assert reached <= SLOWEST_MS
     assert seen.scene.arm == "idle"
