@@ -80,14 +80,14 @@ class ArmOperations:
         answer_ns = arm.answer_time(_QUESTIONS)
         times: list[int] = []
         unasked = late = 0
-        was_complete = False
+        was_complete = False  # and nobody else asks: that is told by the loop
         for number, _ in enumerate(self._periods(_EXCHANGE_PERIODS), 1):
             is_unasked = number % UNASKED_EVERY == 0
             now_ns = clock.now_ns()
             reading = arm.skip(now_ns) if is_unasked else arm.read(now_ns)
             if not is_unasked:
-                was_complete = reading.is_complete
-                if was_complete:
+                was_complete = reading.is_complete and reading.foreign_id is None
+                if reading.is_complete:
                     times.append(reading.arm_ns - reading.host_ns)
             elif was_complete:  # a motor that owes an answer may still give it
                 unasked += 1

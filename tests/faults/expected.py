@@ -289,6 +289,11 @@ _ASKED_IN_TURN = replace(
 )
 _LET_GO = replace(OK, why="the arm holds, or lies with its virtual weight")
 _DRAGGED = replace(OK, why="the person gives way at the next prompt, within 0.2 m")
+_WEAK = Cell(
+    End.SOMEHOW,
+    arm=Arm(30, DAMPED_OR_IDLE, None, ""),
+    why="too little torque damps little: the arm is idled if it goes on",
+)
 _NOT_HELD = Cell(End.ABSENT, why="an idle arm holds against nobody")
 _NEVER_SEEN_ACTIVE = Cell(
     End.NOT_ACTIVATED,
@@ -320,8 +325,9 @@ TABLE: dict[str, Row] = {
     "reply-swapped": _row(OK),
     "reply-spoilt": _row(
         OK,
-        # A false first position is what the true ones are judged by.
-        preflight=_refused("98 of 100 exchanges with the arm were incomplete."),
+        preflight=replace(
+            OK, why="true positions are refused until a false first one is too old"
+        ),
     ),
     "puck-silent": _ending(
         _PUCK,
@@ -446,6 +452,13 @@ TABLE: dict[str, Row] = {
         Arm(250, "driven", HOLD, "UNKNOWN - support it"),
         "safety-silent",
         preflight=_refused("The safety module does not answer"),
+        ready=Cell(
+            End.ENDED,
+            "The safety module has not reported its mode for ",
+            ("interrupted: safety-silent",),
+            Arm(250, "driven", HOLD, "UNKNOWN - support it"),
+            why="the trial has begun before it is known",
+        ),
         idle=Cell(
             End.ENDED,
             "The safety module has not reported its mode for ",
@@ -503,11 +516,16 @@ TABLE: dict[str, Row] = {
         idle=_CANNOT_COUNT,
     ),
     "joint-limit": _limit("Joint 6 at ", "joint-limit"),
-    "torque-limit": _limit("Joint 2 was asked for ", "torque-limit"),
+    "torque-limit": _limit(
+        "Joint 2 was asked for ",
+        "torque-limit",
+        **dict.fromkeys(("ready", "recording", "review"), _WEAK),
+    ),
     "foot-speed": _limit(
         "The foot moved at ",
         "foot-speed",
         idle=Cell(End.TOLD, "The foot moved at ", why="found when the arm is moved"),
+        tare=replace(_WEAK, why="a blow that hold may not allow either"),
     ),
     "overspeed": _limit(
         "Joint 6 ", "overspeed", preflight=_STAYS, idle=_STAYS, tare=_PUSHED_AWAY

@@ -27,12 +27,18 @@ _MET = Cell(
     " N on the foot beyond its weight (limit 40)",
     arm=Arm(30, "driven", HOLD, "holding"),
 )
-_BLOWN = Cell(
-    End.UNMEASURED,
-    "Joint 6 ",
-    arm=Arm(30, "idle", ArmState.IDLE, "idle"),
-    why="no hand is on it: what is too fast may be its own encoder",
-)
+
+
+def _too_fast(text: str) -> Cell:
+    """Return the cell of an arm that leaves its limits with no hand on it."""
+    return Cell(
+        End.UNMEASURED,
+        text,
+        arm=Arm(30, "idle", ArmState.IDLE, "idle"),
+        why="no hand is on it: what is too fast may be its own encoder",
+    )
+
+
 _LATE = replace(TABLE["replies-late"][_TARE], end=End.UNMEASURED)
 _OWN = {
     "joint7-slip": _UNLOCKED,
@@ -42,7 +48,10 @@ _OWN = {
     "replies-late-3": _LATE,
     "puck-late": _LATE,
     "hold-dragged": _ASTRAY,
-    "overspeed": _BLOWN,
+    "overspeed": _too_fast("Joint 6 "),
+    "joint-limit": _too_fast("Joint 6 at "),
+    "torque-limit": _too_fast("Joint 2 was asked for "),
+    "foot-speed": _too_fast("The foot moved at "),
     "lie-of-motor-3": _IN_VAIN,
     "contact-force": _MET,
     "second-command": OTHER_REFUSED,
