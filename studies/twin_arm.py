@@ -40,7 +40,7 @@ MOST_TORQUE, MOST_WAY = 0.1, 5e-3  # of Coulomb friction; rad
 _WINDOW, _JOINED = 250, 150  # cycles on its own, and led to the arm before that
 _START_Q = np.array([0.2, 0.2, -0.1, 1.8, 0.2, 0.5, 0.3])
 _TONES = np.array([0.11, 0.23, 0.41, 0.67])  # Hz
-_REACH = np.array([0.25, 0.08, 0.25, 0.08, 0.35, 0.10, 0.35])  # rad
+_SWING = np.array([0.25, 0.08, 0.25, 0.08, 0.35, 0.10, 0.35])  # rad
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +75,7 @@ def wanted(seconds: float, start: np.ndarray) -> np.ndarray:
     phases = np.random.default_rng(7).uniform(0.0, 2.0 * np.pi, (7, len(_TONES)))
     way = np.sin(2.0 * np.pi * _TONES * t[:, None, None] + phases).mean(axis=2)
     begun = np.clip(t / 2.0, 0.0, 1.0)[:, None]
-    return start + _REACH * begun**2 * (3.0 - 2.0 * begun) * way
+    return start + _SWING * begun**2 * (3.0 - 2.0 * begun) * way
 
 
 def servo(plant: ArmPlant, goal: np.ndarray, speed: np.ndarray) -> np.ndarray:

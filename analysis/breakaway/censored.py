@@ -28,7 +28,7 @@ _LOG_SPREAD = (float(np.log(0.35)), 0.5)  # prior of log s: mean, sd
 _SLOPE = (0.5, 0.5)  # prior of b1
 _TRIAL_SD = 0.3  # scale of the half-normal prior of su
 _LARGEST_Z = 300.0  # exp stays finite
-_REACH = 3.0  # of a level around the mean of log P
+_LEVEL_RANGE = 3.0  # of a level around the mean of log P
 _NO_EFFECT = -7.0  # log su of as good as none
 _BOX = (
     (-1.0, 2.0),
@@ -188,7 +188,9 @@ class CensoredLikelihood:
 
     def _box(self) -> list[tuple[float, float]]:
         middle = float(self.table.log_peak.mean())
-        return [(middle - _REACH, middle + _REACH)] * self.levels + list(_BOX)
+        return [(middle - _LEVEL_RANGE, middle + _LEVEL_RANGE)] * self.levels + list(
+            _BOX
+        )
 
 
 def log_prior(p: Array) -> tuple[float, Array]:

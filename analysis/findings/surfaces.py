@@ -12,7 +12,7 @@ from analysis.study.terrain_fit import TerrainResult
 
 _POINTS = 41  # along each axis of a surface
 _CELLS = 20  # along each axis of a coverage map
-_REACH = 0.995  # quantile of F_n that the load axis ends at
+_LOAD_QUANTILE = 0.995  # quantile of F_n that the load axis ends at
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +112,10 @@ def _axes(study: Study, count: int) -> SurfaceAxes:
     options = study.options.prepare
     loads = SampleTable.of([t for r in study.terrains.values() for t in r.trials]).F_n
     low, high = (
-        (float(np.quantile(loads, 1.0 - _REACH)), float(np.quantile(loads, _REACH)))
+        (
+            float(np.quantile(loads, 1.0 - _LOAD_QUANTILE)),
+            float(np.quantile(loads, _LOAD_QUANTILE)),
+        )
         if loads.size
         else (0.0, 1.0)
     )

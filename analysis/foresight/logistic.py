@@ -18,7 +18,7 @@ from pydantic import Field, TypeAdapter
 from acquisition.validation import Many
 from analysis.data.series import Array
 
-_REACH = 5.0  # standard deviations beyond which a feature says no more
+_CLIPPED_AT = 5.0  # standard deviations beyond which a feature says no more
 _LARGEST_LOGIT = 30.0
 _STEPS, _HALVINGS = 25, 14
 _CONVERGED = 1e-4
@@ -56,7 +56,13 @@ class RidgeLogistic:
         logit = next(weights)
         for value, mean, scale in zip(features, self.mean, self.scale, strict=True):
             step = (value - mean) / scale
-            step = _REACH if step > _REACH else -_REACH if step < -_REACH else step
+            step = (
+                _CLIPPED_AT
+                if step > _CLIPPED_AT
+                else -_CLIPPED_AT
+                if step < -_CLIPPED_AT
+                else step
+            )
             z.append(step)
             logit += next(weights) * step
         for (i, j), weight in zip(self.pairs, weights, strict=True):
@@ -185,7 +191,7 @@ def _logistic(logit: Array) -> Array:
 
 
 def _design(features: Array, mean: Array, scale: Array, pairs: Pairs) -> Array:
-    z = np.clip((features - mean) / scale, -_REACH, _REACH)
+    z = np.clip((features - mean) / scale, -_CLIPPED_AT, _CLIPPED_AT)
     products = [z[:, i] * z[:, j] for i, j in pairs]
     return np.column_stack([np.ones(len(z)), z, *products])
 

@@ -52,7 +52,7 @@ _PLATE = (
     (0.4, 0.7),
 )
 _SC = {False: 10, True: 11}  # indices in the priors of all ground: stones, plates
-_REACH = 4.0  # prior standard deviations that the search goes
+_SEARCHED_SDS = 4.0  # prior standard deviations that the search goes
 _HOPELESS = 1e25
 _SMALLEST = 1e-12  # variance that rounding may leave [N^2]
 _NOISE = TrialNoise(ConstantNoise(), has_drift=True)
@@ -178,7 +178,7 @@ def _likeliest(records: Sequence[PushRecord], r: Array, kind: str) -> Array:
         far = (theta - mean) / sd
         return 0.5 * float(far @ far) - lml, far / sd - slope
 
-    bounds = mean[:, None] + sd[:, None] * [-_REACH, _REACH]
+    bounds = mean[:, None] + sd[:, None] * [-_SEARCHED_SDS, _SEARCHED_SDS]
     options = {"maxiter": 40, "ftol": 1e-5}
     best = minimize(
         downhill, mean, jac=True, method="L-BFGS-B", bounds=bounds, options=options

@@ -31,7 +31,7 @@ from analysis.terrains.parts import (
 from analysis.terrains.table import Table, rows_of
 
 POINTS = 32  # of each axis
-_REACH = 99.8  # percentile of F_n up to which the tables reach, with a margin
+_LOAD_PERCENTILE = 99.8  # percentile of F_n up to which the tables reach, with a margin
 _MARGIN = 1.2
 _STREAM = 2_000_000  # apart from folds and terrain fits
 
@@ -227,8 +227,8 @@ def _axes(
 ) -> tuple[Array, Array]:
     """Return F_n [N] up to nearly all of it, v_t [m/s] finer where it is slow."""
     loads = np.concatenate([trial.F_n for trial in trials])
-    most = max(_MARGIN * float(np.percentile(loads, _REACH)), 1.0)
-    least = min(float(np.percentile(loads, 100.0 - _REACH)), 0.0)
+    most = max(_MARGIN * float(np.percentile(loads, _LOAD_PERCENTILE)), 1.0)
+    least = min(float(np.percentile(loads, 100.0 - _LOAD_PERCENTILE)), 0.0)
     v_t = np.geomspace(options.slowest, options.fastest, POINTS)
     return np.round(np.linspace(least, most, POINTS), 6), np.round(v_t, 8)
 

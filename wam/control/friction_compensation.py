@@ -25,7 +25,7 @@ SWUNG_MOTOR = "friction:swung_motor"  # in the recording
 _MARGIN = 0.9  # of what surely rubs: share (1 + error) never exceeds it
 _SIGMAS = 1.96
 # Four times what is assumed of real bristles: a stiffer one would hunt.
-_REACH = np.array([4.0, 4.0, 4.0, 4.0, 8.0, 8.0, 8.0]) * 1e-3  # rad of the joint
+_PRESLIDING = np.array([4.0, 4.0, 4.0, 4.0, 8.0, 8.0, 8.0]) * 1e-3  # rad of the joint
 _FADE_NS = 100_000_000  # ns, when the arm is let go of or held
 _AT_WALL = 0.02  # rad, in which it fades before a stop
 # A motor whose bristle is bent the other way so often within a second swings.
@@ -96,7 +96,10 @@ class FrictionCompensation:
             raise ValueError(f"share {share} is outside 0..{LARGEST_SHARE}")
         shares = np.minimum(share, _MARGIN / (1.0 + known.error))
         reach = (
-            motor_turns(constants) * _REACH * np.array(constants.cts) / (2.0 * np.pi)
+            motor_turns(constants)
+            * _PRESLIDING
+            * np.array(constants.cts)
+            / (2.0 * np.pi)
         )
         levels = shares * known.forward, shares * known.backward
         rows = np.stack((1.0 / reach, *levels, shares * known.load, known.load_at))

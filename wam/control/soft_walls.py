@@ -13,7 +13,7 @@ from acquisition.bounds import are_between
 from acquisition.devices import ArmReading, Vector
 
 DEPTH = 0.1  # rad
-_REACH = 0.2  # rad in which the spring would reach the torque limit
+_FULL_DEPTH = 0.2  # rad in which the spring would reach the torque limit
 # A wall takes a joint no further than this: beyond the limit the guard steps in, and
 # would blame the foot's mass.
 _SHARE = 0.95  # of the torque limit
@@ -88,7 +88,7 @@ class SoftWalls:
         walls = self._walls
         limit = walls.torque[joint]
         inward = 1.0 if depth > 0.0 else -1.0
-        spring = limit / _REACH * abs(depth)
+        spring = limit / _FULL_DEPTH * abs(depth)
         brake = walls.damping[joint] * max(-inward * speed, 0.0)
         # The damper comes in with the spring, or touching the wall would be a blow.
         share = min(abs(depth) / DEPTH, 1.0)
