@@ -23,7 +23,9 @@ Taken from the simulated arm itself, not from what the driver believes: from the
 to half a second after the command. `speed` is the largest joint speed as a share of the
 joint's limit in rig.toml, with the joint; `travel` how far the sole gets within 0.5 s;
 `drive` the force that the motors, beyond the arm's weight, put on the person who
-holds the sole; `hand` the force between arm and hand. No cell may exceed speed 1,
+holds the sole; `hand` the force between arm and hand; `sole` its largest speed within
+0.5 s. `idle` is when the arm went idle, `rest` when the sole began to stand for 0.1 s
+(3 cm/s), both counted from the fault; - = not within 3 s. No cell may exceed speed 1,
 travel 160 mm (100 mm where the fault stops the arm), drive 50 N and hand 80 N, but
 where a note says so. Measured by `python -m tests.faults.bounds`.
 """
@@ -68,7 +70,15 @@ def truth_lines() -> list[str]:
     return [*rows, "", *letters]
 
 
-_MEASURED = ("speed", "travel mm", "drive N", "hand N")
+_MEASURED = (
+    "speed",
+    "sole m/s",
+    "travel mm",
+    "drive N",
+    "hand N",
+    "idle ms",
+    "rest ms",
+)
 
 
 def _rows() -> dict[str, tuple[Cell, ...]]:
@@ -94,7 +104,13 @@ def _words(
             notes.append(promise.why)
         note = f" [{chr(97 + notes.index(promise.why))}]"
     speed = f"{bound.speed:.2f} (J{bound.joint}){note}" if bound.speed else "0"
-    return speed, f"{1e3 * bound.travel:.0f}", f"{bound.drive:.0f}", f"{bound.hand:.0f}"
+    times = (bound.idle_ms, bound.rest_ms)
+    return (
+        speed,
+        f"{bound.sole:.2f}",
+        *(f"{x:.0f}" for x in (1e3 * bound.travel, bound.drive, bound.hand)),
+        *("-" if ms is None else f"{ms:.0f}" for ms in times),
+    )
 
 
 def page() -> str:

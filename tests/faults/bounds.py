@@ -36,6 +36,9 @@ class PrintedBound:
     travel: float
     drive: float
     hand: float
+    sole: float
+    idle_ms: float | None
+    rest_ms: float | None
 
     def with_margin(self) -> Promise:
         """Return what a run on another machine has to stay within."""
@@ -64,7 +67,7 @@ def read_bounds() -> dict[str, dict[str, PrintedBound]]:
     }
 
 
-def _rounded(motion: TrueMotion) -> list[float]:
+def _rounded(motion: TrueMotion) -> list[float | None]:
     """Return the values with two or three decimals, never smaller than they are."""
     return [
         _up(motion.speed, 0.01),
@@ -72,6 +75,9 @@ def _rounded(motion: TrueMotion) -> list[float]:
         _up(motion.travel, 0.001),
         _up(motion.drive, 0.1),
         _up(motion.hand, 0.1),
+        _up(motion.sole, 0.01),
+        None if motion.idle_ms is None else _up(motion.idle_ms, 1.0),
+        None if motion.rest_ms is None else _up(motion.rest_ms, 1.0),
     ]
 
 
@@ -98,7 +104,7 @@ def main(part: str) -> None:
             _write(rows)
 
 
-def _write(rows: dict[str, dict[str, list[float]]]) -> None:
+def _write(rows: dict[str, dict[str, list[float | None]]]) -> None:
     """Write one line a cell, in the order of the table."""
     order = dict.fromkeys(fault for fault, _, _ in cells_of_all())
     known = {

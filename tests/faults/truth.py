@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
+from numpy.lib.stride_tricks import sliding_window_view
 
 import fakes.world.rig
 from fakes.plant.plant import ArmPlant
@@ -22,6 +23,8 @@ BLOW_NS = 150 * MS  # a blow to a joint is over after this
 SPEED_LIMITS = np.array([1.5, 1.5, 2.0, 2.5, 4.0, 4.0, 4.0])  # rad/s, of rig.toml
 BLOWS = {"overspeed": 6.0, "foot-speed": 5.0}  # rad/s that the fault itself gives
 _PERIOD_NS = 2 * MS
+_LATEST_NS = 3_000 * MS  # idle or at rest later than this: not of the fault
+_STILL, _STANDS_NS = 0.03, 100 * MS  # m/s of a sole that stands, for so long
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +38,9 @@ class TrueMotion:
         drive: largest force that the motors, beyond the arm's weight, put on the person
             who holds the sole [N].
         hand: largest force between the arm and the operator's hand [N].
+        sole: largest speed of the sole within 0.5 s [m/s].
+        idle_ms: when all windings were shorted [ms]; None = not within 3 s.
+        rest_ms: when the sole began to stand for 0.1 s [ms]; None = not within 3 s.
     """
 
     speed: float
@@ -42,11 +48,14 @@ class TrueMotion:
     travel: float
     drive: float
     hand: float
+    sole: float
+    idle_ms: float | None
+    rest_ms: float | None
 
 
 @dataclass(frozen=True, slots=True)
 class Promise:
-    """What nothing may exceed; fields as of `TrueMotion`.
+    """What nothing may exceed; fields as of `TrueMotion`, those that it has.
 
     Attributes:
         why: why it is another one than that of most faults.
@@ -173,16 +182,37 @@ class TruthLog:
         shares = calm / SPEED_LIMITS if len(calm) else np.zeros((1, 7))
         joint = int(shares.max(axis=0).argmax())
         model = ArmModel(load_constants(), self.tool)
-        near = q[after_ns <= WINDOW_NS]
-        positions = model.sole_path(near if len(near) else q[:1]).position
-        travel = np.linalg.norm(positions - positions[0], axis=1).max()
+        near = after_ns <= WINDOW_NS
+        near[0] = True
+        positions = model.sole_path(q).position
+        travel = np.linalg.norm((positions - positions[0])[near], axis=1).max()
+        steps = np.linalg.norm(
+            np.diff(positions, axis=0, prepend=positions[:1]), axis=1
+        )
+        pace = steps / (_PERIOD_NS * 1e-9)
         return TrueMotion(
             speed=float(shares.max()),
             joint=joint + 1,
             travel=float(travel),
             drive=_drive(model, q, tau, rows[:, 21] > 0.0),
             hand=float(np.linalg.norm(hand, axis=1).max()),
+            sole=float(pace[near].max()),
+            idle_ms=_first_ms(after_ns, rows[:, 21] == 0.0),
+            rest_ms=_first_ms(after_ns, _stands(pace)),
         )
+
+
+def _stands(pace):
+    """Return in which cycles the sole begins to stand for a while, shape (n,)."""
+    window = _STANDS_NS // _PERIOD_NS
+    moves = np.concatenate([pace > _STILL, np.ones(window - 1, bool)])
+    return ~sliding_window_view(moves, window).any(axis=1)
+
+
+def _first_ms(after_ns, happened) -> float | None:
+    """Return when something first happened after the fault [ms]."""
+    when = after_ns[happened & (after_ns >= 0)]
+    return float(when[0]) / MS if len(when) and when[0] <= _LATEST_NS else None
 
 
 def watch_truth(patch: pytest.MonkeyPatch) -> list[TruthLog]:
