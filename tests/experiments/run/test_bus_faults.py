@@ -28,7 +28,7 @@ BRAKED, UNKNOWN = (
     "ARM: idle; it sinks slowly, support it.",
     "ARM: UNKNOWN - support it.",
 )
-SINKS = "ARM: stopped by its hardware; it sinks, support it."
+SINKS = "ARM: stopped by its hardware: it sinks, support it."
 NO_POWER = "ARM: stopped by its hardware, without power; it sinks, support it."
 IDLE, E_STOP = SafetyMode.IDLE, SafetyMode.E_STOP
 HELD = "ARM: held by its last torques, going idle - support it."
