@@ -259,6 +259,8 @@ class ConsoleLoop:
         verdict = loop_client.status.verdict
         self._reported = "" if verdict is None else verdict.reason
         try:
+            if loop_client.status.state in {ArmState.FLOAT, ArmState.GUIDE}:
+                loop_client.request(ArmState.HOLD)
             loop_client.advance(_STANDS)
             if loop_client.status.state is ArmState.DAMP:
                 self.console.say(_DAMPED)
