@@ -19,6 +19,10 @@ class SafetyMode(IntEnum):
     UNKNOWN = 7
 
 
+# In these the windings of the motors are shorted: no torque drives the arm.
+SHORTED = frozenset({SafetyMode.E_STOP, SafetyMode.IDLE})
+
+
 class BusCondition(IntEnum):
     """What is known of the bus between host and arm."""
 

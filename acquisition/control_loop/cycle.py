@@ -26,9 +26,9 @@ from acquisition.control_loop.states import (
     ControlStatus,
 )
 from acquisition.devices import (
+    SHORTED,
     Arm,
     ArmReading,
-    SafetyMode,
     Vector,
     WrenchSample,
     WrenchSensor,
@@ -49,7 +49,6 @@ CONTACT_FORCE = 0.5  # F_n above which the foot counts as touching [N]
 _UNPOWERED = frozenset({ArmState.IDLE, ArmState.UNKNOWN})
 _IDLE = ArmState.IDLE
 _UNKNOWN = ArmState.UNKNOWN
-_BRAKED = frozenset({SafetyMode.IDLE, SafetyMode.E_STOP})
 _NONE = Action.NONE
 _REQUEST_IDLE = ArmEvent.REQUEST_IDLE
 
@@ -147,8 +146,8 @@ class Cycle:
         self.replies_ns = reading.arm_ns
         status = self.status
         status.safety = self._arm.safety_mode()
-        if status.safety in _BRAKED:
-            self._handle(ArmEvent.CIRCUIT_BRAKED, reading)
+        if status.safety in SHORTED:
+            self._handle(ArmEvent.CIRCUIT_IDLE, reading)
         self._enter_requested(reading)
         self._begin_move(reading)
         tau, tau_gravity = self._torque(reading)
@@ -216,7 +215,7 @@ class Cycle:
         Unless idle is confirmed no zero torque follows: the arm would fall.
         """
         transition = TRANSITIONS[self.status.state, event]
-        if transition.brakes:
+        if transition.idles:
             is_confirmed = self._arm.idle()
             self.status.safety = self._arm.safety_mode()
             followed_by = (

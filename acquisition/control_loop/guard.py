@@ -34,9 +34,8 @@ from acquisition.control_loop.motion import (
     follow,
 )
 from acquisition.control_loop.states import ArmState
-from acquisition.devices import ArmReading, SafetyMode, Vector
+from acquisition.devices import SHORTED, ArmReading, SafetyMode, Vector
 
-_BRAKED = frozenset({SafetyMode.E_STOP, SafetyMode.IDLE})
 _NO_LOAD = ContactState()
 _ALL_JOINTS = 0x7F  # one bit each, bit i of joint or motor i+1
 _TREMBLE = 1  # counts by which an encoder at rest flickers
@@ -148,8 +147,8 @@ def check(
     arm without torques must not be active, and no other master may be there. Among
     equally severe verdicts the first of `CHECKS` counts.
     """
-    may_drive = seen.is_commanded and (state.may_drive or seen.safety not in _BRAKED)
-    is_live = may_drive and seen.safety not in _BRAKED
+    may_drive = seen.is_commanded and (state.may_drive or seen.safety not in SHORTED)
+    is_live = may_drive and seen.safety not in SHORTED
     motion = _driven(seen) if is_live else None
     state = _remember(limits, state, seen, motion, may_drive=may_drive)
     is_stopped = seen.is_commanded and seen.safety is SafetyMode.E_STOP
@@ -266,7 +265,7 @@ def _check_safety(facts: Facts) -> GuardVerdict:
         is_lasting = age_ms >= facts.limits.idle_after_safety_ms
         detail = SafetySilence(age_ms)
         return verdict_for(Fault.SAFETY_SILENT, detail, is_lasting=is_lasting)
-    if seen.safety not in _BRAKED:
+    if seen.safety not in SHORTED:
         return OK
     fault = Fault.E_STOP if seen.safety is SafetyMode.E_STOP else Fault.PENDANT_IDLE
     return verdict_for(fault, CircuitCauses())
@@ -287,7 +286,7 @@ def _check_silence(facts: Facts) -> GuardVerdict:
 
 
 def _check_late(facts: Facts) -> GuardVerdict:
-    """Hold, then brake, an arm that tells where it was and not where it is."""
+    """Hold, then idle, an arm that tells where it was and not where it is."""
     late = facts.seen.reading.late
     if late is None:
         return OK

@@ -40,7 +40,7 @@ class ArmEvent(Enum):
     VERDICT_IDLE = "verdict: idle"
     IDLE_CONFIRMED = "idle confirmed"
     IDLE_UNCONFIRMED = "idle not confirmed"
-    CIRCUIT_BRAKED = "safety circuit is idle"
+    CIRCUIT_IDLE = "safety circuit is idle"
 
 
 REQUESTS: Mapping[ArmState, ArmEvent] = {
@@ -64,17 +64,17 @@ class Transition:
 
     Attributes:
         to: the state that is entered, possibly the same anew; None = nothing changes.
-        brakes: the safety circuit is put to idle first; `IDLE_CONFIRMED` or
+        idles: the safety circuit is put to idle first; `IDLE_CONFIRMED` or
             `IDLE_UNCONFIRMED` follows in the same cycle.
     """
 
     to: ArmState | None = None
-    brakes: bool = False
+    idles: bool = False
 
 
 _STAY = Transition()
 _MOVABLE = (ArmState.FLOAT, ArmState.HOLD, ArmState.GUIDE)
-_BRAKE = Transition(brakes=True)
+_GO_IDLE = Transition(idles=True)
 
 
 def _always(transition: Transition) -> Mapping[ArmState, Transition]:
@@ -87,7 +87,7 @@ def _only(to: ArmState, *states: ArmState) -> Mapping[ArmState, Transition]:
 
 
 _ROWS: Mapping[ArmEvent, Mapping[ArmState, Transition]] = {
-    ArmEvent.REQUEST_IDLE: _always(_BRAKE),
+    ArmEvent.REQUEST_IDLE: _always(_GO_IDLE),
     # A state may be entered anew: the law then starts from the pose of this cycle.
     ArmEvent.REQUEST_FLOAT: _always(Transition(ArmState.FLOAT)),
     ArmEvent.REQUEST_HOLD: _always(Transition(ArmState.HOLD)),
@@ -98,13 +98,13 @@ _ROWS: Mapping[ArmEvent, Mapping[ArmState, Transition]] = {
     # Hold is entered from hold too: the arm may be moving by itself in it.
     ArmEvent.VERDICT_HOLD: _only(ArmState.HOLD, *_MOVABLE),
     ArmEvent.VERDICT_DAMP: _only(ArmState.DAMP, *_MOVABLE),
-    ArmEvent.VERDICT_IDLE: _always(_BRAKE),
+    ArmEvent.VERDICT_IDLE: _always(_GO_IDLE),
     ArmEvent.IDLE_CONFIRMED: _always(Transition(ArmState.IDLE)),
     ArmEvent.IDLE_UNCONFIRMED: _always(Transition(ArmState.UNKNOWN)),
     # A late confirmation. While the arm is powered the guard judges the circuit.
     # It idles anew: only then does zero torque replace what the pucks still have.
-    ArmEvent.CIRCUIT_BRAKED: {
-        state: _BRAKE if state is ArmState.UNKNOWN else _STAY for state in ArmState
+    ArmEvent.CIRCUIT_IDLE: {
+        state: _GO_IDLE if state is ArmState.UNKNOWN else _STAY for state in ArmState
     },
 }
 TRANSITIONS: Mapping[tuple[ArmState, ArmEvent], Transition] = {
@@ -117,7 +117,7 @@ def transition_lines() -> list[str]:
     lines: list[str] = []
     for (state, event), transition in TRANSITIONS.items():
         result = "-"
-        if transition.brakes:
+        if transition.idles:
             result = "idle is asked for, then idle confirmed or idle not confirmed"
         elif transition.to is not None:
             result = f"-> {transition.to.name.lower()}"

@@ -134,9 +134,9 @@ class LoopServer:
         ):
             self._cycle.report(verdict_for(Fault.RECORDER_SILENT))
         if self._is_orphaned:
-            self._brake_alone(now_ns)
+            self._idle_alone(now_ns)
 
-    def _brake_alone(self, now_ns: int) -> None:
+    def _idle_alone(self, now_ns: int) -> None:
         """Nobody will ever ask for anything again: hold, then idle, then end."""
         if not self._orphaned_ns:
             self._orphaned_ns = now_ns

@@ -221,7 +221,7 @@ def _check_exchange(rig: Rig, add: Add) -> None:
     measured = rig.backend.arm.measure_exchange()
     times = np.array(measured.replies_ns)
     lost = EXCHANGE_CYCLES - len(times)
-    if len(times) < EXCHANGE_CYCLES // 2:
+    if len(times) < EXCHANGE_CYCLES // 2 or measured.jumps:
         add(BAD, "exchange", f"{lost} of {EXCHANGE_CYCLES} cycles incomplete")
         raise preflight_error("exchange", lost=lost, cycles=EXCHANGE_CYCLES)
     if measured.late:

@@ -34,6 +34,7 @@ class ExchangeTimes:
             none came after its cycle.
         answer_ns: from a question for a property to its answer [ns], median; 0 = none
             was answered.
+        jumps: cycles with a position that was not believed; the arm stands.
     """
 
     replies_ns: list[int]
@@ -41,6 +42,7 @@ class ExchangeTimes:
     late: int = 0
     age_ns: int = 0
     answer_ns: int = 0
+    jumps: int = 0
 
 
 _EXCHANGE_PERIODS = EXCHANGE_CYCLES + (EXCHANGE_CYCLES - 1) // (UNASKED_EVERY - 1)
@@ -79,25 +81,26 @@ class ArmOperations:
         arm, clock = self._opened(), self._clock
         answer_ns = arm.answer_time(_QUESTIONS)
         times: list[int] = []
-        unasked = late = 0
-        was_complete = False  # and nobody else asks: that is told by the loop
+        unasked = late = jumps = 0
+        is_judged = False  # complete, and nobody else asks: that is told by the loop
         for number, _ in enumerate(self._periods(_EXCHANGE_PERIODS), 1):
             is_unasked = number % UNASKED_EVERY == 0
             now_ns = clock.now_ns()
             reading = arm.skip(now_ns) if is_unasked else arm.read(now_ns)
             if not is_unasked:
-                was_complete = reading.is_complete and reading.foreign_id is None
+                is_judged = reading.is_complete and reading.foreign_id is None
+                jumps += reading.jump is not None
                 if reading.is_complete:
                     times.append(reading.arm_ns - reading.host_ns)
-            elif was_complete:  # a motor that owes an answer may still give it
+            elif is_judged:  # a motor that owes an answer may still give it
                 unasked += 1
                 late += reading.late is not None
         ages = [0]
         for _ in self._periods(_AGE_CYCLES):
             reading = arm.skip(clock.now_ns())
-            if reading.late is not None and was_complete:
+            if reading.late is not None and is_judged:
                 ages.append(reading.late.age_ns)
-        return ExchangeTimes(times, unasked, late, max(ages), answer_ns)
+        return ExchangeTimes(times, unasked, late, max(ages), answer_ns, jumps)
 
     def _periods(self, count: int) -> Iterator[int]:
         """Yield at the beginning of each of `count` periods of the loop."""

@@ -325,9 +325,8 @@ TABLE: dict[str, Row] = {
     "reply-swapped": _row(OK),
     "reply-spoilt": _row(
         OK,
-        preflight=replace(
-            OK, why="true positions are refused until a false first one is too old"
-        ),
+        # A false first position is what the true ones are judged by, for a while.
+        preflight=_refused(" of 100 exchanges with the arm were incomplete."),
     ),
     "puck-silent": _ending(
         _PUCK,

@@ -8,6 +8,7 @@ import numpy as np
 
 from acquisition.clock import NS_PER_MS, Clock
 from acquisition.devices import (
+    SHORTED,
     ArmReading,
     BusCondition,
     LatePositions,
@@ -32,7 +33,6 @@ from wam.driver.joint_estimator import JointEstimator
 from wam.driver.safety_module import SafetyModule
 from wam.driver.settings import ArmSettings
 from wam.driver.startup import ArmInfo, StartUp
-from wam.driver.status_poller import BRAKED
 from wam.driver.transmission import MOTORS, Transmission
 
 _MS = NS_PER_MS
@@ -136,10 +136,11 @@ class WamArm:
 
         Never raises for missing replies and waits until `give_up_ns` at most. Missing
         joints go on at their last velocity, and stand still after 50 ms of silence.
-        In one of `unasked_every` cycles it does not ask, while nothing is missing.
+        In one of `unasked_every` cycles it does not ask, while nothing is missing and
+        every position is believed.
         """
         self._until_unasked -= 1
-        if self._until_unasked <= 0 and self._traffic.is_settled:
+        if self._until_unasked <= 0 and not self._missing_cycles:
             return self.skip(now_ns)
         self._traffic.exchange(now_ns)
         return self._reading(now_ns)
@@ -262,13 +263,13 @@ class WamArm:
         Never raises. Returns whether the module confirmed.
         """
         if self._is_closed:
-            return self._poller.mode in BRAKED
+            return self._poller.mode in SHORTED
         mode = self._safety.lower_to_idle(self._settings.idle_ns)
         if mode is SafetyMode.IDLE and self._safety.is_driven(_BEARING_NODE):
             self._poller.contradicted_by = _BEARING_NODE
             mode = SafetyMode.ACTIVE  # whatever the module says
         self._poller.note_mode(mode, self._clock.now_ns())
-        if self._poller.mode not in BRAKED:
+        if self._poller.mode not in SHORTED:
             self._poller.is_lowering = True
             return False
         self._traffic.transmit([0] * MOTORS)

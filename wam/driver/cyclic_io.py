@@ -168,11 +168,6 @@ class CycleTraffic:
             for i in range(MOTORS):
                 self.counters.missing[i] += self._owed >> i & 1
 
-    @property
-    def is_settled(self) -> bool:
-        """Whether every motor answered the last question, as far as one can tell."""
-        return not self._owed
-
     def skip(self, now_ns: int) -> tuple[int, int]:
         """Ask for no position at `now_ns`; return what comes all the same.
 

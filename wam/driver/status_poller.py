@@ -6,7 +6,7 @@ Half a millisecond of a 2 ms cycle is free on the bus; a question and its answer
 
 from typing import Final
 
-from acquisition.devices import SafetyMode
+from acquisition.devices import SHORTED, SafetyMode
 from wam.bus.frames import (
     MOTOR_NODES,
     SAFETY_NODE,
@@ -30,7 +30,6 @@ from wam.driver.property_watch import PropertyWatch
 from wam.driver.safety_module import decode_mode
 from wam.driver.settings import ArmSettings
 
-BRAKED = (SafetyMode.IDLE, SafetyMode.E_STOP)
 _MODE = 8  # the same in every firmware
 _GET_MODE = encode_get(_MODE)
 _SET_IDLE = encode_set(_MODE, SafetyMode.IDLE)
@@ -157,7 +156,7 @@ class StatusPoller:
         if mode is not SafetyMode.UNKNOWN:
             self.heard_ns = now_ns
         self._unanswered = 0
-        if mode in BRAKED:
+        if mode in SHORTED:
             self.is_lowering = False
 
     def begin(self, pendant: PendantWord) -> None:

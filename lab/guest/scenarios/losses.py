@@ -125,7 +125,7 @@ def lost_in_a_trial(room: MachineRoom) -> Figures:
 
 def _kill(session: LedSession) -> None:
     session.program.signal(signal.SIGKILL)
-    session.program.run_on(1.0)  # the process that outlives it brakes the arm
+    session.program.run_on(1.0)  # the process that outlives it idles the arm
 
 
 def _lose(room: MachineRoom, losses: tuple[Loss, ...]) -> Figures:

@@ -11,7 +11,7 @@ from acquisition.control_loop.states import (
 )
 
 # Rows: events; columns: idle, float, hold, damp, unknown, guide.
-# "b" = brakes, "." = nothing.
+# "b" = idles, "." = nothing.
 TABLE = """
 idle requested            b b b b b b
 float requested           F F F F F F
@@ -30,7 +30,7 @@ LETTERS = {state: state.name[0] for state in ArmState}
 
 
 def letter(transition):
-    if transition.brakes:
+    if transition.idles:
         return "b"
     return "." if transition.to is None else LETTERS[transition.to]
 

@@ -72,6 +72,16 @@ def test_replies_that_are_late_for_ever_are_found_or_missing(nodes, late_ms):
     assert bench.arm.counters.late == len(late) * len(nodes)
 
 
+@pytest.mark.parametrize("before", range(1, 6))
+def test_while_positions_are_not_believed_no_question_is_left_out(before):
+    bench = Bench()
+    bench.run(EVERY - 1 - before)
+    bench.rig.motors.position[2] += 1_000_000
+    readings = bench.run(30)
+    assert [r.missing_cycles for r in readings] == list(range(1, 31))
+    assert unasked(readings) == []
+
+
 @pytest.mark.parametrize("late_ms", [1.95, 2.0, 2.6, 3.95, 5.9])
 def test_until_then_they_look_in_time(late_ms):
     bench = Bench()
