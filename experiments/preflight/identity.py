@@ -12,8 +12,7 @@ from wam.driver.startup import ArmInfo
 
 def serial_numbers(rig: Rig, info: ArmInfo) -> tuple[int, ...] | None:
     """Return the serial numbers of a real arm's pucks; None = not all are known."""
-    # A driver that does not ask for them has no such field.
-    known = [getattr(puck, "serial", None) for puck in info.pucks]
+    known = [puck.serial for puck in info.pucks]
     serials = tuple(serial for serial in known if serial is not None)
     return None if rig.is_simulated or len(serials) < len(known) else serials
 
