@@ -103,7 +103,7 @@ def _verify_published(folders: list[Path], args: argparse.Namespace) -> int:
 
     from acquisition.errors import SessionError
     from experiments.operator.console import BAD, GOOD, Console
-    from experiments.report.checksums import changed_files
+    from experiments.report.witnesses import changed_publication
 
     if len(folders) != 1 or len(args.sessions) != 1:
         raise SessionError(
@@ -111,7 +111,7 @@ def _verify_published(folders: list[Path], args: argparse.Namespace) -> int:
             hint="For example: traction verify crate --rebuild",
         )
     console = Console(color=not args.no_color)
-    changes = changed_files(folders[0])
+    changes = changed_publication(folders[0])
     if args.json:
         console.say(json.dumps([asdict(change) for change in changes], indent=1))
     for change in [] if args.json else changes:
