@@ -59,7 +59,10 @@ def _make_session(
         sidecar = {"trial": stem.name, "attempt": 1, "verdict": "keep", **sums}
         stem.with_suffix(".json").write_text(json.dumps(sidecar))
     events.append({"event": Event.ENDED, "reason": "complete"})
-    lines = [journal_line({**event, "utc": _UTC}) for event in events]
+    lines = [
+        journal_line({**event, "utc": _UTC}, number)
+        for number, event in enumerate(events, 1)
+    ]
     (folder / "events.jsonl").write_bytes(b"".join(lines))
     summary = {"id": folder.name[11:15], "phase": "complete", "operator": "made"}
     (folder / "session.json").write_text(json.dumps(summary))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from experiments.operator.console import Console
+    from experiments.session.store import SessionFolder
 
 EXAMPLES = """\
   traction verify S012                      the kept trials of one session
@@ -54,7 +55,9 @@ def run(args: argparse.Namespace) -> int:
     if published or args.rebuild:
         return _verify_published(published, args)
     sessions = list_sessions(args.data)
-    if not args.all:
+    if args.all:
+        _require_any(args.data, sessions)
+    else:
         names = dict.fromkeys(args.sessions)
         sessions = [find_session(args.data, name) for name in names]
     console = Console(color=not args.no_color)
@@ -69,6 +72,30 @@ def run(args: argparse.Namespace) -> int:
     return _NOT_AS_KEPT if deviations else 0
 
 
+def _require_any(data: Path, sessions: list[SessionFolder]) -> None:
+    """Refuse to call it all well where nothing, or not all, was looked at.
+
+    Raises:
+        KeptDataError: a session was renamed.
+        SessionError: there is none.
+    """
+    from acquisition.errors import SessionError
+    from experiments.session.kept_files import KeptDataError
+    from experiments.session.store import unnamed_sessions
+
+    renamed = unnamed_sessions(data)
+    if renamed:
+        raise KeptDataError(
+            f"{renamed[0]} holds a journal, and is not called like a session.",
+            hint="Give it its name back, e.g. 2027-03-14_S012_TF.",
+        )
+    if not sessions:
+        raise SessionError(
+            f"There is no session in {data / 'sessions'}: nothing was verified.",
+            hint="Name the folder of the data with --data.",
+        )
+
+
 def _verify_published(folders: list[Path], args: argparse.Namespace) -> int:
     """Name every changed file of a publication; return the exit code."""
     import json
@@ -76,7 +103,7 @@ def _verify_published(folders: list[Path], args: argparse.Namespace) -> int:
 
     from acquisition.errors import SessionError
     from experiments.operator.console import BAD, GOOD, Console
-    from experiments.report.checksums import changed_files
+    from experiments.report.witnesses import changed_publication
 
     if len(folders) != 1 or len(args.sessions) != 1:
         raise SessionError(
@@ -84,7 +111,7 @@ def _verify_published(folders: list[Path], args: argparse.Namespace) -> int:
             hint="For example: traction verify crate --rebuild",
         )
     console = Console(color=not args.no_color)
-    changes = changed_files(folders[0])
+    changes = changed_publication(folders[0])
     if args.json:
         console.say(json.dumps([asdict(change) for change in changes], indent=1))
     for change in [] if args.json else changes:

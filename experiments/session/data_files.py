@@ -175,13 +175,19 @@ def _finite(text: str) -> float:
     return number
 
 
-_CRC = "crc"
+_CRC, _NUMBER = "crc", "line"
 _CHECKED = re.compile(rb'^(?P<body>\{.+), "crc": "(?P<crc>[0-9a-f]{8})"\}$')
 
 
-def journal_line(event: Mapping[str, object]) -> bytes:
-    """Return `event` as a line that carries the CRC-32 of what it would be without."""
-    body = json.dumps(event, allow_nan=False).encode()
+def journal_line(event: Mapping[str, object], number: int) -> bytes:
+    """Return `event` as a line that carries the CRC-32 of what it would be without.
+
+    Args:
+        event: what has happened.
+        number: of the line in its file, from 1, which it states: a line that is gone
+            is missed by those behind it.
+    """
+    body = json.dumps({**event, _NUMBER: number}, allow_nan=False).encode()
     crc = b', "%s": "%08x"}\n' % (_CRC.encode(), zlib.crc32(body))
     return body[:-1] + crc
 
@@ -191,6 +197,13 @@ def parse_line(line: bytes) -> dict[str, Any] | None:
 
     A line of an older version has no checksum and is taken as it is.
     """
+    event = _parse_numbered(line)
+    if event is not None:
+        event.pop(_NUMBER, None)
+    return event
+
+
+def _parse_numbered(line: bytes) -> dict[str, Any] | None:
     event = parse_object(line)
     if event is None or _CRC not in event:
         return event
@@ -201,10 +214,26 @@ def parse_line(line: bytes) -> dict[str, Any] | None:
     return event
 
 
-def damaged_lines(text: bytes) -> list[int]:
-    """Return the numbers of lines with a wrong checksum, from 1; torn ones are none."""
-    return [
-        number
-        for number, line in enumerate(text.splitlines(), 1)
-        if parse_line(line) is None and parse_object(line) is not None
-    ]
+def line_faults(text: bytes) -> list[str]:
+    """Return what is wrong with the lines of a journal, in words.
+
+    A torn line is what a kill leaves, and no fault. Lines of older versions state no
+    number; once they do, each states its own.
+    """
+    faults: list[str] = []
+    is_numbered = False
+    for number, line in enumerate(text.splitlines(), 1):
+        event = _parse_numbered(line)
+        if event is None:
+            if parse_object(line) is not None:
+                faults.append(f"has a wrong checksum in line {number}")
+            continue
+        stated = event.get(_NUMBER)
+        if stated is None and not is_numbered:
+            continue
+        is_numbered = True
+        if stated != number:
+            was = f"line {stated}" if type(stated) is int else "of no number"
+            faults.append(f"lacks lines or has others: line {number} was {was}")
+            break
+    return faults

@@ -6,7 +6,7 @@ from acquisition.clock import Clock
 from acquisition.errors import SessionError
 from experiments.session.data_files import read_json, write_json
 from experiments.session.reducer import KEEP, SessionState, apply, refusal, replay
-from experiments.session.store import SessionFolder, iso_utc
+from experiments.session.store import SUMMARY_FILE, SessionFolder, iso_utc
 from experiments.session.trial_files import (
     decision_of,
     find_sidecar,
@@ -47,11 +47,11 @@ class Journal:
         verdict = decision_of(entry)
         if verdict is not None and verdict.verdict == KEEP:
             entry |= recorded_sum(find_sidecar(self.folder, verdict.name))
-        self.folder.append_event(entry)
+        lines = self.folder.append_event(entry)
         self.state = apply(self.state, entry)
         if verdict is not None:
             move_trial_files(self.folder, verdict)
-        self._write_summary(details)
+        self._write_summary(details, lines)
 
     def saved(self) -> str:
         """Return what is safe on the disk, for a message."""
@@ -59,8 +59,8 @@ class Journal:
         trials = "1 trial is" if kept == 1 else f"{kept} trials are"
         return f"{trials} safe in {self.folder.path}."
 
-    def _write_summary(self, details: dict[str, object]) -> None:
-        path = self.folder.path / "session.json"
+    def _write_summary(self, details: dict[str, object], lines: int) -> None:
+        path = self.folder.path / SUMMARY_FILE
         operator = details.get("operator", read_json(path).get("operator", ""))
         summary: dict[str, object] = {
             "id": self.folder.id,
@@ -72,6 +72,7 @@ class Journal:
             "kept": [f"T{number:02d}" for number in self.state.kept],
             "rejected": self.state.rejected,
             "ended": self.state.ended,
+            "events": lines,
             "force_drift": list(self.state.drift) or None,
         }
         write_json(path, summary)

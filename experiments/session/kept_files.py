@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
 from acquisition.errors import SessionError, TrialFileError
 from acquisition.trial_file.data_files import is_there, list_folder
-from experiments.session.data_files import damaged_lines, read_json, sha256_of
+from experiments.session.data_files import line_faults, read_json, sha256_of
 from experiments.session.reducer import KEEP, replay
 from experiments.session.sidecar import TrialName
-from experiments.session.store import SessionFolder
+from experiments.session.store import JOURNAL_FILE, SUMMARY_FILE, SessionFolder
 from experiments.session.trial_files import decision_of, find_sidecar, kept_pushes
 
 if TYPE_CHECKING:
@@ -75,12 +75,10 @@ def _compare(
     Raises:
         TrialFileError: a file or folder that all depends on cannot be read.
     """
-    events = folder.events()
+    events, text = folder.events(), folder.journal_text()
     kept = [TrialName(*pair) for pair in sorted(replay(events).kept_attempts)]
-    faults = [
-        ("events.jsonl", f"has a wrong checksum in line {number}")
-        for number in damaged_lines(folder.journal_text())
-    ]
+    faults = [(JOURNAL_FILE, fault) for fault in line_faults(text)]
+    faults += _unknown_to_journal(folder, text, {name.kept for name in kept})
     for name in kept:
         try:
             faults += _check_trial(folder, name, recorded_facts(events, name), digest)
@@ -91,8 +89,36 @@ def _compare(
         fields = read_json(path)
         stem, attempt = path.stem, fields.get("attempt")
         is_judged = any(d.kept == stem and d.attempt == attempt for d in judged)
-        if events and fields.get("verdict") == KEEP and not is_judged:
+        if fields.get("verdict") == KEEP and not is_judged:
             faults.append((f"trials/{path.name}", "is kept, but is not in the journal"))
+            attempt = attempt if type(attempt) is int else 1
+            name = TrialName(int(stem[1:]), attempt) if stem[1:].isdigit() else None
+            if name is not None:
+                faults += _check_trial(folder, name, {}, digest)
+    return faults
+
+
+def _unknown_to_journal(
+    folder: SessionFolder, text: bytes, kept: Collection[str]
+) -> list[tuple[str, str]]:
+    """Return what session.json knows of and the journal does not.
+
+    session.json is written after the journal, so it never knows more.
+    """
+    summary = read_json(folder.path / SUMMARY_FILE)
+    listed = cast("list[object]", summary.get("kept"))
+    known = [str(name) for name in listed] if isinstance(listed, list) else []
+    faults: list[tuple[str, str]] = []
+    lines, stated = text.count(b"\n"), summary.get("events")
+    lost = [name for name in known if name not in kept]
+    if not text and (known or stated):
+        faults.append((JOURNAL_FILE, f"is missing or empty; {SUMMARY_FILE} is not"))
+    elif type(stated) is int and lines < stated:
+        faults.append((JOURNAL_FILE, f"ends after {lines} of {stated} lines"))
+    for name in lost:
+        faults.append(
+            (f"trials/{name}.mcap", f"is kept in {SUMMARY_FILE}, not in the journal")
+        )
     return faults
 
 

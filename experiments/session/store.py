@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from acquisition.clock import SystemClock
 from acquisition.errors import SessionError, SettingsError, TrialFileError
@@ -31,6 +31,7 @@ from experiments.session.data_files import (
 )
 
 JOURNAL_FILE, STANCE_FILE = "events.jsonl", "stance.json"
+SUMMARY_FILE = "session.json"  # written after each line of the journal
 FOLDS = ".folds"  # below the data: finished folds, so that a study resumes
 _FOLDER = re.compile(
     r"^(?P<date>\d{4}-\d\d-\d\d)_(?P<id>S\d{3,})_(?P<terrain>[A-Za-z0-9-]+)"
@@ -77,15 +78,14 @@ class SessionFolder:
         """Whether the foot stands in its trials, instead of being pushed."""
         return is_there(self.path / STANCE_FILE)
 
-    def append_event(self, event: Mapping[str, object]) -> None:
-        """Append one line to the journal and force it to the disk.
+    def append_event(self, event: Mapping[str, object]) -> int:
+        """Append one line to the journal, force it to the disk; return its number.
 
         A line that a kill has torn is ended first, so that it spoils no other.
 
         Raises:
             TrialFileError: the disk is full or gone.
         """
-        line = journal_line(event)
         path = self.path / JOURNAL_FILE
         with writing(path):
             descriptor = open_data(path, os.O_RDWR | os.O_APPEND | os.O_CREAT)
@@ -93,9 +93,15 @@ class SessionFolder:
                 is_new = not file.seek(0, os.SEEK_END)
                 if is_new:  # a journal whose name is lost would take all with it
                     sync_directory(self.path)
-                file.write(b"\n" + line if _is_torn(file) else line)
+                file.seek(0)
+                before = file.read()
+                is_torn = bool(before) and not before.endswith(b"\n")
+                number = before.count(b"\n") + is_torn + 1
+                line = journal_line(event, number)
+                file.write(b"\n" + line if is_torn else line)
                 file.flush()
                 os.fsync(descriptor)
+        return number
 
     def journal_text(self) -> bytes:
         """Return the journal as it is on the disk, empty where there is none.
@@ -177,6 +183,19 @@ def list_sessions(data: Path) -> list[SessionFolder]:
     return sorted((s for s in matches if s), key=lambda s: (int(s.id[1:]), s.path.name))
 
 
+def unnamed_sessions(data: Path) -> list[Path]:
+    """Return folders below `data` that hold a journal and are not called like one.
+
+    Raises:
+        TrialFileError: the folder cannot be listed.
+    """
+    return [
+        path
+        for path in list_folder(data / "sessions")
+        if _session_at(path) is None and is_there(path / JOURNAL_FILE)
+    ]
+
+
 def find_session(data: Path, name: str) -> SessionFolder:
     """Return the session called `name`: an id, a folder name or a path.
 
@@ -228,14 +247,6 @@ def create_session(
             hint="Name another folder with --data. Nothing was started.",
         ) from error
     return SessionFolder(path, f"S{number:03d}", terrain, is_simulated)
-
-
-def _is_torn(journal: BinaryIO) -> bool:
-    """Return whether the last line of `journal` has no end."""
-    if not journal.seek(0, os.SEEK_END):
-        return False
-    journal.seek(-1, os.SEEK_END)
-    return journal.read(1) != b"\n"
 
 
 def _session_at(path: Path) -> SessionFolder | None:

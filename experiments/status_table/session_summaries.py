@@ -11,7 +11,7 @@ from hashlib import blake2b
 from typing import TYPE_CHECKING
 
 from acquisition.errors import TrialFileError
-from experiments.session.store import list_sessions
+from experiments.session.store import SUMMARY_FILE, list_sessions
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -98,7 +98,7 @@ def _summarise(
         kept = folder.kept_trials(digest or (lambda _: ""))
         rejected = len(folder.rejected_sidecars())
         owner_of(folder)
-        fields = read_json(folder.path / "session.json")
+        fields = read_json(folder.path / SUMMARY_FILE)
         return SessionSummary(
             kept=tuple(path.stem for path in kept),
             pushes=len(kept_pushes(folder)),

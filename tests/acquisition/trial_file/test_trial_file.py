@@ -1,6 +1,7 @@
 import hashlib
 import io
 import itertools
+import os
 import stat
 import struct
 
@@ -438,6 +439,34 @@ def test_a_full_disk_keeps_the_partial_and_says_how_to_recover(tmp_path, monkeyp
     assert writer.partial.stat().st_size >= kept
     with pytest.raises(TrialFileError, match="closed"):
         writer.flush()
+
+
+_FSYNCS = 6  # of a trial that is flushed once, finished and published
+
+
+@pytest.mark.parametrize("number", [None, *range(_FSYNCS)])
+def test_no_fsync_of_a_trial_fails_in_silence(tmp_path, monkeypatch, number):
+    usual, calls = os.fsync, []
+
+    def fsync(descriptor):
+        calls.append(descriptor)
+        if len(calls) - 1 == number:
+            raise OSError(5, "Input/output error")
+        usual(descriptor)
+
+    def record():
+        writer = write_trial(tmp_path / "T.mcap", make_cycles(50))
+        writer.flush()
+        seal(writer, "end")
+
+    monkeypatch.setattr("os.fsync", fsync)
+    if number is None:
+        record()
+        assert len(calls) == _FSYNCS
+    else:
+        with pytest.raises(TrialFileError, match="Input/output error"):
+            record()
+        assert len(calls) == number + 1
 
 
 def test_a_strange_note_does_not_end_the_recording(tmp_path):

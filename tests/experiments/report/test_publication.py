@@ -267,6 +267,45 @@ def test_one_changed_byte_of_a_publication_is_named(published, tmp_path, name):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("name", ["T02.mcap", "T02.json", "fits.csv", "T01.photo.jpg"])
+def test_a_file_taken_out_with_its_checksum_is_missed(published, tmp_path, name):
+    copy = tmp_path / "crate"
+    shutil.copytree(published, copy)
+    (path,) = (copy / "sessions").rglob(name) if name[0] == "T" else copy.rglob(name)
+    path.unlink()
+    _forget(copy, "SHA256SUMS", str(path.relative_to(copy)))
+    done = traction("verify", copy)
+    assert done.code == 6
+    assert f"{path.relative_to(copy)} is missing" in done.err
+
+
+@pytest.mark.slow
+def test_a_trial_taken_out_with_all_that_describes_it_is_missed(published, tmp_path):
+    copy = tmp_path / "crate"
+    shutil.copytree(published, copy)
+    for path in list((copy / "sessions").rglob("T02.*")):
+        path.unlink()
+        _forget(copy, "SHA256SUMS", str(path.relative_to(copy)))
+    graph = json.loads((copy / METADATA).read_text())
+    graph["@graph"] = [e for e in graph["@graph"] if "T02" not in json.dumps(e)]
+    (copy / METADATA).write_text(json.dumps(graph))
+    _forget(copy, "SHA256SUMS", METADATA)
+    with (copy / "SHA256SUMS").open("a") as sums:
+        sums.write(f"{digest(copy / METADATA)}  {METADATA}\n")
+    done = traction("verify", copy)
+    assert done.code == 6
+    assert "trials/T02.mcap is missing" in done.err
+
+
+def _forget(folder, file, name):
+    """Take the line of a file out of a list of checksums."""
+    lines = (folder / file).read_text().splitlines(keepends=True)
+    kept = [line for line in lines if not line.endswith(f"  {name}\n")]
+    assert len(kept) == len(lines) - 1
+    (folder / file).write_text("".join(kept))
+
+
+@pytest.mark.slow
 def test_results_are_computed_again_from_the_recordings(published):
     before = set(published.rglob("*"))
     done = traction("verify", published, "--rebuild")

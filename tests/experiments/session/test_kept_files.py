@@ -68,6 +68,107 @@ def test_a_trial_changed_together_with_its_sidecar_is_found(data):
     assert files(data) == {"trials/T01.json", "trials/T01.mcap"}
 
 
+def _empty(session):
+    (session / "events.jsonl").write_bytes(b"")
+
+
+def _missing(session):
+    (session / "events.jsonl").unlink()
+
+
+def _cut_behind_first(session):
+    """Leave the journal up to the line that kept T01."""
+    path = session / "events.jsonl"
+    lines = path.read_bytes().splitlines(keepends=True)
+    first = next(i for i, line in enumerate(lines) if b"trial-kept" in line)
+    path.write_bytes(b"".join(lines[: first + 1]))
+
+
+def _without_a_keep(session):
+    path = session / "events.jsonl"
+    lines = path.read_bytes().splitlines(keepends=True)
+    last = max(i for i, line in enumerate(lines) if b"trial-kept" in line)
+    path.write_bytes(b"".join(lines[:last] + lines[last + 1 :]))
+
+
+def _without_a_note(session):
+    """Take a line away that changes no state."""
+    path = session / "events.jsonl"
+    lines = path.read_bytes().splitlines(keepends=True)
+    first = next(i for i, line in enumerate(lines) if b"tared" in line)
+    path.write_bytes(b"".join(lines[:first] + lines[first + 1 :]))
+
+
+def _twice(session):
+    path = session / "events.jsonl"
+    lines = path.read_bytes().splitlines(keepends=True)
+    path.write_bytes(b"".join([*lines[:3], lines[2], *lines[3:]]))
+
+
+LOSSES = (_empty, _missing, _cut_behind_first, _without_a_keep, _without_a_note, _twice)
+
+
+@pytest.mark.parametrize("lose", LOSSES)
+def test_a_journal_that_lost_lines_is_named(data, lose):
+    lose(only_session(data))
+    assert "events.jsonl" in files(data)
+    done = traction("verify", "--all", "--data", data)
+    assert done.code == 6
+    assert "events.jsonl" in done.err
+
+
+@pytest.mark.parametrize("lose", LOSSES)
+def test_no_report_is_made_of_a_session_whose_journal_lost_lines(data, lose):
+    lose(only_session(data))
+    done = traction("report", "S001", "--data", data)
+    assert done.code == 6
+    assert "Not as in the journal: S001 events.jsonl " in done.err
+
+
+@pytest.mark.parametrize("lose", [_empty, _missing, _cut_behind_first])
+def test_a_changed_trial_is_found_without_the_journal(data, lose):
+    session = only_session(data)
+    lose(session)
+    path = session / "trials" / "T02.mcap"
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.chmod(0o644)
+    path.write_bytes(content)
+    assert "trials/T02.mcap" in files(data)
+
+
+@pytest.mark.parametrize("lose", [_empty, _missing, _cut_behind_first])
+def test_a_trial_that_is_gone_is_missed_without_the_journal(data, lose):
+    session = only_session(data)
+    lose(session)
+    for path in session.glob("trials/T02.*"):
+        path.unlink()
+    assert "trials/T02.mcap" in files(data)
+
+
+def test_lines_of_an_older_version_state_no_number(data):
+    path = only_session(data) / "events.jsonl"
+    events = [json.loads(line) for line in path.read_text().splitlines()]
+    for event in events:
+        del event["crc"], event["line"]
+    path.write_text("".join(json.dumps(event) + "\n" for event in events))
+    assert files(data) == set()
+
+
+def test_nothing_found_is_not_all_well(tmp_path):
+    done = traction("verify", "--all", "--data", tmp_path)
+    assert done.code == 2
+    assert f"There is no session in {tmp_path / 'sessions'}" in done.err
+
+
+def test_a_session_that_was_renamed_is_named(data):
+    session = only_session(data)
+    session.rename(session.with_name("my favourite"))
+    done = traction("verify", "--all", "--data", data)
+    assert done.code == 6
+    assert "my favourite holds a journal, and is not called like a session" in done.err
+
+
 def test_a_sidecar_that_the_journal_does_not_know_is_named(data):
     trials = only_session(data) / "trials"
     for suffix in (".mcap", ".json"):
