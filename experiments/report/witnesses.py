@@ -21,10 +21,13 @@ def changed_publication(folder: Path) -> list[ChangedFile]:
     description of the crate and the journals of its sessions still name it.
 
     Raises:
-        TrialFileError: the list or the description is missing or none.
+        TrialFileError: the list is missing or none, or the description is none.
     """
     changes = changed_files(folder)
     known = {change.path for change in changes}
+    if METADATA not in known and not (folder / METADATA).is_file():
+        changes.append(ChangedFile(METADATA, "is missing"))
+        known.add(METADATA)
     # a description that was changed itself is no witness
     for name in [] if METADATA in known else _described(folder / METADATA):
         if name not in known and not (folder / name).is_file():
