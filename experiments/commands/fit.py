@@ -80,6 +80,7 @@ def run(args: argparse.Namespace) -> int:
     console = Console(color=not args.no_color)
     choices = analysis_choices(args)
     trials = _load(args)
+    _refuse_repeated(trials)
     for choice in choices.variants:  # refused before anything is fitted
         choice.series(next(iter(trials.values()))[0])
     is_simulated = _is_simulated(trials)
@@ -120,6 +121,26 @@ def _load(args: argparse.Namespace) -> dict[str, list[TractionSeries]]:
     stones = parse_stones(args.stones) if args.stones else None
     units = parse_units(args.unit) if args.unit else None
     return load_tables(args.files, columns, args.terrain, stones, units, args.rate)
+
+
+def _refuse_repeated(trials: Mapping[str, Sequence[TractionSeries]]) -> None:
+    """Refuse a trial that is there twice: left out, it would be fitted all the same."""
+    from hashlib import blake2b
+
+    from acquisition.errors import SettingsError
+
+    first: dict[bytes, str] = {}
+    for series in (one for group in trials.values() for one in group):
+        digest = blake2b()
+        for column in (series.t - series.t[0], series.v_t, series.F_n, series.F_t):
+            digest.update(column.tobytes())
+        name = f"{series.terrain} {series.name}"
+        original = first.setdefault(digest.digest(), name)
+        if original is not name:
+            raise SettingsError(
+                f"{name} holds the same trial as {original}.",
+                hint="Give each trial once.",
+            )
 
 
 def _is_simulated(trials: Mapping[str, Sequence[TractionSeries]]) -> bool:

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
+from hashlib import blake2b
 from pathlib import Path
 
 from acquisition.clock import SystemClock
@@ -84,6 +85,7 @@ def _load_trials(
     trials: dict[str, list[HeldTrial]] = {}
     truths: dict[Path, TruthErrors] = {}
     problems: list[str] = []
+    first: dict[bytes, str] = {}  # by what was recorded, whatever file it is in
     for session in sorted(sessions, key=lambda s: (s.path.name[:10], int(s.id[1:]))):
         for path in session.kept_trials():
             try:
@@ -99,6 +101,12 @@ def _load_trials(
                     "otherwise. A report cannot mix the two.",
                     hint="Put the file back where it came from.",
                 )
+            name = f"{session.id} {path.stem}"
+            original = first.setdefault(blake2b(trial.cycles.tobytes()).digest(), name)
+            if original is not name:
+                problems.append(f"{name} is the same recording as {original}")
+                console.say(f"▲ left out: {problems[-1]}")
+                continue
             trials.setdefault(trial.terrain, []).append(HeldTrial.of(trial))
             if (truth := compare_with_truth(trial)) is not None:
                 truths[path] = truth

@@ -1,6 +1,7 @@
 """What has to be in a publication, by its description and by the journals inside."""
 
 from pathlib import Path
+from typing import cast
 
 from acquisition.errors import TrialFileError
 from acquisition.files import read_regular
@@ -50,10 +51,9 @@ def _described(path: Path) -> list[str]:
     if not isinstance(graph, list):
         raise TrialFileError(path, "describes no crate")
     names: list[str] = []
-    for entity in graph[:_MOST]:
-        if not isinstance(entity, dict) or entity.get("@type") != "File":
-            continue
-        name = entity.get("@id")
+    for entity in cast("list[object]", graph)[:_MOST]:
+        known = cast("dict[str, object]", entity if isinstance(entity, dict) else {})
+        name = known.get("@id") if known.get("@type") == "File" else None
         if isinstance(name, str) and _is_below(name):
             names.append(name)
     return names

@@ -82,10 +82,9 @@ def judge(folder, name, data, rng):
     is_sound = whole_chunks(data, damaged)
     try:
         recovery = recover_file(path)
-    except TrialFileError as error:
+    except TrialFileError:
         # only where what says which trial it is was hit
         assert damaged[:head] != data[:head], at
-        assert "nothing to save" in error.reason or "lacks metadata" in error.reason
         return False
     reader = TrialReader(recovery.path)
     found = reader.cycles()
