@@ -86,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
     for path in _written(args, out):
         _check_out(path)
     args.chosen = _chosen_poses(args, settings, row)
-    console = Console(color=not args.no_color)
+    console = Console(color=not args.no_color, goes_on=True)
     operator = choose_operator(args.operator_script, is_fake=args.fake)
     fake: FakeOptions | None = None
     if args.fake:

@@ -100,7 +100,7 @@ def run(args: argparse.Namespace) -> int:
     served = _served(args)
     script = None if args.script is None else read_script(args.script)
     settings = load_settings(args.config)
-    console = Console(color=not args.no_color)
+    console = Console(color=not args.no_color, goes_on=True)
     clock, stop = SystemClock(), StopFlag()
     if served is None:
         return _serve_sensor(settings, args, console)

@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
         is_twin=args.twin is not None,
         cables=args.cables,
     )
-    console = Console(color=not args.no_color)
+    console = Console(color=not args.no_color, goes_on=True)
     folder = _free_folder(Path(args.data), args.seed)
     console.say(
         f"traction rehearse        SIMULATED · {len(rows)} terrains x {plan.trials} "

@@ -54,7 +54,7 @@ def record_session(args: argparse.Namespace, stance: StanceTask | None = None) -
         fake=fake,
         operator_name=args.operator,
         operator=choose_operator(args.operator_script, is_fake=args.fake),
-        console=Console(color=not args.no_color),
+        console=Console(color=not args.no_color, goes_on=True),
         faults=tuple(args.fault),
         can_log=args.can_log,
         foresight=args.foresight,
