@@ -6,7 +6,7 @@ swapped column or a wrong unit breaks one of these, and no fit notices.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,14 @@ FREE_MOMENT = 0.03  # moment along the force over the force [m]
 # Medians beyond which a column is in another unit than its own.
 _FASTEST, _STRONGEST, _WEAKEST, _RAREST = 2.0, 500.0, 0.02, 0.2
 
+# What helps a table that another program recorded: its sensor is not at hand.
+_OF_TABLES = {
+    "power": "--negate F_t",
+    "ratio": "--negate F_t",
+    "normal": "--negate F_n",
+    "direction": "--negate v_t",
+    "friction": "--columns F_n=...,F_t=...",
+}
 _TURNED = "the sensor is turned by 180 degrees about z, or F_t has the other sign"
 
 
@@ -57,6 +65,13 @@ class Doubt:
 
 def doubts_of(trial: PreparedTrial) -> list[Doubt]:
     """Return why velocity and forces of a trial cannot be right; empty if they can."""
+    doubts = _doubts_of(trial)
+    if not trial.is_foreign:
+        return doubts
+    return [replace(d, remedy=_OF_TABLES.get(d.name, d.remedy)) for d in doubts]
+
+
+def _doubts_of(trial: PreparedTrial) -> list[Doubt]:
     smooth = trial.smooth
     units = list(_units(smooth))
     if units:
