@@ -45,8 +45,9 @@ class Doubt:
     """One reason why a trial cannot be what it says it is.
 
     Attributes:
-        name: "power", "ratio", "direction", "normal", "friction", "lateral", "moment",
-            "unit", "lag", "swapped", "incline", "heading" or "pressure".
+        name: "power", "ratio", "no-traction", "direction", "normal", "friction",
+            "lateral", "moment", "unit", "lag", "swapped", "incline", "heading" or
+            "pressure".
         seen: what was measured, with the number.
         cause: the likely cause.
         remedy: what to do.
@@ -204,7 +205,14 @@ def _signs(v: Array, load: Array, along: Array) -> Iterator[Doubt]:
         mean = power / float(np.mean(np.abs(along * v)))
         yield Doubt("power", f"the ground drives the foot ({mean:+.0%})", _TURNED)
     ratio = float(np.median(along * np.sign(v) / np.abs(load)))
-    if ratio <= 0.0:
+    if not along.any():
+        yield Doubt(
+            "no-traction",
+            "F_t is 0 throughout",
+            "its column was never filled, or is another one",
+            "--columns F_t=...",
+        )
+    elif ratio <= 0.0:
         yield Doubt("ratio", f"median F_t/F_n {ratio:.2f}", _TURNED)
     elif not FRICTION[0] <= ratio <= FRICTION[1]:
         yield Doubt(

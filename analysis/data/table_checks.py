@@ -73,12 +73,12 @@ def check_order(path: Path, table: TrialTable, rows: Array) -> None:
     row = int(backward[0]) + 1
     where = table.place(int(kept[row]))
     before, now = float(t[row - 1]), float(t[row])
-    if backward.size > kept.size // 2:
+    if now == before:
+        hint = "The times have too few digits: leave t out and give --rate HZ."
+    elif backward.size > kept.size // 2:
         hint = "Sort the rows by time; or --negate t where it counts down."
     elif now <= t[0] + abs(before - t[0]) / 2.0:
         hint = f"A trial seems to begin there: split the file at {where}."
-    elif now == before:
-        hint = "The times have too few digits: leave t out and give --rate HZ."
     else:
         hint = "Sort the rows by time, each time once."
     raise SettingsError(

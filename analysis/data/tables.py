@@ -84,6 +84,9 @@ def load_tables(
     Raises:
         SettingsError: a file that is missing, too large, or not what it should be.
     """
+    _check_names({*(columns or {}), *(units or {}), *negate})
+    if decimal not in {None, ".", ","}:
+        raise SettingsError(f"{decimal!r} is no decimal mark.", hint='Give "." or ",".')
     columns = {name: name for name in COLUMNS} | dict(columns or {})
     request = TextRequest(columns, rate, decimal)
     form = _TableForm(request, terrain, stones or {}, units or {}, frozenset(negate))
@@ -94,6 +97,15 @@ def load_tables(
     if not trials:
         raise SettingsError("No table was given.", hint="Name at least one file.")
     return trials
+
+
+def _check_names(names: set[str]) -> None:
+    """Refuse what is no column of the analysis."""
+    if strangers := names - {*COLUMNS}:
+        raise SettingsError(
+            f"{', '.join(sorted(map(str, strangers)))}: no column of the analysis.",
+            hint=f"The columns are {', '.join(COLUMNS)}.",
+        )
 
 
 def _expanded(path: Path) -> list[Path]:
@@ -150,8 +162,8 @@ class _TableForm:
         )
         notes: list[str] = []
         if not origin.session:
-            check_clock(path, rows, is_timed)
             check_order(path, table, rows)
+            check_clock(path, rows, is_timed)
             found = notes_of(path, table, rows)
             notes = [*table.notes, *filter(None, [epoch]), *found]
         terrain = self.terrain or origin.terrain or DEFAULT_TERRAIN

@@ -144,11 +144,10 @@ def _by_name(
     for k in range(start, min(len(lines), start + _SEARCHED)):
         found: list[_Found] = []
         for delimiter in delimiters:
-            for text in (lines[k], _uncommented(lines[k])):
+            for text in dict.fromkeys((lines[k], _uncommented(lines[k]))):
                 header = _header_cells(text, delimiter)
                 if all(find_column(header, column) for column in needed.values()):
                     found.append((delimiter, k, header, k + 1))
-                    break
         if found:
             fits = (f for f in found if _has_width(lines, f[3], f[0], len(f[2])))
             return next(fits, found[0])
@@ -293,7 +292,8 @@ def _no_header(
     hint = columns_hint(header, needed)
     if missing == [needed.get("t")]:
         hint += " Rows without a time: --rate HZ."
-    if len(header) < _FEWEST:
+    known, is_even, _ = _score(lines, line, delimiter, needed)
+    if not known and not is_even:
         hint = (
             f"A table has a header with {', '.join(needed.values())} within the first "
             f"{_SEARCHED} lines, parted by tabs, semicolons, commas or blanks."
@@ -310,9 +310,8 @@ def _score(
     """Return how much a line looks like the header."""
     header = _header_cells(_uncommented(lines[k]), delimiter)
     known = sum(bool(find_column(header, column)) for column in needed.values())
-    is_even = len(header) >= _FEWEST and _has_width(
-        lines, k + 1, delimiter, len(header)
-    )
+    has_rows = any(line.strip() for line in lines[k + 1 :])
+    is_even = has_rows and _has_width(lines, k + 1, delimiter, len(header))
     return known, is_even, min(len(header), _FEWEST)
 
 

@@ -16,6 +16,7 @@ _ISO = re.compile(
 )
 # 2001 to 2100 since 1970, by unit: a number of one is none of the others.
 _FIRST, _LAST = 9.78e8, 4.11e9  # s
+_LONGEST_STEP = 60.0  # s; a counter from another start has other steps
 _EPOCHS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 
@@ -95,9 +96,12 @@ def since_first(t: NDArray[np.float64], unit: str) -> SinceFirst:
     finite = t[np.isfinite(t)]
     if not finite.size:
         return SinceFirst(t, unit, "")
-    middle = float(np.median(finite))
+    low, high = float(finite.min()), float(finite.max())
+    step = float(np.median(np.abs(np.diff(finite)))) if finite.size > 1 else 0.0
     for name in (unit,) if unit else tuple(_EPOCHS):
-        if _FIRST <= middle * _EPOCHS.get(name, np.nan) <= _LAST:
+        second = _EPOCHS.get(name, np.nan)
+        is_since_1970 = low * second >= _FIRST and high * second <= _LAST
+        if is_since_1970 and step * second <= _LONGEST_STEP:
             note = f"t counts {name} since 1970" + ("" if unit else " by its size")
             return SinceFirst(t - finite[0], name, note)
     return SinceFirst(t, unit, "")
