@@ -215,7 +215,8 @@ def add_table_form(parser: ArgumentParser) -> None:
     group.add_argument(
         "--decimal",
         choices=(".", ","),
-        help="decimal mark of a CSV in which the other one groups thousands",
+        metavar="MARK",
+        help="decimal mark, . or , of a CSV in which the other one groups thousands",
     )
     group.add_argument(
         "--rate",

@@ -202,19 +202,9 @@ def _places(
     columns: Mapping[str, str],
     needed: Mapping[str, str],
 ) -> dict[str, int]:
-    places: dict[str, int] = {}
-    for name, column in columns.items():
-        found = find_column(header, column)
-        if len(found) > 1:
-            either = " or ".join(f"{name}={place + 1}" for place in found[:4])
-            raise refused_line(
-                path,
-                line + 1,
-                f"column {column} occurs twice",
-                f"Take one by its place: --columns {either}",
-            )
-        if found:
-            places[name] = found[0]
+    found = {name: find_column(header, column) for name, column in columns.items()}
+    _refuse_twice(path, line, columns, found)
+    places = {name: at[0] for name, at in found.items() if at}
     chosen = [places[name] for name in needed]
     if len(set(chosen)) < len(chosen):
         raise refused_line(
@@ -224,6 +214,24 @@ def _places(
             columns_hint(header, dict.fromkeys(needed, "")),
         )
     return places
+
+
+def _refuse_twice(
+    path: Path,
+    line: int,
+    columns: Mapping[str, str],
+    found: Mapping[str, Sequence[int]],
+) -> None:
+    """Refuse a header in which a name stands twice."""
+    for name, at in found.items():
+        if len(at) > 1:
+            either = " or ".join(f"{name}={place + 1}" for place in at[:4])
+            raise refused_line(
+                path,
+                line + 1,
+                f"column {columns[name]} occurs twice",
+                f"Take one by its place: --columns {either}",
+            )
 
 
 def _units_row(
@@ -288,7 +296,9 @@ def _no_header(
             f"{len(header)} numbers stand where the names of the columns were expected",
             _place_hint(len(header)),
         )
-    missing = [c for c in needed.values() if not find_column(header, c)]
+    found = {name: find_column(header, column) for name, column in needed.items()}
+    _refuse_twice(path, line, needed, found)
+    missing = [needed[name] for name, at in found.items() if not at]
     hint = columns_hint(header, needed)
     if missing == [needed.get("t")]:
         hint += " Rows without a time: --rate HZ."

@@ -7,6 +7,7 @@ believes it.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from numbers import Real
 from typing import Any, overload
 
 from numpy.typing import ArrayLike
@@ -84,10 +85,11 @@ class KnownTerrain:
             SettingsError: there is no such model, or a value is no finite number.
         """
         table = self._table(model)
-        if isinstance(F_n, int | float) and isinstance(v_t, int | float):
-            _check_finite(F_n=F_n, v_t=v_t)
-            forces = table.at(F_n, v_t)
-            return TractionEstimate(table.shares, forces, not table.covers(F_n, v_t))
+        if isinstance(F_n, Real) and isinstance(v_t, Real):
+            load, speed = float(F_n), float(v_t)
+            _check_finite(F_n=load, v_t=speed)
+            forces = table.at(load, speed)
+            return TractionEstimate(table.shares, forces, not table.covers(load, speed))
         loads, speeds = points_of(F_n, v_t)
         is_outside = ~table.covers_many(loads, speeds)
         return TractionEstimates(table.shares, table.over(loads, speeds), is_outside)
