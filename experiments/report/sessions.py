@@ -6,6 +6,8 @@ from functools import cache, partial
 from hashlib import blake2b
 from pathlib import Path
 
+import numpy as np
+
 from acquisition.clock import SystemClock
 from acquisition.errors import SessionError, SettingsError, TrialFileError
 from analysis.data.load import load_trial
@@ -190,10 +192,22 @@ def require_samples(study: Study) -> None:
     if any(result.kept for result in study.terrains.values()):
         return
     prepare = study.options.prepare
+    present = np.concatenate(
+        [trial.smooth.v_t for r in study.terrains.values() for trial in r.trials]
+    )
+    slow, fast = float(present.min()), float(present.max())
+    forward = np.quantile(present[present > 0.0], (0.05, 0.95)) if fast > 0 else None
+    hint = (
+        "No row moves forward: --negate v_t turns its sign."
+        if forward is None
+        else f"--window {forward[0]:.2g}:{forward[1]:.2g} keeps nine in ten of those "
+        "that move forward; or check the unit of v_t."
+    )
     raise SettingsError(
         "No sample is left to fit: none moves forward at "
-        f"{prepare.slowest:g} to {prepare.fastest:g} m/s.",
-        hint=" ".join(study.warnings) or "Check the columns and their units.",
+        f"{prepare.slowest:g} to {prepare.fastest:g} m/s (--window); v_t is {slow:.3g} "
+        f"to {fast:.3g} m/s.",
+        hint=" ".join([hint, *study.warnings]),
     )
 
 

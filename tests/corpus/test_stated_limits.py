@@ -17,8 +17,8 @@ from acquisition.trial_file.chunks import RECORD_LIMIT, unpacked_limit
 from acquisition.trial_file.data_files import open_data
 from acquisition.trial_file.reader import MAX_ROWS, TrialReader
 from acquisition.trial_file.salvage import SoundRecords
-from analysis.data.columns import LONGEST_LINE
 from analysis.data.tables import LARGEST_FILE, MOST_TRIALS, load_tables
+from analysis.dialects.encoding import LONGEST_LINE
 from analysis.study.store import LARGEST, MOST_BYTES
 from analysis.terrains import database
 from experiments.operator.scripted import ScriptedOperator

@@ -120,7 +120,7 @@ def test_flags_are_columns_and_the_safety_mode_is_a_word(
 def test_the_kept_samples_are_those_inside_the_window(exported, recorded):
     path = exported / recorded.folder.name / "T01.kept.csv"
     names = ["t [s]", "v_t [m/s]", "F_n [N]", "F_t [N]", "kept_row [1]"]
-    assert table(path)[0] == names
+    assert table(path)[0] == [*names, "simulated [1]"]
     v_t = numbers(path, "v_t [m/s]")
     assert 0.005 <= v_t.min() <= v_t.max() <= 0.2
     rows = numbers(path, "kept_row [1]").astype(int)
