@@ -336,4 +336,4 @@ def _from_array(
         )
     table = TrialTable(np.asarray(array, dtype=np.float64), {}, is_in_seconds=True)
     origin = TableOrigin(table="trial", terrain=key.rpartition("/")[0])
-    return form.series(f"{path.name}:{key}", path, table, origin)
+    return form.series(f"{path.name}:{key}", Path(f"{path}:{key}"), table, origin)

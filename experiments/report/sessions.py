@@ -200,7 +200,7 @@ def require_samples(study: Study) -> None:
     hint = (
         "No row moves forward: --negate v_t turns its sign."
         if forward is None
-        else f"--window {forward[0]:.2g}:{forward[1]:.2g} keeps nine in ten of those "
+        else f"--window {forward[0]:.3g}:{forward[1]:.3g} keeps nine in ten of those "
         "that move forward; or check the unit of v_t."
     )
     raise SettingsError(

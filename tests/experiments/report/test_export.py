@@ -278,10 +278,25 @@ def test_fit_reports_an_exported_folder_as_simulated(in_parquet, tmp_path):
 def test_fit_mixes_no_simulated_with_recorded_tables(exported, recorded, tmp_path):
     name = f"{recorded.folder.name}/T01.csv"
     real = tmp_path / "real.csv"
-    real.write_bytes((exported / name).read_bytes())
+    with (exported / name).open() as file:
+        rows = list(csv.DictReader(file))
+    with real.open("w") as file:
+        writer = csv.DictWriter(file, rows[0])
+        writer.writeheader()
+        writer.writerows(row | {"simulated [1]": "0"} for row in rows)
     done = traction("fit", exported / name, real, "--to", tmp_path / "fit")
     assert done.code == 2
     assert not (tmp_path / "fit").exists()
+
+
+@pytest.mark.parametrize("name", ["T01.csv", "T01.kept.csv"])
+def test_a_table_copied_out_of_its_folder_stays_simulated(
+    exported, recorded, tmp_path, name
+):
+    copy = tmp_path / name
+    copy.write_bytes((exported / recorded.folder.name / name).read_bytes())
+    ((series,),) = load_tables([copy]).values()
+    assert series.is_simulated
 
 
 def test_without_pyarrow_the_extra_is_named_and_nothing_written(
