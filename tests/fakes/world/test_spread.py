@@ -1,5 +1,7 @@
 """Sound rigs as they differ from each other."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -78,9 +80,8 @@ def test_the_same_seed_is_the_same_rig():
 
 
 def spread_rig(departure):
-    scene = SimulatedScene(
-        "S0", "small", "tread", FRAME, START_Q, 5, departure=departure
-    )
+    scene = SimulatedScene("S0", "small", "tread", FRAME, START_Q, 5)
+    scene = replace(scene, departure=departure)
     clock = SteppedClock()
     rig = FakeRig(scene, CONSTANTS, TOOL, clock)
     clock.attach(rig)
