@@ -1,6 +1,7 @@
 """Each wrong rig of the catalogue differs from the sound one in the way it is named."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from fakes.world.rig import FakeRig, SimulatedScene
 from fakes.world.true_rig import shown_load, true_constants, true_frame, true_tool
 from fakes.world.wrong_rigs import Class, catalogue, wrong_rig
 from tests.fakes.scenes import CONSTANTS, FRAME, MODEL, START_Q, TOOL
+from tests.fakes.world.wrong_rigs_page import page
 from wam.bus.frames import (
     MOTOR_NODES,
     SAFETY_NODE,
@@ -98,6 +100,11 @@ def test_the_catalogue_has_every_row_and_ten_more():
     assert all(rig.wrong and rig.cause for rig in rigs.values())
     assert {rig.kind for rig in rigs.values()} == set(Class)
     assert [rig.number for rig in rigs.values() if not rig.steps] == [35]
+
+
+def test_the_printed_catalogue_is_the_tested_one():
+    printed = Path(__file__).parents[3] / "docs" / "wrong-rigs.md"
+    assert printed.read_text() == page()
 
 
 def test_a_name_that_there_is_not_is_refused_with_the_nearest():
