@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -45,6 +45,22 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
+class RigTruth:
+    """What is true of a simulated rig, but not believed.
+
+    Attributes:
+        spread: it is one of many sound rigs, drawn by the seed: zeros, stops, mounting
+            and sensor are nearly those of the drawings.
+        mount: turns of its base about x, then y, then z [degrees].
+        wrong: name of what is wrong with it in the catalogue; "" = nothing.
+    """
+
+    spread: bool = False
+    mount: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    wrong: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class SimulatedRig:
     """What is simulated: the settings as written, before any calibration.
 
@@ -56,6 +72,7 @@ class SimulatedRig:
         pace: how the simulated person pushes.
         twin: calibrations of the arm whose twin it is; None = an arm of its own.
         cables: resonance of the joints on their cables [Hz]; None = stiff ones.
+        truth: what is true of the rig, but not believed; None = nothing.
     """
 
     rig: RigSettings
@@ -65,6 +82,7 @@ class SimulatedRig:
     pace: str
     twin: LawCalibrations | None = None
     cables: float | None = None
+    truth: RigTruth | None = None
 
     def metadata(self) -> dict[str, Any]:
         """Return the world in plain values, for a process of its own."""
@@ -82,6 +100,7 @@ class SimulatedRig:
             "start_q": list(self.row.start_q),
             "seed": self.seed,
             "sensor": sensor_metadata(self.rig.ft_sensor),
+            "truth": None if self.truth is None else asdict(self.truth),
         }
         return {
             "scene": scene,
@@ -115,6 +134,26 @@ class SimulatedRig:
         if weight == "shipped":
             return weighed_arm(constants, constants.mus + change)
         return weighed_arm(constants, moments_of_links(constants) + change)
+
+
+def wrong_rigs() -> dict[str, str]:
+    """Return what is wrong with each rig of the catalogue, by its name."""
+    from fakes.world.wrong_rigs import catalogue
+
+    return {name: rig.wrong for name, rig in catalogue().items()}
+
+
+def typed_wrongly(settings: Settings, wrong: str) -> Settings:
+    """Return the settings as they are with the wrong rig of that name.
+
+    Raises:
+        SettingsError: there is no such rig, or rig.toml would be refused with what is
+            typed into it.
+    """
+    from fakes.world.wrong_rigs import wrong_rig
+
+    mass = wrong_rig(wrong).departure.foot_typed
+    return settings if mass is None else settings.with_foot_mass(mass)
 
 
 def sensor_metadata(section: AnySensor) -> dict[str, Any]:
@@ -197,6 +236,10 @@ class ServedArm:
             for the foot of the first terrain.
         has_hand: a person carries the arm.
         firmware: of the motor pucks, and of the safety module.
+        is_at_rest: the arm is at home with joint 6 on its upper stop, not just at home.
+        friction: of the joints, as a share; None = what fits `has_hand`.
+        seed: of the sound arm that it is; None = that of the drawings.
+        truth: what is true of the arm, but not believed; None = nothing.
     """
 
     bus: tuple[str, str]
@@ -205,6 +248,10 @@ class ServedArm:
     tool: str
     has_hand: bool
     firmware: tuple[int, int]
+    is_at_rest: bool = False
+    friction: float | None = None
+    seed: int | None = None
+    truth: RigTruth | None = None
 
 
 def _served_tool(settings: Settings, tool: str) -> Tool | None:
@@ -262,7 +309,9 @@ def build_server(settings: Settings, served: ServedArm) -> PuckServer:
     """
     from fakes.serving.home_arm import HomePose, build_home_server
     from fakes.serving.puck_server import open_can_port
+    from fakes.world.plain_world import departure_of
 
+    truth = None if served.truth is None else asdict(served.truth)
     tool, line = _served_tool(settings, served.tool), None
     if served.line is not None:
         _with_sensor(tool)
@@ -274,6 +323,10 @@ def build_server(settings: Settings, served: ServedArm) -> PuckServer:
         served.is_idle_first,
         served.has_hand,
         served.firmware,
+        served.is_at_rest,
+        served.friction,
+        served.seed,
+        departure_of(truth, 1 if served.seed is None else served.seed),
     )
     port = open_can_port(*served.bus, settings.rig.can.bitrate)
     try:

@@ -28,6 +28,7 @@ class Wiring:
         torn: motor whose cable to the joints is torn, 1-7: its rotor alone turns, and
             under the law's spring stays where it is. 0 = none.
         torn_at: where that rotor stands [counts].
+        shift: counts that are told too much, shape (7,).
     """
 
     torque: Array = field(default_factory=_as_built)
@@ -35,6 +36,7 @@ class Wiring:
     home: Array = field(default_factory=lambda: np.zeros(7))
     torn: int = 0
     torn_at: float = 0.0
+    shift: Array = field(default_factory=lambda: np.zeros(7))
 
     def made_of(self, units: Sequence[int]) -> list[int]:
         """Return the torques [puck units] that the motors make, shape (7,)."""
@@ -45,7 +47,7 @@ class Wiring:
 
     def told_of(self, counts: Array) -> Array:
         """Return what the encoders tell where the motors have turned by `counts`."""
-        told = self.home + self.counts.dot(counts - self.home)
+        told = self.home + self.counts.dot(counts - self.home) + self.shift
         if self.torn:
             told[self.torn - 1] = self.torn_at
         return told

@@ -1,6 +1,6 @@
 """The whole simulated rig: arm, pucks, sensor, ground and hand, and its handle."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,6 +11,7 @@ from acquisition.sample import Record
 from fakes.bus.in_process import FakeCanBus
 from fakes.clock import SteppedClock
 from fakes.ground.terrain import Container, Terrain, make_terrain
+from fakes.plant.grip import Side
 from fakes.plant.hand import touched_place
 from fakes.plant.model import PlantOptions
 from fakes.plant.plant import ArmPlant
@@ -24,6 +25,7 @@ from fakes.sensor.errors import SensorErrors
 from fakes.sensor.kinds import SensorChoice, make_stream
 from fakes.sensor.port import FakeSerialPort
 from fakes.truth import truth_records
+from fakes.world.departure import Departure
 from fakes.world.faults import (
     BodyFaults,
     Cable,
@@ -32,6 +34,17 @@ from fakes.world.faults import (
     clear_stream_faults,
     network_faults,
     stream_faults,
+)
+from fakes.world.true_rig import (
+    depart,
+    shown_load,
+    true_constants,
+    true_frame,
+    true_network,
+    true_options,
+    true_start,
+    true_stones,
+    true_tool,
 )
 from ft_sensor.payload import TerrainFrame
 from wam.model.arm_model import ArmModel
@@ -57,6 +70,7 @@ class SimulatedScene:
         start_q: joint positions with the foot at the far end [rad], shape (7,).
         seed: of everything random.
         sensor: which wrist sensor the arm has.
+        departure: how the rig differs from what is believed; None = not at all.
     """
 
     terrain: str
@@ -66,6 +80,7 @@ class SimulatedScene:
     start_q: Array
     seed: int
     sensor: SensorChoice = _ANY_SENSOR
+    departure: Departure | None = None
 
 
 def solve_start(model: ArmModel, frame: TerrainFrame, q: Array, height: float) -> Array:
@@ -111,25 +126,38 @@ class FakeRig:
         options: PlantOptions | None = None,
         network: NetworkOptions | None = None,
     ) -> None:
-        self.scene = scene
         self._clock = clock
         model = ArmModel(constants, tool)
         q = solve_start(model, scene.frame, scene.start_q, _START_HEIGHT)
+        believed, departure = constants, scene.departure
+        network = network or NetworkOptions()
+        if departure is not None:
+            constants = true_constants(constants, departure)
+            tool = true_tool(tool, departure)
+            options = true_options(options or PlantOptions(), departure)
+            network = true_network(network, departure)
+            scene = replace(scene, frame=true_frame(scene.frame, departure))
+            scene = replace(scene, stones=true_stones(scene.stones, departure))
+            q = true_start(q, departure)
+        self.scene = scene
         self.plant = ArmPlant(constants, tool, scene.frame, q, options)
         self.plant.t_ns = clock.now_ns() // PERIOD_NS * PERIOD_NS
-        chosen = replace(network or NetworkOptions(), mt=constants.mt)
+        chosen = replace(network, mt=constants.mt)
         if scene.sensor.is_on_bus:
             chosen = replace(chosen, has_sensor=True)
         self.random = self._rake(0)
         kind = (SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS) if chosen.has_sensor else ()
         self.errors = SensorErrors(self.random.sensor, *kind)
-        load = Load(self.plant.sensor_load, self.errors)
+        source = self.plant.sensor_load
+        if departure is not None:
+            source = shown_load(source, departure)
+        load = Load(source, self.errors)
         self.network = PuckNetwork(self.plant, chosen, clock.now_ns(), load)
+        if departure is not None:
+            depart(self.plant, self.network, departure, believed)
         self._body = BodyFaults(self.plant, self.network.schedule.after)
         self.bus = FakeCanBus(self.network, clock)
-        self.stream = make_stream(
-            scene.sensor, self.plant.sensor_load, self.errors, clock.now_ns()
-        )
+        self.stream = make_stream(scene.sensor, source, self.errors, clock.now_ns())
         self._port: FakeSerialPort | None = None
         self._cable: Cable | None = None
 
@@ -227,8 +255,32 @@ class LocalSimulation:
         """Rake the bed for `trial` and begin to write the truth."""
         self.rig.rake(trial)
 
+    @property
+    def is_hand_done(self) -> bool:
+        """Whether the hand has come to the end of its last order."""
+        return self.rig.plant.hand.is_done
+
+    def pose(self, q: Sequence[float], seconds: float) -> None:
+        """Let two hands bring the joints truly to `q` [rad] in `seconds`."""
+        self.rig.plant.terrain = None  # the container is moved aside
+        self.rig.plant.pose(q, seconds)
+
+    def turn_to_stop(self, joint: int, side: Side) -> None:
+        """Let two hands turn joint 1-7 until its stop bears, and hold it there."""
+        self.rig.plant.terrain = None
+        self.rig.plant.turn_to_stop(joint, side)
+
+    def hang(self, mass: float) -> None:
+        """Hang `mass` [kg] on a string from the centre of the sole; 0 = nothing."""
+        self.rig.plant.hang(mass)
+
+    def push_with(self, force: Sequence[float], seconds: float) -> None:
+        """Push the sole with `force` [N], base frame, for `seconds`."""
+        self.rig.plant.push_with(force, seconds)
+
     def lift(self) -> None:
         """Let the hand carry the foot above the far end and hold it still."""
+        self._roll_in()
         self.rig.plant.hand.lift_to_start()
 
     def rest(self) -> None:
@@ -245,6 +297,7 @@ class LocalSimulation:
 
     def put_down(self) -> None:
         """Let the hand put the foot down at the far end."""
+        self._roll_in()
         self.rig.plant.hand.put_down(self.rig.ground.surface(0.0))
 
     def touch(self, number: int) -> None:
@@ -253,8 +306,13 @@ class LocalSimulation:
         1 to 4: far left, far right, near left, near right, seen from the arm; more:
         points between them.
         """
+        self._roll_in()
         x, y = touched_place(number, self.rig.scene.frame.travel)
         self.rig.plant.hand.touch(x, y, self.rig.ground.surface(x))
+
+    def _roll_in(self) -> None:
+        """Put the container where it belongs."""
+        self.rig.plant.terrain = self.rig.ground
 
     def push(self) -> None:
         """Let the hand push the foot across."""
