@@ -57,7 +57,8 @@ def _archive(*names: str) -> bytes:
 
 def _npz(array: np.ndarray, name: str = "S0/01") -> bytes:
     stream = io.BytesIO()
-    np.savez(stream, **{name: array})
+    arrays: Any = {name: array}
+    np.savez(stream, **arrays)
     return stream.getvalue()
 
 
