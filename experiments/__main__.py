@@ -10,7 +10,7 @@ import sys
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import IO, NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 from acquisition.errors import TractionError
 from acquisition.linear_algebra import openblas_settings
@@ -19,6 +19,9 @@ from experiments.arguments import (
     did_you_mean,
     with_present_names,
 )
+
+if TYPE_CHECKING:
+    from _typeshed import SupportsWrite
 
 COMMANDS = {
     "check": "check that the rig is ready: one graded page",
@@ -90,9 +93,10 @@ class _Parser(argparse.ArgumentParser):
             message = f"{message} {did_you_mean(invalid['got'], known)}".rstrip()
         super().error(message)
 
-    def print_help(self, file: IO[str] | None = None) -> None:
+    def print_help(self, file: "SupportsWrite[str] | None" = None) -> None:
         """Print the help; unlike argparse's own it tells of a disk that is full."""
-        print(self.format_help(), end="", file=file, flush=True)
+        print(self.format_help(), end="", file=file)
+        sys.stdout.flush()
 
 
 class _Formatter(argparse.RawDescriptionHelpFormatter):
@@ -182,7 +186,7 @@ def _report_output(error: OSError) -> int:
     from experiments.operator.console import OutputError, discard
 
     discard(sys.stdout)
-    if error.errno == errno.EPIPE:
+    if isinstance(error, BrokenPipeError):
         return 0
     print(OutputError(error), file=sys.stderr)  # noqa: T201
     return OutputError.exit_code

@@ -68,10 +68,10 @@ def run(args: argparse.Namespace) -> int:
     console = Console(color=not args.no_color)
     choices = analysis_choices(args)
     trials = _load(args)
-    _refuse_repeated(trials)
     for choice in choices.variants:  # refused before anything is fitted
         choice.series(next(iter(trials.values()))[0])
     is_simulated = _is_simulated(trials)
+    _refuse_repeated(trials)
     told = notes_of_tables(trials)
     for note in told:  # before the work: a wrong unit shows here
         console.say(f"▲ {note}")

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 GOOD, WARNING, BAD = "✔", "▲", "✘"
 _GRADES = {GOOD: "good", WARNING: "warning", BAD: "bad"}
 _ARM, _ARM_WHOLE = "ARM: ", "ARM:\N{NO-BREAK SPACE}"
-_GONE = {errno.EPIPE, errno.EIO}  # a pipe that nobody reads, a terminal that was closed
 _BELOW_TEXT = " " * 18  # where the text of a graded line begins
 
 
@@ -42,8 +41,8 @@ class Console:
 
     Args:
         color: colours and a panel are wanted, where there is a terminal for them.
-        goes_on: output that cannot be written is told once and does not end what is
-            being done: an arm is moved, or trials are recorded.
+        goes_on: output that cannot be written is told once and ends nothing, because an
+            arm is moved, or trials are recorded.
 
     Attributes:
         is_lost: the other end of the pipe was closed.
@@ -147,8 +146,8 @@ class Console:
         self.is_lost = True
         self._live = None
         discard(sys.stdout)
-        if error.errno in _GONE:
-            return
+        if isinstance(error, BrokenPipeError) or error.errno == errno.EIO:
+            return  # nobody reads the pipe, the terminal was closed
         fault = OutputError(error)
         if not self._goes_on:
             raise fault from error
