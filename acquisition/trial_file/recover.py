@@ -337,7 +337,7 @@ def _write(
             raise TrialFileError(source, f"cannot be copied ({error})") from error
         if not copy.messages or "trial" not in copy.metadata:
             why = salvage.reason or details["reason"]
-            if copy.messages:
+            if copy.messages and salvage.reason:
                 why += "; what says which trial it is was there"
             raise TrialFileError(source, f"has nothing to save: it {why}")
         for name, digest in copy.missing_attachments.items():
