@@ -169,13 +169,14 @@ def test_what_the_warp_clips_is_counted():
 @pytest.mark.filterwarnings("error")
 def test_forces_of_the_other_sign_are_not_warped():
     turned = [
-        SampleTable(rows.F_n, rows.v_t, -rows.F_t) for rows in trials_of(normal, 4)
+        SampleTable(rows.F_n, rows.v_t, -10.0 - rows.F_t)
+        for rows in trials_of(normal, 4)
     ]
     model = NewTrialFit(training(turned), None).fit(SE)
     assert model.c is None
     assert "log warp" not in model.choice.nlpd
     assert float(model.mean(np.array([4.0]), np.array([0.1]))[0]) == pytest.approx(
-        -4.0, abs=0.3
+        -14.0, abs=0.3
     )
 
 
