@@ -208,7 +208,7 @@ def find_session(data: Path, name: str) -> SessionFolder:
     matches = [s for s in list_sessions(data) if name in {s.id, s.path.name}]
     if len(matches) == 1:
         return matches[0]
-    if Path(name).is_file():
+    if os.path.isfile(name):  # noqa: PTH113 - no error for a name that no file can have
         raise SessionError(
             f"{name} is a file, and no session.",
             hint=_reads_it(Path(name)),
