@@ -83,7 +83,9 @@ def _compare(
     events, text = folder.events(), folder.journal_text()
     kept = [TrialName(*pair) for pair in sorted(replay(events).kept_attempts)]
     faults = [(JOURNAL_FILE, fault) for fault in line_faults(text)]
-    faults += _unknown_to_journal(folder, text, {name.kept for name in kept})
+    decisions = [decision_of(event) for event in events]
+    told = {d.name.kept for d in decisions if d is not None}
+    faults += _unknown_to_journal(folder, text, told)
     for name in kept:
         try:
             faults += _check_trial(folder, name, recorded_facts(events, name), digest)
@@ -104,11 +106,17 @@ def _compare(
 
 
 def _unknown_to_journal(
-    folder: SessionFolder, text: bytes, kept: Collection[str]
+    folder: SessionFolder, text: bytes, told: Collection[str]
 ) -> list[tuple[str, str]]:
     """Return what session.json knows of and the journal does not.
 
-    session.json is written after the journal, so it never knows more.
+    session.json is written after the journal: it may be behind, where a trial was
+    rejected since, and never knows more.
+
+    Args:
+        folder: the session.
+        text: the journal.
+        told: names of the trials of which it has a verdict.
     """
     summary = read_json(folder.path / SUMMARY_FILE)
     listed = summary.get("kept")
@@ -118,7 +126,7 @@ def _unknown_to_journal(
     if origin := stated_id(folder):
         faults.append((SUMMARY_FILE, f"is of {origin}: a copy, or a renamed session"))
     lines, stated = text.count(b"\n"), summary.get("events")
-    lost = [name for name in known if name not in kept]
+    lost = [name for name in known if name not in told]
     if not text and (known or stated):
         faults.append((JOURNAL_FILE, f"is missing or empty; {SUMMARY_FILE} is not"))
     elif type(stated) is int and lines < stated:
