@@ -77,7 +77,7 @@ class NumberForm:
     def numbers(
         self, cells: Iterable[str], count: int
     ) -> tuple[NDArray[np.float64], int | None]:
-        """Return the numbers of `count` cells, and the index of the first that is none."""
+        """Return the numbers of `count` cells, and which is the first that is none."""
         values = np.empty(count)
         for k, cell in enumerate(cells):
             value = self.number(cell)
