@@ -208,6 +208,12 @@ def find_session(data: Path, name: str) -> SessionFolder:
     matches = [s for s in list_sessions(data) if name in {s.id, s.path.name}]
     if len(matches) == 1:
         return matches[0]
+    if matches:
+        raise SessionError(
+            f"{name} is the number of {len(matches)} sessions: "
+            f"{', '.join(s.path.name for s in matches)}.",
+            hint="Name the folder; give the copy another place.",
+        )
     if os.path.isfile(name):  # noqa: PTH113 - no error for a name that no file can have
         raise SessionError(
             f"{name} is a file, and no session.",

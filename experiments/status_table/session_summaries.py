@@ -35,7 +35,8 @@ class SessionSummary:
         operator: who recorded it, as session.json has it.
         phase: where it stands, as session.json has it.
         deviations: what is missing or changed of the kept trials.
-        problem: what leads out of the session or cannot be read; None for nothing.
+        problem: what leads out of the session, cannot be read or contradicts its name;
+            None for nothing.
             Such a session is not counted.
     """
 
@@ -89,7 +90,11 @@ def _summarise(
     folder: SessionFolder, digest: Callable[[Path], str] | None
 ) -> SessionSummary:
     from experiments.session.data_files import read_json
-    from experiments.session.kept_files import compare_kept, unreadable
+    from experiments.session.kept_files import (
+        compare_kept,
+        contradiction,
+        unreadable,
+    )
     from experiments.session.lock import owner_of
     from experiments.session.trial_files import kept_pushes
 
@@ -108,6 +113,7 @@ def _summarise(
             operator=str(fields.get("operator", "")),
             phase=str(fields.get("phase", "opening")),
             deviations=deviations,
+            problem=contradiction(folder),
         )
     except TrialFileError as error:
         return SessionSummary(deviations=deviations, problem=unreadable(folder, error))

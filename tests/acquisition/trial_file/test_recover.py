@@ -32,7 +32,7 @@ from tests.acquisition.trials import (
     write_trial,
 )
 
-MESSAGE, MESSAGE_INDEX, CHUNK, ATTACHMENT = 5, 7, 6, 9
+MESSAGE, MESSAGE_INDEX, CHUNK, ATTACHMENT, METADATA = 5, 7, 6, 9, 12
 BLOCK = 50  # cycles in a chunk
 
 
@@ -187,6 +187,32 @@ def test_a_truth_file_is_recovered_too(tmp_path):
     recovery = recover_file(writer.partial)
     assert recovery.path.name == "T07.truth.recovered.mcap"
     assert len(TrialReader(recovery.path).truth().data) == 9
+
+
+def test_a_chunk_that_is_gone_is_said_to_be_lost(put, sealed):
+    third = chunks(sealed)[2]
+    recovery = recover_file(
+        put(sealed[: third.start] + sealed[third.end :], "T01.mcap")
+    )
+    assert recovery.verified.cycles == 5 * BLOCK
+    assert recovery.losses == (Loss(0.204, 0.1),)
+
+
+def test_a_zeroed_first_chunk_is_known_from_the_summary(put, sealed):
+    first = chunks(sealed)[0]
+    zeroed = sealed[: first.body] + bytes(first.end - first.body) + sealed[first.end :]
+    assert recover_file(put(zeroed, "T01.mcap")).losses == (Loss(0.0, 0.104),)
+
+
+def test_a_description_that_is_damaged_is_doubted(put, sealed):
+    at = span_of(sealed, METADATA).end - 3
+    recovery = recover_file(put(flipped(sealed, at, 2), "T01.mcap"))
+    assert recovery.is_doubtful
+    assert (recovery.verified.cycles, recovery.losses) == (300, ())
+    assert recover_file(recovery.source).is_doubtful
+    third = chunks(sealed)[2]
+    known = recover_file(put(flipped(sealed, third.body + 90), "T02.mcap"))
+    assert not known.is_doubtful
 
 
 # --- what the new file says -----------------------------------------------------------
