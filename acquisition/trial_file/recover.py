@@ -36,7 +36,7 @@ ROOM = ".recover"  # begins the name of a folder in which a copy grows
 
 
 @dataclass(frozen=True, slots=True)
-class Loss:
+class LostSpan:
     """A part of a recording that is gone.
 
     Attributes:
@@ -48,7 +48,7 @@ class Loss:
     seconds: float
 
 
-_LOSSES = TypeAdapter(tuple[Loss, ...])
+_LOSSES = TypeAdapter(tuple[LostSpan, ...])
 
 
 class TrialCopy:
@@ -143,7 +143,7 @@ class TrialCopy:
         }
 
     @property
-    def losses(self) -> list[Loss]:
+    def losses(self) -> list[LostSpan]:
         """What is missing of the recording, in order."""
         if not self._times:
             return []
@@ -151,13 +151,13 @@ class TrialCopy:
         # A chunk that is gone leaves no other trace than its hole in the cycles.
         steps = np.diff(np.array(self._times))
         holes = (np.flatnonzero(steps > _LONGEST_MISSED) + 1).tolist()
-        found: list[Loss] = []
+        found: list[LostSpan] = []
         for at in sorted({*self._gaps, *holes}):
             before, after = self._edges(at)
             lost_ns = after - before - PERIOD_NS
             if lost_ns > PERIOD_NS:  # more than a cycle that was missed
                 start_s = max(0, before + PERIOD_NS - first) / NS_PER_S
-                found.append(Loss(round(start_s, 3), round(lost_ns / NS_PER_S, 3)))
+                found.append(LostSpan(round(start_s, 3), round(lost_ns / NS_PER_S, 3)))
         return found
 
     def _edges(self, at: int) -> tuple[int, int]:
@@ -258,7 +258,7 @@ class Recovery:
     verified: VerifiedFile
     messages: int
     bytes_dropped: int = 0
-    losses: tuple[Loss, ...] = ()
+    losses: tuple[LostSpan, ...] = ()
     missing_attachments: tuple[str, ...] = ()
     reason: str = ""
     is_doubtful: bool = False
