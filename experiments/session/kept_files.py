@@ -84,7 +84,7 @@ def _compare(
     events, text = folder.events(), folder.journal_text()
     kept = [TrialName(*pair) for pair in sorted(replay(events).kept_attempts)]
     faults = [(JOURNAL_FILE, fault) for fault in line_faults(text)]
-    if (otherwise := contradiction(folder)) is not None:
+    if (otherwise := contradiction(folder, events)) is not None:
         faults.append((otherwise.file, otherwise.problem))
     judged = {d.name for d in map(decision_of, events) if d is not None}
     faults += _unknown_to_journal(folder, text, {name.kept for name in judged})
@@ -141,15 +141,11 @@ def _unknown_to_journal(
     return faults
 
 
-def contradiction(folder: SessionFolder) -> Deviation | None:
+def contradiction(folder: SessionFolder, events: Sequence[_Facts]) -> Deviation | None:
     """Return what the journal says otherwise than the folder's name; None = nothing.
 
     A name decides where a session counts, and whether as a simulated one.
-
-    Raises:
-        TrialFileError: the journal cannot be read.
     """
-    events = folder.events()
     if not events or events[0].get("event") != Event.STARTED:
         return None
     first = events[0]
