@@ -34,6 +34,7 @@ from ft_sensor.calibration.sensor_file import sensor_from_toml
 from ft_sensor.reading import StreamTiming
 from ft_sensor.serial_line.timestamps import SampleTimestamper
 from ft_sensor.vendors import bota, optoforce, robotous
+from tests.corpus.copied_session import use_lines, use_names
 from tests.corpus.foresight import read_foreseen, read_models
 from tests.corpus.used_session import use
 from wam.bus.decoder import BusReader
@@ -243,6 +244,9 @@ READERS: dict[str, Callable[[bytes, Path], None]] = {
     "foresight": read_models,
     "foreseen": read_foreseen,
     "table": _table("trial.csv"),
+    "german-table": _table("trial.csv"),
+    "preamble-table": _table("trial.csv"),
+    "iso-table": _table("trial.txt"),
     "npz": _table("trials.npz"),
     "parquet": _table("trial.parquet"),
     "package": _package,
@@ -262,6 +266,8 @@ READERS: dict[str, Callable[[bytes, Path], None]] = {
     "used-session": _used("/session.json"),
     "used-journal": _used("/events.jsonl"),
     "used-mcap": _used("trials/T01.mcap"),
+    "journal-lines": use_lines,
+    "session-names": use_names,
 }
 RESULTS = """\
 terrain,model,fold,quantity,value,unit

@@ -30,6 +30,7 @@ from tests.acquisition.trials import (
     make_header,
     write_trial,
 )
+from tests.corpus.copied_session import all_lines, all_names
 from tests.corpus.readers import PACKAGED, RESULTS, RUNNING
 from tests.corpus.used_session import session_file
 from wam.bus.frames import encode_force, encode_position, encode_torques
@@ -70,6 +71,39 @@ _LOG = b"""\
 (1800000000.000100) can0 404#16
 (1800000000.000400) can0 463#00C000
 (1800000000.000900) can0 405#AA80000000000000
+"""
+# Tables as other programs write them.
+_GERMAN = """\
+t [s];v_t [mm/s];F_n [N];F_t [N]
+0,000;100,0;13,25;0,89
+0,002;100,5;13,50;0,91
+0,004;101,0;13,75;0,90
+0,006;101,5;14,00;0,92
+"""
+_PREAMBLE = """\
+# Test bench 4
+Operator:,somebody
+Date:,2027-01-15
+
+t,v_t,F_n,F_t
+s,m/s,N,N
+0.0,0.1,2.0,1.0
+0.1,0.1,2.1,1.0
+0.2,0.1,2.0,nan
+0.3,0.1,,1.0
+0.4,0.1,2.0,1.1
+0.5,0.1,2.2,1.0
+0.6,0.1,2.0,1.0
+0.7,0.1,2.1,1.0
+0.8,0.1,2.0,1.2
+0.9,0.1,2.0,1.0
+"""
+_ISO = """\
+t\tv_t\tF_n\tF_t
+2027-01-15T08:00:00.000Z\t0.1\t2\t1
+2027-01-15T08:00:00.002Z\t0.1\t2\t1
+2027-01-15T08:00:00.004Z\t0.1\t2\t1
+2027-01-15T08:00:00.006Z\t0.1\t2\t1
 """
 
 
@@ -221,6 +255,9 @@ def samples() -> dict[str, bytes]:
         "foresight": DATABASE.read_text(),
         "sidecar": json.dumps(_SIDECAR),
         "session": json.dumps({"kept": ["T01"], "phase": "unfinished"}),
+        "german-table": "\ufeff" + _GERMAN,
+        "preamble-table": _PREAMBLE,
+        "iso-table": _ISO,
         "table": "t,v_t,F_n,F_t\n0,0.1,2,1\n0.1,0.1,2,1\n0.2,0.1,2,1\n",
     }
     return {name: text.encode() for name, text in texts.items()} | {
@@ -245,4 +282,6 @@ def samples() -> dict[str, bytes]:
         "bus-log": _LOG,
         "frames": _frames(),
         "sensor": _stream(),
+        "journal-lines": all_lines(),
+        "session-names": all_names(),
     }
