@@ -34,7 +34,8 @@ def window(folder: Path, database: Path | None) -> np.ndarray:
     for old, new in _SETTINGS:
         text = text.replace(old, new)
     config.write_text(text)
-    words = ["run", "S0", "--fake", "--trials", "1", "--operator-script", "auto"]
+    words = ["run", "S0", "--fake", "--processes", "--trials", "1"]
+    words += ["--operator-script", "auto"]
     words += ["--config", str(config), "--data", str(folder / "data")]
     words += [] if database is None else ["--foresight", str(database)]
     subprocess.run([*program, *words], check=True, capture_output=True)

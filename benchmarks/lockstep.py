@@ -65,7 +65,7 @@ HEADER = TrialHeader(
 def float_rig() -> Rig:
     """Return a simulated rig whose hand pushes the foot over stones."""
     settings = load_settings(None)
-    rig = build_rig(settings, settings.row(TERRAIN), FakeOptions(is_fast=True, seed=1))
+    rig = build_rig(settings, settings.row(TERRAIN), FakeOptions("fast", seed=1))
     backend, hand = rig.backend, rig.simulation
     assert hand is not None
     backend.start_arm()

@@ -110,7 +110,7 @@ def main() -> None:
         witness, exchange = compiled(Path(name))
         settings = settings_with_bus_sensor()
         row = settings.matrix.terrains[0]
-        rig = build_rig(settings, row, FakeOptions(is_fast=False, seed=1))
+        rig = build_rig(settings, row, FakeOptions("processes", seed=1))
         length = str(args.seconds * 3 + 60)
         seen = Path(name) / "stalls"
         with closing(rig.backend), seen.open("w") as lines:

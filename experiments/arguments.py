@@ -5,6 +5,7 @@ import shlex
 from argparse import SUPPRESS, ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Literal
 
 FRICTION = 0.4  # of the simulated joints, as a share of another arm's; ASSUMED
 CABLES = (8.0, 25.0)  # Hz, resonance of joints on cables; ASSUMED
@@ -18,6 +19,8 @@ _FORMER: Mapping[str, Mapping[str, str]] = {  # names that scripts may still use
     "report": _SEED,
 }
 PACES = ("steady", "slow", "fast", "clumsy")  # of the simulated person
+# How time passes in a simulation: as on the wall, as fast as can be, in processes.
+TimeMode = Literal["paced", "fast", "processes"]
 
 
 def add_global_options(
@@ -244,13 +247,34 @@ def add_pdf(parser: ArgumentParser) -> None:
     )
 
 
+def add_time(parser: ArgumentParser) -> None:
+    """Declare how time passes in a simulation."""
+    chosen = parser.add_mutually_exclusive_group()
+    chosen.add_argument(
+        "--fast",
+        action="store_true",
+        help="simulated time passes as fast as the computer can, only if simulated",
+    )
+    chosen.add_argument(
+        "--processes",
+        action="store_true",
+        help="the processes of the real rig on the wall clock, only if simulated; "
+        "needs an idle computer",
+    )
+
+
+def asked_time(args: Namespace) -> TimeMode | None:
+    """Return how simulated time is asked to pass; None = not said."""
+    if args.fast:
+        return "fast"
+    return "processes" if args.processes else None
+
+
 def add_recording(parser: ArgumentParser) -> None:
     """Declare what every command takes that opens a new session."""
     parser.add_argument("terrain", metavar="TERRAIN", help="a name in matrix.toml")
     parser.add_argument("--fake", action="store_true", help="simulated devices")
-    parser.add_argument(
-        "--fast", action="store_true", help="stepped time, only with --fake"
-    )
+    add_time(parser)
     parser.add_argument(
         "--trials", type=int, metavar="N", help="trials to keep (of the terrain)"
     )
@@ -296,9 +320,7 @@ def add_reopening(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--fake", action="store_true", help="accept a simulated session only"
     )
-    parser.add_argument(
-        "--fast", action="store_true", help="stepped time, only if simulated"
-    )
+    add_time(parser)
     parser.add_argument(
         "--operator",
         default="",

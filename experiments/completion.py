@@ -83,7 +83,7 @@ def _faults(args: argparse.Namespace) -> list[str]:
     from experiments.settings.load import load_settings
 
     settings = load_settings(getattr(args, "config", None))
-    fake = FakeOptions(is_fast=True, seed=1)
+    fake = FakeOptions("fast", seed=1)
     rig = build_rig(settings, settings.matrix.terrains[0], fake)
     names = rig.simulation.fault_names if rig.simulation is not None else ()
     rig.backend.close()

@@ -6,7 +6,12 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from experiments.arguments import add_simulated_arm, friction_share
+from experiments.arguments import (
+    add_simulated_arm,
+    add_time,
+    asked_time,
+    friction_share,
+)
 from experiments.rig.truth_options import add_truth, check_truth, mount_of
 
 if TYPE_CHECKING:
@@ -36,9 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="row of the matrix: its foot, its container (the first row)",
     )
     parser.add_argument("--fake", action="store_true", help="simulated devices")
-    parser.add_argument(
-        "--fast", action="store_true", help="stepped time, only with --fake"
-    )
+    add_time(parser)
     add_simulated_arm(parser)
     add_truth(parser)
     parser.add_argument(
@@ -93,7 +96,7 @@ def run(args: argparse.Namespace) -> int:
     fake: FakeOptions | None = None
     if args.fake:
         fake = FakeOptions(
-            args.fast,
+            asked_time(args) or "paced",
             args.seed,
             friction,
             cables=args.cables,
@@ -263,9 +266,10 @@ def _check_arguments(args: argparse.Namespace) -> None:
     from acquisition.errors import SettingsError
 
     nothing = "Nothing was started."
-    if not args.fake and (args.fast or args.operator_script):
+    if not args.fake and (asked_time(args) or args.operator_script):
         raise SettingsError(
-            "--fast and --operator-script work only with --fake.", hint=nothing
+            "--fast, --processes and --operator-script work only with --fake.",
+            hint=nothing,
         )
     check_truth(args)
     fewest = _FEWEST.get(args.what, 0)

@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from experiments.arguments import did_you_mean, number_within
+from experiments.arguments import add_time, asked_time, did_you_mean, number_within
 from experiments.rig.truth_options import add_truth, check_truth, mount_of
 
 if TYPE_CHECKING:
@@ -25,9 +25,7 @@ _JSON_SCHEMA = 1
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `check`."""
     parser.add_argument("--fake", action="store_true", help="simulated devices")
-    parser.add_argument(
-        "--fast", action="store_true", help="stepped time, only with --fake"
-    )
+    add_time(parser)
     parser.add_argument(
         "--loop-test",
         type=number_within(0.1, 3600, "seconds, e.g. 5"),
@@ -107,7 +105,8 @@ def _check(args: argparse.Namespace, settings: Settings, console: Console) -> No
     row = settings.row(args.terrain or first)
     fake: FakeOptions | None = None
     if args.fake:
-        fake = FakeOptions(args.fast, 1, mount=mount_of(args), wrong=args.wrong)
+        mode = asked_time(args) or "paced"
+        fake = FakeOptions(mode, 1, mount=mount_of(args), wrong=args.wrong)
     rig = connect_rig(settings, row, fake)
     console.say("traction check        " + ("SIMULATED" if fake else "LIVE RIG"))
     with logging_bus(rig, args.can_log, console):

@@ -5,7 +5,12 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from experiments.arguments import add_recording, data_option, friction_share
+from experiments.arguments import (
+    add_recording,
+    asked_time,
+    data_option,
+    friction_share,
+)
 from experiments.rig.truth_options import add_truth, check_truth, mount_of
 
 if TYPE_CHECKING:
@@ -46,7 +51,7 @@ def record_session(args: argparse.Namespace, stance: StanceTask | None = None) -
     fake: FakeOptions | None = None
     if args.fake:
         fake = FakeOptions(
-            args.fast,
+            asked_time(args) or "paced",
             args.seed,
             friction,
             args.pace,
@@ -109,7 +114,7 @@ def _as_reopening(args: argparse.Namespace, request: SessionRequest) -> ResumeRe
         data=request.data,
         config=request.config,
         console=request.console,
-        is_fast=args.fast,
+        mode=asked_time(args),
         is_fake=args.fake,
         operator=request.operator_name,
         script=args.operator_script,
@@ -123,10 +128,12 @@ def _check_arguments(args: argparse.Namespace) -> None:
     from acquisition.errors import SettingsError
 
     nothing = "Nothing was started."
-    simulated = (args.fast, args.twin, args.fault, args.operator_script)
+    time = asked_time(args)
+    simulated = (time, args.twin, args.fault, args.operator_script)
     if not args.fake and any(simulated):
         raise SettingsError(
-            "--fast, --twin, --fault and --operator-script work only with --fake.",
+            "--fast, --processes, --twin, --fault and --operator-script work only "
+            "with --fake.",
             hint=nothing,
         )
     check_truth(args)

@@ -35,7 +35,7 @@ def run(args: argparse.Namespace) -> int:
 
     console = Console(color=not args.no_color, goes_on=True)
     settings = load_settings(args.config)
-    fake = FakeOptions(is_fast=True, seed=1) if args.fake else None
+    fake = FakeOptions("fast", seed=1) if args.fake else None
     rig = connect_rig(settings, settings.matrix.terrains[0], fake)
     try:
         info = _start(rig)

@@ -70,6 +70,11 @@ def keyboard(operator: OperatorInput) -> contextlib.AbstractContextManager[objec
     return contextlib.nullcontext()
 
 
+def is_person(operator: OperatorInput) -> bool:
+    """Return whether `operator` types at a terminal, and may take any time."""
+    return isinstance(operator, TerminalInput)
+
+
 def login_name() -> str:
     """Return the name of the person who is logged in."""
     try:

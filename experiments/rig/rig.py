@@ -10,7 +10,7 @@ from acquisition.clock import Clock, SystemClock
 from acquisition.ipc.layout import SharedLayout
 from acquisition.simulation import SimulationControl
 from analysis.foresight.model import RigIdentity
-from experiments.arguments import FRICTION
+from experiments.arguments import FRICTION, TimeMode
 from experiments.rig.arm_lock import ArmLock
 from experiments.rig.backend import RigBackend
 from experiments.rig.build import build_tool, read_properties, terrain_frame
@@ -26,6 +26,7 @@ from experiments.rig.law_calibrations import (
     build_law,
     read_law_calibrations,
 )
+from experiments.rig.pace import WallPace
 from experiments.rig.processes import MultiProcessBackend, WorkerConfigs
 from experiments.rig.simulation import connect_simulation
 from experiments.settings.calibrations import with_calibrations
@@ -40,7 +41,8 @@ class FakeOptions:
     """How a simulated session runs.
 
     Attributes:
-        is_fast: on stepped time; otherwise on the wall clock.
+        mode: stepped time at the pace of the wall, as fast as it can, or the processes
+            of the real rig.
         seed: of everything random.
         friction: of the joints, as a share of what was identified on another arm.
         pace: how the simulated person pushes, a name of `fakes.plant.push.PACES`.
@@ -54,7 +56,7 @@ class FakeOptions:
             nothing.
     """
 
-    is_fast: bool
+    mode: TimeMode
     seed: int
     friction: float = FRICTION
     pace: str = "steady"
@@ -94,6 +96,7 @@ class Rig:
         calibrations: of gravity and friction.
         simulation: handle of the simulation; None on the real rig.
         is_stepped: time passes only while the loop runs.
+        pace: of stepped time, against the wall's; None where that is the clock.
     """
 
     clock: Clock
@@ -109,6 +112,7 @@ class Rig:
     calibrations: LawCalibrations
     simulation: SimulationControl | None
     is_stepped: bool
+    pace: WallPace | None = None
     serials: tuple[int, ...] | None = None
     tared_ns: int = 0
     foresight: ForesightSource | None = None
@@ -164,9 +168,12 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
     law = build_law(settings.rig, calibrations, row.foot, is_simulated=kind)
     shared = SharedLayout.create()
     simulation: SimulationControl | None = None
-    is_stepped = fake is not None and fake.is_fast
-    if world is not None and is_stepped:
+    pace: WallPace | None = None
+    if world is not None and fake is not None and fake.mode != "processes":
         clock, backend, simulation = stepped(world, settings, row, law, shared)
+        pace = WallPace(clock, SystemClock())
+        if fake.mode == "paced":
+            backend.loop_client.on_tick.append(pace.keep)
     else:
         fields = world.metadata() if world is not None else None
         clock = SystemClock()
@@ -189,7 +196,8 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
         settings=settings,
         calibrations=calibrations,
         simulation=simulation,
-        is_stepped=is_stepped,
+        is_stepped=pace is not None,
+        pace=pace,
     )
 
 

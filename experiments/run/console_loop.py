@@ -15,6 +15,7 @@ from experiments.fault_injection.plan import FaultTrigger, PlannedFaults
 from experiments.operator.console import Console
 from experiments.operator.keys import KeyAction, key_action
 from experiments.operator.prompts import OperatorInput, Prompt, PromptState
+from experiments.operator.terminal import is_person
 from experiments.rig.rig import Rig
 from experiments.rig.simulation import SimulatedHand
 from experiments.run.stop import (
@@ -41,6 +42,11 @@ _LED_ASTRAY = frozenset(
 # Of an arm whose motors work.
 _DRIVEN = frozenset({ArmState.FLOAT, ArmState.HOLD, ArmState.DAMP, ArmState.GUIDE})
 LAY_DOWN_SECONDS = 60.0  # the arm waits so long for a hand before it goes idle
+# At these the simulated world moves for as long as it takes.
+_WORLD_ACTS = frozenset({Prompt.RECORDING, Prompt.MOVING, Prompt.LIFT})
+_SETTLED_NS = 5_000_000_000  # at any other, it has come to rest within this
+_REST_TICKS = 25  # of the wall to one of a world at rest
+_SLOW = 0.95  # of real time; below it the screen says so
 _ON_STAND = 0.1  # rad
 _STANDS = 0.3  # s, in which an arm that holds has come to rest
 _SUPPORT = "Support the arm: it goes idle and sinks slowly. [space]"
@@ -76,6 +82,9 @@ class ConsoleLoop:
     _shown_ns: int = field(default=0, init=False)
     _prompt: tuple[Prompt, int, int] | None = field(default=None, init=False)
     _prompt_ns: int = field(default=0, init=False)  # when `_prompt` began
+    _acted_ns: int = field(default=0, init=False)  # newest key, or start of `_prompt`
+    _rests: int = field(default=0, init=False)  # ticks since
+    _rested_ns: int = field(default=0, init=False)  # in which simulated time stood
     _is_stopped: bool = field(default=False, init=False)
     _reported: str = field(default="", init=False)  # a fault that persists
 
@@ -104,6 +113,8 @@ class ConsoleLoop:
         if self.stop.count and prompt is not Prompt.REVIEW:
             raise StopRequestedError
         key = self.operator.answer(state)
+        if key:
+            self._act()
         if key == "q" and prompt not in _OWN_QUIT:
             raise StopRequestedError
         if key_action(prompt, key) is KeyAction.UNDO:
@@ -129,11 +140,34 @@ class ConsoleLoop:
             return ""
         return self.operator.line(state)
 
+    def _pass_time(self, prompt: Prompt) -> None:
+        """Let 20 ms pass, or let them pass on the wall only.
+
+        A person may read a prompt for minutes. What the simulated world does at it is
+        done after some seconds; from then on its time goes at a small share of real
+        time, which costs as little and runs into no limit.
+        """
+        if self._prompt is None or prompt is not self._prompt[0]:
+            self._act()
+        pace, waited_ns = self.rig.pace, self.rig.clock.now_ns() - self._acted_ns
+        is_done = prompt not in _WORLD_ACTS and waited_ns >= _SETTLED_NS
+        if pace is not None and is_done and is_person(self.operator):
+            self._rests += 1
+            if self._rests % _REST_TICKS:
+                pace.rest(TICK)
+                self._rested_ns += round(TICK * 1e9)
+                return
+        self.loop_client.advance(TICK)
+
+    def _act(self) -> None:
+        """Let the simulated world go on: a prompt begins, or a key was pressed."""
+        self._acted_ns, self._rests = self.rig.clock.now_ns(), 0
+
     def _advance(
         self, prompt: Prompt, name: TrialName | None, *, is_complete: bool = False
     ) -> PromptState:
         """Let 20 ms pass and return the prompt, which the simulated hand follows."""
-        self.loop_client.advance(TICK)
+        self._pass_time(prompt)
         self._refresh()
         self._raise_fault(prompt)
         if self.console.is_lost:
@@ -175,12 +209,16 @@ class ConsoleLoop:
         self.console.end_panel()
 
     def _refresh(self) -> None:
-        now_ns = self.rig.clock.now_ns()
+        now_ns = self.rig.clock.now_ns() + self._rested_ns
         if self._view is None or not self.console.is_live:
             return
         if now_ns - self._shown_ns >= REFRESH_NS:
             self._shown_ns = now_ns
-            self.console.panel(self._view(self.console.width))
+            lines = self._view(self.console.width)
+            pace = self.rig.pace
+            if pace is not None and pace.speed < _SLOW:
+                lines = [*lines, f"{pace.speed:.1f} x real time: the computer is busy"]
+            self.console.panel(lines)
 
     def inject_faults(self, moment: FaultTrigger, number: int, seconds: float) -> None:
         """Inject the rehearsed faults that are due in trial `number`."""

@@ -11,7 +11,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from acquisition.clock import SystemClock
 from acquisition.errors import SessionError, SettingsError
-from experiments.arguments import PACES
+from experiments.arguments import PACES, TimeMode, asked_time
 from experiments.messages import CATALOGUE
 from experiments.operator.console import WARNING, Console
 from experiments.operator.keys import KeyAction
@@ -104,7 +104,7 @@ class ResumeRequest:
         data: the data folder.
         config: a rig.toml; None = the one of the session.
         console: where everything is printed.
-        is_fast: on stepped time, whatever it was before.
+        mode: how simulated time passes; None = as before.
         is_fake: a simulated session is meant.
         is_forced: record under other conditions, too.
         allow_missing: go on without kept trials that are missing or changed.
@@ -118,7 +118,7 @@ class ResumeRequest:
     data: Path
     config: Path | None
     console: Console
-    is_fast: bool = False
+    mode: TimeMode | None = None
     is_fake: bool = False
     is_forced: bool = False
     allow_missing: bool = False
@@ -135,7 +135,7 @@ def resume_request(args: argparse.Namespace) -> ResumeRequest:
         data=args.data,
         config=args.config,
         console=Console(color=not args.no_color, goes_on=True),
-        is_fast=args.fast,
+        mode=asked_time(args),
         is_fake=args.fake,
         is_forced=args.force,
         allow_missing=args.allow_missing,
@@ -222,9 +222,10 @@ def _check_kind(folder: SessionFolder, request: ResumeRequest) -> None:
             f"{folder.id} is a session with the real arm.",
             hint="Leave --fake out. Simulated and real trials do not mix.",
         )
-    if request.is_fast or request.script or request.faults:
+    if request.mode or request.script or request.faults:
         raise SettingsError(
-            "--fast, --fault and --operator-script work only with a simulated session.",
+            "--fast, --processes, --fault and --operator-script work only with a "
+            "simulated session.",
             hint="Nothing was started.",
         )
 
@@ -280,12 +281,14 @@ def _path_of(opening: Mapping[str, Any], name: str) -> Path | None:
 
 
 def fake_of(opening: Mapping[str, Any], request: ResumeRequest) -> FakeOptions:
-    """Return how it was simulated before, on stepped time if that is asked for."""
+    """Return how it was simulated before, and how time is to pass now."""
     written = opening.get("fake")
     try:
         known = {"friction": _FRICTION_OF_THEN} | _FIELDS.validate_python(written)
+        if "mode" not in known:  # as it was before there was a pace
+            known["mode"] = "fast" if known.pop("is_fast", False) else "paced"
         before = _FAKE.validate_python(known)
     except ValidationError:
-        before = FakeOptions(is_fast=False, seed=1)
+        before = FakeOptions("paced", seed=1)
     pace = before.pace if before.pace in PACES else PACES[0]
-    return replace(before, is_fast=request.is_fast or before.is_fast, pace=pace)
+    return replace(before, mode=request.mode or before.mode, pace=pace)

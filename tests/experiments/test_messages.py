@@ -117,7 +117,7 @@ def test_a_computer_that_is_too_busy_is_said_first_and_no_cable_is_blamed():
     )
     assert "No reply from the arm for 10 ms." in text
     assert "ARM: UNKNOWN - support it" in text
-    assert "--fast" in text
+    assert "--processes" in text
     assert "cable" not in text
 
 

@@ -49,7 +49,7 @@ def test_a_session_without_streams_is_recorded(tmp_path):
 
 @pytest.mark.wall_clock
 def test_processes_keep_their_memory_without_streams(tmp_path):
-    done = started(tmp_path, "check", "--fake", closed=CLOSED)
+    done = started(tmp_path, "check", "--fake", "--processes", closed=CLOSED)
     assert done.returncode == 0
     assert not list(tmp_path.glob("traction-bug-*"))
 

@@ -135,7 +135,7 @@ def waiting_in(phase, folder, fault):
     marker = folder / "there"
     config = patient_config(folder, travel=0.12)
     command = [sys.executable, "-c", START, PROMPTS[phase], str(marker), "run", "TF"]
-    command += ["--fake", "--trials", "1", "--operator-script", "auto"]
+    command += ["--fake", "--processes", "--trials", "1", "--operator-script", "auto"]
     command += ["--config", str(config), "--data", str(data)]
     environment = dict(os.environ)
     if fault.startswith("fsync"):

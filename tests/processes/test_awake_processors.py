@@ -29,7 +29,7 @@ def holders():
 def test_one_process_asks_for_it_and_takes_it_along():
     before = holders()
     settings = load_settings(None)
-    rig = build_rig(settings, settings.row("S0"), FakeOptions(is_fast=False, seed=1))
+    rig = build_rig(settings, settings.row("S0"), FakeOptions("processes", seed=1))
     try:
         rig.backend.start_arm()
         grants = [grant for group in rig.backend.grants().values() for grant in group]

@@ -15,7 +15,7 @@ FOUND_AGAIN = 25.0  # s; boot text, ritual, rate check, on a machine with other 
 @pytest.fixture
 def rig():
     settings = load_settings(None)
-    rig = build_rig(settings, settings.row(ROW), FakeOptions(is_fast=False, seed=1))
+    rig = build_rig(settings, settings.row(ROW), FakeOptions("processes", seed=1))
     yield rig
     rig.backend.close()
 

@@ -83,7 +83,8 @@ class Person:
 def person_at(folder):
     """Yield somebody at a session whose files are in `folder`."""
     folder.mkdir()
-    options = ("--fake", "--trials", 1, "--config", patient_config(folder))
+    options = ("--fake", "--processes", "--trials", 1)
+    options += ("--config", patient_config(folder))
     found = Person("run", "TF", *options, "--data", folder / "data")
     try:
         yield found

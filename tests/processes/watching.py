@@ -212,7 +212,8 @@ def session(data, *options):
     """Start a session; whatever is left of it at the end is ended."""
     data.mkdir(parents=True, exist_ok=True)
     config = patient_config(data)
-    command = [sys.executable, "-c", START, "run", "S0", "--fake", "--trials", "1"]
+    command = [sys.executable, "-c", START, "run", "S0", "--fake", "--processes"]
+    command += ["--trials", "1"]
     command += ["--operator-script", "auto", "--config", str(config)]
     command += ["--data", str(data), *options]
     with (data / "out.txt").open("w") as out:

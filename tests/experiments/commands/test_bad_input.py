@@ -29,6 +29,7 @@ def refusal(done, code=2):
     return line
 
 
+SIMULATED = "--fast, --processes, --twin, --fault and --operator-script work only with"
 # --- run ------------------------------------------------------------------------------
 
 
@@ -36,12 +37,10 @@ def refusal(done, code=2):
     ("arguments", "text"),
     [
         (("ZZ", *FAKE), "There is no terrain 'ZZ' in matrix.toml. Terrains: S0 S10"),
-        (("TF", "--fast"), "--fast, --twin, --fault and --operator-script work only"),
-        (("TF", "--twin"), "--fast, --twin, --fault and --operator-script work only"),
-        (
-            ("TF", "--fault", "estop"),
-            "--fast, --twin, --fault and --operator-script work",
-        ),
+        (("TF", "--fast"), SIMULATED),
+        (("TF", "--processes"), SIMULATED),
+        (("TF", "--twin"), SIMULATED),
+        (("TF", "--fault", "estop"), SIMULATED),
         (("TF", *FAKE, "--trials", 0), "--trials 0 - expected a whole number 1..99"),
         (("TF", *FAKE, "--trials", 100), "--trials 100 - expected a whole number"),
         (("TF", *FAKE, "--seed", -1), "--seed -1 - expected a whole number >= 0"),

@@ -13,11 +13,12 @@ def on_arm(monkeypatch):
 
 
 def test_processes_are_not_started(config, tmp_path):
-    done = traction("check", "--fake", "--config", config, "--data", tmp_path)
+    options = ("--fake", "--processes", "--config", config, "--data", tmp_path)
+    done = traction("check", *options)
     assert done.code == 3
     assert "aarch64" in done.err
 
 
 def test_a_simulation_in_one_thread_runs(config, tmp_path):
-    options = ("--fake", "--fast", "--config", config, "--data", tmp_path)
+    options = ("--fake", "--config", config, "--data", tmp_path)
     assert traction("check", *options).code == 0

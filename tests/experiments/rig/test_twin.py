@@ -26,7 +26,7 @@ from wam.calibration.gravity_file import gravity_from_toml
 from wam.model.arm_model import ArmModel
 from wam.model.constants import load_constants
 
-TWIN = FakeOptions(is_fast=True, seed=1, is_twin=True)
+TWIN = FakeOptions("fast", seed=1, is_twin=True)
 HEAVIER = np.full((7, 3), 0.01)  # kg m
 
 
@@ -74,7 +74,7 @@ def test_without_the_option_the_simulated_arm_is_one_of_its_own(folder):
 
 def test_joints_swing_on_their_cables_where_that_is_asked_for(tmp_path):
     write_config(tmp_path)
-    plant, _ = plant_of(tmp_path, FakeOptions(is_fast=True, seed=1, cables=15.0))
+    plant, _ = plant_of(tmp_path, FakeOptions("fast", seed=1, cables=15.0))
     plant.short_windings([False] * 7)
     plant.advance(plant.t_ns + 100_000_000)
     turns = np.array(plant.counts()) / np.array(load_constants().cts)

@@ -10,6 +10,7 @@ import numpy as np
 from acquisition.control_loop.states import ControlStatus
 from acquisition.devices import BusCondition, SafetyMode
 from experiments.operator.console import Console
+from experiments.rig.pace import WallPace
 from experiments.run.console_loop import ConsoleLoop
 from experiments.run.context import RunContext
 from experiments.run.stop import StopFlag
@@ -83,14 +84,15 @@ class StubBackend:
         return SafetyMode.IDLE
 
 
-def make_loop(operator, *, is_stepped=True, console=None, **more):
-    """Return a console loop over a rig without devices."""
+def make_loop(operator, *, is_stepped=True, console=None, wall=None, **more):
+    """Return a console loop over a rig without devices; `wall` paces a person's."""
     clock = SteppedClock()
     rig = SimpleNamespace(
         clock=clock,
         backend=StubBackend(StubClient(clock)),
         simulation=None,
         is_stepped=is_stepped,
+        pace=None if wall is None else WallPace(clock, wall),
         is_simulated=True,
         settings=SimpleNamespace(
             rig=SimpleNamespace(operator=SimpleNamespace(double_tap=False))

@@ -1,6 +1,8 @@
 """Time, keys, stops and faults of the console loop, without any device."""
 
+import os
 import time
+from types import SimpleNamespace
 
 import pytest
 
@@ -8,9 +10,11 @@ from acquisition.control_loop.faults import Action, Fault, GuardVerdict
 from acquisition.control_loop.states import ArmState
 from acquisition.errors import SessionError
 from experiments.operator.prompts import Prompt
+from experiments.operator.terminal import TerminalInput
 from experiments.run.console_loop import TICK
 from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.session.sidecar import TrialName
+from fakes.clock import SteppedClock
 from tests.experiments.run.bench import Keys, make_loop
 
 NAME = TrialName(3, 2)
@@ -130,6 +134,68 @@ def test_what_slow_work_raises_is_raised(is_stepped):
 
     with pytest.raises(SessionError):
         make_loop(Keys(), is_stepped=is_stepped).run_aside(work)
+
+
+@pytest.fixture
+def keyboard():
+    """Yield the two ends of what a person types on."""
+    reads, writes = os.pipe()
+    yield reads, writes
+    os.close(reads)
+    os.close(writes)
+
+
+def waited(loop, prompt, seconds):
+    """Let a prompt wait for `seconds`; return how many passed in the world."""
+    before = loop.loop_client.advanced
+    for _ in range(round(seconds / TICK)):
+        loop.tick(prompt)
+    return loop.loop_client.advanced - before
+
+
+@pytest.mark.parametrize("prompt", [Prompt.SUPPORT, Prompt.READY, Prompt.REVIEW])
+def test_a_simulated_world_rests_while_a_person_reads(keyboard, prompt):
+    wall = SteppedClock()
+    loop = make_loop(TerminalInput(keyboard[0]), wall=wall)
+    assert waited(loop, prompt, 4.0) == pytest.approx(4.0)
+    start_ns, before = wall.now_ns(), loop.loop_client.advanced
+    assert waited(loop, prompt, 60.0) < 4.0
+    passed = (wall.now_ns() - start_ns) * 1e-9
+    assert passed + loop.loop_client.advanced - before == pytest.approx(60.0)
+
+
+def test_a_key_wakes_a_world_at_rest(keyboard):
+    loop = make_loop(TerminalInput(keyboard[0]), wall=SteppedClock())
+    waited(loop, Prompt.READY, 60.0)
+    os.write(keyboard[1], b"n")
+    assert loop.tick(Prompt.READY) == "n"
+    assert waited(loop, Prompt.READY, 4.0) == pytest.approx(4.0)
+
+
+@pytest.mark.parametrize("prompt", [Prompt.RECORDING, Prompt.MOVING, Prompt.LIFT])
+def test_a_world_that_acts_does_not_rest(keyboard, prompt):
+    loop = make_loop(TerminalInput(keyboard[0]), wall=SteppedClock())
+    assert waited(loop, prompt, 60.0) == pytest.approx(60.0)
+
+
+def test_a_world_without_a_person_does_not_rest():
+    loop = make_loop(Keys(), wall=SteppedClock())
+    assert waited(loop, Prompt.READY, 60.0) == pytest.approx(60.0)
+
+
+def test_what_is_typed_of_a_note_is_shown_while_the_world_rests(keyboard):
+    shown = []
+    console = SimpleNamespace(is_live=True, is_lost=False, width=80, panel=shown.append)
+    loop = make_loop(TerminalInput(keyboard[0]), wall=SteppedClock(), console=console)
+    console.end_panel = lambda: None
+    loop.show(lambda _: [loop.operator.draft])
+    for _ in range(500):
+        loop.line(NAME)
+    shown.clear()
+    os.write(keyboard[1], b"wet")
+    for _ in range(10):
+        assert loop.line(NAME) is None
+    assert shown[-1] == ["wet"]
 
 
 def test_a_stop_holds_the_arm():

@@ -30,7 +30,7 @@ class Bench:
         rig = shipped.rig.model_copy(update={"limits": changed})
         settings = replace(shipped, rig=rig)
         row = settings.row("TF")
-        self.rig = build_rig(settings, row, FakeOptions(is_fast=True, seed=1))
+        self.rig = build_rig(settings, row, FakeOptions("fast", seed=1))
         backend = self.rig.backend
         self.loop_client = backend.loop_client
         self.plant = self.rig.simulation.rig.plant

@@ -220,9 +220,24 @@ def test_a_trial_whose_sidecar_is_damaged_is_redone_and_the_old_one_kept(
     [
         ({"is_fast": True, "seed": 3}, 0.02),  # as it was when nobody could choose
         ({"is_fast": True, "seed": 3, "friction": 0.7}, 0.7),
-        (asdict(FakeOptions(is_fast=True, seed=3)), FRICTION),
+        (asdict(FakeOptions("fast", seed=3)), FRICTION),
     ],
 )
 def test_a_simulated_arm_rubs_on_as_it_did(fake, friction):
-    opened = fake_of({"fake": fake}, SimpleNamespace(is_fast=False))
-    assert (opened.seed, opened.friction) == (3, friction)
+    opened = fake_of({"fake": fake}, SimpleNamespace(mode=None))
+    assert (opened.seed, opened.friction, opened.mode) == (3, friction, "fast")
+
+
+@pytest.mark.parametrize(
+    ("fake", "asked", "mode"),
+    [
+        ({"is_fast": False, "seed": 3}, None, "paced"),  # processes then
+        ({"is_fast": False, "seed": 3}, "fast", "fast"),
+        ({"is_fast": True, "seed": 3}, "processes", "processes"),
+        ({"mode": "processes", "seed": 3}, None, "processes"),
+        ({"mode": "hurried", "seed": 3}, None, "paced"),
+        (None, None, "paced"),
+    ],
+)
+def test_simulated_time_passes_as_before_or_as_asked(fake, asked, mode):
+    assert fake_of({"fake": fake}, SimpleNamespace(mode=asked)).mode == mode
