@@ -12,7 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
-from acquisition.errors import TractionError
+from acquisition.errors import SettingsError, TractionError
 from acquisition.linear_algebra import openblas_settings
 from experiments.arguments import (
     add_global_options,
@@ -78,6 +78,11 @@ EXIT_CODES = """\
 exit codes: 0 done, 1 a bug, 2 usage or configuration, 3 preflight failed,
 4 device fault, 5 session left unfinished on purpose, 6 data failed verification,
 130 interrupted outside a session"""
+
+_NO_FOLDER = (
+    "The folder this was started in is gone, or may not be read. Go to another one: "
+    "cd ~   Nothing was started."
+)
 
 
 _INVALID = re.compile(r"invalid choice: '(?P<got>[^']*)' \(choose from (?P<known>.*)\)")
@@ -153,6 +158,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _complete()
     for name, value in openblas_settings().items():
         os.environ.setdefault(name, value)
+    if not _has_folder():
+        print(_NO_FOLDER, file=sys.stderr)  # noqa: T201
+        return SettingsError.exit_code
     named = with_present_names(sys.argv[1:] if arguments is None else arguments)
     parser = build_parser(set(named) & set(COMMANDS))
     try:
@@ -179,6 +187,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         return int(code) or _report_output(error)
     return int(code)
+
+
+def _has_folder() -> bool:
+    """Return whether the folder this was started in is still there."""
+    try:
+        Path.cwd()
+    except OSError:
+        return False
+    return True
 
 
 def _report_output(error: OSError) -> int:

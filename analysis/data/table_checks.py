@@ -151,6 +151,17 @@ def _wild(table: TrialTable, rows: Array) -> Iterator[str]:
     for k, floor in enumerate(_FLOORS, 1):
         size = np.abs(rows[:, k])
         size[~np.isfinite(size)] = 0.0
+        same = size == size.max()
+        others = float(size[~same].max(initial=0.0))
+        count = int(np.count_nonzero(same))
+        if 1 < count < size.size and size.max() > _WILD * max(others, floor):
+            first = int(same.argmax())
+            yield (
+                f"{COLUMNS[k]} is {rows[first, k]:.6g} in {_counted(count)}, the first "
+                f"is {table.place(first)}, elsewhere {others:.3g} at most: a word for "
+                "a missing value? Leave the cells empty"
+            )
+            continue
         spared = max(3, -(-size.size // 1000))
         usual = float(np.partition(size, -spared - 1)[-spared - 1])
         wild = np.flatnonzero(size > _WILD * max(usual, floor))

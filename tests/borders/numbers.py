@@ -82,6 +82,8 @@ _SLOW = with_column(0, lambda k, _: f"{0.05 * k:.2f}")
 _HALF = with_column(0, lambda k, _: f"{0.004 * k:.3f}")
 _SPIKED = VALUES.copy()
 _SPIKED[30, 3] = 1e6
+_SENTINELS = VALUES.copy()
+_SENTINELS[20:22, 2] = 9999
 
 NUMBERS: tuple[Border, ...] = (
     refused(
@@ -290,6 +292,12 @@ NUMBERS: tuple[Border, ...] = (
         text(_DECADE[0]),
         "gap of 3.15e+08 s before line 32",
         expected=_DECADE[1],
+    ),
+    flagged(
+        "9999 for a missing value, in 4 % of the rows",
+        text(with_column(2, lambda k, old: "9999" if k in {20, 21} else old)),
+        "F_n is 9999 in 2 rows, the first is line 22",
+        expected=_SENTINELS,
     ),
     flagged(
         "one row of 1e6 N",

@@ -3,12 +3,14 @@
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 from experiments.settings.load import load_settings
 from tests.experiments.program import traction, write_config
 
+ROOT = Path(__file__).parents[2]
 CLOSED = {"stdin": 0, "stdout": 1, "stderr": 2}
 
 
@@ -104,3 +106,18 @@ def test_an_error_names_the_file_that_was_given(tmp_path):
     assert done.code == 2
     assert done.err.startswith("arm-2.toml: ")
     assert "rig.toml" not in done.err
+
+
+def test_a_folder_that_is_gone_is_told(tmp_path):
+    command = 'mkdir gone && cd gone && rmdir ../gone && exec "$@"'
+    done = subprocess.run(
+        ["bash", "-c", command, "start", sys.executable, "-m", "traction", "status"],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path,
+        env={**os.environ, "TMPDIR": str(tmp_path), "PYTHONPATH": str(ROOT)},
+    )
+    assert done.returncode == 2
+    assert "The folder this was started in is gone" in done.stderr
+    assert list(tmp_path.iterdir()) == []  # no log of a bug
