@@ -22,6 +22,7 @@ _IN_VAIN = Cell(
     " does not turn although the arm is commanded to move.",
     why="seen when the move turns the motor in vain, at the latest in the next move",
 )
+_STEP = Cell(End.COMPLETE, why="in a move the step is followed like any other way")
 _MET = Cell(
     End.UNMEASURED,
     " N on the foot beyond its weight (limit 40)",
@@ -53,6 +54,7 @@ _OWN = {
     "torque-limit": _too_fast("Joint 2 was asked for "),
     "foot-speed": _too_fast("The foot moved at "),
     "lie-of-motor-3": _IN_VAIN,
+    **{f"lie-of-motor-{motor}": _STEP for motor in (1, 2, 5, 6)},
     "contact-force": _MET,
     "second-command": OTHER_REFUSED,
 }
