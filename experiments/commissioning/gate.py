@@ -30,7 +30,7 @@ class Lack:
     @property
     def text(self) -> str:
         """Return it in one line."""
-        return f"{self.step} {self.step.title}: {self.cause}"
+        return f"{self.step} {self.step.words}: {self.cause}"
 
 
 def bases_of(step: Step) -> list[str]:

@@ -125,6 +125,7 @@ class Commissioning(_Part):
     Attributes:
         version: of the file.
         program: version that wrote it.
+        is_simulated: the arm is.
         serials: of the seven motor pucks; None = not known.
         steps: what was done.
         signed: the two names typed at the end; () = it has not ended.
@@ -132,6 +133,7 @@ class Commissioning(_Part):
 
     version: Literal[1] = VERSION
     program: Word
+    is_simulated: bool = False
     serials: tuple[int | None, ...] = Field(default=(), max_length=7)
     steps: Many[StepRecord] = ()
     signed: tuple[Word, ...] = Field(default=(), max_length=2)
@@ -185,7 +187,7 @@ def read_commissioning(folder: Path) -> Commissioning | None:
     broken = found.first_broken()
     if broken is not None:
         raise SettingsError(
-            f"{path} was changed at or before {broken} {broken.title}: its digest is "
+            f"{path} was changed at or before {broken} {broken.words}: its digest is "
             "not that of what stands there.",
             hint=_ANEW,
         )

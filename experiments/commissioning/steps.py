@@ -28,7 +28,7 @@ class Step(StrEnum):
     PLATE = "C14"
 
     @property
-    def title(self) -> str:
+    def words(self) -> str:
         """What it looks at, in words."""
         return self.name.replace("_", " ").lower()
 

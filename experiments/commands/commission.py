@@ -1,0 +1,176 @@
+"""traction commission: the first day of an arm, guided, each step one proof."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import TYPE_CHECKING
+
+from experiments.arguments import add_simulated_arm, friction_share
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from experiments.commissioning.guide import RecordFolder
+    from experiments.commissioning.steps import Step
+    from experiments.operator.console import Console
+    from experiments.operator.prompts import OperatorInput
+    from experiments.rig.rig import FakeOptions
+    from experiments.settings.load import Settings
+
+EXAMPLES = """\
+  traction commission --config lab/rig.toml what is not done or stale, step by step
+  traction commission --fake --fast --until C3    the first steps, simulated devices"""
+
+FAKE_FOLDER = "commissioning.fake"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `commission`."""
+    parser.add_argument(
+        "--from",
+        dest="first",
+        metavar="STEP",
+        help="begin with this step and do all from there again, e.g. C8",
+    )
+    parser.add_argument(
+        "--until", dest="last", metavar="STEP", help="end after this step, e.g. C4"
+    )
+    parser.add_argument(
+        "--recheck",
+        action="store_true",
+        help="judge the recordings again, no device is touched",
+    )
+    parser.add_argument("--operator", metavar="NAME", help="who does it (login name)")
+    parser.add_argument("--witness", metavar="NAME", help="who stands by")
+    parser.add_argument("--fake", action="store_true", help="simulated devices")
+    parser.add_argument(
+        "--fast", action="store_true", help="stepped time, only with --fake"
+    )
+    add_simulated_arm(parser)
+    parser.add_argument(
+        "--operator-script", metavar="auto", help="simulated operator, only with --fake"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Do the steps that are due and return the exit code."""
+    from experiments.commissioning.guide import RecordFolder, recheck
+    from experiments.operator.console import Console
+    from experiments.operator.scripted import choose_operator
+    from experiments.rig.rig import FakeOptions
+    from experiments.settings.load import load_settings
+
+    steps = _steps(args)
+    friction = friction_share(args)
+    settings = load_settings(args.config)
+    console = Console(color=not args.no_color)
+    folder = _folder(settings, is_fake=args.fake)
+    files = RecordFolder.open(folder, is_simulated=args.fake)
+    if args.recheck:
+        return 0 if recheck(files, console) else 6
+    operator = choose_operator(args.operator_script, is_fake=args.fake)
+    fake: FakeOptions | None = None
+    if args.fake:
+        fake = FakeOptions(args.fast, args.seed, friction, cables=args.cables)
+    persons = (args.operator or operator.who, args.witness or "")
+    kind = "SIMULATED" if args.fake else "LIVE RIG"
+    console.say(f"traction commission        {kind} · {files.folder}")
+    code = _sittings(args, settings, fake, steps, files, persons, console, operator)
+    if code == 0:
+        _end(files, console, persons)
+    return code
+
+
+def _sittings(
+    args: argparse.Namespace,
+    settings: Settings,
+    fake: FakeOptions | None,
+    steps: Sequence[Step],
+    files: RecordFolder,
+    persons: tuple[str, str],
+    console: Console,
+    operator: OperatorInput,
+) -> int:
+    """Do the steps, as many on one connection as can be; return the exit code."""
+    from experiments.commissioning.guide import do_step, wanted
+    from experiments.commissioning.scene import Scene
+    from experiments.commissioning.work import SITTINGS
+    from experiments.operator.terminal import keyboard
+    from experiments.preflight.connecting import connect_rig
+    from experiments.rig.bus_log import logging_bus
+    from experiments.run.console_loop import ConsoleLoop
+    from experiments.run.pose_walk import INTERRUPTED
+    from experiments.run.stop import StopFlag, StopRequestedError, handle_signals
+
+    stop = StopFlag()
+    row = settings.matrix.terrains[0]
+    is_anew = args.first is not None
+    for sitting in SITTINGS:
+        rig = connect_rig(settings, row, fake)
+        with logging_bus(rig, None, console), handle_signals(stop), keyboard(operator):
+            scene = Scene(rig, ConsoleLoop(rig, console, operator, stop))
+            due = [step for step in sitting if step in steps]
+            try:
+                for step in wanted(scene, due, files, is_anew=is_anew):
+                    if do_step(scene, step, files, persons).cause:
+                        return 3
+                    if stop.count:
+                        raise StopRequestedError
+            except StopRequestedError:
+                console.say(
+                    "Stopped as asked. The steps that were done are kept; "
+                    "traction commission goes on with the next."
+                )
+                return INTERRUPTED
+            finally:
+                scene.console_loop.make_safe()
+    return 0
+
+
+def _end(files: RecordFolder, console: Console, persons: tuple[str, str]) -> None:
+    """Ask for the two names once everything is done."""
+    from experiments.commissioning.work import WORK
+
+    done = {each.step for each in files.record.steps}
+    missing = [step for step in WORK if step not in done]
+    if missing:
+        console.say(f"Still to do: {', '.join(missing)}.")
+        return
+    names = persons if persons[1] else (persons[0], persons[0])
+    if sys.stdin is not None and sys.stdin.isatty() and not persons[1]:
+        console.say("Name of the person who did it, then Enter:")
+        first = sys.stdin.readline().strip() or persons[0]
+        console.say("Name of the person who stood by, then Enter:")
+        names = (first, sys.stdin.readline().strip())
+    files.sign(names)
+    console.say(f"Written and signed: {files.folder / 'commissioning.json'}.")
+
+
+def _steps(args: argparse.Namespace) -> list[Step]:
+    from acquisition.errors import SettingsError
+    from experiments.commissioning.work import WORK
+
+    if not args.fake and (args.fast or args.operator_script):
+        raise SettingsError(
+            "--fast and --operator-script work only with --fake.",
+            hint="Nothing was started.",
+        )
+    known = list(WORK)
+    ends = [args.first or known[0], args.last or known[-1]]
+    for name in ends:
+        if name not in known:
+            raise SettingsError(
+                f"There is no step {name!r}.",
+                hint=f"Steps: {' '.join(known)}. Nothing was started.",
+            )
+    first, last = (known.index(name) for name in ends)
+    return known[first : last + 1]
+
+
+def _folder(settings: Settings, *, is_fake: bool) -> Path:
+    folder = settings.folder / FAKE_FOLDER if is_fake else settings.folder
+    if is_fake:
+        folder.mkdir(exist_ok=True)
+    return folder

@@ -1,0 +1,132 @@
+"""Each step: how it is collected, how it is judged, and what to do if it fails."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+
+from experiments.commissioning import bus, configuration, rest_pose, stop_circuit
+from experiments.commissioning.limits import Judgement
+from experiments.commissioning.recording import Values
+from experiments.commissioning.scene import Scene
+from experiments.commissioning.steps import Step
+from experiments.rig.rig import Rig
+
+
+@dataclass(frozen=True, slots=True)
+class StepWork:
+    """One step.
+
+    Attributes:
+        collect: returns what was recorded.
+        judge: returns what came of that; it looks at nothing else.
+        needs_loop: the loop runs, the arm is zeroed or not.
+        minutes: it takes about so long.
+        way_back: what to do where it fails.
+    """
+
+    collect: Callable[[Scene], Values]
+    judge: Callable[[Values], Judgement]
+    minutes: float
+    way_back: str
+    needs_loop: bool = False
+    needs_zero: bool = False
+
+
+def _shown(
+    work: Callable[[Rig], Iterator[tuple[float, Values]]], what: str
+) -> Callable[[Scene], Values]:
+    def collect(scene: Scene) -> Values:
+        values: Values = {}
+        for share, values in work(scene.rig):  # noqa: B007
+            scene.show_share(share, what)
+            if scene.console_loop.stop.count:
+                break
+        return values
+
+    return collect
+
+
+def _identify(scene: Scene) -> Values:
+    values = bus.identify(scene.rig)
+    scene.answers = scene.rig.backend.arm.answers()
+    return values
+
+
+def _time(scene: Scene) -> Values:
+    if scene.info is None:
+        scene.info = scene.rig.backend.start_arm()
+        scene.answers = scene.rig.backend.arm.answers()
+    return _shown(bus.time_replies, "the loop runs, the arm idle")(scene)
+
+
+WORK: Mapping[Step, StepWork] = {
+    Step.CONFIGURATION: StepWork(
+        lambda scene: configuration.collect(scene.rig),
+        configuration.judge,
+        1,
+        "Correct the file, or measure again what it says.",
+    ),
+    Step.LISTEN: StepWork(
+        _shown(bus.listen, "listening, nothing is sent"),
+        bus.judge_silence,
+        1,
+        "End the other program; look at cable, terminators and bit rate.",
+    ),
+    Step.IDENTITY: StepWork(
+        _identify,
+        bus.judge_identity,
+        1,
+        "Is this the arm and the puck it should be? What is right as it is goes into "
+        "the file that [arm] properties of rig.toml names.",
+    ),
+    Step.TIMING: StepWork(
+        _time,
+        bus.judge_timing,
+        2,
+        "Use another adapter or computer, and end other programs on the bus.",
+    ),
+    Step.STOP_CIRCUIT: StepWork(
+        stop_circuit.collect,
+        stop_circuit.judge,
+        5,
+        "Do not go on without a stop that works: pendant, its cable, the module.",
+        needs_loop=True,
+    ),
+    Step.REST_POSE: StepWork(
+        rest_pose.rest,
+        rest_pose.judge_rest,
+        5,
+        "Lay the arm down again with nothing leaning on it; look at the mounting.",
+        needs_loop=True,
+        needs_zero=True,
+    ),
+    Step.RAMPS: StepWork(
+        rest_pose.ramps,
+        rest_pose.judge_ramps,
+        2,
+        "Switch the arm off and look at the motor that is named, and its cables.",
+        needs_loop=True,
+        needs_zero=True,
+    ),
+    Step.LIFT: StepWork(
+        rest_pose.lift,
+        rest_pose.judge_lift,
+        2,
+        "Weigh the foot; look at the zero position and at the drive cables.",
+        needs_loop=True,
+        needs_zero=True,
+    ),
+    Step.GRAVITY_RAMP: StepWork(
+        rest_pose.gravity_ramp,
+        rest_pose.judge_gravity_ramp,
+        1,
+        "Weigh the foot; look at mounting, zero position and gravity calibration.",
+        needs_loop=True,
+        needs_zero=True,
+    ),
+}
+# Steps that share one connection to the rig. A stop takes power and positions away.
+SITTINGS: tuple[tuple[Step, ...], ...] = (
+    (Step.CONFIGURATION, Step.LISTEN, Step.IDENTITY, Step.TIMING),
+    (Step.STOP_CIRCUIT,),
+    (Step.REST_POSE, Step.RAMPS, Step.LIFT, Step.GRAVITY_RAMP),
+)
