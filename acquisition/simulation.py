@@ -1,12 +1,53 @@
 """What a simulated rig offers beyond a real one, whichever process it runs in."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
 from acquisition.sample import Record
 
 
-class SimulationControl(Protocol):
+class Hands(Protocol):
+    """A person who brings a simulated arm to poses and loads its foot."""
+
+    @property
+    def is_hand_done(self) -> bool:
+        """Whether the hand has come to the end of its last order, and holds still."""
+        ...
+
+    def pose(self, q: Sequence[float], seconds: float) -> None:
+        """Let two hands bring the joints truly to `q` [rad] in `seconds`, shape (7,).
+
+        They bear the arm's weight and hold it there until another order, or `let_go`.
+        No stop lets a joint further than it gives. The container is out of the way.
+        """
+        ...
+
+    def turn_to_stop(self, joint: int, side: Literal["low", "high"]) -> None:
+        """Let two hands turn joint 1-7 until its mechanical stop bears.
+
+        They hold it there, and the other joints where they are. The container is out
+        of the way.
+        """
+        ...
+
+    def let_go(self) -> None:
+        """Let the hand let go of the arm."""
+        ...
+
+    def hang(self, mass: float) -> None:
+        """Hang `mass` [kg] on a string from the centre of the sole; 0 takes it off.
+
+        It pulls where gravity truly does.
+        """
+        ...
+
+    def push_with(self, force: Sequence[float], seconds: float) -> None:
+        """Push the sole with `force` [N] in the base frame, shape (3,), so long [s]."""
+        ...
+
+
+class SimulationControl(Hands, Protocol):
     """Hand, pendant, ground and faults of a simulated rig."""
 
     @property
@@ -28,10 +69,6 @@ class SimulationControl(Protocol):
 
     def take(self) -> None:
         """Let the hand take the arm where it is and hold it there."""
-        ...
-
-    def let_go(self) -> None:
-        """Let the hand let go of the arm."""
         ...
 
     def put_down(self) -> None:

@@ -20,7 +20,7 @@ import pinocchio as pin
 from acquisition.clock import PERIOD_NS
 from fakes.ground.contact import NO_CONTACT
 from fakes.ground.terrain import Terrain
-from fakes.plant.joints import JointDrives, JointLoads, JointState
+from fakes.plant.joints import GripTorques, JointDrives, JointLoads, JointState
 from fakes.plant.model import ArmAndHand
 from fakes.plant.push import HandView, Vector3
 from wam.model.constants import Array
@@ -35,10 +35,14 @@ class HandLoad(NamedTuple):
     Attributes:
         force: on the hand point, with the weight that the person carries [N].
         grip: GRIP or NO_GRIP.
+        sole: force on the sole beside the ground's [N]; None = none.
+        links: of hands on the links; None = there are none.
     """
 
     force: Vector3
     grip: tuple[float, float]
+    sole: Vector3 | None = None
+    links: GripTorques | None = None
 
 
 _LIFTED = [1, 3]  # joints 2 and 4
@@ -82,6 +86,7 @@ class ArmBody:
         self._is_held = True
         self._sum = _NOTHING
         self._force, self._grip = (0.0, 0.0, 0.0), NO_GRIP
+        self._pull: Vector3 | None = None
         self._joints = JointState(q, self._dt)
         self._loads = JointLoads(j2mp)
         pin.forwardKinematics(self._model, self._data, q)
@@ -126,6 +131,24 @@ class ArmBody:
         x, z = np.linalg.lstsq(lifted.T, weight[_LIFTED], rcond=0.05)[0].tolist()
         return x, 0.0, z
 
+    def bearing(self, hand: Vector3, sole: Vector3 | None) -> Array:
+        """Return the torques that bear what neither motors nor these forces do, (7,).
+
+        Args:
+            hand: force on the hand point [N].
+            sole: force on the sole [N]; None = none.
+        """
+        weight = pin.computeGeneralizedGravity(self._model, self._data, self.q)
+        borne = self.drives.driven + self._loads.A[6:9].T.dot(hand)
+        if sole is not None:
+            borne = borne + self._loads.A[:3].T.dot(sole)
+        return weight - borne
+
+    def keep_turn(self) -> None:
+        """Let the hand keep the turn that the forearm has now."""
+        hand = pin.updateFramePlacement(self._model, self._data, self._hand)
+        self._wanted = hand.rotation.copy()
+
     def counts(self) -> list[float]:
         """Return what the encoders of the motors count, seven."""
         return self.drives.counts(self.q).tolist()
@@ -162,7 +185,7 @@ class ArmBody:
 
     def begin_cycle(self, load: HandLoad, t_ns: int) -> None:
         """Take anew what stays as it is for 2 ms from `t_ns` on."""
-        self._force, self._grip = load
+        self._force, self._grip, self._pull, self.drives.grip = load
         self._begin_drives(t_ns)
 
     def go_on(self, steps: int, terrain: Terrain | None) -> None:
@@ -191,6 +214,9 @@ class ArmBody:
             k, b = self._grip
             ex, ey, ez = self._tilt
             turned = (k * ex - b * wx, k * ey - b * wy, k * ez - b * wz)
+            if self._pull is not None:
+                px, py, pz = self._pull
+                F_t, F_y, F_n = F_t - px, F_y + py, F_n + pz
             self._integrate((-F_t, F_y, F_n, M_x, M_y, M_z, *self._force, *turned))
 
     def _integrate(self, wrench: tuple[float, ...]) -> None:

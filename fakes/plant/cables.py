@@ -88,7 +88,7 @@ class CableDrives(JointDrives):
 
         Arguments as of JointDrives.
         """
-        if self._stopping.is_near:
+        if self._stopping.is_near or self.grip is not None:
             self._stop(rows)
             self._resist(())
         dt, bristles = self._dt, self._bristles
@@ -110,10 +110,15 @@ class CableDrives(JointDrives):
 
     def _resist(self, speeds: Sequence[float]) -> None:
         del speeds
-        self.armature = self._dt * np.array(self._stopping.damping)
+        damping = np.array(self._stopping.damping)
+        if self.grip is not None:
+            damping = damping + self.grip.against(self._dt)
+        self.armature = self._dt * damping
 
     def _add_up(self) -> None:
         driving = self.disturbance
         if self._stopping.is_near:
             driving = driving + self._stopping.torques
+        if self.grip is not None:
+            driving = driving + self.grip.at(self._held_at)
         self.driving = driving.tolist()

@@ -8,6 +8,7 @@ from enum import Enum, auto
 
 import numpy as np
 
+from fakes.plant.grip import JointGrip
 from fakes.plant.push import (
     LATERAL_B,
     LATERAL_K,
@@ -43,6 +44,7 @@ class HandPhase(Enum):
     CARRY = auto()
     REST = auto()
     PUSH = auto()
+    POSE = auto()
     AWAY = auto()
 
 
@@ -57,6 +59,7 @@ class Hand:
         self._moved = 0.0
         self._speed = SPEED
         self._push: Push | None = None
+        self._grip: JointGrip | None = None
         self._pending: tuple[Pace, np.random.Generator] | None = None
         self._anchor = 0.0
         self._rests_then = False
@@ -64,12 +67,19 @@ class Hand:
     @property
     def is_done(self) -> bool:
         """Whether the last carrying has come to its end."""
+        if (grip := self.grip) is not None:
+            return grip.is_done
         return self.phase is not HandPhase.CARRY or not self._path
 
     @property
     def is_holding(self) -> bool:
         """Whether the hand is on the arm."""
         return self.phase is not HandPhase.AWAY
+
+    @property
+    def grip(self) -> JointGrip | None:
+        """What two hands on the links do; None = they are not there."""
+        return self._grip if self.phase is HandPhase.POSE else None
 
     def carry(self, *points: Vector3) -> None:
         """Carry the sole through `points` (terrain frame) and hold it there."""
@@ -102,6 +112,11 @@ class Hand:
         """Stop where it is and lie on the arm."""
         self.carry()
         self._rests_then = True
+
+    def hold_links(self, grip: JointGrip) -> None:
+        """Take the links with two hands, and move them as `grip` does."""
+        self.phase = HandPhase.POSE
+        self._grip = grip
 
     def let_go(self) -> None:
         """Take the hand away."""

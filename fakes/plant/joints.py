@@ -30,6 +30,36 @@ class StopForces(NamedTuple):
     is_near: bool
 
 
+class GripTorques(NamedTuple):
+    """What hands on the links do at the joints in a cycle; shapes (7,).
+
+    tau = torques + K (target - q) - (B + K dt) qd', implicitly in the speed at the end
+    of a step, so that a stiff grip stays stable.
+
+    Attributes:
+        torques: that bear and hurry the joints [N m].
+        stiffness: K [N m/rad].
+        damping: B [N m s/rad].
+        target: joint positions that are wanted [rad].
+        strongest: that the springs pull [N m].
+    """
+
+    torques: Array
+    stiffness: Array
+    damping: Array
+    target: Array
+    strongest: Array
+
+    def at(self, q: Array) -> Array:
+        """Return what does not depend on the speed, at `q` [rad], [N m], shape (7,)."""
+        pull = self.stiffness * (self.target - q)
+        return self.torques + np.clip(pull, -self.strongest, self.strongest)
+
+    def against(self, dt: float) -> Array:
+        """Return the damping over a step of `dt` [s], [N m s/rad], shape (7,)."""
+        return self.damping + dt * self.stiffness
+
+
 class JointStops:
     """Stops of the seven joints: springs with dampers."""
 
@@ -71,6 +101,7 @@ class JointDrives:
         disturbance: joint torques from outside [N m], shape (7,).
         driving: torques that drive the joints whatever they do in a step [N m], seven.
         stops: of the joints.
+        grip: of hands on the links; None = nobody has them.
         armature: inertia of the drives and dt D [kg m^2], shape (7,).
     """
 
@@ -105,6 +136,8 @@ class JointDrives:
         self.disturbance = np.zeros(7)
         self.stops = JointStops(constants)
         self._stopping = _CLEAR
+        self.grip: GripTorques | None = None
+        self._held_at = np.zeros(7)  # where the hands find the joints
         self.armature = self._inertia
         self.drive([0.0] * 7)
 
@@ -127,6 +160,11 @@ class JointDrives:
     def sent(self) -> list[float]:
         """Return the torques applied to motors 1 to 7 [N m]."""
         return [u / ipnm for u, ipnm in zip(self._units, self._ipnm, strict=True)]
+
+    @property
+    def driven(self) -> Array:
+        """Torques with which the motors drive the joints [N m], shape (7,)."""
+        return self._tau
 
     def rest(self) -> None:
         """Unbend the bristles of an arm that something bears."""
@@ -151,7 +189,7 @@ class JointDrives:
         Near a stop, and where a motor is fast, the resistance is taken anew before.
         Arguments as of `begin_cycle`.
         """
-        if self._stopping.is_near:
+        if self._stopping.is_near or self.grip is not None:
             self._stop(rows)
             self._resist(speeds)
         elif self._is_lively or self._is_other:
@@ -172,6 +210,7 @@ class JointDrives:
             self._bristles.bear(self._j2mp.dot(rows[0]).tolist(), net)
 
     def _stop(self, rows: Array) -> None:
+        self._held_at = rows[0]
         self._stopping = self.stops.at(*rows[:2].tolist())
         self._add_up()
 
@@ -184,6 +223,8 @@ class JointDrives:
         armature = self._dampings.dot(damping)
         if self._stopping.is_near:
             armature += self._stopping.damping
+        if self.grip is not None:
+            armature += self.grip.against(self._dt)
         armature *= self._dt
         armature += self._inertia
         self._is_other = False
@@ -193,6 +234,8 @@ class JointDrives:
         driving = self._tau + self.disturbance
         if self._stopping.is_near:
             driving += self._stopping.torques
+        if self.grip is not None:
+            driving += self.grip.at(self._held_at)
         self.driving: list[float] = driving.tolist()
 
 

@@ -16,6 +16,7 @@ from fakes.plant.body import GRIP, NO_GRIP, ArmBody, HandLoad
 from fakes.plant.cables import CableDrives
 from fakes.plant.friction import draw_friction
 from fakes.plant.gauges import Wrench, WristGauges
+from fakes.plant.grip import Ends, JointGrip, PoseWay, Side, StopWay
 from fakes.plant.hand import Hand
 from fakes.plant.joints import JointDrives
 from fakes.plant.model import (
@@ -27,6 +28,7 @@ from fakes.plant.model import (
     motor_inertia,
     motor_weights,
 )
+from fakes.plant.push import Vector3
 from fakes.plant.windings import shorted_damping
 from fakes.plant.wiring import Wiring
 from fakes.truth import Truth
@@ -49,6 +51,7 @@ class ArmPlant:
         terrain: the ground; None = the foot hangs above nothing.
         hand: the operator's.
         finger: force of a person who touches the foot, terrain frame [N].
+        hung: mass that hangs on a string from the centre of the sole [kg].
         t_ns: how far the world has gone on [ns].
         truth: what really happened; None = not written down.
         friction: of the motors.
@@ -72,7 +75,8 @@ class ArmPlant:
         weights = motor_weights(parts.model, constants, q)
         drawn = draw_friction(constants, options.friction, options.seed, weights)
         self.friction = drawn if options.motors is None else options.motors
-        up = -frame.axes().dot(options.down)
+        self._axes, self._down = frame.axes(), _unit(options.down)
+        up = -self._axes.dot(self._down)
         self._up: list[float] = (up * forearm * GRAVITY).tolist()
         self.support = options.support
         self._stand = q.copy()
@@ -82,6 +86,11 @@ class ArmPlant:
         self.terrain: Terrain | None = None
         self.hand = Hand(PERIOD_NS * 1e-9, is_there=options.has_hand)
         self.finger = (0.0, 0.0, 0.0)
+        self.hung = 0.0
+        self._pushed: tuple[Array, int] = (np.zeros(3), 0)  # at the sole [N], until
+        self._pull: Vector3 | None = None  # at the sole beside the ground's [N]
+        self._ends = Ends(constants.q_lower, constants.q_upper)
+        self._has_links = False
         self.t_ns = 0
         self.truth: Truth | None = None
         self.wiring: Wiring | None = None
@@ -118,6 +127,11 @@ class ArmPlant:
     def q(self, q: Array) -> None:
         self._body.move(q)
         self._stand = q.copy()  # it is put there, its stand too
+
+    @property
+    def ends(self) -> Ends:
+        """Where the joints really end."""
+        return self._ends
 
     @property
     def qd(self) -> Array:
@@ -209,6 +223,19 @@ class ArmPlant:
         """Speed of the sole [m/s]."""
         return float(np.linalg.norm(self._body.motion()[3:6]))
 
+    def pose(self, q: Sequence[float], seconds: float) -> None:
+        """Let two hands bring the joints to `q` [rad] in `seconds`, and hold them."""
+        self._grip_links(JointGrip(PoseWay(q, seconds, self._ends)))
+
+    def turn_to_stop(self, joint: int, side: Side) -> None:
+        """Let two hands turn joint 1-7 until its stop bears; the others stay."""
+        self._grip_links(JointGrip(StopWay(joint, side, self._ends)))
+
+    def push_with(self, force: Sequence[float], seconds: float) -> None:
+        """Let a person push the sole with `force` [N], base frame, for `seconds`."""
+        until_ns = self.t_ns + round(1e9 * seconds)
+        self._pushed = self._axes.dot(np.array(force, dtype=np.float64)), until_ns
+
     def start_truth(self) -> None:
         """Begin to write down what really happens."""
         self.truth = Truth()
@@ -218,9 +245,15 @@ class ArmPlant:
         taken, self.truth = self.truth or Truth(), None
         return taken
 
+    def _grip_links(self, grip: JointGrip) -> None:
+        self.hand.hold_links(grip)
+        self._lay_down()
+
     def _lay_down(self) -> None:
         """Find out whether something bears the arm."""
-        if self.support is Support.PERSON:
+        if self.hand.grip is not None:
+            is_held = False
+        elif self.support is Support.PERSON:
             is_held = self._is_idle or not self._is_pulled
         else:
             is_held = (
@@ -236,11 +269,27 @@ class ArmPlant:
         """Take anew what stays as it is for 2 ms."""
         if self._is_idle and not self._is_held:
             self._lay_down()
-        body = self._body
+        body, links = self._body, self.hand.grip
         self._push = self.hand.step(body.linearise())
-        x, y, z = self._lift()
-        grip = GRIP if self.hand.is_holding else NO_GRIP
-        body.begin_cycle(HandLoad((x, y, z), grip), self.t_ns)
+        if self._has_links and links is None:
+            body.keep_turn()
+        self._has_links = links is not None
+        force, self._pull = self._lift(), self._pull_at_sole()
+        grip = GRIP if self.hand.is_holding and links is None else NO_GRIP
+        torques = None
+        if links is not None:
+            torques = links.step(self.q, body.bearing(force, self._pull))
+        body.begin_cycle(HandLoad(force, grip, self._pull, torques), self.t_ns)
+
+    def _pull_at_sole(self) -> Vector3 | None:
+        """Return the force of what hangs there or pushes, terrain frame [N]."""
+        pushed, until_ns = self._pushed
+        is_pushed = self.t_ns < until_ns
+        if not (self.hung or is_pushed):
+            return None
+        force = self.hung * GRAVITY * self._axes.dot(self._down)
+        x, y, z = (force + pushed if is_pushed else force).tolist()
+        return x, y, z
 
     def _lift(self) -> tuple[float, float, float]:
         """Return the force of the hand with what the person carries [N].
@@ -248,7 +297,8 @@ class ArmPlant:
         That is the own forearm, and soon after it went idle the arm.
         """
         (x, y, z), (ux, uy, uz) = self._push, self._up
-        if self._is_idle and self.hand.is_holding and not self._is_held:
+        is_borne = self._is_held or self.hand.grip is not None
+        if self._is_idle and self.hand.is_holding and not is_borne:
             heavy = 1e-9 * (self.t_ns - self._heavy_since_ns)
             share = min(max((heavy - _NOTICED) / (_BORNE - _NOTICED), 0.0), 1.0)
             bx, by, bz = self._body.burden()
@@ -264,8 +314,16 @@ class ArmPlant:
         self._ground = x, y, z, tx, ty, tz = x / n, y / n, z / n, tx / n, ty / n, tz / n
         # The hand that holds the arm gives way to nothing that small.
         fx, fy, fz = self.finger
+        if self._pull is not None:
+            px, py, pz = self._pull
+            fx, fy, fz = fx + px, fy + py, fz + pz
         felt = (x + fx, y + fy, z + fz, tx, ty, tz)
         self._wrist.end_cycle(self._body.rotation, felt, motion[3:])
         if self.truth is not None:
             row = (*self.q.tolist(), *motion[:6], -x, y, z, *self._push)
             self.truth.add(self.t_ns, row)
+
+
+def _unit(vector: Sequence[float]) -> Array:
+    """Return `vector` with length one, shape (3,)."""
+    return np.array(vector) / np.linalg.norm(vector)

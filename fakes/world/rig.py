@@ -1,6 +1,6 @@
 """The whole simulated rig: arm, pucks, sensor, ground and hand, and its handle."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,6 +11,7 @@ from acquisition.sample import Record
 from fakes.bus.in_process import FakeCanBus
 from fakes.clock import SteppedClock
 from fakes.ground.terrain import Container, Terrain, make_terrain
+from fakes.plant.grip import Side
 from fakes.plant.hand import touched_place
 from fakes.plant.model import PlantOptions
 from fakes.plant.plant import ArmPlant
@@ -227,8 +228,32 @@ class LocalSimulation:
         """Rake the bed for `trial` and begin to write the truth."""
         self.rig.rake(trial)
 
+    @property
+    def is_hand_done(self) -> bool:
+        """Whether the hand has come to the end of its last order."""
+        return self.rig.plant.hand.is_done
+
+    def pose(self, q: Sequence[float], seconds: float) -> None:
+        """Let two hands bring the joints truly to `q` [rad] in `seconds`."""
+        self.rig.plant.terrain = None  # the container is moved aside
+        self.rig.plant.pose(q, seconds)
+
+    def turn_to_stop(self, joint: int, side: Side) -> None:
+        """Let two hands turn joint 1-7 until its stop bears, and hold it there."""
+        self.rig.plant.terrain = None
+        self.rig.plant.turn_to_stop(joint, side)
+
+    def hang(self, mass: float) -> None:
+        """Hang `mass` [kg] on a string from the centre of the sole; 0 = nothing."""
+        self.rig.plant.hung = mass
+
+    def push_with(self, force: Sequence[float], seconds: float) -> None:
+        """Push the sole with `force` [N], base frame, for `seconds`."""
+        self.rig.plant.push_with(force, seconds)
+
     def lift(self) -> None:
         """Let the hand carry the foot above the far end and hold it still."""
+        self._roll_in()
         self.rig.plant.hand.lift_to_start()
 
     def rest(self) -> None:
@@ -245,6 +270,7 @@ class LocalSimulation:
 
     def put_down(self) -> None:
         """Let the hand put the foot down at the far end."""
+        self._roll_in()
         self.rig.plant.hand.put_down(self.rig.ground.surface(0.0))
 
     def touch(self, number: int) -> None:
@@ -253,8 +279,13 @@ class LocalSimulation:
         1 to 4: far left, far right, near left, near right, seen from the arm; more:
         points between them.
         """
+        self._roll_in()
         x, y = touched_place(number, self.rig.scene.frame.travel)
         self.rig.plant.hand.touch(x, y, self.rig.ground.surface(x))
+
+    def _roll_in(self) -> None:
+        """Put the container where it belongs."""
+        self.rig.plant.terrain = self.rig.ground
 
     def push(self) -> None:
         """Let the hand push the foot across."""
