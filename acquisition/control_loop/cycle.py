@@ -217,6 +217,8 @@ class Cycle:
                 self.law.stand(stance, reading)
             elif proof is not None:
                 self.law.prove(proof, reading)
+                # It was laid onto its stops, from wherever it was.
+                self._guard = replace(self._guard, armed=0)
         except ValueError:
             self.report(verdict_for(Fault.MOVE_REFUSED))
 

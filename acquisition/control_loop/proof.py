@@ -13,7 +13,8 @@ class ProofKind(IntEnum):
     """What is given to the arm.
 
     REST: nothing. RAMP: a torque of one joint that grows evenly, until the joint has
-    moved. LIFT: a bounded torque that takes one joint slowly off its stop and back.
+    moved. LIFT: a bounded torque that takes one joint slowly off its stop and back, and
+    a small one that keeps the other joint of its motors where it is.
     GRAVITY: a share of the compensation of gravity that grows to the whole.
     """
 
@@ -52,6 +53,9 @@ class ProofGoal:
         return cls(ProofKind(int(kind)), int(joint), torque, seconds)
 
 
+PARTNERS = {2: 3, 3: 2, 5: 6, 6: 5}  # joints that two motors turn together
+
+
 @dataclass(frozen=True, slots=True)
 class ProofLimits:
     """How far joints may go in a proof.
@@ -60,6 +64,8 @@ class ProofLimits:
         rest: of each joint without torque [rad], seven.
         reach: of the joint that is pushed; then it has moved [rad], seven.
         aside: of every other joint [rad].
+        partner: of the other joint of the same two motors [rad]: where their friction
+            differs, one of them slides first and turns it.
         lift_way: of a joint that is lifted [rad].
         lift_speed: of it [rad/s].
         beyond: of what is aimed at, on the way it is pushed [rad].
@@ -70,11 +76,16 @@ class ProofLimits:
     rest: Sequence[float] = (0.008, 0.015, 0.015, 0.015, 0.030, 0.030, 0.030)
     reach: Sequence[float] = (0.008, 0.008, 0.008, 0.008, 0.015, 0.015, 0.020)
     aside: float = 0.025
+    partner: float = 0.045
     lift_way: float = 0.080
     lift_speed: float = 0.05
     beyond: float = 0.025
     gravity: float = 1.5
     energy: float = 0.07
+
+    def aside_of(self, pushed: int, joint: int) -> float:
+        """Return how far joint 1-7 may go while another is pushed [rad]."""
+        return self.partner if PARTNERS.get(pushed) == joint else self.aside
 
     def ways(self, goal: ProofGoal) -> list[tuple[float, float]]:
         """Return between which ways each joint may be [rad], from where it began."""
@@ -82,8 +93,9 @@ class ProofLimits:
             return [(-way, way) for way in self.rest]
         if goal.kind is ProofKind.GRAVITY:
             return [(-self.gravity * way, self.gravity * way) for way in self.rest]
-        ways = [(-self.aside, self.aside)] * len(self.rest)
         i = goal.joint - 1
+        asides = [self.aside_of(goal.joint, joint) for joint in range(1, 8)]
+        ways = [(-aside, aside) for aside in asides]
         reach = self.lift_way if goal.kind is ProofKind.LIFT else self.reach[i]
         # The other way it may give as little as shows that it is the other way.
         low, high = -self.reach[i], reach + self.beyond

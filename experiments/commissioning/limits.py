@@ -191,15 +191,12 @@ LIMITS: Mapping[str, Limit] = {
         "mrad",
         "Pushed was joint {joint}, moved joint {other}: motors or their cables are "
         "exchanged, or one is reversed",
-        high=25.0,
     ),
     "liftoff": Limit(
         "lift-off of joint {joint} over its weight",
         "",
-        "It lifts with too little, or needs too much: torque constant, foot, friction "
-        "or a motor of its differential",
+        "Less lifts it than it weighs: torque constant, foot, or zero position",
         low=0.75,
-        high=2.0,
     ),
     # C10
     "lifted": Limit(

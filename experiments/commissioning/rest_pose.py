@@ -33,7 +33,7 @@ _GRAVITY_SECONDS, _GRAVITY_KEPT = 1.4, 0.6
 _ON_POSE = 0.12  # rad
 _PATIENCE = 120.0  # s
 _MIDDLE = (0.3, 0.8)  # share of the way of a lift in which its torque is averaged
-_SETTLE = 3.0  # s, a hand takes to lay the arm down
+_CARRIED = 8.0  # s, a simulated hand takes to lay the arm down
 
 
 def rest_pose(constants: ArmConstants) -> Array:
@@ -58,8 +58,8 @@ def lay_down(scene: Scene) -> None:
         f"{q[5]:+.2f} rad. Take the hands off it. [space] when it lies there."
     )
     if scene.simulation is not None:
-        scene.simulation.pose(q.tolist(), _SETTLE)
-        scene.wait(_SETTLE + 1.0)
+        scene.simulation.pose(q.tolist(), _CARRIED)
+        scene.await_hand()
         scene.simulation.let_go()
         scene.wait(1.0)
     here = scene.loop_client.latest()["position"][0]
@@ -131,7 +131,6 @@ def ramps(scene: Scene) -> Values:
 def judge_ramps(values: Values) -> Judgement:
     """Judge whether each joint moved as it was pushed, and at which torque."""
     rows: list[Found] = []
-    last = len(values["joints"]) - 1
     for number, (joint, torque) in enumerate(
         zip(values["joints"].tolist(), values["torques"].tolist(), strict=True)
     ):
@@ -142,20 +141,26 @@ def judge_ramps(values: Values) -> Judgement:
         q, tau = values["q"][part], values["tau"][part]
         ways = np.abs(q - q[0]).max(axis=0)
         ways[i] = 0.0
-        other = int(ways.argmax())
-        rows.append(found("aside", 1e3 * ways[other], joint=i + 1, other=other + 1))
+        most = np.array([PROOF_LIMITS.aside_of(i + 1, j) for j in range(1, 8)])
+        other = int((ways / most).argmax())
+        rows.append(
+            found(
+                "aside",
+                1e3 * ways[other],
+                high=1e3 * most[other],
+                joint=i + 1,
+                other=other + 1,
+            )
+        )
         way = sense * (q[:, i] - q[0, i])
         reach = PROOF_LIMITS.reach[i]
         rows.append(
             found("moved", 1e3 * way.max(), low=1e3 * reach, joint=_signed(i, sense))
         )
-        if int(sense) * (i + 1) in LIFTED and (way >= reach / 2).any():
-            at = int(np.argmax(way >= reach / 2))
-            needed = float(np.abs(tau[: at + 1, i]).max())
+        if int(sense) * (i + 1) in LIFTED:
+            needed = float(np.abs(tau[:, i]).max())  # it ends where the joint moves
             weight = abs(float(values["weights"][i]))
             rows.append(found("liftoff", needed / weight, joint=i + 1))
-        if number < last and len(values["ended"]) and number == values["proof"].max():
-            break
     return judged([*rows, *_ended(values)])
 
 

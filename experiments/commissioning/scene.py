@@ -96,6 +96,12 @@ class Scene:
         for _ in range(max(1, round(seconds / TICK))):
             self.console_loop.tick(Prompt.MOVING)
 
+    def await_hand(self) -> None:
+        """Wait until a simulated hand has done what it was told; raises as `ask`."""
+        hand = self.simulation
+        while hand is not None and not hand.is_hand_done:
+            self.wait(TICK)
+
     def wait_through(self, seconds: float) -> None:
         """Let `seconds` pass whatever the guard says; raises StopRequestedError."""
         for _ in range(max(1, round(seconds / TICK))):

@@ -4,6 +4,7 @@ import numpy as np
 
 from acquisition.control_loop.details import MotionExcess
 from acquisition.control_loop.proof import (
+    PARTNERS,
     PROOF_LIMITS,
     ProofGoal,
     ProofKind,
@@ -13,6 +14,7 @@ from acquisition.devices import ArmReading, Vector
 from wam.model.constants import ArmConstants
 
 _JOINTS = 7
+_KEEPS = 2.0  # of another arm's friction: what keeps the partner of a lifted joint
 _AT_THE_TOP = 0.3  # s, a lifted joint stays there
 
 
@@ -67,6 +69,9 @@ class Proof:
             tau[i] = 0.0 if self._has_moved else share * goal.torque
         elif goal.kind is ProofKind.LIFT:
             tau[i] = self._lift(reading, i, seconds)
+            if partner := PARTNERS.get(goal.joint):
+                most = _KEEPS * float(self._constants.coulomb[partner - 1])
+                tau[partner - 1] = self._pull(reading, partner - 1, 0.0, most)
         return tau
 
     def _lift(self, reading: ArmReading, i: int, seconds: float) -> float:
@@ -78,10 +83,14 @@ class Proof:
         if height < 0.0:
             return 0.0  # it lies on its stop again
         sense = float(np.sign(goal.torque))
-        wanted = self._q[i] + sense * height * limits.lift_way
+        way = sense * height * limits.lift_way
+        return self._pull(reading, i, way, abs(goal.torque))
+
+    def _pull(self, reading: ArmReading, i: int, way: float, most: float) -> float:
+        """Return what pulls joint `i` to `way` from its begin, `most` at most [N m]."""
         kp, kd = float(self._constants.kp[i]), float(self._constants.kd[i])
+        wanted = self._q[i] + way
         pull = kp * (wanted - float(reading.q[i])) - kd * float(reading.qd[i])
-        most = abs(goal.torque)
         return min(max(pull, -most), most)
 
     def excess(
