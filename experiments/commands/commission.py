@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from experiments.commissioning.guide import RecordFolder
-    from experiments.commissioning.steps import Step
+    from experiments.commissioning.steps import ProofStep
     from experiments.operator.console import Console
     from experiments.operator.prompts import OperatorInput
     from experiments.rig.rig import FakeOptions
@@ -87,7 +87,7 @@ def _sittings(
     args: argparse.Namespace,
     settings: Settings,
     fake: FakeOptions | None,
-    steps: Sequence[Step],
+    steps: Sequence[ProofStep],
     files: RecordFolder,
     persons: tuple[str, str],
     console: Console,
@@ -148,7 +148,7 @@ def _end(files: RecordFolder, console: Console, persons: tuple[str, str]) -> Non
     console.say(f"Written and signed: {files.folder / 'commissioning.json'}.")
 
 
-def _steps(args: argparse.Namespace) -> list[Step]:
+def _steps(args: argparse.Namespace) -> list[ProofStep]:
     from acquisition.errors import SettingsError
     from experiments.commissioning.work import WORK
 

@@ -11,7 +11,7 @@ from experiments.commissioning.steps import (
     GATED,
     LONGEST_DAYS,
     ORDER,
-    Step,
+    ProofStep,
 )
 
 
@@ -24,7 +24,7 @@ class Lack:
         cause: why, in words.
     """
 
-    step: Step
+    step: ProofStep
     cause: str
 
     @property
@@ -33,7 +33,7 @@ class Lack:
         return f"{self.step} {self.step.words}: {self.cause}"
 
 
-def bases_of(step: Step) -> list[str]:
+def bases_of(step: ProofStep) -> list[str]:
     """Return the names of what a step stands on."""
     return [name for name, basis in BASES.items() if step in basis.steps]
 
@@ -58,7 +58,7 @@ def lacks(
 
 def _cause(
     record: Commissioning | None,
-    step: Step,
+    step: ProofStep,
     inputs: Mapping[str, str],
     now: datetime,
 ) -> str:

@@ -18,7 +18,7 @@ from experiments.commissioning.record import (
 )
 from experiments.commissioning.recording import read_raw, write_raw
 from experiments.commissioning.scene import Scene
-from experiments.commissioning.steps import Step
+from experiments.commissioning.steps import ProofStep
 from experiments.commissioning.work import WORK
 from experiments.messages import preflight_error
 from experiments.operator.console import BAD, GOOD, Console
@@ -64,7 +64,7 @@ class RecordFolder:
 
 
 def do_step(
-    scene: Scene, step: Step, files: RecordFolder, persons: tuple[str, str]
+    scene: Scene, step: ProofStep, files: RecordFolder, persons: tuple[str, str]
 ) -> Judgement:
     """Do one step and write what came of it.
 
@@ -109,8 +109,8 @@ def do_step(
 
 
 def wanted(
-    scene: Scene, steps: Sequence[Step], files: RecordFolder, *, is_anew: bool
-) -> list[Step]:
+    scene: Scene, steps: Sequence[ProofStep], files: RecordFolder, *, is_anew: bool
+) -> list[ProofStep]:
     """Return those of `steps` that have to be done; all of them where `is_anew`."""
     if is_anew:
         return list(steps)
@@ -119,7 +119,7 @@ def wanted(
     return [step for step in steps if step in lacking]
 
 
-def say_judgement(console: Console, step: Step, judgement: Judgement) -> None:
+def say_judgement(console: Console, step: ProofStep, judgement: Judgement) -> None:
     """Say what came of a step in a line, and what to do where it failed."""
     console.end_panel()
     name = f"{step} {step.words}"

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from experiments.commissioning.gate import bases_of
-from experiments.commissioning.steps import Step
+from experiments.commissioning.steps import ProofStep
 from experiments.rig.rig import Rig
 from experiments.settings.calibrations import PREFIX
 from wam.driver.startup import ArmInfo
@@ -31,14 +31,15 @@ def present_inputs(
     section = rig.settings.rig
     arm = section.arm.model_dump(mode="json")
     zero = arm.pop("mech_at_home")
-    texts = rig.settings.calibrations
-    sensor = texts.get(f"{PREFIX}{section.ft_sensor.calibration}", "")
+    texts, feet = rig.settings.calibrations, section.feet
+    names = (section.ft_sensor, feet.tread, feet.bare)
+    sensor, *of_feet = (texts.get(f"{PREFIX}{each.calibration}", "") for each in names)
     content: dict[str, Any] = {
         "zero": zero,
         "[safety]": section.safety.model_dump(mode="json"),
         "[limits]": section.limits.model_dump(mode="json"),
         "[arm]": arm,
-        "[feet]": [section.feet.model_dump(mode="json"), sorted(texts.items())],
+        "[feet]": [feet.model_dump(mode="json"), of_feet],
         "[ft_sensor]": [section.ft_sensor.model_dump(mode="json"), sensor],
         "[gravity]": [
             section.gravity.model_dump(mode="json"),
@@ -60,7 +61,7 @@ def present_inputs(
     return {name: _digest(each) for name, each in content.items()}
 
 
-def inputs_of(step: Step, present: Mapping[str, str]) -> dict[str, str]:
+def inputs_of(step: ProofStep, present: Mapping[str, str]) -> dict[str, str]:
     """Return of the present digests those that a step stands on."""
     return {name: present[name] for name in bases_of(step) if name in present}
 

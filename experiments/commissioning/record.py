@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from acquisition.errors import SettingsError
 from acquisition.files import open_directory, read_regular, replace_file
 from acquisition.validation import Entries, Many, first_problem
-from experiments.commissioning.steps import ORDER, Step
+from experiments.commissioning.steps import ORDER, ProofStep
 
 VERSION = 1
 NAME = "commissioning.json"
@@ -99,7 +99,7 @@ class StepRecord(_Part):
         digest: of all this and of the step before.
     """
 
-    step: Step
+    step: ProofStep
     started: datetime
     ended: datetime
     operator: Word
@@ -145,7 +145,7 @@ class Commissioning(_Part):
             raise ValueError("its steps are not in order, or one stands twice")
         return self
 
-    def of(self, step: Step) -> StepRecord | None:
+    def of(self, step: ProofStep) -> StepRecord | None:
         """Return what was done of a step; None = nothing."""
         return next((done for done in self.steps if done.step is step), None)
 
@@ -155,7 +155,7 @@ class Commissioning(_Part):
         steps = sorted([*steps, done], key=lambda one: ORDER.index(one.step))
         return self.model_copy(update={"steps": _chain(steps), "signed": ()})
 
-    def first_broken(self) -> Step | None:
+    def first_broken(self) -> ProofStep | None:
         """Return the first step whose digest is not that of what stands there."""
         pairs = zip(self.steps, _chain(self.steps), strict=True)
         return next((is_.step for is_, was in pairs if is_.digest != was.digest), None)

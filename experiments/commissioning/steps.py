@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 
-class Step(StrEnum):
+class ProofStep(StrEnum):
     """A step by its number; in the order in which they are done."""
 
     CONFIGURATION = "C0"
@@ -33,12 +33,12 @@ class Step(StrEnum):
         return self.name.replace("_", " ").lower()
 
 
-ORDER = tuple(Step)
+ORDER = tuple(ProofStep)
 # Without these no torque is sent to a real arm.
-GATED = ORDER[: ORDER.index(Step.GRAVITY_RAMP) + 1]
+GATED = ORDER[: ORDER.index(ProofStep.GRAVITY_RAMP) + 1]
 
 
-def _from(first: Step, last: Step = Step.PLATE) -> tuple[Step, ...]:
+def _from(first: ProofStep, last: ProofStep = ProofStep.PLATE) -> tuple[ProofStep, ...]:
     return ORDER[ORDER.index(first) : ORDER.index(last) + 1]
 
 
@@ -52,10 +52,10 @@ class Basis:
     """
 
     words: str
-    steps: tuple[Step, ...]
+    steps: tuple[ProofStep, ...]
 
 
-_S = Step
+_S = ProofStep
 BASES: dict[str, Basis] = {
     "pucks": Basis(
         "serial number, firmware, role, counts, slot or groups of a motor puck",

@@ -7,7 +7,7 @@ from experiments.commissioning import bus, configuration, rest_pose, stop_circui
 from experiments.commissioning.limits import Judgement
 from experiments.commissioning.recording import Values
 from experiments.commissioning.scene import Scene
-from experiments.commissioning.steps import Step
+from experiments.commissioning.steps import ProofStep
 from experiments.rig.rig import Rig
 
 
@@ -58,40 +58,40 @@ def _time(scene: Scene) -> Values:
     return _shown(bus.time_replies, "the loop runs, the arm idle")(scene)
 
 
-WORK: Mapping[Step, StepWork] = {
-    Step.CONFIGURATION: StepWork(
+WORK: Mapping[ProofStep, StepWork] = {
+    ProofStep.CONFIGURATION: StepWork(
         lambda scene: configuration.collect(scene.rig),
         configuration.judge,
         1,
         "Correct the file, or measure again what it says.",
     ),
-    Step.LISTEN: StepWork(
+    ProofStep.LISTEN: StepWork(
         _shown(bus.listen, "listening, nothing is sent"),
         bus.judge_silence,
         1,
         "End the other program; look at cable, terminators and bit rate.",
     ),
-    Step.IDENTITY: StepWork(
+    ProofStep.IDENTITY: StepWork(
         _identify,
         bus.judge_identity,
         1,
         "Is this the arm and the puck it should be? What is right as it is goes into "
         "the file that [arm] properties of rig.toml names.",
     ),
-    Step.TIMING: StepWork(
+    ProofStep.TIMING: StepWork(
         _time,
         bus.judge_timing,
         2,
         "Use another adapter or computer, and end other programs on the bus.",
     ),
-    Step.STOP_CIRCUIT: StepWork(
+    ProofStep.STOP_CIRCUIT: StepWork(
         stop_circuit.collect,
         stop_circuit.judge,
         5,
         "Do not go on without a stop that works: pendant, its cable, the module.",
         needs_loop=True,
     ),
-    Step.REST_POSE: StepWork(
+    ProofStep.REST_POSE: StepWork(
         rest_pose.rest,
         rest_pose.judge_rest,
         5,
@@ -99,7 +99,7 @@ WORK: Mapping[Step, StepWork] = {
         needs_loop=True,
         needs_zero=True,
     ),
-    Step.RAMPS: StepWork(
+    ProofStep.RAMPS: StepWork(
         rest_pose.ramps,
         rest_pose.judge_ramps,
         2,
@@ -107,7 +107,7 @@ WORK: Mapping[Step, StepWork] = {
         needs_loop=True,
         needs_zero=True,
     ),
-    Step.LIFT: StepWork(
+    ProofStep.LIFT: StepWork(
         rest_pose.lift,
         rest_pose.judge_lift,
         2,
@@ -115,7 +115,7 @@ WORK: Mapping[Step, StepWork] = {
         needs_loop=True,
         needs_zero=True,
     ),
-    Step.GRAVITY_RAMP: StepWork(
+    ProofStep.GRAVITY_RAMP: StepWork(
         rest_pose.gravity_ramp,
         rest_pose.judge_gravity_ramp,
         1,
@@ -125,8 +125,8 @@ WORK: Mapping[Step, StepWork] = {
     ),
 }
 # Steps that share one connection to the rig. A stop takes power and positions away.
-SITTINGS: tuple[tuple[Step, ...], ...] = (
-    (Step.CONFIGURATION, Step.LISTEN, Step.IDENTITY, Step.TIMING),
-    (Step.STOP_CIRCUIT,),
-    (Step.REST_POSE, Step.RAMPS, Step.LIFT, Step.GRAVITY_RAMP),
+SITTINGS: tuple[tuple[ProofStep, ...], ...] = (
+    (ProofStep.CONFIGURATION, ProofStep.LISTEN, ProofStep.IDENTITY, ProofStep.TIMING),
+    (ProofStep.STOP_CIRCUIT,),
+    (ProofStep.REST_POSE, ProofStep.RAMPS, ProofStep.LIFT, ProofStep.GRAVITY_RAMP),
 )

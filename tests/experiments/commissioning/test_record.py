@@ -15,7 +15,7 @@ from experiments.commissioning.record import (
     read_commissioning,
     write_commissioning,
 )
-from experiments.commissioning.steps import BASES, GATED, ORDER, Step
+from experiments.commissioning.steps import BASES, GATED, ORDER, ProofStep
 
 NOON = datetime(2026, 11, 26, 12, tzinfo=UTC)
 INPUTS = {name: f"{number:064x}" for number, name in enumerate(BASES)}
@@ -54,9 +54,9 @@ def test_a_folder_without_the_file_has_none(tmp_path):
 
 def test_a_step_that_is_done_again_takes_its_place_and_the_names_go():
     record = whole().model_copy(update={"signed": ("one", "two")})
-    again = record.with_step(done(Step.TIMING, cause="a slow adapter"))
+    again = record.with_step(done(ProofStep.TIMING, cause="a slow adapter"))
     assert [one.step for one in again.steps] == list(ORDER)
-    assert again.of(Step.TIMING).cause == "a slow adapter"
+    assert again.of(ProofStep.TIMING).cause == "a slow adapter"
     assert again.signed == ()
     assert again.first_broken() is None
 
@@ -110,7 +110,9 @@ def test_a_link_is_not_followed(tmp_path):
         read_commissioning(tmp_path)
 
 
-@pytest.mark.parametrize("order", [(Step.TIMING, Step.LISTEN), (Step.LISTEN,) * 2])
+@pytest.mark.parametrize(
+    "order", [(ProofStep.TIMING, ProofStep.LISTEN), (ProofStep.LISTEN,) * 2]
+)
 def test_steps_stand_in_order_and_once(order):
     steps = tuple(done(step) for step in order)
     with pytest.raises(ValueError, match="not in order"):
@@ -158,7 +160,7 @@ def test_a_record_of_the_future_does_not_count():
 
 def test_a_step_that_failed_is_named_with_its_cause():
     record = whole().with_step(
-        done(Step.RAMPS, verdict="wrong", cause="joint 3 moves the other way")
+        done(ProofStep.RAMPS, verdict="wrong", cause="joint 3 moves the other way")
     )
     with pytest.raises(PreflightError, match="C9 ramps: joint 3 moves the other way"):
         require(lacks(record, INPUTS, NOON))
