@@ -41,6 +41,11 @@ def winding_generator(seed: int) -> np.random.Generator:
     return trial_generator(seed, "windings", 0)
 
 
+def sound_rig_generator(seed: int) -> np.random.Generator:
+    """Return the generator of what differs between sound rigs."""
+    return trial_generator(seed, "sound rig", 0)
+
+
 class NormalStream:
     """Standard normal numbers one by one, drawn in blocks."""
 

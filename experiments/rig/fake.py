@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -45,6 +45,22 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
+class RigTruth:
+    """What is true of a simulated rig, but not believed.
+
+    Attributes:
+        spread: it is one of many sound rigs, drawn by the seed: zeros, stops, mounting
+            and sensor are nearly those of the drawings.
+        mount: turns of its base about x, then y, then z [degrees].
+        wrong: name of what is wrong with it in the catalogue; "" = nothing.
+    """
+
+    spread: bool = False
+    mount: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    wrong: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class SimulatedRig:
     """What is simulated: the settings as written, before any calibration.
 
@@ -56,6 +72,7 @@ class SimulatedRig:
         pace: how the simulated person pushes.
         twin: calibrations of the arm whose twin it is; None = an arm of its own.
         cables: resonance of the joints on their cables [Hz]; None = stiff ones.
+        truth: what is true of the rig, but not believed; None = nothing.
     """
 
     rig: RigSettings
@@ -65,6 +82,7 @@ class SimulatedRig:
     pace: str
     twin: LawCalibrations | None = None
     cables: float | None = None
+    truth: RigTruth | None = None
 
     def metadata(self) -> dict[str, Any]:
         """Return the world in plain values, for a process of its own."""
@@ -82,6 +100,7 @@ class SimulatedRig:
             "start_q": list(self.row.start_q),
             "seed": self.seed,
             "sensor": sensor_metadata(self.rig.ft_sensor),
+            "truth": None if self.truth is None else asdict(self.truth),
         }
         return {
             "scene": scene,
@@ -115,6 +134,19 @@ class SimulatedRig:
         if weight == "shipped":
             return weighed_arm(constants, constants.mus + change)
         return weighed_arm(constants, moments_of_links(constants) + change)
+
+
+def typed_wrongly(settings: Settings, wrong: str) -> Settings:
+    """Return the settings as they are with the wrong rig of that name.
+
+    Raises:
+        SettingsError: there is no such rig, or rig.toml would be refused with what is
+            typed into it.
+    """
+    from fakes.world.wrong_rigs import wrong_rig
+
+    mass = wrong_rig(wrong).departure.foot_typed
+    return settings if mass is None else settings.with_foot_mass(mass)
 
 
 def sensor_metadata(section: AnySensor) -> dict[str, Any]:

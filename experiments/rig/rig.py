@@ -14,7 +14,12 @@ from experiments.arguments import FRICTION
 from experiments.rig.arm_lock import ArmLock
 from experiments.rig.backend import RigBackend
 from experiments.rig.build import build_tool, read_properties, terrain_frame
-from experiments.rig.fake import SimulatedRig, stepped
+from experiments.rig.fake import (
+    RigTruth,
+    SimulatedRig,
+    stepped,
+    typed_wrongly,
+)
 from experiments.rig.foresight_source import ForesightSource
 from experiments.rig.law_calibrations import (
     LawCalibrations,
@@ -41,6 +46,12 @@ class FakeOptions:
         pace: how the simulated person pushes, a name of `fakes.plant.push.PACES`.
         is_twin: the arm, its sensor and the containers are what calibrations say.
         cables: resonance of the joints on their cables [Hz]; None = stiff ones.
+        spread: the rig is one of many sound ones, drawn by the seed; a wrong one is
+            always.
+        mount: turns of the true base about x, then y, then z [degrees], which the
+            program does not know; None = as it believes.
+        wrong: name of what is wrong with the rig in the catalogue of wrong rigs; "" =
+            nothing.
     """
 
     is_fast: bool
@@ -49,6 +60,17 @@ class FakeOptions:
     pace: str = "steady"
     is_twin: bool = False
     cables: float | None = None
+    spread: bool = False
+    mount: tuple[float, float, float] | None = None
+    wrong: str = ""
+
+    @property
+    def truth(self) -> RigTruth | None:
+        """What is true of the rig, but not believed; None = nothing."""
+        if not (self.spread or self.wrong or self.mount):
+            return None
+        spread = self.spread or bool(self.wrong)
+        return RigTruth(spread, self.mount or (0.0, 0.0, 0.0), self.wrong)
 
 
 @dataclass(slots=True)
@@ -129,12 +151,15 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
         settings.check_real()
     is_twin = fake is not None and fake.is_twin
     kind = None if is_twin else fake is not None
-    written, settings = settings, with_calibrations(settings, is_simulated=kind)
+    true = with_calibrations(settings, is_simulated=None) if is_twin else settings
+    if fake is not None and fake.wrong:
+        settings = typed_wrongly(settings, fake.wrong)
+    settings = with_calibrations(settings, is_simulated=kind)
     calibrations = read_law_calibrations(settings, is_twin=is_twin)
     world: SimulatedRig | None = None
     if fake is not None:
         # A simulated world does not know what was calibrated, unless it is a twin.
-        world = _world(settings if is_twin else written, row.name, fake, calibrations)
+        world = _world(true, row.name, fake, calibrations)
     row = settings.row(row.name)
     law = build_law(settings.rig, calibrations, row.foot, is_simulated=kind)
     shared = SharedLayout.create()
@@ -179,6 +204,7 @@ def _world(
         pace=fake.pace,
         twin=calibrations if fake.is_twin else None,
         cables=fake.cables,
+        truth=fake.truth,
     )
 
 

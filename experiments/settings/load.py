@@ -76,6 +76,18 @@ class Settings:
         none = self.rig.friction.model_copy(update={"model": "none"})
         return replace(self, rig=self.rig.model_copy(update={"friction": none}))
 
+    def with_foot_mass(self, mass: float) -> "Settings":
+        """Return the same as if the feet had `mass` [kg] in rig.toml.
+
+        Raises:
+            SettingsError: rig.toml would be refused.
+        """
+        data = self.rig.model_dump(mode="json")
+        for foot in data["feet"].values():
+            foot["mass"] = mass
+        rig = _validated(RigSettings, data, self.rig_text, "rig.toml")
+        return replace(self, rig=rig)
+
     def with_row(self, row: TerrainRow) -> "Settings":
         """Return the same with `row` in place of the one of its name."""
         rows = tuple(row if old.name == row.name else old for old in self._rows)
@@ -173,6 +185,11 @@ def _parse(model: type[_M], text: str, name: str) -> _M:
         data = parse_toml(text)
     except ValueError as error:
         raise SettingsError(f"{name}: {error}.", hint="Nothing was started.") from error
+    return _validated(model, data, text, name)
+
+
+def _validated(model: type[_M], data: object, text: str, name: str) -> _M:
+    """Return the `data` of a file `name` with `text` as a `model`."""
     try:
         return model.model_validate(data)
     except ValidationError as error:

@@ -20,6 +20,9 @@ class WristGauges:
 
     with F_c and M_c the ground's at the sole p_s, a and alpha the mean accelerations of
     the foot over the cycle, m, c and I those of everything below the gauges.
+
+    Attributes:
+        cable: its force on the foot [N], terrain frame, shape (3,); None = none.
     """
 
     def __init__(self, tool: Tool, up: Array, period: float) -> None:
@@ -40,6 +43,7 @@ class WristGauges:
         self._before: Sequence[float] = (0.0,) * 6
         self._load: Wrench | None = None
         self._up: list[float] = up.tolist()
+        self.cable: Array | None = None
 
     def end_cycle(
         self, rotation: Array, ground: Sequence[float], rates: Sequence[float]
@@ -74,13 +78,17 @@ class WristGauges:
         spin = _cross(w, (jx, jy, jz))
         euler = _cross(alpha, self._com_from_sole)
         inward = _cross(w, _cross(w, self._com_from_sole))
+        lever = _cross(self._sole, force)
+        if self.cable is not None:  # it pulls at the gauges, without a lever
+            pull = self.cable.dot(self._rotation.dot(self._turn))
+            force = [felt + more for felt, more in zip(force, pull, strict=True)]
         m, s = self._mass, self._sign
         weight = (
             -m * (GRAVITY * gx + a[0] + euler[0] + inward[0]),
             -m * (GRAVITY * gy + a[1] + euler[1] + inward[1]),
             -m * (GRAVITY * gz + a[2] + euler[2] + inward[2]),
         )
-        lever, swing = _cross(self._sole, force), _cross(self._com, weight)
+        swing = _cross(self._com, weight)
         return (
             s * (force[0] + weight[0]),
             s * (force[1] + weight[1]),

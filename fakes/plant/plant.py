@@ -128,6 +128,10 @@ class ArmPlant:
         self._body.move(q)
         self._stand = q.copy()  # it is put there, its stand too
 
+    def lay_cable(self, force: Sequence[float]) -> None:
+        """Let the wrist sensor's cable pull at the foot, `force` [N] in base frame."""
+        self._wrist.cable = self._axes.dot(np.array(force, dtype=np.float64))
+
     @property
     def ends(self) -> Ends:
         """Where the joints really end."""

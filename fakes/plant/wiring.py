@@ -25,6 +25,7 @@ class Wiring:
         torque: what each motor makes of each torque that is sent, shape (7, 7).
         counts: what each encoder tells of each motor's way, shape (7, 7).
         home: counts of the motors where the arm was zeroed, shape (7,).
+        shift: counts that are told too much, shape (7,).
         torn: motor whose cable to the joints is torn, 1-7: its rotor alone turns, and
             under the law's spring stays where it is. 0 = none.
         torn_at: where that rotor stands [counts].
@@ -33,6 +34,7 @@ class Wiring:
     torque: Array = field(default_factory=_as_built)
     counts: Array = field(default_factory=_as_built)
     home: Array = field(default_factory=lambda: np.zeros(7))
+    shift: Array = field(default_factory=lambda: np.zeros(7))
     torn: int = 0
     torn_at: float = 0.0
 
@@ -45,7 +47,7 @@ class Wiring:
 
     def told_of(self, counts: Array) -> Array:
         """Return what the encoders tell where the motors have turned by `counts`."""
-        told = self.home + self.counts.dot(counts - self.home)
+        told = self.home + self.counts.dot(counts - self.home) + self.shift
         if self.torn:
             told[self.torn - 1] = self.torn_at
         return told

@@ -124,6 +124,14 @@ class PuckNetwork:
         """Let the safety module ignore hosts that lower its mode, or obey again."""
         self._safety.is_disobedient = is_disobedient
 
+    def break_button(self, action: PendantAction) -> None:
+        """Let a button of the pendant do nothing from now on."""
+        self._safety.dead_button = action
+
+    def misset(self, limit: str, factor: float) -> None:
+        """Let the safety module set a limit `factor` times as large as it is told."""
+        self._safety.limit_factors[limit] = factor
+
     def say_idle(self, *, says_idle: bool = True) -> None:
         """Let the safety module answer IDLE whatever its mode, or the truth again."""
         self._safety.says_idle = says_idle

@@ -66,6 +66,8 @@ class FakeSafetyModule:
         is_mute: its transmit wire is cut.
         is_disobedient: it ignores a host that lowers its mode.
         says_idle: it answers IDLE whatever its mode.
+        dead_button: of the pendant that does nothing; None = none.
+        limit_factors: by name, how much larger a limit is set than a host says.
     """
 
     def __init__(
@@ -78,6 +80,8 @@ class FakeSafetyModule:
         self.is_mute = False
         self.is_disobedient = False
         self.says_idle = False
+        self.dead_button: PendantAction | None = None
+        self.limit_factors: dict[str, float] = {}
         self._heartbeat_ns = options.heartbeat_ns
         self._options = options
         vers = nearest_documented(options.safety_vers)
@@ -127,6 +131,8 @@ class FakeSafetyModule:
 
     def press(self, action: PendantAction) -> None:
         """Press a button of the pendant."""
+        if action == self.dead_button:
+            return
         if action == "estop":
             self._levels["other"] = SafetyLevel.FAULT
             self._enter(SafetyMode.E_STOP)
@@ -223,7 +229,7 @@ class FakeSafetyModule:
             if limit in _POWER_UP_LIMITS:
                 self._properties[limit] = _POWER_UP_LIMITS[limit]
         elif name in self._properties and name not in _READ_ONLY:
-            self._properties[name] = value
+            self._properties[name] = round(value * self.limit_factors.get(name, 1.0))
             self._judge_voltage()
 
     def _judge_speed(self) -> None:

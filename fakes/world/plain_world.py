@@ -10,7 +10,9 @@ from acquisition.clock import Clock
 from fakes.plant.model import PlantOptions
 from fakes.plant.push import PACES
 from fakes.sensor.kinds import SensorChoice
+from fakes.world.departure import Departure, draw_sound
 from fakes.world.rig import FakeRig, LocalSimulation, SimulatedScene
+from fakes.world.wrong_rigs import wrong_rig
 from ft_sensor.payload import TerrainFrame
 from wam.model.constants import ArmConstants
 from wam.model.friction import MotorFriction, friction_of
@@ -33,7 +35,25 @@ def _scene_of(fields: Mapping[str, Any]) -> SimulatedScene:
         start_q=np.array(fields["start_q"]),
         seed=fields["seed"],
         sensor=SensorChoice(**fields["sensor"]),
+        departure=departure_of(fields.get("truth"), fields["seed"]),
     )
+
+
+def departure_of(truth: Mapping[str, Any] | None, seed: int) -> Departure | None:
+    """Return how a rig differs from what is believed of it; None = not at all.
+
+    Args:
+        truth: "spread": it is one of many sound rigs; "mount": turns of its base about
+            x, y, z [degrees]; "wrong": its name in the catalogue, "" = none.
+        seed: of the sound rig.
+    """
+    if truth is None:
+        return None
+    sound = draw_sound(seed) if truth["spread"] else Departure()
+    mount = np.radians(np.array(truth["mount"], dtype=np.float64))
+    mounted = Departure(mount=mount).on(sound)
+    name = truth["wrong"]
+    return wrong_rig(name).departure.on(mounted) if name else mounted
 
 
 def arm_of(

@@ -25,6 +25,7 @@ from fakes.sensor.errors import SensorErrors
 from fakes.sensor.kinds import SensorChoice, make_stream
 from fakes.sensor.port import FakeSerialPort
 from fakes.truth import truth_records
+from fakes.world.departure import Departure
 from fakes.world.faults import (
     BodyFaults,
     Cable,
@@ -33,6 +34,17 @@ from fakes.world.faults import (
     clear_stream_faults,
     network_faults,
     stream_faults,
+)
+from fakes.world.true_rig import (
+    depart,
+    shown_load,
+    true_constants,
+    true_frame,
+    true_network,
+    true_options,
+    true_start,
+    true_stones,
+    true_tool,
 )
 from ft_sensor.payload import TerrainFrame
 from wam.model.arm_model import ArmModel
@@ -58,6 +70,7 @@ class SimulatedScene:
         start_q: joint positions with the foot at the far end [rad], shape (7,).
         seed: of everything random.
         sensor: which wrist sensor the arm has.
+        departure: how the rig differs from what is believed; None = not at all.
     """
 
     terrain: str
@@ -67,6 +80,7 @@ class SimulatedScene:
     start_q: Array
     seed: int
     sensor: SensorChoice = _ANY_SENSOR
+    departure: Departure | None = None
 
 
 def solve_start(model: ArmModel, frame: TerrainFrame, q: Array, height: float) -> Array:
@@ -112,25 +126,38 @@ class FakeRig:
         options: PlantOptions | None = None,
         network: NetworkOptions | None = None,
     ) -> None:
-        self.scene = scene
         self._clock = clock
         model = ArmModel(constants, tool)
         q = solve_start(model, scene.frame, scene.start_q, _START_HEIGHT)
+        believed, departure = constants, scene.departure
+        network = network or NetworkOptions()
+        if departure is not None:
+            constants = true_constants(constants, departure)
+            tool = true_tool(tool, departure)
+            options = true_options(options or PlantOptions(), departure)
+            network = true_network(network, departure)
+            scene = replace(scene, frame=true_frame(scene.frame, departure))
+            scene = replace(scene, stones=true_stones(scene.stones, departure))
+            q = true_start(q, departure)
+        self.scene = scene
         self.plant = ArmPlant(constants, tool, scene.frame, q, options)
         self.plant.t_ns = clock.now_ns() // PERIOD_NS * PERIOD_NS
-        chosen = replace(network or NetworkOptions(), mt=constants.mt)
+        chosen = replace(network, mt=constants.mt)
         if scene.sensor.is_on_bus:
             chosen = replace(chosen, has_sensor=True)
         self.random = self._rake(0)
         kind = (SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS) if chosen.has_sensor else ()
         self.errors = SensorErrors(self.random.sensor, *kind)
-        load = Load(self.plant.sensor_load, self.errors)
+        source = self.plant.sensor_load
+        if departure is not None:
+            source = shown_load(source, departure)
+        load = Load(source, self.errors)
         self.network = PuckNetwork(self.plant, chosen, clock.now_ns(), load)
+        if departure is not None:
+            depart(self.plant, self.network, departure, believed)
         self._body = BodyFaults(self.plant, self.network.schedule.after)
         self.bus = FakeCanBus(self.network, clock)
-        self.stream = make_stream(
-            scene.sensor, self.plant.sensor_load, self.errors, clock.now_ns()
-        )
+        self.stream = make_stream(scene.sensor, source, self.errors, clock.now_ns())
         self._port: FakeSerialPort | None = None
         self._cable: Cable | None = None
 

@@ -1,0 +1,185 @@
+"""Applies what is true of a rig, but not believed, to arm, sensor, pucks and ground."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from fakes.plant.model import PlantOptions
+from fakes.plant.plant import ArmPlant
+from fakes.plant.wiring import Wiring
+from fakes.pucks.network import PuckNetwork
+from fakes.pucks.options import NetworkOptions
+from fakes.sensor.mounting import MountedSensor
+from fakes.sensor.stream import Source
+from fakes.world.departure import BusTrouble, Departure, rotation
+from ft_sensor.payload import TerrainFrame
+from wam.bus.frames import MOTOR_NODES, Payload, position_reply_id, property_reply_id
+from wam.model.constants import ArmConstants, Array, Body
+from wam.model.tool import Tool
+
+_DOWN = np.array([0.0, 0.0, -1.0])
+_TWIN_NS = 150_000  # after which the second of two nodes answers
+
+
+def constants_around_home(constants: ArmConstants) -> ArmConstants:
+    """Return the arm with its stops no further in than home, which lies beyond two.
+
+    A simulated spring would throw the arm off them.
+    """
+    return replace(
+        constants,
+        q_lower=np.minimum(constants.q_lower, constants.home),
+        q_upper=np.maximum(constants.q_upper, constants.home),
+    )
+
+
+def true_constants(believed: ArmConstants, departure: Departure) -> ArmConstants:
+    """Return the arm as it is: stops, gear ratios, masses of its links."""
+    arm = constants_around_home(believed)
+    pairs = zip(arm.links, departure.links.tolist(), strict=True)
+    return replace(
+        arm,
+        q_lower=arm.q_lower + departure.stops[0],
+        q_upper=arm.q_upper + departure.stops[1],
+        j2mp=arm.j2mp * departure.ratios,
+        links=tuple(replace(link, mass=link.mass + more) for link, more in pairs),
+    )
+
+
+def true_tool(believed: Tool, departure: Departure) -> Tool:
+    """Return the foot as it is."""
+    turn = np.diag([-1.0, -1.0, 1.0]) if departure.is_foot_turned else np.eye(3)
+    foot = believed.foot
+    com = turn @ foot.com + departure.foot_centre
+    share = departure.foot_mass
+    body = Body(share * foot.mass, com, share * (turn @ foot.inertia @ turn.T))
+    return replace(believed, foot=body, sole=turn @ believed.sole + departure.sole)
+
+
+def true_options(believed: PlantOptions, departure: Departure) -> PlantOptions:
+    """Return friction and gravity as they are."""
+    down: list[float] = (rotation(departure.mount.tolist()).T @ _DOWN).tolist()
+    x, y, z = down
+    friction = departure.friction * believed.friction
+    return replace(believed, friction=friction, down=(x, y, z))
+
+
+def true_network(believed: NetworkOptions, departure: Departure) -> NetworkOptions:
+    """Return the network as it is found: firmware of its pucks."""
+    vers = list(believed.vers)
+    for node, version in departure.versions:
+        vers[node - 1] = version
+    return replace(believed, vers=tuple(vers))
+
+
+def true_frame(believed: TerrainFrame, departure: Departure) -> TerrainFrame:
+    """Return where the container stands, in the frame of the base as it is turned."""
+    place, yaw = departure.place, float(departure.mount[2])
+    incline = -believed.incline if place.is_other_way else believed.incline
+    shifted = np.array(believed.far_end) + place.far_end
+    x, y, z = (rotation((0.0, 0.0, yaw)).T @ shifted).tolist()
+    return TerrainFrame(
+        incline + place.incline,
+        believed.heading + place.heading - yaw,
+        (x, y, z),
+        believed.travel + place.travel,
+    )
+
+
+def true_stones(believed: str, departure: Departure) -> str:
+    """Return the stones in the container: "small", "big" or "none"."""
+    if not departure.place.is_relabelled:
+        return believed
+    return "small" if believed == "none" else "none"
+
+
+def true_start(q: Array, departure: Departure) -> Array:
+    """Return the pose of an arm that a person brings to its container, shape (7,)."""
+    turned = q.copy()
+    turned[0] -= departure.mount[2]
+    return turned
+
+
+def shown_load(source: Source, departure: Departure) -> Source:
+    """Return what the wrist sensor shows of the load on it."""
+    late_ns = round(1e9 * departure.force_late)
+    if not late_ns and (departure.shown == np.eye(6)).all():
+        return source
+    return MountedSensor(source, departure.shown, late_ns)
+
+
+def depart(
+    plant: ArmPlant,
+    network: PuckNetwork,
+    departure: Departure,
+    believed: ArmConstants,
+) -> None:
+    """Let cables, pucks, module and bus of a standing rig be as they are."""
+    plant.wiring = wiring_of(plant, departure, believed)
+    if departure.cable.any():
+        plant.lay_cable(departure.cable.tolist())
+    for node, name, value in departure.properties:
+        network.set_property(node, name, value)
+    _break_module(network, departure)
+    _break_bus(network, departure.bus)
+
+
+def wiring_of(
+    plant: ArmPlant, departure: Departure, believed: ArmConstants
+) -> Wiring | None:
+    """Return what passes between pucks and motors; None = what is believed."""
+    per_radian = np.array(believed.cts) / (2.0 * np.pi)
+    true_home = per_radian * (believed.j2mp * departure.ratios @ believed.home)
+    home = per_radian * (believed.j2mp @ believed.home)
+    shift = per_radian * (believed.j2mp @ departure.zeros) + home - true_home
+    is_built = (departure.torque == np.eye(7)).all()
+    is_told = (departure.counts == np.eye(7)).all() and not shift.any()
+    torn = departure.torn
+    if is_built and is_told and not torn:
+        return None
+    wiring = Wiring(departure.torque, departure.counts, true_home, shift)
+    if not torn:
+        return wiring
+    torn_at = float(wiring.told_of(np.array(plant.counts()))[torn - 1])
+    return replace(wiring, torn=torn, torn_at=torn_at)
+
+
+def _break_module(network: PuckNetwork, departure: Departure) -> None:
+    module = departure.module
+    for limit, factor in module.limits:
+        network.misset(limit, factor)
+    if module.dead_button is not None:
+        network.break_button(module.dead_button)
+    if module.is_disobedient:
+        network.disobey()
+    if module.voltage is not None:
+        network.set_bus_voltage(module.voltage)
+
+
+def _break_bus(network: PuckNetwork, bus: BusTrouble) -> None:
+    faults = network.faults
+    for node, late_ns in bus.late_ns:
+        faults.delay(position_reply_id(node), late_ns, None)
+    if bus.lag_ns:
+        faults.lag(bus.lag_ns)
+    if bus.lost:
+        for node in MOTOR_NODES:
+            faults.drop(position_reply_id(node), None, bus.lost)
+    if bus.doubled:
+        for reply in (position_reply_id(bus.doubled), property_reply_id(bus.doubled)):
+            faults.answer_twice(reply, _of_twin, _TWIN_NS)
+    if bus.other_master:
+        network.other_master.join(bus.other_master)
+    if bus.poller:
+        network.other_master.join(bus.poller, is_poller=True)
+    for node in bus.silent:
+        network.silence(node)
+
+
+def _of_twin(data: Payload) -> bytes:
+    """Return what another device says in place of `data`: its lowest bits differ."""
+    last = len(data) - 1 if len(data) == _POSITION else 2
+    return bytes(b ^ 1 if i == last else b for i, b in enumerate(bytes(data)))
+
+
+_POSITION = 3  # bytes of a position
