@@ -6,6 +6,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from experiments import provenance
+from experiments.commissioning import by_hand
 from experiments.commissioning.gate import lacks
 from experiments.commissioning.inputs import inputs_of, present_inputs
 from experiments.commissioning.limits import Judgement
@@ -83,6 +84,10 @@ def do_step(
         scene.start()
     if work.needs_zero and scene.info is not None and not scene.info.is_zeroed:
         raise preflight_error("not-zeroed")
+    by_hand_before = files.record.of(ProofStep.BY_HAND)
+    if by_hand_before is not None and by_hand_before.raw:
+        stops = read_raw(files.folder, by_hand_before.raw[0])
+        scene.stops = by_hand.stop_errors(stops)
     started = _now(scene.rig)
     values = work.collect(scene)
     judgement = work.judge(values)
