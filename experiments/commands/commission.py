@@ -50,6 +50,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_simulated_arm(parser)
     parser.add_argument(
+        "--wrong",
+        default="",
+        metavar="NAME",
+        help="what is wrong with the simulated rig, e.g. motor-2-reversed (nothing)",
+    )
+    parser.add_argument(
         "--operator-script", metavar="auto", help="simulated operator, only with --fake"
     )
 
@@ -73,7 +79,14 @@ def run(args: argparse.Namespace) -> int:
     operator = choose_operator(args.operator_script, is_fake=args.fake)
     fake: FakeOptions | None = None
     if args.fake:
-        fake = FakeOptions(args.fast, args.seed, friction, cables=args.cables)
+        fake = FakeOptions(
+            args.fast,
+            args.seed,
+            friction,
+            cables=args.cables,
+            spread=True,
+            wrong=args.wrong,
+        )
     persons = (args.operator or operator.who, args.witness or "")
     kind = "SIMULATED" if args.fake else "LIVE RIG"
     console.say(f"traction commission        {kind} · {files.folder}")
@@ -152,9 +165,9 @@ def _steps(args: argparse.Namespace) -> list[ProofStep]:
     from acquisition.errors import SettingsError
     from experiments.commissioning.work import WORK
 
-    if not args.fake and (args.fast or args.operator_script):
+    if not args.fake and (args.fast or args.operator_script or args.wrong):
         raise SettingsError(
-            "--fast and --operator-script work only with --fake.",
+            "--fast, --wrong and --operator-script work only with --fake.",
             hint="Nothing was started.",
         )
     known = list(WORK)

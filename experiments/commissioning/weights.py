@@ -1,8 +1,9 @@
 """C6 and C7: the foot's own weight and a known one, in poses held by hand, arm idle.
 
-With s the sensor's sign and R the believed orientation of the sensor, a foot that weighs
-w in the base frame shows s f = b + R^T w and s n = b_n + c x R^T w: linear in bias, centre
-and weight. Differences with and without a known weight are free of all but that weight.
+With s the sensor's sign and R the believed orientation of the sensor, a foot that
+weighs w in the base frame shows s f = b + R^T w and s n = b_n + c x R^T w: linear in
+bias, centre and weight. Differences with and without a known weight are free of all but
+that weight.
 """
 
 from collections.abc import Sequence
@@ -163,7 +164,7 @@ def judge_own_weight(values: Values) -> Judgement:
     rows[:, :3] = np.tile(np.eye(3), (count, 1))
     rows[:, 3:] = R.transpose(0, 2, 1).reshape(-1, 3)
     solved, *_ = np.linalg.lstsq(rows, loads[:, :3].ravel())
-    w = solved[3:]
+    w: Array = solved[3:].astype(np.float64)
     left = loads[:, :3].ravel() - rows @ solved
     arms = np.zeros((3 * count, 6))
     arms[:, :3] = np.tile(np.eye(3), (count, 1))
