@@ -12,10 +12,10 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from experiments.commissioning.guide import RecordFolder
     from experiments.commissioning.steps import ProofStep
     from experiments.operator.console import Console
     from experiments.operator.prompts import OperatorInput
+    from experiments.proving.guide import RecordFolder
     from experiments.rig.rig import FakeOptions
     from experiments.settings.load import Settings
 
@@ -62,9 +62,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Do the steps that are due and return the exit code."""
-    from experiments.commissioning.guide import RecordFolder, recheck
     from experiments.operator.console import Console
     from experiments.operator.scripted import choose_operator
+    from experiments.proving.guide import RecordFolder, recheck
     from experiments.rig.rig import FakeOptions
     from experiments.settings.load import load_settings
 
@@ -107,11 +107,11 @@ def _sittings(
     operator: OperatorInput,
 ) -> int:
     """Do the steps, as many on one connection as can be; return the exit code."""
-    from experiments.commissioning.guide import do_step, wanted
-    from experiments.commissioning.scene import Scene
-    from experiments.commissioning.work import SITTINGS
     from experiments.operator.terminal import keyboard
     from experiments.preflight.connecting import connect_rig
+    from experiments.proving.guide import do_step, wanted
+    from experiments.proving.scene import Scene
+    from experiments.proving.work import SITTINGS
     from experiments.rig.bus_log import logging_bus
     from experiments.run.console_loop import ConsoleLoop
     from experiments.run.pose_walk import INTERRUPTED
@@ -144,7 +144,7 @@ def _sittings(
 
 def _end(files: RecordFolder, console: Console, persons: tuple[str, str]) -> None:
     """Ask for the two names once everything is done."""
-    from experiments.commissioning.work import WORK
+    from experiments.proving.work import WORK
 
     done = {each.step for each in files.record.steps}
     missing = [step for step in WORK if step not in done]
@@ -163,7 +163,7 @@ def _end(files: RecordFolder, console: Console, persons: tuple[str, str]) -> Non
 
 def _steps(args: argparse.Namespace) -> list[ProofStep]:
     from acquisition.errors import SettingsError
-    from experiments.commissioning.work import WORK
+    from experiments.proving.work import WORK
 
     if not args.fake and (args.fast or args.operator_script or args.wrong):
         raise SettingsError(

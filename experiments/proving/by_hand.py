@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from experiments.commissioning.limits import Found, Judgement, found, judged
-from experiments.commissioning.recording import Values
-from experiments.commissioning.scene import Scene
+from experiments.proving.limits import Found, Judgement, found, judged
+from experiments.proving.recording import Values
+from experiments.proving.scene import Scene
 from wam.model.constants import Array
 
 # Where the arm is before its joints are turned [rad]: nothing is in the way of one.
@@ -67,12 +67,6 @@ def collect(scene: Scene) -> Values:
 def _mean(scene: Scene) -> Array:
     scene.wait(_MEANT)
     return scene.loop_client.last(_MEANT)["position"].mean(axis=0)
-
-
-def stop_errors(values: Values) -> Array:
-    """Return by how much the zero of each joint is off by its stops [rad], (7,)."""
-    low, high = np.diag(values["low"]), np.diag(values["high"])
-    return ((low - values["q_lower"]) + (high - values["q_upper"])) / 2
 
 
 def judge(values: Values) -> Judgement:

@@ -15,10 +15,10 @@ from acquisition.control_loop.states import ArmState
 from acquisition.devices import SafetyMode
 from acquisition.errors import PreflightError
 from acquisition.sample import SAFETY_MODE_MASK
-from experiments.commissioning.limits import Found, Judgement, found, judged
-from experiments.commissioning.recording import Values, texts, words
-from experiments.commissioning.scene import Scene
 from experiments.messages import preflight_error
+from experiments.proving.limits import Found, Judgement, found, judged
+from experiments.proving.recording import Values, texts, words
+from experiments.proving.scene import Scene
 from wam.model.constants import ArmConstants, Array
 
 # Joints as they are pushed, the sign is that of the motion: what bears least first.

@@ -4,13 +4,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from acquisition.control_loop.proof import ProofGoal
-from acquisition.errors import TractionError
 from acquisition.ipc.loop_client import LoopClient
 from acquisition.simulation import SimulationControl
 from experiments.messages import FaultContext, fault_text
 from experiments.operator.console import Console
 from experiments.operator.prompts import Prompt
-from experiments.preflight.connecting import as_preflight
 from experiments.rig.rig import Rig
 from experiments.run.console_loop import TICK, ConsoleLoop
 from experiments.run.stop import ArmFaultError
@@ -31,8 +29,6 @@ class Scene:
         info: of the arm that was started; None = it was not.
         answers: what its pucks said of themselves.
         is_proving: the arm is active in a proof.
-        stops: by how much each joint's zero is off by its stops [rad], shape (7,);
-            None = not measured.
     """
 
     rig: Rig
@@ -40,7 +36,6 @@ class Scene:
     info: ArmInfo | None = None
     answers: Sequence[Mapping[str, int | None]] = ()
     is_proving: bool = False
-    stops: Array | None = None
 
     @property
     def loop_client(self) -> LoopClient:
@@ -61,16 +56,13 @@ class Scene:
         """Start arm, sensor and loop, unless that was done.
 
         Raises:
-            PreflightError: the arm or the sensor is not fit.
+            TractionError: the arm or the sensor is not fit.
         """
         if self.loop_client.loop.is_running:
             return
-        try:
-            self.info = self.rig.backend.start_arm()
-            self.answers = self.rig.backend.arm.answers()
-            self.rig.backend.open_sensor()
-        except TractionError as error:
-            raise as_preflight(error, "not touched") from error
+        self.info = self.rig.backend.start_arm()
+        self.answers = self.rig.backend.arm.answers()
+        self.rig.backend.open_sensor()
         self.rig.backend.begin()
 
     def say(self, text: str) -> None:

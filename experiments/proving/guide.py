@@ -6,10 +6,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from experiments import provenance
-from experiments.commissioning import by_hand
 from experiments.commissioning.gate import lacks
 from experiments.commissioning.inputs import inputs_of, present_inputs
-from experiments.commissioning.limits import Judgement
 from experiments.commissioning.record import (
     Commissioning,
     Measured,
@@ -17,12 +15,13 @@ from experiments.commissioning.record import (
     read_commissioning,
     write_commissioning,
 )
-from experiments.commissioning.recording import read_raw, write_raw
-from experiments.commissioning.scene import Scene
 from experiments.commissioning.steps import ProofStep
-from experiments.commissioning.work import WORK
 from experiments.messages import preflight_error
 from experiments.operator.console import BAD, GOOD, Console
+from experiments.proving.limits import Judgement
+from experiments.proving.recording import read_raw, write_raw
+from experiments.proving.scene import Scene
+from experiments.proving.work import WORK
 from experiments.rig.rig import Rig
 
 SHOWN = 4  # quantities of a step that passed, on the screen
@@ -84,10 +83,6 @@ def do_step(
         scene.start()
     if work.needs_zero and scene.info is not None and not scene.info.is_zeroed:
         raise preflight_error("not-zeroed")
-    by_hand_before = files.record.of(ProofStep.BY_HAND)
-    if by_hand_before is not None and by_hand_before.raw:
-        stops = read_raw(files.folder, by_hand_before.raw[0])
-        scene.stops = by_hand.stop_errors(stops)
     started = _now(scene.rig)
     values = work.collect(scene)
     judgement = work.judge(values)

@@ -10,9 +10,9 @@ from acquisition.control_loop.faults import Fault
 from acquisition.devices import SafetyMode
 from acquisition.errors import PreflightError
 from acquisition.sample import MOTOR_FRESH_SHIFT, SAFETY_MODE_MASK
-from experiments.commissioning.limits import Judgement, found, judged
-from experiments.commissioning.recording import Values
-from experiments.commissioning.scene import Scene
+from experiments.proving.limits import Judgement, found, judged
+from experiments.proving.recording import Values
+from experiments.proving.scene import Scene
 
 _PATIENCE = 60.0  # s, for each press
 _RELEASED = 2.0  # s, that a released stop has to last

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from experiments.commissioning.limits import Judgement, found, judged
-from experiments.commissioning.recording import Values, number, texts, words
+from experiments.proving.limits import Judgement, found, judged
+from experiments.proving.recording import Values, number, texts, words
 from experiments.rig.rig import Rig
 
 

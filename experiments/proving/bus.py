@@ -7,8 +7,8 @@ import numpy as np
 
 from acquisition.errors import TractionError, UnfitDeviceError
 from acquisition.sample import Flag
-from experiments.commissioning.limits import Judgement, found, judged
-from experiments.commissioning.recording import Values, number, texts, words
+from experiments.proving.limits import Judgement, found, judged
+from experiments.proving.recording import Values, number, texts, words
 from experiments.rig.build import read_properties
 from experiments.rig.rig import Rig
 from wam.bus.frames import MOTOR_NODES, SAFETY_NODE

@@ -3,18 +3,17 @@
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
-from experiments.commissioning import (
+from experiments.commissioning.steps import ProofStep
+from experiments.proving import (
     bus,
     by_hand,
     configuration,
     rest_pose,
     stop_circuit,
-    weights,
 )
-from experiments.commissioning.limits import Judgement
-from experiments.commissioning.recording import Values
-from experiments.commissioning.scene import Scene
-from experiments.commissioning.steps import ProofStep
+from experiments.proving.limits import Judgement
+from experiments.proving.recording import Values
+from experiments.proving.scene import Scene
 from experiments.rig.rig import Rig
 
 
@@ -106,22 +105,6 @@ WORK: Mapping[ProofStep, StepWork] = {
         needs_loop=True,
         needs_zero=True,
     ),
-    ProofStep.OWN_WEIGHT: StepWork(
-        weights.own_weight,
-        weights.judge_own_weight,
-        8,
-        "Weigh the foot; look at the sensor's mounting, sign, sheet and cable.",
-        needs_loop=True,
-        needs_zero=True,
-    ),
-    ProofStep.HUNG_WEIGHT: StepWork(
-        weights.hung_weight,
-        weights.judge_hung_weight,
-        12,
-        "Zero the arm again where a zero is named; look at base and sensor.",
-        needs_loop=True,
-        needs_zero=True,
-    ),
     ProofStep.REST_POSE: StepWork(
         rest_pose.rest,
         rest_pose.judge_rest,
@@ -159,6 +142,6 @@ WORK: Mapping[ProofStep, StepWork] = {
 SITTINGS: tuple[tuple[ProofStep, ...], ...] = (
     (ProofStep.CONFIGURATION, ProofStep.LISTEN, ProofStep.IDENTITY, ProofStep.TIMING),
     (ProofStep.STOP_CIRCUIT,),
-    (ProofStep.BY_HAND, ProofStep.OWN_WEIGHT, ProofStep.HUNG_WEIGHT),
+    (ProofStep.BY_HAND,),
     (ProofStep.REST_POSE, ProofStep.RAMPS, ProofStep.LIFT, ProofStep.GRAVITY_RAMP),
 )
