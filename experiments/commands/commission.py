@@ -115,7 +115,12 @@ def _sittings(
     from experiments.rig.bus_log import logging_bus
     from experiments.run.console_loop import ConsoleLoop
     from experiments.run.pose_walk import INTERRUPTED
-    from experiments.run.stop import StopFlag, StopRequestedError, handle_signals
+    from experiments.run.stop import (
+        ArmFaultError,
+        StopFlag,
+        StopRequestedError,
+        handle_signals,
+    )
 
     stop = StopFlag()
     row = settings.matrix.terrains[0]
@@ -137,6 +142,9 @@ def _sittings(
                     "traction commission goes on with the next."
                 )
                 return INTERRUPTED
+            except ArmFaultError as fault:
+                console.problem(scene.fault_words(fault))
+                return 4
             finally:
                 scene.console_loop.make_safe()
     return 0

@@ -26,7 +26,7 @@ RAMPS = (1, -1, 3, -3, 5, -5, 7, -7, 2, -4, -6)
 LIFTED = (2, -4, -6)  # those that bear weight on the rest pose
 _RAMP_SECONDS = 1.0
 _AFTER = 0.3  # s, recorded beyond the end of a ramp
-_REST = 0.4  # s, without torque between two proofs
+_REST = 0.6  # s, without torque at the end of a proof
 _STILL = 1.0  # s, C8
 _LIFT_SECONDS = 2 * PROOF_LIMITS.lift_way / PROOF_LIMITS.lift_speed + 0.6
 _GRAVITY_SECONDS, _GRAVITY_KEPT = 1.4, 0.6
@@ -234,14 +234,13 @@ def _proofs(scene: Scene, goals: Sequence[ProofGoal], seconds: float) -> Values:
         scene.show_share(number / len(goals), _words(goal))
         scene.prove(goal)
         reader = scene.rig.shared.cycles.reader()
-        ended = scene.until_fault(lambda: None, seconds)
+        # It ends without torque, and lies down again within its own limits.
+        ended = scene.until_fault(lambda: None, seconds + _REST)
         part = reader.read()
         parts.append(part)
         numbers.append(np.full(len(part), number))
         if ended:
             break
-        scene.prove(ProofGoal(ProofKind.REST))
-        scene.wait(_REST)
     record = np.concatenate(parts)
     return {
         "proof": np.concatenate(numbers),

@@ -120,17 +120,21 @@ class Scene:
             work()
             self.wait(seconds)
         except ArmFaultError as fault:
-            self.is_proving = False
-            self.loop_client.advance(TICK)
-            context = FaultContext(
-                "The step",
-                bus=self.loop_client.loop.bus_condition,
-                prompt=None,
-                command=COMMAND,
-                state=self.loop_client.status.state,
-            )
-            return [fault_text(fault.verdict, context, "").strip()]
+            return [self.fault_words(fault)]
         return []
+
+    def fault_words(self, fault: ArmFaultError) -> str:
+        """Return the message of what the guard stopped the arm for."""
+        self.is_proving = False
+        self.loop_client.advance(TICK)
+        context = FaultContext(
+            "The step",
+            bus=self.loop_client.loop.bus_condition,
+            prompt=None,
+            command=COMMAND,
+            state=self.loop_client.status.state,
+        )
+        return fault_text(fault.verdict, context, "").strip()
 
     def prove(self, goal: ProofGoal) -> None:
         """Ask the loop for a proof."""
