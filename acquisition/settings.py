@@ -48,6 +48,7 @@ _LARGEST = 1_000_000  # bytes; what a person writes has a few thousand
 def read_text(path: Path) -> str:
     """Return the UTF-8 text of a small file that a person or a calibration wrote.
 
+    A byte-order mark, which some editors put before it, is left out.
     Pipes and devices are not opened: they would be read for ever.
 
     Raises:
@@ -56,7 +57,7 @@ def read_text(path: Path) -> str:
     """
     try:
         data = read_regular(path, _LARGEST, is_link_followed=True)
-        return io.TextIOWrapper(io.BytesIO(data), encoding="utf-8").read()
+        return io.TextIOWrapper(io.BytesIO(data), encoding="utf-8-sig").read()
     except NotRegularError as error:
         raise ValueError("it is not a file") from error
     except UnfitFileError as error:

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 from acquisition.errors import TractionError
 from acquisition.linear_algebra import openblas_settings
@@ -19,6 +19,9 @@ from experiments.arguments import (
     did_you_mean,
     with_present_names,
 )
+
+if TYPE_CHECKING:
+    from _typeshed import SupportsWrite
 
 COMMANDS = {
     "check": "check that the rig is ready: one graded page",
@@ -91,6 +94,11 @@ class _Parser(argparse.ArgumentParser):
             message = f"{message} {did_you_mean(invalid['got'], known)}".rstrip()
         super().error(message)
 
+    def print_help(self, file: "SupportsWrite[str] | None" = None) -> None:
+        """Print the help; unlike argparse's own it tells of a disk that is full."""
+        print(self.format_help(), end="", file=file)
+        sys.stdout.flush()
+
 
 class _Formatter(argparse.RawDescriptionHelpFormatter):
     """Keeps the examples as they are written."""
@@ -134,7 +142,9 @@ def build_parser(wanted: Collection[str] = COMMANDS) -> argparse.ArgumentParser:
 
 
 def _show_first_steps(_: argparse.Namespace) -> int:
-    print(FIRST_STEPS.rstrip())  # noqa: T201
+    from experiments.operator.console import Console
+
+    Console(color=False).say(FIRST_STEPS.rstrip())
     return 0
 
 
@@ -146,7 +156,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         os.environ.setdefault(name, value)
     named = with_present_names(sys.argv[1:] if arguments is None else arguments)
     parser = build_parser(set(named) & set(COMMANDS))
-    args = parser.parse_args(named)
+    try:
+        args = parser.parse_args(named)
+    except OSError as error:  # --version and --help print while they are parsed
+        return _report_output(error)
     try:
         code = args.run(args)
     except TractionError as error:
@@ -156,13 +169,28 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return error.exit_code
     except KeyboardInterrupt:
         return _tell("nothing-lost", {})
-    except BrokenPipeError:
-        return 0
+    except BrokenPipeError as error:
+        return _report_output(error)
     except Exception as error:
         if isinstance(error, OSError) and error.errno in _OF_THE_DISK:
             return _report_disk(error)
         return _report_bug()
+    try:
+        sys.stdout.flush()
+    except OSError as error:
+        return int(code) or _report_output(error)
     return int(code)
+
+
+def _report_output(error: OSError) -> int:
+    """Say that a full disk took no output; a reader that has gone is no fault."""
+    from experiments.operator.console import OutputError, discard
+
+    discard(sys.stdout)
+    if isinstance(error, BrokenPipeError):
+        return 0
+    print(OutputError(error), file=sys.stderr)  # noqa: T201
+    return OutputError.exit_code
 
 
 def _complete() -> None:
@@ -217,7 +245,7 @@ class _Version(argparse.Action):
         code = provenance.collect()
         changed = ", changed" if code["dirty"] == "true" else ""
         text = f"{code['software']} (commit {code['commit']}{changed})"
-        print(text)  # noqa: T201
+        print(text, flush=True)  # noqa: T201
         parser.exit()
 
 

@@ -195,6 +195,38 @@ def add_analysis(parser: ArgumentParser) -> None:
     )
 
 
+def add_table_form(parser: ArgumentParser) -> None:
+    """Declare how tables of other programs are read."""
+    group = parser.add_argument_group("tables")
+    group.add_argument(
+        "--columns",
+        metavar="t=..,v_t=..,F_n=..,F_t=..",
+        help="names in a CSV or Parquet file, or places from 1; a name with commas in "
+        "quotes",
+    )
+    group.add_argument(
+        "--unit", metavar="v_t=mm/s,..", help="units where a header gives none"
+    )
+    group.add_argument(
+        "--negate",
+        metavar="F_n,..",
+        help="columns with the other sign, e.g. F_n below zero in compression",
+    )
+    group.add_argument(
+        "--decimal",
+        choices=(".", ","),
+        metavar="MARK",
+        help="decimal mark, . or , of a CSV in which the other one groups thousands",
+    )
+    group.add_argument(
+        "--rate",
+        type=number_within(1, 100_000, "a rate in Hz, e.g. 500"),
+        metavar="HZ",
+        help="rows of a CSV per second, where it has no time",
+    )
+    group.add_argument("--terrain", metavar="NAME", help="terrain of the CSV files")
+
+
 def add_scheduler(parser: ArgumentParser) -> None:
     """Declare where models are fitted."""
     parser.add_argument(

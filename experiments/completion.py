@@ -43,6 +43,10 @@ def _names(metavar: str, dest: str, args: argparse.Namespace) -> Iterable[str] |
         return _terrains(args)
     if dest == "fault":
         return _faults(args)
+    if dest == "wrong":
+        from experiments.rig.fake import wrong_rigs
+
+        return [*wrong_rigs(), "help"]
     if dest == "explain":
         from experiments.messages import CATALOGUE
 

@@ -19,10 +19,10 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.data.columns import parse_columns
 from analysis.data.load import RecordedTrial, load_trial
 from analysis.data.tables import load_tables
 from analysis.data.terrain_kinds import terrain_kind
+from analysis.dialects.columns import parse_columns
 from analysis.foresight.engine import Foresight
 from analysis.foresight.held_out import foresee, hold_out
 from analysis.foresight.model import ForesightModel, RigIdentity

@@ -23,6 +23,8 @@ from fakes.clock import SteppedClock
 from fakes.plant.model import PlantOptions, Support
 from fakes.plant.wiring import Wiring
 from fakes.world.rig import FakeRig, SimulatedScene
+from fakes.world.true_rig import true_options
+from fakes.world.wrong_rigs import scaled, wrong_rig
 from tests.acquisition.control_loop.limits import guard_limits
 from tests.fakes.scenes import CONSTANTS, FRAME, START_Q, TOOL
 from wam.bus.link import CanLink
@@ -74,44 +76,43 @@ class WrongRig:
     free_rotor: int = 0
 
 
-def scaled(**motors: float) -> np.ndarray:
-    """Return the matrix of motors that make a share of their torque, `m2=0.5`."""
-    matrix = np.eye(7)
-    for name, share in motors.items():
-        matrix[int(name[1:]) - 1] *= share
-    return matrix
-
-
-def swapped(a: int, b: int) -> np.ndarray:
-    """Return the matrix of two cables that are swapped, 1-7."""
-    matrix = np.eye(7)
-    matrix[[a - 1, b - 1]] = matrix[[b - 1, a - 1]]
-    return matrix
+def known(name: str, words: str) -> WrongRig:
+    """Return a rig of the catalogue, called `words`."""
+    rig = wrong_rig(name).departure
+    return WrongRig(
+        words,
+        torque=rig.torque,
+        counts=rig.counts,
+        properties=rig.properties,
+        foot_mass=rig.foot_typed,
+        down=true_options(PlantOptions(), rig).down,
+        free_rotor=rig.torn,
+    )
 
 
 RIGS = (
     WrongRig("activated while the program is idle", is_asked=False),
-    WrongRig("motor 2 reversed", torque=scaled(m2=-1.0)),
-    WrongRig("motor 3 reversed", torque=scaled(m3=-1.0)),
-    WrongRig("motor 4 reversed", torque=scaled(m4=-1.0)),
-    WrongRig("motor 5 reversed", torque=scaled(m5=-1.0)),
-    WrongRig("motor cables 5/6 swapped", torque=swapped(5, 6)),
-    WrongRig("encoders 5/6 swapped", counts=swapped(5, 6)),
-    WrongRig("motor cables 2/3 swapped", torque=swapped(2, 3)),
-    WrongRig("motor cables 1/4 swapped", torque=swapped(1, 4)),
-    WrongRig("PIDX 2 on puck 3", properties=((3, "PIDX", 2),)),
-    WrongRig("PIDX 1 on puck 2", properties=((2, "PIDX", 1),)),
-    WrongRig("MT 700 on pucks 2, 3", properties=((2, "MT", 700), (3, "MT", 700))),
-    WrongRig("MT 400 on puck 2", properties=((2, "MT", 400),)),
+    known("motor-2-reversed", "motor 2 reversed"),
+    known("motor-3-reversed", "motor 3 reversed"),
+    known("motor-4-reversed", "motor 4 reversed"),
+    known("motor-5-reversed", "motor 5 reversed"),
+    known("motors-5-6-swapped", "motor cables 5/6 swapped"),
+    known("encoders-5-6-swapped", "encoders 5/6 swapped"),
+    known("motors-2-3-swapped", "motor cables 2/3 swapped"),
+    known("motors-1-4-swapped", "motor cables 1/4 swapped"),
+    known("pidx-3-is-2", "PIDX 2 on puck 3"),
+    known("pidx-2-is-1", "PIDX 1 on puck 2"),
+    known("mt-700", "MT 700 on pucks 2, 3"),
+    known("mt-400", "MT 400 on puck 2"),
     WrongRig("IPNM of puck 2 a tenth", torque=scaled(m2=0.1)),
     WrongRig("IPNM of puck 2 tenfold", torque=scaled(m2=10.0)),
-    WrongRig("motor 2 without torque", torque=scaled(m2=0.0)),
-    WrongRig("motors 2 and 3 at half torque", torque=scaled(m2=0.5, m3=0.5)),
-    WrongRig("foot typed 4.5 kg", foot_mass=4.5),
+    known("motor-2-dead", "motor 2 without torque"),
+    known("motors-2-3-half", "motors 2 and 3 at half torque"),
+    known("foot-typed-4.5kg", "foot typed 4.5 kg"),
     WrongRig("foot typed 2.95 kg", foot_mass=2.95),
-    WrongRig("base on a wall", down=(0.0, 1.0, 0.0)),
-    WrongRig("base on the ceiling", down=(0.0, 0.0, 1.0)),
-    WrongRig("cable of motor 2 torn", free_rotor=2),
+    known("base-on-wall", "base on a wall"),
+    known("base-on-ceiling", "base on the ceiling"),
+    known("cable-2-torn", "cable of motor 2 torn"),
 )
 OTHERS = (
     WrongRig("sound"),
@@ -122,10 +123,7 @@ OTHERS = (
         WrongRig(f"motor {k} without torque", torque=scaled(**{f"m{k}": 0.0}))
         for k in (1, 3, 4, 5, 6, 7)
     ),
-    *(
-        WrongRig(f"motor {k} reversed", torque=scaled(**{f"m{k}": -1.0}))
-        for k in (1, 6, 7)
-    ),
+    *(known(f"motor-{k}-reversed", f"motor {k} reversed") for k in (1, 6, 7)),
 )
 
 

@@ -60,7 +60,7 @@ def load_trial(path: Path | str) -> Trial:
         TrialFileError: the file is no sound recording.
         SettingsError: the table cannot be read, or holds more than one trial.
     """
-    path = Path(path)
+    path = Path(path).expanduser()
     if path.suffix == _RECORDED:
         return trial_of(recorded_trial(path))
     trials = load_tables(path)
@@ -77,6 +77,8 @@ def load_tables(
     terrain: str | None = None,
     units: Mapping[str, str] | None = None,
     rate: float | None = None,
+    negate: Iterable[str] = (),
+    decimal: str | None = None,
 ) -> TrialSet:
     """Return the trials of tables: those of `traction export`, or of other programs.
 
@@ -86,19 +88,46 @@ def load_tables(
 
     Args:
         paths: a folder of `traction export`, CSV or Parquet files of one trial each, or
-            npz files of many; one or several.
+            npz files of many; one or several. `~` and patterns are expanded.
         columns: names of t, v_t, F_n and F_t in the tables, where they differ.
         terrain: of every CSV and Parquet file; by default what its data package says.
         units: of columns whose header gives none, e.g. {"v_t": "mm/s"}.
         rate: rows per second where a CSV has no time [Hz].
+        negate: columns with the other sign, e.g. ["F_n"].
+        decimal: "." or ",", where the other one groups thousands in a CSV.
 
     Raises:
         SettingsError: a table that is missing, too large, changed, or none.
     """
-    many = [paths] if isinstance(paths, str | Path) else list(paths)
-    files = [Path(path) for path in many]
-    tables = tables_by_terrain(files, columns, terrain, None, units, rate)
+    files = _files(paths)
+    for name, value in (("columns", columns), ("units", units)):
+        if value is not None and not isinstance(value, Mapping):
+            raise SettingsError(
+                f"load_tables: {name} is {value!r:.60}, and no dictionary.",
+                hint='Several files go into a list: load_tables(["a.csv", "b.csv"]).',
+            )
+    tables = tables_by_terrain(
+        files, columns, terrain, None, units, rate, tuple(negate), decimal
+    )
     name = files[0].name if len(files) == 1 else f"{len(files)} files"
     return TrialSet(
         name, tuple(trial_of(s) for series in tables.values() for s in series)
+    )
+
+
+def _files(paths: Path | str | Iterable[Path | str]) -> list[Path]:
+    """Return the names of files.
+
+    Raises:
+        SettingsError: something else was given.
+    """
+    if isinstance(paths, str | Path):
+        return [Path(paths)]
+    if not isinstance(paths, Mapping) and isinstance(paths, Iterable):
+        many = list(paths)
+        if all(isinstance(path, str | Path) for path in many):
+            return [Path(path) for path in many]
+    raise SettingsError(
+        f"load_tables: {paths!r:.60} is no name of a file and no list of names.",
+        hint='Write e.g. load_tables("a.csv") or load_tables(["a.csv", "b.csv"]).',
     )

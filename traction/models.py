@@ -32,6 +32,7 @@ from analysis.study.models import (
 from analysis.study.terrain_fit import mean_of
 from analysis.terrains.database import load
 from analysis.terrains.known import TerrainDatabase
+from analysis.terrains.points import points_of
 from analysis.tustin.model import UNITS
 from traction.frames import data_frame
 from traction.trial_sets import by_terrain
@@ -108,19 +109,7 @@ class Model:
         Raises:
             SettingsError: the two do not have one shape, or a value is not finite.
         """
-        try:
-            loads, speeds = np.broadcast_arrays(
-                np.atleast_1d(np.asarray(F_n, dtype=np.float64)),
-                np.atleast_1d(np.asarray(v_t, dtype=np.float64)),
-            )
-        except ValueError as error:
-            raise SettingsError(
-                f"F_n and v_t are no numbers of one shape ({error}).",
-                hint="Give two numbers, or two arrays of one length.",
-            ) from error
-        if loads.ndim != 1 or not (np.isfinite(loads) & np.isfinite(speeds)).all():
-            raise SettingsError("F_n and v_t have to be finite numbers in one row.")
-        return self.fitted.predict(loads, speeds)
+        return self.fitted.predict(*points_of(F_n, v_t))
 
 
 @dataclass(frozen=True, slots=True)
@@ -235,7 +224,7 @@ def fit(
 
 def compare(
     trials: Iterable[Trial],
-    models: Sequence[str] = PAPER_MODELS,
+    models: str | Sequence[str] = PAPER_MODELS,
     options: FitOptions | None = None,
     n_jobs: int | None = None,
 ) -> Comparison:
@@ -252,7 +241,7 @@ def compare(
 
     Args:
         trials: of one terrain or several, two of each at least.
-        models: their names; by default the five of the paper's Fig. 9.
+        models: their names, or a single one; by default the five of the paper's Fig. 9.
         options: bounds, points and seed; its `models` are not used.
         n_jobs: processes; one per core by default. Does not change the results.
 
@@ -266,7 +255,8 @@ def compare(
             f"No trial can be left out on {', '.join(single) or 'no terrain'}.",
             hint="Give two trials of each terrain at least.",
         )
-    wanted = replace(options or FitOptions(), models=tuple(models))
+    names = (models,) if isinstance(models, str) else tuple(models)
+    wanted = replace(options or FitOptions(), models=names)
     plan, _ = plan_folds(groups, wanted)
     folds = tuple(run_tasks(run_fold, plan, n_jobs))
     scores = [s for terrain in groups for s in _scores(terrain, folds, wanted.models)]

@@ -96,7 +96,7 @@ class TrialSet(Sequence[Trial]):
         >>> import traction as tr
         >>> samples = tr.load_session("S001").to_pandas()
         >>> list(samples.columns)
-        ['trial', 'terrain', 't', 'v_t', 'F_n', 'F_t', 'kept_row']
+        ['trial', 'terrain', 't', 'v_t', 'F_n', 'F_t', 'kept_row', 'simulated']
 
         Args:
             kept: only the samples that models are fitted to, smoothed; else every
@@ -116,7 +116,7 @@ class TrialSet(Sequence[Trial]):
             "trial": np.repeat([trial.name for trial in self.trials], sizes),
             "terrain": np.repeat([trial.terrain for trial in self.trials], sizes),
         }
-        units = SERIES_UNITS | ({"kept_row": "1"} if kept else {})
+        units = SERIES_UNITS | ({"kept_row": "1", "simulated": "1"} if kept else {})
         return data_frame(labels | columns, units, name=self.name)
 
     def plot(self) -> Figure:
@@ -140,7 +140,17 @@ class TrialSet(Sequence[Trial]):
 
 
 def by_terrain(trials: Iterable[Trial]) -> dict[str, list[PreparedTrial]]:
-    """Return the kept samples of trials by terrain."""
+    """Return the kept samples of trials by terrain.
+
+    Raises:
+        SettingsError: some are simulated and others are not.
+    """
+    trials = list(trials)
+    if len({trial.is_simulated for trial in trials}) > 1:
+        raise SettingsError(
+            "Simulated and recorded trials cannot be mixed.",
+            hint="Give trials of one kind: [t for t in trials if not t.is_simulated].",
+        )
     groups: dict[str, list[PreparedTrial]] = {}
     for trial in trials:
         groups.setdefault(trial.terrain, []).append(trial.kept)

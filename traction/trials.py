@@ -36,16 +36,22 @@ class Trial:
 
     def __repr__(self) -> str:
         kind = ", simulated" if self.is_simulated else ""
+        notes = f" [{'; '.join(self.notes)}]" if self.notes else ""
         return (
             f"<Trial {self.name} on {self.terrain}: {self.duration:.1f} s, "
             f"{self.t.size} samples at {self.series.rate:.0f} Hz, "
-            f"{self.kept.kept} kept{kind}>"
+            f"{self.kept.kept} kept{kind}{notes}>"
         )
 
     @property
     def name(self) -> str:
         """Session and trial, e.g. S012/T04; of a table its file."""
         return self.series.name
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was decided when the table was read: dropped rows, gaps, spikes."""
+        return self.series.notes
 
     @property
     def terrain(self) -> str:

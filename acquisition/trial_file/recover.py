@@ -1,30 +1,52 @@
 """Recovery: what is sound of a broken trial file, as a new file beside it."""
 
 import hashlib
+import json
 import os
 import struct
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import IO
 
 import numpy as np
 from mcap.records import Attachment, Channel, Message, Metadata, Schema
 from mcap.writer import CompressionType, Writer
+from pydantic import TypeAdapter
 
+from acquisition.clock import NS_PER_S, PERIOD_NS
 from acquisition.errors import TrialFileError
 from acquisition.files import publish_file
 from acquisition.sample import Flag
 from acquisition.schema import CYCLE, EARLIER_CYCLES
 from acquisition.temporary_folders import temporary_folder
 from acquisition.trial_file.chunks import as_trial_file_error, read_file
+from acquisition.trial_file.contents import read_contents
 from acquisition.trial_file.reader import TrialReader
-from acquisition.trial_file.salvage import Salvaged, SoundRecords
+from acquisition.trial_file.salvage import Gap, Salvaged, SoundRecords
 from acquisition.trial_file.verify import VerifiedFile, verify_file
 from acquisition.trial_file.writer import CHUNK_BYTES
 
+_DIGEST = "sha256:"  # begins the keys of attachments in the provenance
 _CYCLES = {layout.size: layout for layout in (CYCLE, *EARLIER_CYCLES)}
+_MOST_BESIDE = 50  # files that are looked into
 ROOM = ".recover"  # begins the name of a folder in which a copy grows
+
+
+@dataclass(frozen=True, slots=True)
+class Loss:
+    """A part of a recording that is gone.
+
+    Attributes:
+        start: since the first cycle of the recording [s].
+        seconds: how long it was [s].
+    """
+
+    start: float
+    seconds: float
+
+
+_LOSSES = TypeAdapter(tuple[Loss, ...])
 
 
 class TrialCopy:
@@ -51,7 +73,11 @@ class TrialCopy:
         self._channels: dict[int, int] = {}
         self._cycle_channel: int | None = None
         self._numbers: list[int] = []
+        self._times: list[int] = []
         self._late = 0
+        self._gaps: dict[int, list[Gap]] = {}  # by how many cycles are before them
+        self._digests: dict[str, str] = {}
+        self._attached: set[str] = set()
         self._stop_reason = "recovered"
 
     def add(self, record: Salvaged) -> None:
@@ -71,15 +97,10 @@ class TrialCopy:
                 self._add_channel(record)
             case Metadata():
                 self._add_metadata(record)
-            case Attachment():
-                self._writer.flush()
-                self._writer.add_attachment(
-                    record.create_time,
-                    record.log_time,
-                    record.name,
-                    record.media_type,
-                    record.data,
-                )
+            case Attachment() if record.name not in self._attached:
+                self._add_attachment(record)
+            case Gap():
+                self._gaps.setdefault(len(self._numbers), []).append(record)
             case _:
                 pass  # a schema or channel that is known already
 
@@ -89,11 +110,11 @@ class TrialCopy:
         Raises:
             OSError: the disk is full or gone.
         """
-        dropped = int(self.details["source_bytes"]) - salvage.kept_bytes
         self.details["reason"] = salvage.reason or self.details["reason"]
         self.details["messages_kept"] = str(self.messages)
-        self.details["bytes_dropped"] = str(dropped if salvage.reason else 0)
-        self.details["attachments_dropped"] = " ".join(salvage.left_out)
+        self.details["bytes_dropped"] = str(salvage.lost_bytes)
+        self.details["attachments_dropped"] = " ".join(self.missing_attachments)
+        self.details["gaps"] = json.dumps([asdict(loss) for loss in self.losses])
         missed = int((np.diff(np.array(self._numbers, np.int64)) - 1).sum())
         result = {
             "complete": "false",
@@ -108,14 +129,74 @@ class TrialCopy:
         self._writer.add_metadata("result", result)
         self._writer.finish()
 
+    @property
+    def missing_attachments(self) -> dict[str, str]:
+        """Digests of the attachments that were written once and are not here."""
+        return {
+            name: digest
+            for name, digest in self._digests.items()
+            if name not in self._attached
+        }
+
+    @property
+    def losses(self) -> list[Loss]:
+        """What is missing of the recording, in order."""
+        if not self._gaps:
+            return []
+        first = self._edges(0)[0] + PERIOD_NS if 0 in self._gaps else self._times[0]
+        found: list[Loss] = []
+        for at in self._gaps:
+            before, after = self._edges(at)
+            lost_ns = after - before - PERIOD_NS
+            if lost_ns > PERIOD_NS:  # more than a cycle that was missed
+                start_s = max(0, before + PERIOD_NS - first) / NS_PER_S
+                found.append(Loss(round(start_s, 3), round(lost_ns / NS_PER_S, 3)))
+        return found
+
+    def _edges(self, at: int) -> tuple[int, int]:
+        """Return the log times of the cycles before and behind gaps [ns].
+
+        At the ends of the recording they are those that lost chunks have stated; none
+        is left of a gap of unknown length.
+
+        Args:
+            at: how many cycles are before them.
+        """
+        stated = [(gap.first_ns, gap.last_ns) for gap in self._gaps[at] if gap.first_ns]
+        before = self._times[at - 1] if at else None
+        behind = self._times[at] if at < len(self._times) else None
+        if before is None:
+            earliest = min((first for first, _ in stated), default=behind)
+            before = (earliest or 0) - PERIOD_NS
+        if behind is None:
+            behind = max((last for _, last in stated), default=before) + PERIOD_NS
+        return before, behind
+
     def _add_metadata(self, record: Metadata) -> None:
         """Append a metadata record; those of `finish` take the place of two."""
         if record.name == "result":
             self._stop_reason = record.metadata.get("stop_reason", "recovered")
-        elif record.name != "recovered":
+        elif record.name != "recovered" and record.name not in self.metadata:
             self.metadata.add(record.name)
+            if record.name == "provenance":
+                self._digests = {
+                    name.removeprefix(_DIGEST): value
+                    for name, value in record.metadata.items()
+                    if name.startswith(_DIGEST)
+                }
             self._writer.flush()  # or it would overtake the messages before it
             self._writer.add_metadata(record.name, record.metadata)
+
+    def _add_attachment(self, record: Attachment) -> None:
+        self._attached.add(record.name)
+        self._writer.flush()
+        self._writer.add_attachment(
+            record.create_time,
+            record.log_time,
+            record.name,
+            record.media_type,
+            record.data,
+        )
 
     def _add_channel(self, record: Channel) -> None:
         self._channels[record.id] = self._writer.register_channel(
@@ -138,6 +219,7 @@ class TrialCopy:
         if layout is not None:  # others fail to verify
             cycle = np.frombuffer(record.data, layout.dtype, 1)[0]
             self._numbers.append(int(cycle["cycle"]))
+            self._times.append(record.log_time)
             self._late += bool(cycle["flags"] & Flag.DEADLINE_MISSED)
 
 
@@ -150,8 +232,10 @@ class Recovery:
         path: the new file; the source itself where it was whole.
         verified: what reading that file back has shown.
         messages: how many it holds.
-        bytes_dropped: of the source, from its first broken record on.
-        seconds_dropped: recording that was in them, as far as can be seen [s].
+        bytes_dropped: of the source, damaged ones.
+        losses: recording that was in them, as far as can be seen.
+        missing_attachments: names of those that are gone, and stand in no other file
+            beside it.
         reason: what is broken in the source; empty where it is whole.
         is_new: the file was written now.
     """
@@ -161,9 +245,15 @@ class Recovery:
     verified: VerifiedFile
     messages: int
     bytes_dropped: int = 0
-    seconds_dropped: float = 0.0
+    losses: tuple[Loss, ...] = ()
+    missing_attachments: tuple[str, ...] = ()
     reason: str = ""
     is_new: bool = False
+
+    @property
+    def seconds_dropped(self) -> float:
+        """Recording that is gone, as far as can be seen [s]."""
+        return sum(loss.seconds for loss in self.losses)
 
 
 def recovered_path(source: Path) -> Path:
@@ -173,10 +263,12 @@ def recovered_path(source: Path) -> Path:
 
 
 def recover_file(source: Path) -> Recovery:
-    """Save everything up to the first broken record of `source` into a new file.
+    """Save every sound record of `source` into a new file.
 
-    The new file is marked as incomplete, verified and read-only. A source that is
-    whole needs none, and one that was recovered before is not recovered again.
+    An attachment that is damaged is taken from a file beside it that holds the very
+    same, by its digest. The new file is marked as incomplete, verified and read-only.
+    A source that is whole needs none, and one that was recovered before is not
+    recovered again.
 
     Raises:
         TrialFileError: nothing can be saved, or another file stands in the way.
@@ -225,7 +317,8 @@ def _recover(
         verified=verified,
         messages=copy.messages,
         bytes_dropped=int(copy.details["bytes_dropped"]),
-        seconds_dropped=salvage.lost_seconds,
+        losses=tuple(copy.losses),
+        missing_attachments=tuple(copy.missing_attachments),
         reason=copy.details["reason"],
         is_new=True,
     )
@@ -244,11 +337,29 @@ def _write(
             raise TrialFileError(source, f"cannot be copied ({error})") from error
         if not copy.messages or "trial" not in copy.metadata:
             why = salvage.reason or details["reason"]
+            if copy.messages:
+                why += "; what says which trial it is was there"
             raise TrialFileError(source, f"has nothing to save: it {why}")
+        for name, digest in copy.missing_attachments.items():
+            content = _attachment_beside(source, name, digest)
+            if content is not None:
+                copy.add(Attachment(0, 0, name, "text/plain", content))
         copy.finish(salvage)
         file.flush()
         os.fsync(file.fileno())
     return copy
+
+
+def _attachment_beside(source: Path, name: str, digest: str) -> bytes | None:
+    """Return an attachment of a trial that another file beside it holds as well."""
+    for path in sorted(source.parent.glob("*.mcap"))[:_MOST_BESIDE]:
+        try:
+            content = read_contents(path).attachments.get(name)
+        except TrialFileError:
+            continue
+        if content is not None and hashlib.sha256(content).hexdigest() == digest:
+            return content
+    return None
 
 
 def _earlier(source: Path, target: Path, details: Mapping[str, str]) -> Recovery:
@@ -263,12 +374,15 @@ def _earlier(source: Path, target: Path, details: Mapping[str, str]) -> Recovery
     with as_trial_file_error(target):
         messages = int(earlier.get("messages_kept", ""))
         dropped = int(earlier.get("bytes_dropped", ""))
+        losses = _LOSSES.validate_json(earlier.get("gaps", "[]"))
     return Recovery(
         source=source,
         path=target,
         verified=verify_file(target),
         messages=messages,
         bytes_dropped=dropped,
+        losses=losses,
+        missing_attachments=tuple(earlier.get("attachments_dropped", "").split()),
         reason=earlier.get("reason", details["reason"]),
     )
 

@@ -1,9 +1,11 @@
-"""The sound beginning of a broken MCAP file: everything up to the first bad record."""
+"""The sound records of a broken MCAP file; what is damaged between them is skipped."""
 
 import io
+import re
 import struct
 import zlib
-from collections.abc import Generator
+from collections.abc import Generator, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 from mcap.data_stream import ReadDataStream
@@ -11,6 +13,7 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Message, Metadata, Schema
 
 from acquisition.errors import TrialFileError
+from acquisition.schema import schema_text
 from acquisition.trial_file.checksums import MAGIC
 from acquisition.trial_file.chunks import (
     RawRecord,
@@ -20,78 +23,194 @@ from acquisition.trial_file.chunks import (
     record_at,
     unpacked_limit,
 )
+from acquisition.trial_file.writer import topics_by_sizes
 
-Salvaged = Schema | Channel | Message | Metadata | Attachment
 _MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
-_CHUNK_TIMES = struct.Struct("<BQQQ")  # opcode, length, start, end
+_CHUNK_TIMES = struct.Struct("<QQ")  # start, end: the first of a chunk's body
 _CRC = struct.Struct("<I")
 _INDEX = struct.Struct("<HI")  # channel, bytes of pairs of 16
+_LENGTH = struct.Struct("<I")  # of a text, and of the texts of a mapping
 _LONGEST_NS = 3600 * 10**9  # a chunk that claims to be later than this is not believed
+# A record that can prove itself, or the end of the data, of less than 16 MiB.
+_PROVABLE = re.compile(rb"(?=[\x06\x09\x0c\x0f].{3}\x00{5})", re.DOTALL)
+_DEFINITION = re.compile(rb"(?=[\x03\x04].{3}\x00{5})", re.DOTALL)
+_CHUNK_INDEX = re.compile(rb"(?=\x08.{3}\x00{5})", re.DOTALL)
+_INDEX_HEAD = struct.Struct("<QQQ")  # of a chunk index: start, end, offset
+_DATA_END = struct.pack("<BQ", Opcode.DATA_END, _CRC.size)
+_KINDS = range(Opcode.HEADER, Opcode.DATA_END + 1)
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """Something that was skipped, in its place among the sound records.
+
+    Attributes:
+        start: offset of the first damaged byte.
+        end: offset of the next sound record, or of the end of the data.
+        reason: what is wrong there.
+        first_ns: earliest log time in what was lost, as its head says [ns]; 0 = no
+            head of a chunk is left.
+        last_ns: latest log time.
+    """
+
+    start: int
+    end: int
+    reason: str
+    first_ns: int = 0
+    last_ns: int = 0
+
+
+Salvaged = Schema | Channel | Message | Metadata | Attachment | Gap
 
 
 class SoundRecords:
-    """Iterates once over the sound records at the beginning of `data`.
+    """Iterates once over the sound records of `data`, in order.
 
-    A chunk's records come when all of it proved sound, or not at all. The one damage
-    that is survived is an attachment whose checksum is wrong: it is left out.
+    A chunk's records come when all of it proved sound and later than what was before,
+    or not at all. What is damaged
+    is skipped up to the next record whose framing or checksum holds; a `Gap` stands in
+    its place. Channels that were defined in a lost chunk are taken from the summary,
+    or from what this program writes.
 
     Attributes:
-        reason: why the reading ended early; empty when all of the data were read.
-        kept_bytes: offset of the first broken record, or of the end of the data.
-        last_ns: largest log time of the chunks so far, as they state it [ns].
+        reason: what is broken first; empty when all of the data were sound.
+        gaps: what was skipped.
+        last_ns: largest log time so far [ns]; -1 = there was none.
         left_out: names of damaged attachments.
     """
 
     def __init__(self, data: bytes, path: Path) -> None:
         self.reason = ""
-        self.kept_bytes = 0
-        self.last_ns = 0
+        self.gaps: list[Gap] = []
+        self.last_ns = -1
         self.left_out: list[str] = []
-        self._data = memoryview(data)
+        self._data = data
+        self._view = memoryview(data)
         self._path = path
         self._unpacker = Unpacker(path)
         self._room = unpacked_limit(len(data))
         self._schemas = {0}
         self._channels: set[int] = set()
 
+    @property
+    def lost_bytes(self) -> int:
+        """Bytes of the source that were skipped."""
+        return sum(gap.end - gap.start for gap in self.gaps)
+
     def __iter__(self) -> Generator[Salvaged]:
-        if bytes(self._data[: len(MAGIC)]) != MAGIC:
+        at = len(MAGIC)
+        if not self._data.startswith(MAGIC):
+            at = self._next_sound(0)
             self.reason = "is no MCAP file"
-            return
-        self.kept_bytes = len(MAGIC)
-        while True:
-            raw = record_at(self._data, self.kept_bytes)
-            if raw is None:
-                is_at_end = self.kept_bytes == len(self._data)
-                where = "after" if is_at_end else "in the record at"
-                self.reason = f"is cut off {where} byte {self.kept_bytes}"
+            if at == len(self._data):
                 return
-            if raw.opcode == Opcode.DATA_END:
+            yield self._gap(0, at, self.reason)
+        while True:
+            raw = record_at(self._view, at)
+            if raw is None and self._next_sound(at) == len(self._data):
+                is_at_end = at == len(self._data)
+                where = "after" if is_at_end else "in the record at"
+                cut = f"is cut off {where} byte {at}"
+                self.reason = self.reason or cut
+                if not is_at_end:
+                    yield self._gap(at, len(self._data), cut)
+                return
+            if raw is not None and raw.opcode == Opcode.DATA_END:
                 return
             try:
                 with as_trial_file_error(self._path):
-                    yield from self._read(raw)
+                    if raw is None:
+                        raise TrialFileError(self._path, "has a broken record")
+                    yield from self._read(raw, at)
+                    at = raw.end
             except TrialFileError as error:
-                self.reason = f"{error.reason} (byte {self.kept_bytes})"
-                return
-            self.kept_bytes = raw.end
+                reason = f"{error.reason} (byte {at})"
+                self.reason = self.reason or reason
+                end = self._behind(raw, at)
+                yield self._gap(at, end, reason)
+                at = end
 
-    @property
-    def lost_seconds(self) -> float:
-        """How far the lost chunks reach, from what is left of their heads [s]."""
-        last_ns, at = self.last_ns, self.kept_bytes
-        while self.reason and at + _CHUNK_TIMES.size <= len(self._data):
-            opcode, _, start_ns, end_ns = _CHUNK_TIMES.unpack_from(self._data, at)
-            is_next = self.last_ns <= start_ns <= end_ns < self.last_ns + _LONGEST_NS
-            if opcode == Opcode.CHUNK and is_next:
-                last_ns = max(last_ns, end_ns)
-            raw = record_at(self._data, at)
+    def _gap(self, start: int, end: int, reason: str) -> Gap:
+        """Return what was skipped, with the times that heads of lost chunks state."""
+        first_ns = last_ns = 0
+        for start_ns, end_ns in self._stated_times(start, end):
+            first_ns = min(first_ns or start_ns, start_ns)
+            last_ns = max(last_ns, end_ns)
+        gap = Gap(start, end, reason, first_ns, last_ns)
+        self.gaps.append(gap)
+        return gap
+
+    def _stated_times(self, start: int, end: int) -> Iterator[tuple[int, int]]:
+        """Give first and last time of the chunks that lay in a gap.
+
+        The summary knows them, or else what is left of their heads.
+        """
+        for index in self._behind_data(_CHUNK_INDEX):
+            if len(index.body) < _INDEX_HEAD.size:
+                continue
+            start_ns, end_ns, offset = _INDEX_HEAD.unpack_from(index.body)
+            if start <= offset < end and start_ns <= end_ns:
+                yield start_ns, end_ns
+        at = start
+        while at + 9 + _CHUNK_TIMES.size <= end:
+            start_ns, end_ns = _CHUNK_TIMES.unpack_from(self._data, at + 9)
+            latest = (self.last_ns if self.last_ns > 0 else start_ns) + _LONGEST_NS
+            if self._data[at] == Opcode.CHUNK and (
+                self.last_ns <= start_ns <= end_ns < latest
+            ):
+                yield start_ns, end_ns
+            raw = record_at(self._view[:end], at)
             if raw is None:
-                break
+                return
             at = raw.end
-        return (last_ns - self.last_ns) * 1e-9
 
-    def _read(self, raw: RawRecord) -> Generator[Salvaged]:
+    def _behind(self, raw: RawRecord | None, at: int) -> int:
+        """Return where reading goes on behind the broken record at `at`."""
+        if raw is not None and self._is_framed(raw.end):
+            return raw.end
+        return self._next_sound(at + 1)
+
+    def _is_framed(self, at: int) -> bool:
+        """Whether a record of a known kind begins at `at`, or the data end there."""
+        if at == len(self._data):
+            return True
+        raw = record_at(self._view, at)
+        return raw is not None and raw.opcode in _KINDS
+
+    def _next_sound(self, start: int) -> int:
+        """Return the offset of the next record that proves itself, or of the end."""
+        for match in _PROVABLE.finditer(self._data, start):
+            raw = record_at(self._view, match.start())
+            if raw is not None and self._is_proved(raw):
+                return match.start()
+        return len(self._data)
+
+    def _is_proved(self, raw: RawRecord) -> bool:
+        try:
+            with as_trial_file_error(self._path):
+                match raw.opcode:
+                    case Opcode.CHUNK:
+                        return self._is_chunk(raw.body)
+                    case Opcode.METADATA:
+                        return _is_metadata(raw.body)
+                    case Opcode.ATTACHMENT:
+                        return _has_checksum(raw.body)
+                    case _:
+                        return len(raw.body) == _CRC.size and self._is_framed(raw.end)
+        except TrialFileError:
+            return False
+
+    def _is_chunk(self, body: memoryview) -> bool:
+        """Whether it is one whose checksum holds; what is tried counts as unpacked."""
+        chunk = parse_chunk(body, self._path)
+        if not chunk.crc or chunk.size > self._room:
+            return False
+        self._room -= chunk.size
+        self._unpacker.unpack(chunk)
+        self._room += chunk.size  # it is unpacked again when it is read
+        return True
+
+    def _read(self, raw: RawRecord, at: int) -> Generator[Salvaged]:
         """Give the records of one top-level record; it raises before it gives any."""
         match raw.opcode:
             case Opcode.CHUNK:
@@ -102,11 +221,11 @@ class SoundRecords:
                 yield from self._read_attachment(raw.body)
             case Opcode.SCHEMA | Opcode.CHANNEL | Opcode.MESSAGE:
                 yield self._parse(raw)
-            case Opcode.HEADER if self.kept_bytes == len(MAGIC):
+            case Opcode.HEADER if at == len(MAGIC):
                 pass
             case Opcode.MESSAGE_INDEX if _is_index(raw.body):
                 pass
-            case opcode:  # perhaps a chunk once: what follows would have a hole before
+            case opcode:  # perhaps a chunk once
                 raise TrialFileError(self._path, f"has a broken record, kind {opcode}")
 
     def _read_chunk(self, body: memoryview) -> Generator[Salvaged]:
@@ -115,11 +234,23 @@ class SoundRecords:
         if self._room < 0:
             raise TrialFileError(self._path, "has chunks that unpack to too much")
         data = memoryview(self._unpacker.unpack(chunk))
-        for raw in self._split(data):
-            self._parse(raw)
-        for raw in self._split(data):
-            yield self._parse(raw)
-        self.last_ns = max(self.last_ns, chunk.end_ns)
+        known = self._schemas.copy(), self._channels.copy()
+        try:
+            records = [self._parse(raw) for raw in self._split(data)]
+        except _UnknownChannelError:
+            self._schemas, self._channels = known
+            definitions = self._definitions(data)
+            for definition in definitions:
+                self._define(definition)
+            records = [
+                *definitions,
+                *(self._parse(raw) for raw in self._split(data)),
+            ]
+        times = [record.log_time for record in records if isinstance(record, Message)]
+        if times and max(times) <= self.last_ns:
+            raise TrialFileError(self._path, "has a chunk out of order")
+        yield from records
+        self.last_ns = max(times, default=self.last_ns)
 
     def _split(self, data: memoryview) -> Generator[RawRecord]:
         at = 0
@@ -131,29 +262,75 @@ class SoundRecords:
                 yield raw
             at = raw.end
 
-    def _parse(self, raw: RawRecord) -> Salvaged:
+    def _parse(self, raw: RawRecord) -> Schema | Channel | Message:
         if raw.opcode == Opcode.MESSAGE:
             channel, sequence, log_time, publish_time = _MESSAGE.unpack_from(raw.body)
             if channel not in self._channels:
-                raise TrialFileError(self._path, "has messages without a channel")
+                raise _UnknownChannelError(self._path, "has messages without a channel")
             content = bytes(raw.body[_MESSAGE.size :])
             return Message(channel, log_time, content, publish_time, sequence)
-        if raw.opcode == Opcode.SCHEMA:
-            schema = Schema.read(_stream(raw.body))
-            self._schemas.add(schema.id)
-            return schema
-        record = Channel.read(_stream(raw.body))
+        record = _definition(raw)
+        self._define(record)
+        return record
+
+    def _define(self, record: Schema | Channel) -> None:
+        if isinstance(record, Schema):
+            self._schemas.add(record.id)
+            return
         if record.schema_id not in self._schemas:
             raise TrialFileError(self._path, "has a channel without a schema")
         self._channels.add(record.id)
-        return record
+
+    def _definitions(self, data: memoryview) -> list[Schema | Channel]:
+        """Return the channels of a file whose definitions were lost.
+
+        They stand in the summary once more; where that is lost too, or was never
+        written, a file of this program has those that it always writes.
+
+        Args:
+            data: a sound chunk, by whose messages they are known.
+        """
+        found = list(self._in_summary()) or list(_written(self._sizes(data)))
+        return found if any(isinstance(one, Channel) for one in found) else []
+
+    def _in_summary(self) -> Iterator[Schema | Channel]:
+        """Give the definitions that stand behind the end of the data."""
+        for raw in self._behind_data(_DEFINITION):
+            try:
+                with as_trial_file_error(self._path):
+                    yield _definition(raw)
+            except TrialFileError:
+                continue
+
+    def _behind_data(self, kind: re.Pattern[bytes]) -> Iterator[RawRecord]:
+        """Give the records of a kind behind the end of the data, damaged ones not."""
+        start = self._data.rfind(_DATA_END)
+        if start < 0:
+            return
+        for match in kind.finditer(self._data, start):
+            raw = record_at(self._view, match.start())
+            if raw is not None and self._is_framed(raw.end):
+                yield raw
+
+    def _sizes(self, data: memoryview) -> dict[int, int]:
+        """Return how long the first message of each channel is."""
+        sizes: dict[int, int] = {}
+        for raw in self._split(data):
+            if raw.opcode == Opcode.MESSAGE:
+                channel = _MESSAGE.unpack_from(raw.body)[0]
+                sizes.setdefault(channel, len(raw.body) - _MESSAGE.size)
+        return sizes
 
     def _read_attachment(self, body: memoryview) -> Generator[Attachment]:
         attachment = Attachment.read(_stream(body))
-        if zlib.crc32(body[: -_CRC.size]) == _CRC.unpack(body[-_CRC.size :])[0]:
+        if _has_checksum(body):
             yield attachment
         else:
             self.left_out.append(attachment.name)
+
+
+class _UnknownChannelError(TrialFileError):
+    """A message refers to a channel that was not defined before it."""
 
 
 def recorded_seconds(data: bytes) -> float:
@@ -167,6 +344,46 @@ def recorded_seconds(data: bytes) -> float:
             last_ns = max(last_ns, end_ns)
         at = raw.end
     return 0.0 if first_ns is None else max(0, last_ns - first_ns) * 1e-9
+
+
+def _definition(raw: RawRecord) -> Schema | Channel:
+    record = Schema if raw.opcode == Opcode.SCHEMA else Channel
+    return record.read(_stream(raw.body))
+
+
+def _written(sizes: Mapping[int, int]) -> Iterable[Schema | Channel]:
+    """Give the definitions that a file of this program begins with."""
+    for number, (topic, name) in enumerate(topics_by_sizes(sizes).items(), 1):
+        yield Schema(
+            id=number, name=name, encoding="ros2msg", data=schema_text(name).encode()
+        )
+        yield Channel(
+            id=number,
+            topic=topic,
+            message_encoding="cdr",
+            schema_id=number,
+            metadata={},
+        )
+
+
+def _has_checksum(body: memoryview) -> bool:
+    """Whether the attachment is as it was written."""
+    return zlib.crc32(body[: -_CRC.size]) == _CRC.unpack(body[-_CRC.size :])[0]
+
+
+def _is_metadata(body: memoryview) -> bool:
+    """Whether the texts in it fill it exactly; it has no checksum of its own."""
+    at = _LENGTH.size + _LENGTH.unpack_from(body)[0]
+    end = at + _LENGTH.size + _LENGTH.unpack_from(body, at)[0]
+    at += _LENGTH.size
+    texts = 0
+    while at < end == len(body):
+        at += _LENGTH.size + _LENGTH.unpack_from(body, at)[0]
+        texts += 1
+    if at != len(body) or not texts or texts % 2:
+        return False
+    Metadata.read(_stream(body))
+    return True
 
 
 def _is_index(body: memoryview) -> bool:

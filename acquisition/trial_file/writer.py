@@ -36,6 +36,29 @@ TRUTH_TOPICS = {TRUTH_TOPIC: "traction_msgs/msg/Truth"}
 FLIGHT_TOPICS = {**TRIAL_TOPICS, CAN_TOPIC: "traction_msgs/msg/CanBatch"}
 
 
+def topics_by_sizes(sizes: Mapping[int, int]) -> Mapping[str, str]:
+    """Return the topics of a file, in the order in which its channels are numbered.
+
+    Args:
+        sizes: how long a message of a channel is [bytes], by its number, from 1 on.
+
+    Returns:
+        types by topics; empty where no file of today has such messages.
+    """
+    if set(sizes) == {1} and sizes[1] == TRUTH.size:
+        return TRUTH_TOPICS
+    numbers = {topic: i for i, topic in enumerate(FLIGHT_TOPICS, 1)}
+    if sizes.get(numbers["/cycle"], CYCLE.size) != CYCLE.size:
+        return {}
+    topics = TRIAL_TOPICS
+    has_frames = sizes.get(numbers[CAN_TOPIC], FORESIGHT.size) != FORESIGHT.size
+    if has_frames:
+        topics = FLIGHT_TOPICS
+    if sizes.get(len(topics) + 1) == FORESIGHT.size:
+        topics = {**topics, **FORESIGHT_TOPICS}
+    return topics if max(sizes, default=0) <= len(topics) else {}
+
+
 class TrialWriter:
     """Writes `<name>.mcap.partial`; `publish` makes it `<name>.mcap`.
 

@@ -17,6 +17,7 @@ EDGE_SPEED = 0.03  # m/s where a slip begins and ends
 BOUNCE_SPEED = -0.01  # m/s below which the foot is thrown back
 SAG_SHARE = 0.08  # loss of force before the drop that counts as sag
 
+LONGEST_STEP = 1.0  # s between two rows of one slip
 _LOADING = 0.6  # s before the onset in which the peak is sought
 _RELEASE = 0.12  # s after the onset in which the peak may still come
 _FLOOR = 0.15  # s after the fastest moment in which the floor is sought
@@ -62,16 +63,23 @@ def find_slips(trial: Smoothed) -> tuple[Slip, ...]:
     """Return the slips of a smoothed trial in time order."""
     return tuple(
         _describe(trial, first, last)
-        for first, last in _stretches(trial.v_t > EDGE_SPEED)
+        for first, last in _stretches(trial.v_t > EDGE_SPEED, _after_gaps(trial.t))
         if trial.v_t[first : last + 1].max() > SLIP_SPEED
     )
 
 
-def _stretches(is_above: np.ndarray) -> list[tuple[int, int]]:
-    """Return first and last row of every run of True."""
+def _after_gaps(t: Array) -> list[int]:
+    """Return the rows that follow a gap of the record."""
+    return [int(row) + 1 for row in np.flatnonzero(np.diff(t) > LONGEST_STEP)]
+
+
+def _stretches(is_above: np.ndarray, cuts: list[int]) -> list[tuple[int, int]]:
+    """Return first and last row of every run of True, which ends before each cut."""
     edges = np.diff(np.concatenate([[0], is_above.astype(np.int8), [0]]))
-    starts, stops = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
-    return [(int(a), int(b) - 1) for a, b in zip(starts, stops, strict=True)]
+    inner = [cut for cut in cuts if is_above[cut - 1] and is_above[cut]]
+    starts = sorted([*np.flatnonzero(edges == 1).tolist(), *inner])
+    stops = sorted([*np.flatnonzero(edges == -1).tolist(), *inner])
+    return [(a, b - 1) for a, b in zip(starts, stops, strict=True)]
 
 
 def _describe(trial: Smoothed, first: int, last: int) -> Slip:

@@ -1,6 +1,7 @@
 """Parquet tables with units and origin; the only module that imports pyarrow."""
 
 import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,15 @@ from pydantic import ValidationError
 from acquisition.errors import MissingLibraryError, SettingsError
 from analysis.data.data_package import TableOrigin
 from analysis.data.series import Array
+from analysis.dialects.columns import (
+    PREPARED,
+    SIMULATED,
+    columns_hint,
+    find_column,
+    plain,
+    split_header,
+)
+from analysis.dialects.refusals import refusal
 
 MAGIC = b"PAR1"
 MOST_ROWS = 500_000  # of a table; 17 minutes at 500 Hz
@@ -57,27 +67,30 @@ class ParquetTable:
     """The columns that were wanted of a Parquet table.
 
     Attributes:
-        columns: values by name, shape (n,); those that it lacks are left out.
-        units: by name; "" where the file states none.
-        names: of all its columns.
+        columns: values by column of the analysis, shape (n,); NaN for a missing one.
+        units: by column of the analysis; "" where the file states none.
+        is_prepared: it has the column of kept samples.
+        is_simulated: what its column `simulated` says of every row; None without one.
         origin: of the table, where the file states one.
     """
 
     columns: Mapping[str, Array]
     units: Mapping[str, str]
-    names: Sequence[str]
+    is_prepared: bool
+    is_simulated: bool | None
     origin: TableOrigin | None
 
 
-def read_parquet(path: Path, names: Sequence[str]) -> ParquetTable:
-    """Return the columns `names` of a file, as far as it has them.
+def read_parquet(path: Path, columns: Mapping[str, str]) -> ParquetTable:
+    """Return columns of a file by their names, as `v_t` or `v_t [cm/s]`, or places.
 
     Args:
         path: the file; the caller has checked its size.
-        names: the columns that are wanted.
+        columns: name in the file by column of the analysis.
 
     Raises:
-        SettingsError: it is no Parquet file of numbers, or unpacks to too much.
+        SettingsError: it lacks a column, it is no Parquet file of numbers, or unpacks
+            to too much.
         MissingLibraryError: pyarrow is not installed.
     """
     arrow = _arrow()
@@ -85,20 +98,78 @@ def read_parquet(path: Path, names: Sequence[str]) -> ParquetTable:
         with arrow.parquet.ParquetFile(path) as file:
             _check_shape(path, file.metadata)
             schema = file.schema_arrow
-            wanted = [name for name in names if name in schema.names]
-            table = file.read(columns=wanted, use_threads=False)
+            places = _places(path, schema.names, columns)
+            mark = find_column(schema.names, SIMULATED)
+            wanted = sorted({*places.values(), *mark[:1]})
+            # by place: names may occur twice, and those with points are taken for paths
+            table = file.read(use_threads=False).select(wanted)
+        at = {place: table.column(k) for k, place in enumerate(wanted)}
         values = {
-            name: np.asarray(table.column(name).to_numpy(), dtype=np.float64)
-            for name in wanted
+            name: _numbers(arrow, path, schema.names[place], at[place])
+            for name, place in places.items()
         }
+        is_simulated = _mark(path, at[mark[0]]) if mark else None
     except (arrow.ArrowException, OSError, MemoryError, TypeError, ValueError) as error:
         first = str(error).splitlines()[0][:200] if str(error) else repr(error)
         raise SettingsError(
             f"{path}: not a readable Parquet table of numbers ({first}).",
             hint="Check that it was copied completely.",
         ) from error
-    units = {name: _unit(schema.field(name).metadata) for name in wanted}
-    return ParquetTable(values, units, schema.names, _origin(schema.metadata))
+    units = {name: _unit(path, schema, place) for name, place in places.items()}
+    is_prepared = bool(find_column(schema.names, PREPARED))
+    origin = _origin(schema.metadata)
+    return ParquetTable(values, units, is_prepared, is_simulated, origin)
+
+
+def _places(
+    path: Path, header: Sequence[str], columns: Mapping[str, str]
+) -> dict[str, int]:
+    """Return the place of each column, from 0."""
+    found = {name: find_column(header, plain(c)) for name, c in columns.items()}
+    missing = [columns[name] for name, places in found.items() if not places]
+    if missing:
+        names = ", ".join(header)[:300] or "none"
+        reason = f"no column {', '.join(missing)}; it has {names}"
+        raise refusal(path, reason, columns_hint(header, columns))
+    for name, places in found.items():
+        if len(places) > 1:
+            either = " or ".join(f"{name}={place + 1}" for place in places[:4])
+            reason = f"column {columns[name]} occurs twice"
+            hint = f"Take one by its place: --columns {either}"
+            raise refusal(path, reason, hint)
+    return {name: places[0] for name, places in found.items()}
+
+
+def _numbers(arrow: Any, path: Path, name: str, column: Any) -> Array:  # noqa: ANN401
+    """Return the values of a column; times are those since the first one."""
+    kind = column.type
+    types = arrow.types
+    if types.is_timestamp(kind) or types.is_duration(kind):
+        ticks = column.cast(arrow.int64())
+        first = next((t.as_py() for t in ticks if t.is_valid), 0)
+        ticks = arrow.compute.subtract(ticks, arrow.scalar(first, arrow.int64()))
+        return np.asarray(ticks.to_numpy(), dtype=np.float64)
+    if types.is_integer(kind) or types.is_floating(kind) or types.is_decimal(kind):
+        if types.is_decimal(kind):
+            column = column.cast(arrow.float64())
+        return np.asarray(column.to_numpy(), dtype=np.float64)
+    raise refusal(
+        path,
+        f"column {name} holds {kind}, numbers were expected",
+        "Convert it, e.g. with pandas.to_numeric, and save it again.",
+    )
+
+
+def _mark(path: Path, column: Any) -> bool:  # noqa: ANN401
+    """Return what the column `simulated` says of every row."""
+    values = {bool(value) for value in column.unique().to_pylist()}
+    if len(values) > 1:
+        raise refusal(
+            path,
+            f"column {SIMULATED} is 0 in some rows and 1 in others",
+            "Keep simulated and recorded trials in files of their own.",
+        )
+    return True in values
 
 
 def _check_shape(path: Path, about: Any) -> None:  # noqa: ANN401
@@ -117,8 +188,30 @@ def _arrow_array(arrow: Any, values: NDArray[np.generic]) -> Any:  # noqa: ANN40
     return arrow.array(values)
 
 
-def _unit(metadata: Mapping[bytes, bytes] | None) -> str:
-    return (metadata or {}).get(b"unit", b"").decode(errors="replace")
+def _unit(path: Path, schema: Any, place: int) -> str:  # noqa: ANN401
+    """Return the unit that type, name or metadata of a column state; "" for none."""
+    field = schema.field(place)
+    metadata = field.metadata or {}
+    stated = {
+        split_header(field.name)[1],
+        metadata.get(b"unit", b"").decode(errors="replace"),
+        _unit_of_type(str(field.type)),
+    }
+    stated = {plain(unit) for unit in stated} - {""}
+    if len(stated) > 1:
+        raise refusal(
+            path,
+            f"column {field.name} is in {' and in '.join(sorted(stated))} by its name, "
+            "type and metadata",
+            "Save it again with one unit.",
+        )
+    return stated.pop() if stated else ""
+
+
+def _unit_of_type(kind: str) -> str:
+    """Return the unit of `timestamp[ns]`, `timestamp[us, tz=UTC]` or `duration[ms]`."""
+    match = re.fullmatch(r"(?:timestamp|duration)\[(\w+)(?:, .*)?\]", kind)
+    return match[1] if match else ""
 
 
 def _origin(metadata: Mapping[bytes, bytes] | None) -> TableOrigin | None:
@@ -134,6 +227,7 @@ def _origin(metadata: Mapping[bytes, bytes] | None) -> TableOrigin | None:
 def _arrow() -> Any:  # noqa: ANN401
     try:
         import pyarrow
+        import pyarrow.compute
         import pyarrow.parquet
     except ImportError as error:
         raise MissingLibraryError("pyarrow", "parquet") from error

@@ -6,7 +6,7 @@ swapped column or a wrong unit breaks one of these, and no fit notices.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,14 @@ FREE_MOMENT = 0.03  # moment along the force over the force [m]
 # Medians beyond which a column is in another unit than its own.
 _FASTEST, _STRONGEST, _WEAKEST, _RAREST = 2.0, 500.0, 0.02, 0.2
 
+# What helps a table that another program recorded: its sensor is not at hand.
+_OF_TABLES = {
+    "power": "--negate F_t",
+    "ratio": "--negate F_t",
+    "normal": "--negate F_n",
+    "direction": "--negate v_t",
+    "friction": "--columns F_n=...,F_t=...",
+}
 _TURNED = "the sensor is turned by 180 degrees about z, or F_t has the other sign"
 
 
@@ -37,8 +45,9 @@ class Doubt:
     """One reason why a trial cannot be what it says it is.
 
     Attributes:
-        name: "power", "ratio", "direction", "normal", "friction", "lateral", "moment",
-            "unit", "lag", "swapped", "incline", "heading" or "pressure".
+        name: "power", "ratio", "no-traction", "direction", "normal", "friction",
+            "lateral", "moment", "unit", "lag", "swapped", "incline", "heading" or
+            "pressure".
         seen: what was measured, with the number.
         cause: the likely cause.
         remedy: what to do.
@@ -57,6 +66,13 @@ class Doubt:
 
 def doubts_of(trial: PreparedTrial) -> list[Doubt]:
     """Return why velocity and forces of a trial cannot be right; empty if they can."""
+    doubts = _doubts_of(trial)
+    if not trial.is_foreign:
+        return doubts
+    return [replace(d, remedy=_OF_TABLES.get(d.name, d.remedy)) for d in doubts]
+
+
+def _doubts_of(trial: PreparedTrial) -> list[Doubt]:
     smooth = trial.smooth
     units = list(_units(smooth))
     if units:
@@ -189,7 +205,14 @@ def _signs(v: Array, load: Array, along: Array) -> Iterator[Doubt]:
         mean = power / float(np.mean(np.abs(along * v)))
         yield Doubt("power", f"the ground drives the foot ({mean:+.0%})", _TURNED)
     ratio = float(np.median(along * np.sign(v) / np.abs(load)))
-    if ratio <= 0.0:
+    if not along.any():
+        yield Doubt(
+            "no-traction",
+            "F_t is 0 throughout",
+            "its column was never filled, or is another one",
+            "--columns F_t=...",
+        )
+    elif ratio <= 0.0:
         yield Doubt("ratio", f"median F_t/F_n {ratio:.2f}", _TURNED)
     elif not FRICTION[0] <= ratio <= FRICTION[1]:
         yield Doubt(

@@ -2,10 +2,14 @@
 
 Smooth with a centred moving average, keep every fifth sample, keep the window of
 velocities; in this order. Sticking, backward motion and fast peaks are left out.
-Widths count samples at 500 Hz and follow the rate: 11 samples are 22 ms.
+Widths count samples at 500 Hz and follow the rate: 11 samples are 22 ms. Where times
+are not evenly apart, they are times: what lies within 11 ms is averaged. A gap of the
+record stays one: nothing is averaged or integrated across it.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from itertools import pairwise
 
 import numpy as np
 
@@ -19,6 +23,9 @@ MINIMUM_TRAVEL_SHARE = 0.9  # of the container
 _WIDEST = 501  # samples of smoothing: a second
 _LITTLE = 1e-3
 _LONGEST_GAP = 3  # missing samples that a difference may span
+_GAP = 10.0  # steps of the median one, above which a step is a gap of the record
+_UNEVEN = 1.5  # times the median step, or its inverse, that no even step exceeds
+_EVEN_SHARE = 0.9  # of the steps of a record that is smoothed by numbers of samples
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,6 +151,8 @@ class PreparedTrial:
         lag: how much later than the motion the forces are; None where the trial does
             not show it.
         stamped_lag: the same by the record's time stamps [s].
+        is_simulated: the devices were simulated.
+        is_foreign: a table that no session of this program states.
         widths: samples that were averaged, and one of how many was kept.
         is_prepared: the record's rows had been prepared before.
     """
@@ -164,6 +173,8 @@ class PreparedTrial:
     stamped_lag: float
     widths: tuple[int, int]
     is_prepared: bool
+    is_simulated: bool = False
+    is_foreign: bool = False
 
     @property
     def kept(self) -> int:
@@ -217,11 +228,12 @@ def prepare_trial(series: TractionSeries, options: PrepareOptions) -> PreparedTr
     """Return the kept samples of a trial: smoothed, thinned, inside the window."""
     widths, smooth = options.widths(series), smoothed(series, options)
     lag = None if series.is_prepared else force_lag(series.t, series.v_t, series.F_t)
-    thinned = np.arange(0, smooth.t.size, widths[1])
+    thinned = _thinned(series, options)
     v = smooth.v_t[thinned]
     is_kept = (v >= options.slowest) & (v <= options.fastest)
     indices = thinned[is_kept]
-    travel = float(np.trapezoid(smooth.v_t, smooth.t))
+    parts = [(0, smooth.t.size)] if series.is_prepared else stretches(smooth.t)
+    travel = _travel(smooth, parts)
     return PreparedTrial(
         terrain=series.terrain,
         name=series.name,
@@ -239,18 +251,74 @@ def prepare_trial(series: TractionSeries, options: PrepareOptions) -> PreparedTr
         stamped_lag=series.stamped_lag,
         widths=widths,
         is_prepared=series.is_prepared,
+        is_simulated=series.is_simulated,
+        is_foreign=series.is_foreign,
     )
 
 
 def smoothed(series: TractionSeries, options: PrepareOptions) -> Smoothed:
     """Return a whole trial after the moving average, and nothing else of it."""
     width, _ = options.widths(series)
-    columns = {
-        field.name: moving_average(getattr(series, field.name), width)
-        for field in fields(Smoothed)
-        if field.name != "t"
+    names = [field.name for field in fields(Smoothed) if field.name != "t"]
+    columns = {name: getattr(series, name) for name in names}
+    if series.is_prepared:
+        return Smoothed(t=series.t, **columns)
+    if not is_even(series.t):
+        near = _nearby(series.t, options.smoothing / RATE_HZ)
+        columns = {name: _mean_of_rows(x, *near) for name, x in columns.items()}
+        return Smoothed(t=series.t, **columns)
+    parts = stretches(series.t)
+    averaged = {
+        name: np.concatenate([moving_average(x[a:b], width) for a, b in parts])
+        for name, x in columns.items()
     }
-    return Smoothed(t=series.t, **columns)
+    return Smoothed(t=series.t, **averaged)
+
+
+def stretches(t: Array) -> list[tuple[int, int]]:
+    """Return (first row, end) of every stretch of a record without a gap.
+
+    Args:
+        t: time [s], shape (n,), increasing.
+    """
+    steps = np.diff(t)
+    gaps = np.flatnonzero(steps > _GAP * np.median(steps)) + 1
+    return list(pairwise([0, *(int(gap) for gap in gaps), t.size]))
+
+
+def is_even(t: Array) -> bool:
+    """Return whether the times of a record are evenly apart, gaps aside."""
+    steps = np.diff(t)
+    usual = np.median(steps)
+    even = (steps > usual / _UNEVEN) & (steps < usual * _UNEVEN)
+    return bool(np.mean(even) >= _EVEN_SHARE)
+
+
+def _nearby(t: Array, span: float) -> tuple[Indices, Indices]:
+    """Return first row and end of what lies within half a span of every row."""
+    first = np.searchsorted(t, t - span / 2.0, "left")
+    return first, np.searchsorted(t, t + span / 2.0, "right")
+
+
+def _mean_of_rows(x: Array, first: Indices, end: Indices) -> Array:
+    """Return the mean of x over rows first to end, each (n,)."""
+    sums = np.concatenate([[0.0], np.cumsum(x)])
+    return (sums[end] - sums[first]) / (end - first)
+
+
+def _thinned(series: TractionSeries, options: PrepareOptions) -> Indices:
+    """Return the rows of which those inside the window are kept."""
+    _, every = options.widths(series)
+    if series.is_prepared or is_even(series.t):
+        return np.arange(0, series.t.size, every)
+    number = np.floor((series.t - series.t[0]) / (options.downsample / RATE_HZ))
+    return np.flatnonzero(np.diff(number, prepend=-1.0) > 0.0)
+
+
+def _travel(smooth: Smoothed, parts: Sequence[tuple[int, int]]) -> float:
+    """Return the way [m] along stretches of the record."""
+    ways = (np.trapezoid(smooth.v_t[a:b], smooth.t[a:b]) for a, b in parts)
+    return float(sum(ways))
 
 
 def _shares(v: Array, options: PrepareOptions) -> CoverageShares:

@@ -38,6 +38,8 @@ class TractionSeries:
         is_prepared: the rows are samples kept by an earlier preparation: smoothed,
             thinned and windowed.
         is_simulated: the devices were simulated.
+        is_foreign: a table that no session of this program states.
+        notes: what was decided when a table was read, for people.
         dropped_rows: number of rows that were not finite.
         repeated_rows: number of rows that were there twice.
 
@@ -57,6 +59,8 @@ class TractionSeries:
     stamped_lag: float = 0.0
     is_prepared: bool = False
     is_simulated: bool = False
+    is_foreign: bool = False
+    notes: tuple[str, ...] = ()
     dropped_rows: int = field(init=False)
     repeated_rows: int = field(init=False)
 

@@ -2,8 +2,10 @@
 
 Every byte is taken as hostile: sizes are checked before anything is unpacked, nothing
 is unpickled, and whatever does not fit becomes one SettingsError that names the file.
+How text is read stands in `analysis.dialects`.
 """
 
+import glob
 import os
 import zipfile
 import zlib
@@ -16,14 +18,6 @@ import numpy as np
 
 from acquisition.errors import SettingsError
 from acquisition.files import UnfitFileError, open_regular
-from analysis.data.columns import (
-    COLUMNS,
-    PREPARED,
-    CsvTable,
-    factor,
-    load_csv,
-    refusal,
-)
 from analysis.data.data_package import (
     PackagedTable,
     TableOrigin,
@@ -32,7 +26,13 @@ from analysis.data.data_package import (
     packaged_tables,
 )
 from analysis.data.parquet_tables import MAGIC, read_parquet
-from analysis.data.series import TractionSeries
+from analysis.data.series import Array, TractionSeries
+from analysis.data.table_checks import check_clock, check_order, notes_of
+from analysis.dialects.columns import COLUMNS, factor
+from analysis.dialects.other_formats import ENOUGH, check_kind, not_an_npz
+from analysis.dialects.reading import TextRequest, TrialTable, read_text_table
+from analysis.dialects.refusals import refusal
+from analysis.dialects.times import since_first
 
 DEFAULT_TERRAIN = "table"
 LARGEST_FILE = 24_000_000  # bytes, also of an npz once unpacked; six times in memory
@@ -58,13 +58,17 @@ def load_tables(
     stones: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
     rate: float | None = None,
+    negate: Sequence[str] = (),
+    decimal: str | None = None,
 ) -> dict[str, list[TractionSeries]]:
     """Return the trials in `paths` by terrain, in the order of the files.
 
     Args:
         paths: CSV and Parquet files, one trial each; npz files, any number of trials
             each; folders of `traction export`, of which every whole trial is read.
-        columns: name of each column of the analysis in a CSV; by default its own.
+            `~` and patterns such as `*.csv` are expanded.
+        columns: name of each column of the analysis in a CSV or Parquet file, or its
+            place from "1"; by default its own.
         terrain: terrain of every CSV; by default that of the data package it lies in,
             or "table". An npz names its own.
         stones: size of the stones by terrain: "small", "big" or "none"; where it is
@@ -72,14 +76,22 @@ def load_tables(
         units: unit of each column where its header gives none, e.g. {"v_t": "mm/s"};
             s, m/s and N by default.
         rate: rows of a CSV per second, where it has no time [Hz].
+        negate: columns with the other sign, e.g. F_n of a machine that counts
+            compression below zero.
+        decimal: "." or ",", the decimal mark of a CSV in which the other one groups
+            thousands.
 
     Raises:
         SettingsError: a file that is missing, too large, or not what it should be.
     """
+    _check_names({*(columns or {}), *(units or {}), *negate})
+    if decimal not in {None, ".", ","}:
+        raise SettingsError(f"{decimal!r} is no decimal mark.", hint='Give "." or ",".')
     columns = {name: name for name in COLUMNS} | dict(columns or {})
-    form = _TableForm(columns, terrain, stones or {}, units or {}, rate)
+    request = TextRequest(columns, rate, decimal)
+    form = _TableForm(request, terrain, stones or {}, units or {}, frozenset(negate))
     trials: dict[str, list[TractionSeries]] = {}
-    for path in paths:
+    for path in (each for given in paths for each in _expanded(given)):
         for series in _load(path, form):
             trials.setdefault(series.terrain, []).append(series)
     if not trials:
@@ -87,59 +99,114 @@ def load_tables(
     return trials
 
 
+def _check_names(names: set[str]) -> None:
+    """Refuse what is no column of the analysis."""
+    if strangers := names - {*COLUMNS}:
+        raise SettingsError(
+            f"{', '.join(sorted(map(str, strangers)))}: no column of the analysis.",
+            hint=f"The columns are {', '.join(COLUMNS)}.",
+        )
+
+
+def _expanded(path: Path) -> list[Path]:
+    """Return the files that a name stands for: `~` and patterns are expanded.
+
+    Raises:
+        SettingsError: a pattern fits no file, or there is no such user.
+    """
+    try:
+        path = path.expanduser()
+    except RuntimeError as error:
+        raise SettingsError(f"{path}: {error}.", hint="Check the name.") from error
+    if os.path.lexists(path) or not glob.has_magic(str(path)):
+        return [path]
+    files = sorted(map(Path, glob.glob(str(path))))  # noqa: PTH207  a pattern may be absolute
+    if not files:
+        raise SettingsError(f"{path}: no file fits this pattern.", hint="Check it.")
+    return files
+
+
 @dataclass(frozen=True, slots=True)
 class _TableForm:
     """How tables are read.
 
     Attributes:
-        columns: name of each column of the analysis in a CSV.
+        text: columns, rate and decimal mark.
         terrain: terrain of every CSV; None = as its package says.
         stones: size of the stones by terrain, where it is given.
         units: unit by column, where it is given.
-        rate: rows of a CSV per second, where it has no time [Hz].
+        negate: columns with the other sign.
     """
 
-    columns: Mapping[str, str]
+    text: TextRequest
     terrain: str | None
     stones: Mapping[str, str]
     units: Mapping[str, str]
-    rate: float | None
+    negate: frozenset[str]
 
-    def series(self, name: str, table: CsvTable, origin: TableOrigin) -> TractionSeries:
+    def series(
+        self, name: str, path: Path, table: TrialTable, origin: TableOrigin
+    ) -> TractionSeries:
         """Return a table as a trial of its terrain.
 
         Raises:
             SettingsError: a unit is not known or is stated otherwise, or the rows make
                 no trial.
         """
-        try:
-            units = [
-                (column, table.units.get(column, ""), self.units.get(column, ""))
-                for column in COLUMNS
-            ]
-            factors = np.array([factor(*unit) for unit in units])
-        except SettingsError as error:
-            raise SettingsError(f"{name}: {error.message}", hint=error.hint) from error
+        rows, epoch = self._in_own_units(name, table)
+        is_timed = (
+            table.is_in_seconds
+            or table.is_prepared
+            or self.text.rate is not None
+            or bool(table.units.get("t") or self.units.get("t") or epoch)
+        )
+        notes: list[str] = []
+        if not origin.session:
+            check_order(path, table, rows)
+            check_clock(path, rows, is_timed)
+            found = notes_of(path, table, rows)
+            notes = [*table.notes, *filter(None, [epoch]), *found]
         terrain = self.terrain or origin.terrain or DEFAULT_TERRAIN
         return TractionSeries(
             terrain,
             name,
-            *(table.rows * factors).T,
+            *rows.T,
             stones=self.stones.get(terrain, origin.stones),
             incline_deg=origin.incline_deg,
             stamped_lag=origin.force_age,
             is_prepared=table.is_prepared,
-            is_simulated=origin.simulated,
+            is_simulated=origin.simulated or table.is_simulated is True,
+            is_foreign=not origin.session,
+            notes=tuple(notes),
         )
+
+    def _in_own_units(self, name: str, table: TrialTable) -> tuple[Array, str]:
+        """Return the rows in s, m/s and N, shape (n, 4), and what is an epoch."""
+        stated, asked = dict(table.units), self.units
+        t, unit, epoch = since_first(
+            table.rows[:, 0], stated.get("t") or asked.get("t", "")
+        )
+        if unit and not asked.get("t"):
+            stated["t"] = unit
+        try:
+            factors = np.array(
+                [factor(n, stated.get(n, ""), asked.get(n, "")) for n in COLUMNS]
+            )
+        except SettingsError as error:
+            where = name if table.header is None else f"{name}, line {table.header}"
+            raise SettingsError(f"{where}: {error.message}", hint=error.hint) from error
+        signs = np.array([-1.0 if n in self.negate else 1.0 for n in COLUMNS])
+        rows = np.column_stack([t, table.rows[:, 1:]])
+        return rows * factors * signs, epoch
 
 
 def _load(path: Path, form: _TableForm) -> list[TractionSeries]:
     if is_package(path):
         return _load_package(path, form)
     start = _first_bytes(path)
+    check_kind(path, start)
     if start[:2] == b"PK":
-        if form.rate is not None:
-            raise refusal(path, "has a time of its own", "Leave --rate out.")
+        _refuse_rate(path, form)
         return _load_npz(path, replace(form, terrain=None))
     packaged = packaged_table(path)
     if packaged is None:
@@ -153,7 +220,7 @@ def _first_bytes(path: Path) -> bytes:
     try:
         with open_regular(path, is_link_followed=True) as file:
             size = os.fstat(file.fileno()).st_size
-            start = file.read(4)
+            start = file.read(ENOUGH)
     except UnfitFileError as error:
         raise refusal(path, f"it {error}", "Give tables of trials.") from error
     except OSError as error:
@@ -164,6 +231,11 @@ def _first_bytes(path: Path) -> bytes:
         raise refusal(path, "the file is empty", "Check that it was copied completely.")
     _check_size(path, size)
     return start
+
+
+def _refuse_rate(path: Path, form: _TableForm) -> None:
+    if form.text.rate is not None:
+        raise refusal(path, "has a time of its own", "Leave --rate out.")
 
 
 def _load_package(path: Path, form: _TableForm) -> list[TractionSeries]:
@@ -191,32 +263,25 @@ def _load_table(
         read = _load_parquet(path, form)
         table, origin = read.table, origin or read.origin
     else:
-        table = load_csv(path, form.columns, form.rate)
+        table = read_text_table(path, form.text, LARGEST_FILE)
     known = origin or TableOrigin(table="trial")
-    return form.series(known.name if known.session else path.name, table, known)
+    name = known.name if known.session else path.name
+    return form.series(name, path, table, known)
 
 
 class _ParquetTrial(NamedTuple):
     """A Parquet table, and what it says of itself."""
 
-    table: CsvTable
+    table: TrialTable
     origin: TableOrigin | None
 
 
 def _load_parquet(path: Path, form: _TableForm) -> _ParquetTrial:
-    if form.rate is not None:
-        raise refusal(path, "has a time of its own", "Leave --rate out.")
-    file = read_parquet(path, [form.columns[name] for name in COLUMNS])
-    missing = [c for c in form.columns.values() if c not in file.columns]
-    if missing:
-        raise refusal(
-            path,
-            f"no column {', '.join(missing)}; it has {', '.join(file.names)[:300]}",
-            "Name them: --columns t=...,v_t=...,F_n=...,F_t=...",
-        )
-    rows = np.column_stack([file.columns[form.columns[name]] for name in COLUMNS])
-    units = {name: file.units[form.columns[name]] for name in COLUMNS}
-    return _ParquetTrial(CsvTable(rows, units, PREPARED in file.names), file.origin)
+    _refuse_rate(path, form)
+    file = read_parquet(path, {name: form.text.columns[name] for name in COLUMNS})
+    rows = np.column_stack([file.columns[name] for name in COLUMNS])
+    table = TrialTable(rows, file.units, file.is_prepared, file.is_simulated)
+    return _ParquetTrial(table, file.origin)
 
 
 def _check_size(path: Path, size: int) -> None:
@@ -243,8 +308,7 @@ def _check_members(path: Path, members: list[zipfile.ZipInfo]) -> None:
     _check_size(path, sum(member.file_size for member in members))
     strangers = [member.filename for member in members if not _is_trial(member)]
     if strangers or not members:
-        others = ", ".join(strangers[:5]) or "nothing"
-        raise refusal(path, f"no table of trials (it holds {others:.200s})", _FORM)
+        raise not_an_npz(path, strangers)
     if len(members) > MOST_TRIALS:
         raise refusal(
             path, f"{len(members)} arrays, the limit is {MOST_TRIALS}", "Split it."
@@ -259,6 +323,7 @@ def _is_trial(member: zipfile.ZipInfo) -> bool:
 def _from_array(
     path: Path, key: str, array: np.ndarray, form: _TableForm
 ) -> TractionSeries:
+    """Return an array of an npz as a trial; its times are seconds by its form."""
     if (
         array.ndim != 2
         or array.shape[1] != len(COLUMNS)
@@ -269,6 +334,6 @@ def _from_array(
             f"array {key} has shape {array.shape} and type {array.dtype}",
             _FORM,
         )
-    table = CsvTable(np.asarray(array, dtype=np.float64), {})
+    table = TrialTable(np.asarray(array, dtype=np.float64), {}, is_in_seconds=True)
     origin = TableOrigin(table="trial", terrain=key.rpartition("/")[0])
-    return form.series(f"{path.name}:{key}", table, origin)
+    return form.series(f"{path.name}:{key}", Path(f"{path}:{key}"), table, origin)

@@ -143,8 +143,11 @@ def force_range(panels: Sequence[Panel]) -> tuple[float, float]:
 
 
 def _starts(smooth: Smoothed) -> Array:
-    last = max(float(smooth.t[-1]) - WINDOW, float(smooth.t[0]))
-    return np.arange(float(smooth.t[0]), last + _STEP / 2, _STEP)
+    """Return starts a step apart, where there are samples."""
+    first = float(smooth.t[0])
+    last = max(float(smooth.t[-1]) - WINDOW, first)
+    starts = first + np.unique(np.floor((smooth.t - first) / _STEP)) * _STEP
+    return starts[starts < last + _STEP / 2]
 
 
 def _is_inside(slip: Slip, start: float) -> bool:

@@ -209,7 +209,7 @@ def _widths(study: Study) -> list[list[str]]:
 
 def _rates(study: Study) -> str:
     rates = [
-        (trial.smooth.t.size - 1) / float(trial.smooth.t[-1] - trial.smooth.t[0])
+        1.0 / float(np.median(np.diff(trial.smooth.t)))
         for result in study.terrains.values()
         for trial in result.trials
     ]

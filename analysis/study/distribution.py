@@ -19,6 +19,7 @@ from typing import Protocol
 
 import numpy as np
 
+from acquisition.errors import SettingsError
 from analysis.data.series import Array
 from analysis.study.skew import ShapeMap, log_warp_slope, unwarped, warped
 
@@ -115,7 +116,7 @@ class NewTrialPrediction:
         """Return the forces [N] that are not reached with these shares, (q, n)."""
         from scipy.special import ndtr, ndtri
 
-        wanted = np.asarray(shares, dtype=float)
+        wanted = checked_shares(shares)
         if self.shape is not None:
             wanted = ndtr(self.shape.inverse(ndtri(wanted)))
         total = self.within + self.between
@@ -153,6 +154,22 @@ class NewTrialPrediction:
         """Return z - m, shape (n,), and every variance it may have, shape (40, n)."""
         variance = self.within + self.between * _mixed(self.freedom)[:, None]
         return warped(F_t, self.c) - self.centre, variance
+
+
+def checked_shares(shares: Sequence[float] | Array) -> Array:
+    """Return shares of a distribution as an array, shape (q,).
+
+    Raises:
+        SettingsError: one is no number from 0 to 1.
+    """
+    wanted = np.asarray(shares)
+    is_share = wanted.dtype.kind in "fiu" and wanted.ndim == 1
+    if not is_share or not ((wanted >= 0.0) & (wanted <= 1.0)).all():
+        raise SettingsError(
+            f"quantiles({shares}): shares are numbers from 0 to 1 in a list.",
+            hint="Write e.g. quantiles([0.05, 0.5, 0.95]).",
+        )
+    return wanted.astype(np.float64)
 
 
 def expected_pinball(F_t: Array, values: Array, nodes: Array, weights: Array) -> Array:

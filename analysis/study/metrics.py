@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from analysis.data.series import Array
-from analysis.study.distribution import Distribution
+from analysis.study.distribution import Distribution, checked_shares
 
 _SMALLEST_SD = 1e-6  # N; a fit without any error is scored as if it had this one
 
@@ -47,7 +47,7 @@ class Prediction(NamedTuple):
         """Return the forces [N] that are not reached with these shares, (q, n)."""
         from scipy.special import ndtri, stdtrit
 
-        wanted = np.asarray(shares, dtype=float)
+        wanted = checked_shares(shares)
         z = ndtri(wanted) if np.isinf(self.nu) else stdtrit(self.nu, wanted)
         return self.mean + np.outer(z, self.scale)
 

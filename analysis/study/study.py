@@ -162,7 +162,8 @@ def run_study(
         name: _result(trials[name], prepared[name], folds, whole, components.get(name))
         for name, whole in zip(prepared, wholes, strict=True)
     }
-    warnings = (*_contradictions(trials), *_all_warnings(results, options))
+    doubtful = (*_contradictions(trials), *notes_of_tables(trials))
+    warnings = (*doubtful, *_all_warnings(results, options))
     relatives = {
         outcome.terrain: outcome for outcome in outcomes if outcome is not None
     }
@@ -251,6 +252,19 @@ def _contradictions(trials: Mapping[str, Sequence[TractionSeries]]) -> list[str]
     ]
 
 
+def notes_of_tables(trials: Mapping[str, Sequence[TractionSeries]]) -> list[str]:
+    """Return what was decided when tables were read, a line for each kind."""
+    names: dict[str, list[str]] = {}
+    for recorded in trials.values():
+        for series in recorded:
+            for note in series.notes:
+                names.setdefault(note, []).append(series.name)
+    return [
+        f"{', '.join(named[:5])}{' and others' if len(named) > 5 else ''}: {note}."
+        for note, named in names.items()
+    ]
+
+
 def _doubts(terrains: Iterable[Sequence[PreparedTrial]]) -> list[str]:
     """Return why trials cannot be what they say they are, a line for each reason."""
     return summed_up((t.name, doubts_of(t)) for trials in terrains for t in trials)
@@ -283,7 +297,7 @@ def _warnings(result: TerrainResult, has_container: bool) -> list[str]:
             f"{len(short)} of {len(result.trials)} trials, analysed nevertheless "
             f"(trial {', '.join(map(str, short))})."
         )
-    dropped = sum(trial.dropped_rows for trial in result.trials)
+    dropped = sum(t.dropped_rows for t in result.trials if not t.is_foreign)
     if dropped:
         warnings.append(f"{result.terrain}: {dropped} rows were not finite; dropped.")
     repeated = sum(trial.repeated_rows for trial in result.trials)

@@ -5,11 +5,12 @@ believes it.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from numbers import Real
+from typing import Any, overload
 
-import numpy as np
+from numpy.typing import ArrayLike
 
 from acquisition.errors import SettingsError
 from analysis.breakaway.answers import BreakAwayRisk
@@ -17,6 +18,7 @@ from analysis.breakaway.model import BreakAwayModel
 from analysis.data.series import Array
 from analysis.study.metrics import Prediction
 from analysis.terrains.parts import BREAK_AWAY_PART, Parts, break_away_in
+from analysis.terrains.points import points_of
 from analysis.terrains.table import SlipRisk, Table, TractionEstimate, TractionEstimates
 
 
@@ -53,39 +55,48 @@ class KnownTerrain:
     recogniser: str = ""
     parts: Parts = field(default_factory=dict[str, Any])
 
-    def predict(self, F_n: float, v_t: float, model: str = "") -> TractionEstimate:
-        """Return the traction to expect of a new trial.
+    @overload
+    def predict(self, F_n: float, v_t: float, model: str = "") -> TractionEstimate: ...
+
+    @overload
+    def predict(
+        self, F_n: Array | Sequence[float], v_t: ArrayLike, model: str = ""
+    ) -> TractionEstimates: ...
+
+    @overload
+    def predict(
+        self, F_n: float, v_t: Array | Sequence[float], model: str = ""
+    ) -> TractionEstimates: ...
+
+    def predict(
+        self, F_n: ArrayLike, v_t: ArrayLike, model: str = ""
+    ) -> TractionEstimate | TractionEstimates:
+        """Return the traction to expect of a new trial, at one point or many.
 
         Args:
-            F_n: normal force [N].
-            v_t: slip velocity [m/s].
+            F_n: normal force [N], a number or shape (n,).
+            v_t: slip velocity [m/s], a number or shape (n,).
             model: name of a model; "" = the default.
 
+        Returns:
+            The answer of one point for two numbers, else that of n points.
+
         Raises:
             SettingsError: there is no such model, or a value is no finite number.
         """
-        _check_finite(F_n=F_n, v_t=v_t)
         table = self._table(model)
-        forces = table.at(F_n, v_t)
-        return TractionEstimate(table.shares, forces, not table.covers(F_n, v_t))
-
-    def predict_many(
-        self, F_n: Array, v_t: Array, model: str = ""
-    ) -> TractionEstimates:
-        """Return the same for many points, shape (n,).
-
-        Raises:
-            SettingsError: there is no such model, or a value is no finite number.
-        """
-        if not (np.isfinite(F_n).all() and np.isfinite(v_t).all()):
-            raise SettingsError("F_n and v_t have to be finite numbers.")
-        table, loads, speeds = self._table(model), np.asarray(F_n), np.asarray(v_t)
+        if isinstance(F_n, Real) and isinstance(v_t, Real):
+            load, speed = float(F_n), float(v_t)
+            _check_finite(F_n=load, v_t=speed)
+            forces = table.at(load, speed)
+            return TractionEstimate(table.shares, forces, not table.covers(load, speed))
+        loads, speeds = points_of(F_n, v_t)
         is_outside = ~table.covers_many(loads, speeds)
         return TractionEstimates(table.shares, table.over(loads, speeds), is_outside)
 
     def prediction(self, F_n: Array, v_t: Array) -> Prediction:
         """Return the recogniser's answer as a model of the study gives it."""
-        many = self.predict_many(F_n, v_t, self.recogniser)
+        many = self.predict(F_n, v_t, self.recogniser)
         return Prediction(many.mean, many.sd)
 
     def slip_risk(self, required: float, F_n: float) -> BreakAwayRisk:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.data.series import Array
-from analysis.study.distribution import SHARES
+from analysis.study.distribution import SHARES, checked_shares
 
 Rows = tuple[tuple[float, ...], ...]
 
@@ -185,6 +185,7 @@ class TractionEstimates:
 
     def quantile(self, share: float) -> Array:
         """Return the traction [N] not reached with probability `share`, shape (n,)."""
+        checked_shares((share,))
         return self._forces_at(normal_scores((share,)))[0]
 
     def _integrated(self) -> tuple[Array, Array]:

@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
             f"--seconds {args.seconds:g} - expected a number from 1 to {_LONGEST:g}.",
             hint="Nothing was started.",
         )
-    console = Console(color=not args.no_color)
+    console = Console(color=not args.no_color, goes_on=True)
     settings = load_settings(args.config)
     fake = FakeOptions(is_fast=False, seed=1) if args.fake else None
     rig = connect_rig(settings, settings.matrix.terrains[0], fake)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from experiments.arguments import add_simulated_arm, friction_share
+from experiments.rig.truth_options import add_truth, check_truth, mount_of
 
 if TYPE_CHECKING:
     from experiments.run.console_loop import ConsoleLoop
@@ -39,6 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--fast", action="store_true", help="stepped time, only with --fake"
     )
     add_simulated_arm(parser)
+    add_truth(parser)
     parser.add_argument(
         "--operator-script", metavar="auto", help="simulated operator, only with --fake"
     )
@@ -86,11 +88,18 @@ def run(args: argparse.Namespace) -> int:
     for path in _written(args, out):
         _check_out(path)
     args.chosen = _chosen_poses(args, settings, row)
-    console = Console(color=not args.no_color)
+    console = Console(color=not args.no_color, goes_on=True)
     operator = choose_operator(args.operator_script, is_fake=args.fake)
     fake: FakeOptions | None = None
     if args.fake:
-        fake = FakeOptions(args.fast, args.seed, friction, cables=args.cables)
+        fake = FakeOptions(
+            args.fast,
+            args.seed,
+            friction,
+            cables=args.cables,
+            mount=mount_of(args),
+            wrong=args.wrong,
+        )
     rig = connect_rig(settings, row, fake)
     kind = "SIMULATED" if rig.is_simulated else "LIVE RIG"
     console.say(f"traction calibrate {args.what}        {kind} · foot {row.foot}")
@@ -266,6 +275,7 @@ def _check_arguments(args: argparse.Namespace) -> None:
         raise SettingsError(
             "--fast and --operator-script work only with --fake.", hint=nothing
         )
+    check_truth(args)
     fewest = _FEWEST.get(args.what, 0)
     if not fewest <= args.poses <= _MOST:
         raise SettingsError(

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from experiments.arguments import did_you_mean, number_within
+from experiments.rig.truth_options import add_truth, check_truth, mount_of
 
 if TYPE_CHECKING:
     from experiments.operator.console import Console
@@ -51,6 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--json", action="store_true", help="the page as JSON, refusals too"
     )
+    add_truth(parser)
     parser.add_argument(
         "--can-log", type=Path, metavar="FILE", help="write every CAN frame there"
     )
@@ -72,6 +74,7 @@ def run(args: argparse.Namespace) -> int:
         )
     if args.explain:
         return _explain(args.explain, console)
+    check_truth(args)
     settings = load_settings(args.config)
     if args.config_only:
         read_law_calibrations(settings)
@@ -102,7 +105,9 @@ def _check(args: argparse.Namespace, settings: Settings, console: Console) -> No
 
     first = settings.matrix.terrains[0].name
     row = settings.row(args.terrain or first)
-    fake = FakeOptions(args.fast, seed=1) if args.fake else None
+    fake: FakeOptions | None = None
+    if args.fake:
+        fake = FakeOptions(args.fast, 1, mount=mount_of(args), wrong=args.wrong)
     rig = connect_rig(settings, row, fake)
     console.say("traction check        " + ("SIMULATED" if fake else "LIVE RIG"))
     with logging_bus(rig, args.can_log, console):

@@ -7,11 +7,14 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from experiments.arguments import number_within, whole_number
+from experiments.rig.truth_options import add_truth, truth_of
+
 if TYPE_CHECKING:
     from experiments.operator.console import Console
     from experiments.rig.fake import ServedArm
     from experiments.settings.load import Settings
-    from experiments.tools.pendant import Press, Pressable
+    from experiments.tools.pendant import Order, Pressable
 
 EXAMPLES = """\
   traction fake --can traction-fake:/tmp/wam.sock --idle-first
@@ -45,12 +48,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="begin powered and idle, pucks asleep; otherwise in E-STOP",
     )
     _add_arm(parser)
+    _add_truth(parser)
     parser.add_argument(
         "--script",
         type=Path,
         metavar="FILE",
-        help="lines that press the pendant, as on stdin: "
-        "[SECONDS] activate|idle|estop|quit",
+        help="lines that press the pendant and order the hands at the arm, as on "
+        "stdin: [SECONDS] activate|idle|estop|quit, pose q1..q7 SECONDS, "
+        "stop JOINT low|high, hang KG, unhang, push FX FY FZ SECONDS, release",
     )
     parser.add_argument(
         "--can-log", type=Path, metavar="FILE", help="write every frame there"
@@ -87,6 +92,32 @@ def _add_arm(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _add_truth(parser: argparse.ArgumentParser) -> None:
+    """Declare where the arm is, and what is true of it."""
+    parser.add_argument(
+        "--pose",
+        choices=("home", "rest"),
+        default="home",
+        help="where it is: home (default), or rest: home with joint 6 on its upper "
+        "stop, where nothing moves without torque",
+    )
+    parser.add_argument(
+        "--seed",
+        type=whole_number,
+        metavar="N",
+        help="one of many sound arms: zeros, stops, mounting and sensor are drawn "
+        "(those of the drawings)",
+    )
+    parser.add_argument(
+        "--friction",
+        type=number_within(0.0, 2.0, "a number 0..2, e.g. 1"),
+        metavar="SHARE",
+        help="friction of the joints: 1 = as identified on another arm (0.02 with "
+        "--hand carry, otherwise 1)",
+    )
+    add_truth(parser)
+
+
 def run(args: argparse.Namespace) -> int:
     """Serve until a signal ends it and return the exit code."""
     from acquisition.clock import SystemClock
@@ -95,12 +126,12 @@ def run(args: argparse.Namespace) -> int:
     from experiments.rig.fake import build_server
     from experiments.run.stop import StopFlag, handle_signals
     from experiments.settings.load import load_settings
-    from experiments.tools.pendant import PRESSES, Lines, Pendant, read_script
+    from experiments.tools.pendant import Lines, Pendant, read_script
 
     served = _served(args)
     script = None if args.script is None else read_script(args.script)
     settings = load_settings(args.config)
-    console = Console(color=not args.no_color)
+    console = Console(color=not args.no_color, goes_on=True)
     clock, stop = SystemClock(), StopFlag()
     if served is None:
         return _serve_sensor(settings, args, console)
@@ -117,8 +148,8 @@ def run(args: argparse.Namespace) -> int:
             if log is not None:
                 log.flush()
             is_on = _press(server, pendant.due(clock.now_ns()))
-            for line in pendant.take_unknown():
-                console.problem(f"{line[:60]!r} is none of {', '.join(PRESSES)}.")
+            for words in pendant.take_unknown():
+                console.problem(f"{words}. Nothing was done.")
         if server.losses:
             console.problem(server.losses)
     return 0
@@ -137,6 +168,10 @@ def _served(args: argparse.Namespace) -> ServedArm | None:
         tool=_tool(args),
         has_hand=(args.hand or ("none" if args.bare else "carry")) == "carry",
         firmware=args.firmware,
+        is_at_rest=args.pose == "rest",
+        friction=args.friction,
+        seed=args.seed,
+        truth=truth_of(args, args.seed),
     )
 
 
@@ -198,12 +233,15 @@ def _serve_sensor(
     return 0
 
 
-def _press(server: Pressable, presses: list[Press]) -> bool:
-    """Press the buttons in turn; return False once one of them is quit."""
-    for press in presses:
-        if press == "quit":
+def _press(server: Pressable, orders: list[Order]) -> bool:
+    """Press buttons, order the hands in turn; return False once there is a quit."""
+    for order in orders:
+        if order == "quit":
             return False
-        server.press(press)
+        if isinstance(order, str):
+            server.press(order)
+        elif server.hands is not None:
+            order.give(server.hands)
     return True
 
 

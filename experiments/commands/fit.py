@@ -11,7 +11,7 @@ from experiments.arguments import (
     add_pdf,
     add_scheduler,
     add_seed,
-    number_within,
+    add_table_form,
 )
 
 if TYPE_CHECKING:
@@ -40,19 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="folder of the report",
     )
-    parser.add_argument(
-        "--columns", metavar="t=..,v_t=..,F_n=..,F_t=..", help="names in a CSV"
-    )
-    parser.add_argument(
-        "--unit", metavar="v_t=mm/s,..", help="units where a header gives none"
-    )
-    parser.add_argument(
-        "--rate",
-        type=number_within(1, 100_000, "a rate in Hz, e.g. 500"),
-        metavar="HZ",
-        help="rows of a CSV per second, where it has no time",
-    )
-    parser.add_argument("--terrain", metavar="NAME", help="terrain of the CSV files")
+    add_table_form(parser)
     parser.add_argument(
         "--stones",
         metavar="NAME=SIZE,..",
@@ -70,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
     from analysis.report.page import ReportContext, write_report
     from analysis.report.what_if_tables import plain_choice, side_by_side
     from analysis.study.models import FitOptions
-    from analysis.study.study import StudyOptions, run_study
+    from analysis.study.study import StudyOptions, notes_of_tables, run_study
     from experiments.operator.console import Console
     from experiments.report.choices import analysis_choices, repeat_study
     from experiments.report.progress import fitting
@@ -83,6 +71,10 @@ def run(args: argparse.Namespace) -> int:
     for choice in choices.variants:  # refused before anything is fitted
         choice.series(next(iter(trials.values()))[0])
     is_simulated = _is_simulated(trials)
+    _refuse_repeated(trials)
+    told = notes_of_tables(trials)
+    for note in told:  # before the work: a wrong unit shows here
+        console.say(f"▲ {note}")
     count = sum(len(series) for series in trials.values())
     console.say(f"{count} trials on {len(trials)} terrains: fitting ...")
     fit = FitOptions(bounds=choices.bounds, seed=args.seed, models=choices.models)
@@ -105,21 +97,51 @@ def run(args: argparse.Namespace) -> int:
     )
     page = write_report(study, args.to, context)
     for warning in study.warnings:
-        console.say(f"▲ {warning}")
+        if warning not in told:
+            console.say(f"▲ {warning}")
     console.say(str(page))
     return 0
 
 
 def _load(args: argparse.Namespace) -> dict[str, list[TractionSeries]]:
     """Return the trials by terrain; raises SettingsError."""
-    from analysis.data.columns import parse_columns, parse_units
     from analysis.data.tables import load_tables
     from analysis.data.terrain_kinds import parse_stones
+    from analysis.dialects.columns import parse_columns, parse_names, parse_units
 
     columns = parse_columns(args.columns) if args.columns else None
     stones = parse_stones(args.stones) if args.stones else None
     units = parse_units(args.unit) if args.unit else None
-    return load_tables(args.files, columns, args.terrain, stones, units, args.rate)
+    return load_tables(
+        args.files,
+        columns,
+        args.terrain,
+        stones,
+        units,
+        args.rate,
+        negate=parse_names(args.negate) if args.negate else (),
+        decimal=args.decimal,
+    )
+
+
+def _refuse_repeated(trials: Mapping[str, Sequence[TractionSeries]]) -> None:
+    """Refuse a trial that is there twice: left out, it would be fitted all the same."""
+    from hashlib import blake2b
+
+    from acquisition.errors import SettingsError
+
+    first: dict[bytes, str] = {}
+    for series in (one for group in trials.values() for one in group):
+        digest = blake2b()
+        for column in (series.t - series.t[0], series.v_t, series.F_n, series.F_t):
+            digest.update(column.tobytes())
+        name = f"{series.terrain} {series.name}"
+        original = first.setdefault(digest.digest(), name)
+        if original is not name:
+            raise SettingsError(
+                f"{name} holds the same trial as {original}.",
+                hint="Give each trial once.",
+            )
 
 
 def _is_simulated(trials: Mapping[str, Sequence[TractionSeries]]) -> bool:

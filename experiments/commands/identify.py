@@ -6,6 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from experiments.arguments import add_table_form
+
 if TYPE_CHECKING:
     from analysis.data.series import TractionSeries
     from analysis.terrains.verdict import Recognition, WindowEvidence
@@ -38,10 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=100,
         help="samples of motion per answer: 50, 100 or 200 are 0.5, 1 or 2 s (100)",
     )
-    parser.add_argument(
-        "--columns", metavar="t=..,v_t=..,F_n=..,F_t=..", help="names in a CSV"
-    )
-    parser.add_argument("--terrain", metavar="NAME", help="terrain of the CSV files")
+    add_table_form(parser)
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 
@@ -74,16 +73,24 @@ def run(args: argparse.Namespace) -> int:
 
 def _series(args: argparse.Namespace) -> list[TractionSeries]:
     """Return the trials of all files, recorded ones and tables."""
-    from analysis.data.columns import parse_columns
     from analysis.data.load import load_trial
     from analysis.data.tables import load_tables
+    from analysis.dialects.columns import parse_columns, parse_names, parse_units
 
     recorded = [path for path in args.files if path.suffix == ".mcap"]
     tables = [path for path in args.files if path.suffix != ".mcap"]
     result = [load_trial(path).series() for path in recorded]
     if tables:
         columns = parse_columns(args.columns) if args.columns else None
-        by_terrain = load_tables(tables, columns, args.terrain)
+        by_terrain = load_tables(
+            tables,
+            columns,
+            args.terrain,
+            units=parse_units(args.unit) if args.unit else None,
+            rate=args.rate,
+            negate=parse_names(args.negate) if args.negate else (),
+            decimal=args.decimal,
+        )
         result += [series for group in by_terrain.values() for series in group]
     return result
 

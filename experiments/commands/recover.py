@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,7 @@ EXAMPLES = """\
 
 _PARTIAL = "*.mcap.partial"
 _NOTHING_SAVED = 6  # exit code
+_MOST_PLACES = 5  # that are named
 _MOST_CYCLES = 10_000_000  # that a sidecar may state
 
 
@@ -76,7 +78,9 @@ def _plain(recovery: Recovery) -> dict[str, object]:
         "seconds": recovery.verified.duration,
         "messages": recovery.messages,
         "bytes_dropped": recovery.bytes_dropped,
-        "seconds_dropped": recovery.seconds_dropped,
+        "seconds_dropped": round(recovery.seconds_dropped, 3),
+        "gaps": [asdict(loss) for loss in recovery.losses],
+        "attachments_missing": list(recovery.missing_attachments),
         "missing": missing_text(recovery),
     }
 
@@ -157,12 +161,20 @@ def missing_text(recovery: Recovery) -> str:
 
 def lost_text(recovery: Recovery) -> str:
     """Return what was lost in words, for the operator."""
-    if not recovery.bytes_dropped:
+    parts: list[str] = []
+    if recovery.bytes_dropped:
+        parts.append(f"{recovery.bytes_dropped} bytes")
+    places = ", ".join(
+        f"{loss.seconds:.2f} s at {loss.start:.2f} s"
+        for loss in recovery.losses[:_MOST_PLACES]
+    )
+    if places:
+        more = len(recovery.losses) - _MOST_PLACES
+        places += f" and at {more} more places" if more > 0 else ""
+        parts.append(f"{recovery.seconds_dropped:.2f} s of the recording ({places})")
+    if recovery.missing_attachments:
+        names = ", ".join(recovery.missing_attachments)
+        parts.append(f"{names}, which no file beside it holds")
+    if not parts:
         return "Lost: nothing that was on the disk. The source is kept."
-    from acquisition.clock import RATE_HZ
-
-    lost = f"Lost: {recovery.bytes_dropped} bytes at the end"
-    if recovery.seconds_dropped > 0.0:
-        cycles = round(recovery.seconds_dropped * RATE_HZ)
-        lost += f", {recovery.seconds_dropped:.2f} s or about {cycles} cycles"
-    return f"{lost}. The source is kept."
+    return f"Lost: {'; '.join(parts)}. The source is kept."

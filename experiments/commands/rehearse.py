@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from experiments.arguments import add_simulated_arm, friction_share
+from experiments.rig.truth_options import add_truth, mount_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -25,6 +26,7 @@ _FAILED = 6
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `rehearse`."""
     add_simulated_arm(parser)
+    add_truth(parser)
     parser.add_argument(
         "--trials", type=int, default=10, metavar="N", help="trials per terrain (10)"
     )
@@ -71,8 +73,10 @@ def run(args: argparse.Namespace) -> int:
         jobs=args.jobs,
         is_twin=args.twin is not None,
         cables=args.cables,
+        mount=mount_of(args),
+        wrong=args.wrong,
     )
-    console = Console(color=not args.no_color)
+    console = Console(color=not args.no_color, goes_on=True)
     folder = _free_folder(Path(args.data), args.seed)
     console.say(
         f"traction rehearse        SIMULATED · {len(rows)} terrains x {plan.trials} "

@@ -10,11 +10,14 @@ from experiments.arguments import add_allow_missing, add_port, number_within
 
 if TYPE_CHECKING:
     from experiments.operator.console import Console
-    from wam.bus.log import BusSummary, DecodedLine
+    from wam.bus.log import BusSummary, CanLogError, DecodedLine
 
 EXAMPLES = """\
   traction replay S012 T04 --speed 2        a trial, twice as fast as it was
   traction replay --can bus.log --summary   a bus log, totals only"""
+
+_LEFT_OUT = 6  # exit code
+_MOST_TOLD = 5  # malformed lines
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -148,6 +151,13 @@ def _show_log(args: argparse.Namespace) -> int:
     console = Console(color=not args.no_color)
     reader = BusReader()
     start_ns: int | None = None
+    malformed = 0
+
+    def leave_out(error: CanLogError) -> None:
+        nonlocal malformed
+        malformed += 1
+        if malformed <= _MOST_TOLD:
+            console.problem(str(error))
 
     def tell(spoken: list[DecodedLine]) -> None:
         if args.summary:
@@ -156,10 +166,10 @@ def _show_log(args: argparse.Namespace) -> int:
             console.say(f"{(line.utc_ns - (start_ns or 0)) / 1e9:12.6f}  {line.text}")
 
     try:
-        with args.can.open(encoding="ascii", errors="replace") as file:
+        with args.can.open(encoding="utf-8-sig", errors="replace") as file:
             # A line is cut: a file without line ends must not fill the memory.
             lines = iter(lambda: file.readline(LONGEST_LINE), "")
-            for frame in parse_log(lines):
+            for frame in parse_log(lines, leave_out):
                 start_ns = frame.utc_ns if start_ns is None else start_ns
                 tell(reader.read(frame))
                 if console.is_lost:
@@ -171,7 +181,9 @@ def _show_log(args: argparse.Namespace) -> int:
         ) from error
     tell(reader.finish())
     _sum_up(reader.tally, console)
-    return 0
+    if malformed:
+        console.problem(f"{malformed} malformed lines were left out.")
+    return _LEFT_OUT if malformed else 0
 
 
 def _sum_up(tally: BusSummary, console: Console) -> None:

@@ -6,6 +6,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from experiments.arguments import add_recording, data_option, friction_share
+from experiments.rig.truth_options import add_truth, check_truth, mount_of
 
 if TYPE_CHECKING:
     from experiments.run.resume import ResumeRequest
@@ -21,6 +22,7 @@ EXAMPLES = """\
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `run`."""
     add_recording(parser)
+    add_truth(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -44,7 +46,14 @@ def record_session(args: argparse.Namespace, stance: StanceTask | None = None) -
     fake: FakeOptions | None = None
     if args.fake:
         fake = FakeOptions(
-            args.fast, args.seed, friction, args.pace, args.twin, args.cables
+            args.fast,
+            args.seed,
+            friction,
+            args.pace,
+            args.twin,
+            args.cables,
+            mount=mount_of(args),
+            wrong=args.wrong,
         )
     request = SessionRequest(
         data=args.data,
@@ -54,7 +63,7 @@ def record_session(args: argparse.Namespace, stance: StanceTask | None = None) -
         fake=fake,
         operator_name=args.operator,
         operator=choose_operator(args.operator_script, is_fake=args.fake),
-        console=Console(color=not args.no_color),
+        console=Console(color=not args.no_color, goes_on=True),
         faults=tuple(args.fault),
         can_log=args.can_log,
         foresight=args.foresight,
@@ -120,6 +129,7 @@ def _check_arguments(args: argparse.Namespace) -> None:
             "--fast, --twin, --fault and --operator-script work only with --fake.",
             hint=nothing,
         )
+    check_truth(args)
     if args.trials is not None and not 1 <= args.trials <= 99:
         raise SettingsError(
             f"--trials {args.trials} - expected a whole number 1..99, e.g. 10.",

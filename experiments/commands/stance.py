@@ -4,6 +4,7 @@ import argparse
 
 from experiments.arguments import add_recording
 from experiments.commands.run import record_session
+from experiments.rig.truth_options import add_truth
 
 EXAMPLES = """\
   traction stance S0 --fake --fast --policy constant-mu
@@ -15,6 +16,7 @@ _STANCES_OF_A_TRIAL = 25
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `stance`."""
     add_recording(parser)
+    add_truth(parser)
     parser.add_argument(
         "--policy",
         choices=("avoid-slip", "constant-mu", "none", "oracle"),

@@ -24,7 +24,7 @@ def run(args: argparse.Namespace) -> int:
     from experiments.operator.console import Console
     from experiments.run.stop import StopFlag, handle_signals
 
-    console, stop = Console(color=not args.no_color), StopFlag()
+    console, stop = Console(color=not args.no_color, goes_on=True), StopFlag()
     with handle_signals(stop):
         watch(
             args.data,

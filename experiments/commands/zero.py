@@ -33,7 +33,7 @@ def run(args: argparse.Namespace) -> int:
     from experiments.rig.rig import FakeOptions
     from experiments.settings.load import load_settings
 
-    console = Console(color=not args.no_color)
+    console = Console(color=not args.no_color, goes_on=True)
     settings = load_settings(args.config)
     fake = FakeOptions(is_fast=True, seed=1) if args.fake else None
     rig = connect_rig(settings, settings.matrix.terrains[0], fake)

@@ -1,12 +1,15 @@
 """Output to the operator: the one place that prints."""
 
+import errno
 import io
 import os
 import shutil
 import sys
 import textwrap
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
+
+from acquisition.errors import TractionError
 
 if TYPE_CHECKING:
     from rich.live import Live
@@ -17,16 +20,38 @@ _ARM, _ARM_WHOLE = "ARM: ", "ARM:\N{NO-BREAK SPACE}"
 _BELOW_TEXT = " " * 18  # where the text of a graded line begins
 
 
+class OutputError(TractionError):
+    """What a command prints cannot be written.
+
+    Args:
+        error: of the system.
+    """
+
+    exit_code = 6
+
+    def __init__(self, error: OSError) -> None:
+        super().__init__(
+            f"The output cannot be written ({error.strerror}).",
+            hint="Make room, or send it elsewhere. What was recorded is safe.",
+        )
+
+
 class Console:
     """Prints lines, and below them a panel that changes, where there is a terminal.
+
+    Args:
+        color: colours and a panel are wanted, where there is a terminal for them.
+        goes_on: output that cannot be written is told once and ends nothing, because an
+            arm is moved, or trials are recorded.
 
     Attributes:
         is_lost: the other end of the pipe was closed.
         is_live: there is a terminal that can show a panel.
     """
 
-    def __init__(self, *, color: bool = True) -> None:
+    def __init__(self, *, color: bool = True, goes_on: bool = False) -> None:
         self.is_lost = False
+        self._goes_on = goes_on
         self._is_terminal = sys.stdout.isatty()
         self._color = color and self._is_terminal
         self.is_live = self._color and os.environ.get("TERM", "dumb") != "dumb"
@@ -36,7 +61,11 @@ class Console:
                 stream.reconfigure(errors="replace")  # a sign is worth no crash
 
     def say(self, text: str = "") -> None:
-        """Print one line; a closed pipe or terminal is remembered, never raised."""
+        """Print one line; a closed pipe or terminal is remembered, never raised.
+
+        Raises:
+            OutputError: the disk is full, and nothing has to go on.
+        """
         self._say(text, "")
 
     def _say(self, text: str, indent: str) -> None:
@@ -49,8 +78,8 @@ class Console:
                 self._live.console.print(text, markup=False, highlight=False)
             else:
                 print(text, flush=True)
-        except OSError:
-            self._lose()
+        except OSError as error:
+            self._lose(error)
 
     def check(self, mark: str, name: str, text: str) -> None:
         """Print one line of a graded page."""
@@ -63,8 +92,8 @@ class Console:
             text = wrapped(text, self.width)
         try:
             print(text, file=sys.stderr, flush=True)
-        except OSError:
-            self._lose()
+        except OSError:  # nothing is left to say it with
+            discard(sys.stderr)
 
     @property
     def width(self) -> int:
@@ -86,8 +115,8 @@ class Console:
             if self._live is None:
                 self._live = self._begin_live()
             self._live.update(text, refresh=True)
-        except OSError:
-            self._lose()
+        except OSError as error:
+            self._lose(error)
 
     def end_panel(self) -> None:
         """Take the panel away; a second call does nothing."""
@@ -95,8 +124,8 @@ class Console:
         if live is not None:
             try:
                 live.stop()
-            except OSError:
-                self._lose()
+            except OSError as error:
+                self._lose(error)
 
     def sound(self, times: int = 1) -> None:
         """Sound the terminal's bell, if there is a terminal."""
@@ -105,14 +134,24 @@ class Console:
         try:
             sys.stdout.write("\a" * times)
             sys.stdout.flush()
-        except OSError:
-            self._lose()
+        except OSError as error:
+            self._lose(error)
 
-    def _lose(self) -> None:
-        """Remember that the reader has gone; further output is dropped."""
+    def _lose(self, error: OSError) -> None:
+        """Drop further output; a reader that has gone is no fault, a full disk is one.
+
+        Raises:
+            OutputError: it is one, and nothing has to go on.
+        """
         self.is_lost = True
         self._live = None
-        _discard_output()
+        discard(sys.stdout)
+        if isinstance(error, BrokenPipeError) or error.errno == errno.EIO:
+            return  # nobody reads the pipe, the terminal was closed
+        fault = OutputError(error)
+        if not self._goes_on:
+            raise fault from error
+        self.problem(f"{WARNING} {fault}")
 
     def _begin_live(self) -> "Live":
         from rich.console import Console as RichConsole
@@ -191,8 +230,8 @@ def wrapped(text: str, width: int, indent: str = "") -> str:
     return "\n".join(lines).replace(_ARM_WHOLE, _ARM)
 
 
-def _discard_output() -> None:
-    """Point stdout at nothing, or Python would fail again when it flushes at exit."""
+def discard(stream: TextIO) -> None:
+    """Point a stream at nothing, or Python would fail again when it flushes at exit."""
     nothing = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nothing, sys.stdout.fileno())
+    os.dup2(nothing, stream.fileno())
     os.close(nothing)

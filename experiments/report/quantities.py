@@ -251,4 +251,12 @@ KEPT: tuple[KeptQuantity, ...] = (
         "row of the trial's table, from 0",
         lambda x: x.indices,
     ),
+    Quantity(
+        ("simulated",),
+        "1",
+        _LOOP,
+        "the devices are simulated",
+        lambda x: np.full(x.kept, x.is_simulated),
+        kind="boolean",
+    ),
 )

@@ -3,7 +3,10 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
+from hashlib import blake2b
 from pathlib import Path
+
+import numpy as np
 
 from acquisition.clock import SystemClock
 from acquisition.errors import SessionError, SettingsError, TrialFileError
@@ -84,6 +87,7 @@ def _load_trials(
     trials: dict[str, list[HeldTrial]] = {}
     truths: dict[Path, TruthErrors] = {}
     problems: list[str] = []
+    first: dict[bytes, str] = {}  # by what was recorded, whatever file it is in
     for session in sorted(sessions, key=lambda s: (s.path.name[:10], int(s.id[1:]))):
         for path in session.kept_trials():
             try:
@@ -99,6 +103,12 @@ def _load_trials(
                     "otherwise. A report cannot mix the two.",
                     hint="Put the file back where it came from.",
                 )
+            name = f"{session.id} {path.stem}"
+            original = first.setdefault(blake2b(trial.cycles.tobytes()).digest(), name)
+            if original is not name:
+                problems.append(f"{name} is the same recording as {original}")
+                console.say(f"▲ left out: {problems[-1]}")
+                continue
             trials.setdefault(trial.terrain, []).append(HeldTrial.of(trial))
             if (truth := compare_with_truth(trial)) is not None:
                 truths[path] = truth
@@ -182,10 +192,22 @@ def require_samples(study: Study) -> None:
     if any(result.kept for result in study.terrains.values()):
         return
     prepare = study.options.prepare
+    present = np.concatenate(
+        [trial.smooth.v_t for r in study.terrains.values() for trial in r.trials]
+    )
+    slow, fast = float(present.min()), float(present.max())
+    forward = np.quantile(present[present > 0.0], (0.05, 0.95)) if fast > 0 else None
+    hint = (
+        "No row moves forward: --negate v_t turns its sign."
+        if forward is None
+        else f"--window {forward[0]:.3g}:{forward[1]:.3g} keeps nine in ten of those "
+        "that move forward; or check the unit of v_t."
+    )
     raise SettingsError(
         "No sample is left to fit: none moves forward at "
-        f"{prepare.slowest:g} to {prepare.fastest:g} m/s.",
-        hint=" ".join(study.warnings) or "Check the columns and their units.",
+        f"{prepare.slowest:g} to {prepare.fastest:g} m/s (--window); v_t is {slow:.3g} "
+        f"to {fast:.3g} m/s.",
+        hint=" ".join([hint, *study.warnings]),
     )
 
 

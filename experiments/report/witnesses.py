@@ -1,6 +1,7 @@
 """What has to be in a publication, by its description and by the journals inside."""
 
 from pathlib import Path
+from typing import cast
 
 from acquisition.errors import TrialFileError
 from acquisition.files import read_regular
@@ -21,10 +22,13 @@ def changed_publication(folder: Path) -> list[ChangedFile]:
     description of the crate and the journals of its sessions still name it.
 
     Raises:
-        TrialFileError: the list or the description is missing or none.
+        TrialFileError: the list is missing or none, or the description is none.
     """
     changes = changed_files(folder)
     known = {change.path for change in changes}
+    if METADATA not in known and not (folder / METADATA).is_file():
+        changes.append(ChangedFile(METADATA, "is missing"))
+        known.add(METADATA)
     # a description that was changed itself is no witness
     for name in [] if METADATA in known else _described(folder / METADATA):
         if name not in known and not (folder / name).is_file():
@@ -47,10 +51,9 @@ def _described(path: Path) -> list[str]:
     if not isinstance(graph, list):
         raise TrialFileError(path, "describes no crate")
     names: list[str] = []
-    for entity in graph[:_MOST]:
-        if not isinstance(entity, dict) or entity.get("@type") != "File":
-            continue
-        name = entity.get("@id")
+    for entity in cast("list[object]", graph)[:_MOST]:
+        known = cast("dict[str, object]", entity if isinstance(entity, dict) else {})
+        name = known.get("@id") if known.get("@type") == "File" else None
         if isinstance(name, str) and _is_below(name):
             names.append(name)
     return names

@@ -136,6 +136,13 @@ class SimulatedRig:
         return weighed_arm(constants, moments_of_links(constants) + change)
 
 
+def wrong_rigs() -> dict[str, str]:
+    """Return what is wrong with each rig of the catalogue, by its name."""
+    from fakes.world.wrong_rigs import catalogue
+
+    return {name: rig.wrong for name, rig in catalogue().items()}
+
+
 def typed_wrongly(settings: Settings, wrong: str) -> Settings:
     """Return the settings as they are with the wrong rig of that name.
 
@@ -229,6 +236,10 @@ class ServedArm:
             for the foot of the first terrain.
         has_hand: a person carries the arm.
         firmware: of the motor pucks, and of the safety module.
+        is_at_rest: the arm is at home with joint 6 on its upper stop, not just at home.
+        friction: of the joints, as a share; None = what fits `has_hand`.
+        seed: of the sound arm that it is; None = that of the drawings.
+        truth: what is true of the arm, but not believed; None = nothing.
     """
 
     bus: tuple[str, str]
@@ -237,6 +248,10 @@ class ServedArm:
     tool: str
     has_hand: bool
     firmware: tuple[int, int]
+    is_at_rest: bool = False
+    friction: float | None = None
+    seed: int | None = None
+    truth: RigTruth | None = None
 
 
 def _served_tool(settings: Settings, tool: str) -> Tool | None:
@@ -294,7 +309,9 @@ def build_server(settings: Settings, served: ServedArm) -> PuckServer:
     """
     from fakes.serving.home_arm import HomePose, build_home_server
     from fakes.serving.puck_server import open_can_port
+    from fakes.world.plain_world import departure_of
 
+    truth = None if served.truth is None else asdict(served.truth)
     tool, line = _served_tool(settings, served.tool), None
     if served.line is not None:
         _with_sensor(tool)
@@ -306,6 +323,10 @@ def build_server(settings: Settings, served: ServedArm) -> PuckServer:
         served.is_idle_first,
         served.has_hand,
         served.firmware,
+        served.is_at_rest,
+        served.friction,
+        served.seed,
+        departure_of(truth, 1 if served.seed is None else served.seed),
     )
     port = open_can_port(*served.bus, settings.rig.can.bitrate)
     try:

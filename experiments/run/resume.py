@@ -134,7 +134,7 @@ def resume_request(args: argparse.Namespace) -> ResumeRequest:
     return ResumeRequest(
         data=args.data,
         config=args.config,
-        console=Console(color=not args.no_color),
+        console=Console(color=not args.no_color, goes_on=True),
         is_fast=args.fast,
         is_fake=args.fake,
         is_forced=args.force,

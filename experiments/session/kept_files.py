@@ -15,7 +15,12 @@ from experiments.session.data_files import line_faults, read_json, sha256_of
 from experiments.session.reducer import KEEP, replay
 from experiments.session.sidecar import TrialName
 from experiments.session.store import JOURNAL_FILE, SUMMARY_FILE, SessionFolder
-from experiments.session.trial_files import decision_of, find_sidecar, kept_pushes
+from experiments.session.trial_files import (
+    decision_of,
+    find_sidecar,
+    kept_pushes,
+    kept_sidecars,
+)
 
 if TYPE_CHECKING:
     from analysis.next_push.stopping import Stopping
@@ -106,9 +111,12 @@ def _unknown_to_journal(
     session.json is written after the journal, so it never knows more.
     """
     summary = read_json(folder.path / SUMMARY_FILE)
-    listed = cast("list[object]", summary.get("kept"))
-    known = [str(name) for name in listed] if isinstance(listed, list) else []
+    listed = summary.get("kept")
+    names = cast("list[object]", listed if isinstance(listed, list) else [])
+    known = [str(name) for name in names]
     faults: list[tuple[str, str]] = []
+    if origin := stated_id(folder):
+        faults.append((SUMMARY_FILE, f"is of {origin}: a copy, or a renamed session"))
     lines, stated = text.count(b"\n"), summary.get("events")
     lost = [name for name in known if name not in kept]
     if not text and (known or stated):
@@ -120,6 +128,21 @@ def _unknown_to_journal(
             (f"trials/{name}.mcap", f"is kept in {SUMMARY_FILE}, not in the journal")
         )
     return faults
+
+
+def stated_id(folder: SessionFolder) -> str:
+    """Return the id that session.json states where it is not the folder's, else ""."""
+    stated = read_json(folder.path / SUMMARY_FILE).get("id")
+    return stated if isinstance(stated, str) and stated != folder.id else ""
+
+
+def repeated_trials(folder: SessionFolder, original: SessionFolder) -> set[str]:
+    """Return the names of the trials of a copy that its original has as well."""
+    sums = [
+        {str(s.get("trial")): s.get("sha256") for s in kept_sidecars(one)}
+        for one in (folder, original)
+    ]
+    return {name for name, sha256 in sums[0].items() if sums[1].get(name) == sha256}
 
 
 def _below(folder: SessionFolder, error: TrialFileError) -> str:

@@ -43,9 +43,14 @@ class Settings:
     folder: Path
     calibrations: Mapping[str, str] = field(default_factory=dict[str, str])
 
+    @property
+    def rig_name(self) -> str:
+        """Name of the file of the rig, in messages."""
+        return "rig.toml" if self.origin == SHIPPED else Path(self.origin).name
+
     def unusual(self) -> list[str]:
         """Return a sentence for each number that no sound rig has."""
-        files = (("rig.toml", self.rig), ("matrix.toml", self.matrix))
+        files = ((self.rig_name, self.rig), ("matrix.toml", self.matrix))
         return [
             f"{file}: {words}"
             for file, section in files
@@ -61,7 +66,7 @@ class Settings:
         beyond = beyond_real(self.rig)
         if beyond:
             raise SettingsError(
-                f"rig.toml: {beyond} on a real arm.",
+                f"{self.rig_name}: {beyond} on a real arm.",
                 hint="Only a simulated one, on a busy computer, may have more. "
                 "Nothing was started.",
             )
@@ -146,7 +151,7 @@ def load_settings(config: Path | None) -> Settings:
         beside = config.with_name("matrix.toml")
         if beside.exists():
             matrix_text = _read(beside)
-    rig = _parse(RigSettings, rig_text, "rig.toml")
+    rig = _parse(RigSettings, rig_text, "rig.toml" if config is None else config.name)
     build_device(rig.ft_sensor)
     matrix = _parse(MatrixSettings, matrix_text, "matrix.toml")
     names = [row.name for row in matrix.terrains]

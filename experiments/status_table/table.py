@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING
 
 from acquisition.errors import SettingsError
@@ -34,7 +34,23 @@ def see_sessions(
         is_asked = matches(facts_of(folder), where)
         look = cache.summary if is_asked else cache.glance
         seen.append(SeenSession(folder, look(folder)))
-    return seen
+    return _counted_once(seen)
+
+
+def _counted_once(seen: list[SeenSession]) -> list[SeenSession]:
+    """Return the sessions without those trials of a copy that its original has."""
+    from experiments.session.kept_files import repeated_trials, stated_id
+
+    folders = {session.folder.id: session.folder for session in seen}
+    result: list[SeenSession] = []
+    for folder, summary in ((s.folder, s.summary) for s in seen):
+        # what was copied is not sound: it states another id
+        is_asked = summary.problem is None and not summary.is_sound
+        original = folders.get(stated_id(folder)) if is_asked else None
+        again = set[str]() if original is None else repeated_trials(folder, original)
+        kept = tuple(name for name in summary.kept if name not in again)
+        result.append(SeenSession(folder, replace(summary, kept=kept)))
+    return result
 
 
 @dataclass(frozen=True, slots=True)

@@ -59,6 +59,8 @@ class AcceptancePlan:
         jobs: processes at a time; None = one per core.
         is_twin: the simulated rig is the one that the calibrations describe.
         cables: resonance of the joints on their cables [Hz]; None = stiff ones.
+        mount: turns of the true base about x, then y, then z [degrees]; None = none.
+        wrong: name of the wrong rig that it is; "" = none.
     """
 
     config: Path | None
@@ -71,6 +73,8 @@ class AcceptancePlan:
     jobs: int | None
     is_twin: bool = False
     cables: float | None = None
+    mount: tuple[float, float, float] | None = None
+    wrong: str = ""
 
 
 def gated(plan: AcceptancePlan, results: Sequence[BandResult]) -> list[BandResult]:
@@ -225,7 +229,11 @@ def _arguments(plan: AcceptancePlan, terrain: str, data: Path) -> list[str]:
 def _arm(plan: AcceptancePlan) -> list[str]:
     """Return the options that say which arm is simulated."""
     kind = ["--twin"] if plan.is_twin else ["--friction", repr(plan.friction)]
-    return kind if plan.cables is None else [*kind, "--cables", repr(plan.cables)]
+    if plan.cables is not None:
+        kind += ["--cables", repr(plan.cables)]
+    if plan.mount is not None:
+        kind += ["--mount", *map(repr, plan.mount)]
+    return [*kind, "--wrong", plan.wrong] if plan.wrong else kind
 
 
 def _pool(jobs: int | None) -> Executor:

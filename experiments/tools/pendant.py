@@ -1,8 +1,7 @@
-"""The pendant of a served network: lines of a script and of stdin that press it."""
+"""Pendant and hands of a served arm: lines of a script and of stdin that use them."""
 
 from __future__ import annotations
 
-import math
 import os
 import select
 from collections.abc import Iterable
@@ -13,16 +12,30 @@ from typing import Literal, Protocol
 from acquisition.clock import NS_PER_S
 from acquisition.errors import SettingsError
 from acquisition.settings import read_text
+from acquisition.simulation import Hands
+from experiments.tools.hand_orders import (
+    HAND_WORDS,
+    HandOrder,
+    HandOrderError,
+    parse_hand_order,
+)
 
 Press = Literal["activate", "idle", "estop", "quit"]
 PendantButton = Literal["activate", "idle", "estop"]
 PRESSES: tuple[Press, ...] = ("activate", "idle", "estop", "quit")
 _LONGEST_LINE = 256  # bytes; what is longer is no button
 _LATEST_S = 1e6
+Order = Press | HandOrder
+ORDERS = (*PRESSES, *HAND_WORDS)
 
 
 class Pressable(Protocol):
-    """A pendant's other end."""
+    """A pendant's other end, and the hands at the arm."""
+
+    @property
+    def hands(self) -> Hands | None:
+        """The person at the arm; None = there can be none."""
+        ...
 
     def press(self, action: PendantButton) -> None:
         """Press a button now."""
@@ -31,16 +44,32 @@ class Pressable(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class TimedPress:
-    """A button, and when it is pressed [ns after the start]."""
+    """A button or an order, and when it comes [ns after the start]."""
 
     after_ns: int
-    press: Press
+    press: Order
 
 
-def parse_press(text: str) -> Press | None:
-    """Return the button that a line names, None if it names none."""
-    word = text.strip().lower()
-    return word if word in PRESSES else None
+class OrderError(ValueError):
+    """A line that is no order; in words why."""
+
+
+def parse_order(words: list[str]) -> Order:
+    """Return the button or the order to the hands that the words of a line are.
+
+    Raises:
+        OrderError: they are neither.
+    """
+    word = words[0].lower() if len(words) == 1 else ""
+    if word in PRESSES:
+        return word
+    try:
+        order = parse_hand_order(words)
+    except HandOrderError as error:
+        raise OrderError(str(error)) from error
+    if order is None:
+        raise OrderError(f"is none of {', '.join(ORDERS)}")
+    return order
 
 
 def read_script(path: Path) -> tuple[TimedPress, ...]:
@@ -62,8 +91,9 @@ def read_script(path: Path) -> tuple[TimedPress, ...]:
 def parse_script(text: str) -> tuple[TimedPress, ...]:
     """Return the presses of a script, in the order in which they come.
 
-    A line is a button, or a time [s after the start] and a button; a line without a
-    time follows the one before it at once. Empty lines and those with # are skipped.
+    A line is a button or an order to the hands, after a time [s after the start] or
+    without; without one it follows the line before it at once. Empty lines and those
+    with # are skipped.
 
     Raises:
         SettingsError: a line is neither, or its time lies before the line above.
@@ -74,26 +104,40 @@ def parse_script(text: str) -> tuple[TimedPress, ...]:
         words = line.split("#")[0].split()
         if not words:
             continue
-        press = parse_press(words[-1])
-        time_ns = _parse_time(words[0]) if len(words) == 2 else after_ns
-        if press is None or len(words) > 2 or time_ns is None or time_ns < after_ns:
+        try:
+            timed = _parse_timed(words, after_ns)
+        except OrderError as error:
             raise SettingsError(
-                f"Script line {number}: {line.strip()[:60]!r} is not a press in order.",
-                hint=f'Expected [SECONDS] {"|".join(PRESSES)}, e.g. "3.0 activate".',
-            )
-        after_ns = time_ns
-        presses.append(TimedPress(after_ns, press))
+                f"Script line {number}: {line.strip()[:60]!r} {error}.",
+                hint=f"Expected [SECONDS] and one of {', '.join(ORDERS)}, "
+                'e.g. "3.0 activate". Nothing was started.',
+            ) from error
+        after_ns = timed.after_ns
+        presses.append(timed)
     return tuple(presses)
 
 
-def _parse_time(text: str) -> int | None:
+def _parse_timed(words: list[str], after_ns: int) -> TimedPress:
+    """Return what a line orders, not before `after_ns`; raise OrderError."""
+    seconds = _number(words[0])
+    if seconds is None:
+        return TimedPress(after_ns, parse_order(words))
+    if not 0 <= seconds <= _LATEST_S:
+        raise OrderError(f"- expected seconds 0..{_LATEST_S:g}")
+    time_ns = round(seconds * NS_PER_S)
+    if time_ns < after_ns:
+        raise OrderError("comes before the line above")
+    if not words[1:]:
+        raise OrderError("has nothing to do")
+    return TimedPress(time_ns, parse_order(words[1:]))
+
+
+def _number(text: str) -> float | None:
+    """Return the number that `text` is, None if it is none."""
     try:
-        seconds = float(text)
+        return float(text)
     except ValueError:
         return None
-    if not (math.isfinite(seconds) and 0 <= seconds <= _LATEST_S):
-        return None
-    return round(seconds * NS_PER_S)
 
 
 class Lines:
@@ -134,7 +178,7 @@ class Lines:
 
 
 class Pendant:
-    """Presses buttons as a script and a person on stdin say.
+    """Presses buttons and orders the hands as a script and a person on stdin say.
 
     Ctrl-D on a terminal quits, unless there is a script. The end of a pipe or a file
     does not: a service has no stdin, and goes on until a signal ends it.
@@ -149,22 +193,22 @@ class Pendant:
         self._start_ns = start_ns
         self._unknown: list[str] = []
 
-    def due(self, now_ns: int) -> list[Press]:
-        """Return what is pressed by `now_ns`, oldest first."""
-        pressed: list[Press] = []
+    def due(self, now_ns: int) -> list[Order]:
+        """Return what is pressed or ordered by `now_ns`, oldest first."""
+        pressed: list[Order] = []
         while self._script and self._script[0].after_ns <= now_ns - self._start_ns:
             pressed.append(self._script.pop(0).press)
         for line in self._lines.take():
-            if (press := parse_press(line)) is None:
-                self._unknown.append(line)
-            else:
-                pressed.append(press)
+            try:
+                pressed.append(parse_order(line.split()))
+            except OrderError as error:
+                self._unknown.append(f"{line.strip()[:60]!r} {error}")
         is_left = self._lines.is_ended and self._lines.is_terminal
         if is_left and not self._has_script:
             pressed.append("quit")
         return pressed
 
     def take_unknown(self) -> list[str]:
-        """Return the lines that named no button since the last call."""
+        """Return the lines since the last call that are no order, and why."""
         unknown, self._unknown = self._unknown, []
         return unknown

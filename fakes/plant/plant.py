@@ -51,7 +51,6 @@ class ArmPlant:
         terrain: the ground; None = the foot hangs above nothing.
         hand: the operator's.
         finger: force of a person who touches the foot, terrain frame [N].
-        hung: mass that hangs on a string from the centre of the sole [kg].
         t_ns: how far the world has gone on [ns].
         truth: what really happened; None = not written down.
         friction: of the motors.
@@ -86,7 +85,7 @@ class ArmPlant:
         self.terrain: Terrain | None = None
         self.hand = Hand(PERIOD_NS * 1e-9, is_there=options.has_hand)
         self.finger = (0.0, 0.0, 0.0)
-        self.hung = 0.0
+        self._hung = 0.0  # on a string from the sole [kg]
         self._pushed: tuple[Array, int] = (np.zeros(3), 0)  # at the sole [N], until
         self._pull: Vector3 | None = None  # at the sole beside the ground's [N]
         self._ends = Ends(constants.q_lower, constants.q_upper)
@@ -235,6 +234,19 @@ class ArmPlant:
         """Let two hands turn joint 1-7 until its stop bears; the others stay."""
         self._grip_links(JointGrip(StopWay(joint, side, self._ends)))
 
+    @property
+    def is_hand_done(self) -> bool:
+        """Whether the hand has come to the end of its last order."""
+        return self.hand.is_done
+
+    def let_go(self) -> None:
+        """Let the hands let go of the arm."""
+        self.hand.let_go()
+
+    def hang(self, mass: float) -> None:
+        """Hang `mass` [kg] on a string from the centre of the sole; 0 = nothing."""
+        self._hung = mass
+
     def push_with(self, force: Sequence[float], seconds: float) -> None:
         """Let a person push the sole with `force` [N], base frame, for `seconds`."""
         until_ns = self.t_ns + round(1e9 * seconds)
@@ -289,9 +301,9 @@ class ArmPlant:
         """Return the force of what hangs there or pushes, terrain frame [N]."""
         pushed, until_ns = self._pushed
         is_pushed = self.t_ns < until_ns
-        if not (self.hung or is_pushed):
+        if not (self._hung or is_pushed):
             return None
-        force = self.hung * GRAVITY * self._axes.dot(self._down)
+        force = self._hung * GRAVITY * self._axes.dot(self._down)
         x, y, z = (force + pushed if is_pushed else force).tolist()
         return x, y, z
 

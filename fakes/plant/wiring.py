@@ -25,18 +25,18 @@ class Wiring:
         torque: what each motor makes of each torque that is sent, shape (7, 7).
         counts: what each encoder tells of each motor's way, shape (7, 7).
         home: counts of the motors where the arm was zeroed, shape (7,).
-        shift: counts that are told too much, shape (7,).
         torn: motor whose cable to the joints is torn, 1-7: its rotor alone turns, and
             under the law's spring stays where it is. 0 = none.
         torn_at: where that rotor stands [counts].
+        shift: counts that are told too much, shape (7,).
     """
 
     torque: Array = field(default_factory=_as_built)
     counts: Array = field(default_factory=_as_built)
     home: Array = field(default_factory=lambda: np.zeros(7))
-    shift: Array = field(default_factory=lambda: np.zeros(7))
     torn: int = 0
     torn_at: float = 0.0
+    shift: Array = field(default_factory=lambda: np.zeros(7))
 
     def made_of(self, units: Sequence[int]) -> list[int]:
         """Return the torques [puck units] that the motors make, shape (7,)."""

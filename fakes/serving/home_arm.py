@@ -15,11 +15,21 @@ from fakes.randomness import trial_generator
 from fakes.sensor.errors import SensorErrors
 from fakes.serving.puck_server import Port, PuckServer
 from fakes.serving.sensor_server import SensorLine, SensorServer
+from fakes.world.departure import Departure
+from fakes.world.true_rig import (
+    depart,
+    shown_load,
+    true_constants,
+    true_network,
+    true_options,
+    true_tool,
+)
 from ft_sensor.payload import TerrainFrame
 from wam.bus.frames import MOTOR_NODES
-from wam.model.constants import ArmConstants, Body, load_constants
+from wam.model.constants import ArmConstants, Array, Body, load_constants
 from wam.model.tool import Tool
 
+_JOINT_6 = 5
 _SEED = 1  # of the sensor's errors
 _AIDED = PlantOptions(support=Support.PERSON)
 _UNAIDED = PlantOptions(friction=1.0, has_hand=False)
@@ -39,6 +49,10 @@ class HomePose:
         has_hand: a person carries the arm, with hardly any friction then; otherwise it
             has all the friction that was identified on another one.
         firmware: of the motor pucks, and of the safety module.
+        is_at_rest: joint 6 is on its upper stop, where its weight lies.
+        friction: of the joints, as a share; None = what fits `has_hand`.
+        seed: of friction and windings; None = the nominal ones.
+        departure: how it differs from what is believed; None = not at all.
     """
 
     tool: Tool | None
@@ -47,6 +61,10 @@ class HomePose:
     is_idle_first: bool
     has_hand: bool = True
     firmware: tuple[int, int] = (200, 200)
+    is_at_rest: bool = False
+    friction: float | None = None
+    seed: int | None = None
+    departure: Departure | None = None
 
 
 def build_home_server(port: Port, pose: HomePose, clock: Clock) -> PuckServer:
@@ -57,10 +75,16 @@ def build_home_server(port: Port, pose: HomePose, clock: Clock) -> PuckServer:
     Raises:
         SettingsError: the serial line's path is in use or cannot be one.
     """
-    constants, now_ns = _constants_around_home(), clock.now_ns()
-    options = _AIDED if pose.has_hand else _UNAIDED
-    tool = pose.tool or _PLATE
-    plant = ArmPlant(constants, tool, pose.frame, constants.home, options)
+    departure = pose.departure or Departure()
+    believed, now_ns = load_constants(), clock.now_ns()
+    constants = true_constants(believed, departure)
+    options = replace(_AIDED if pose.has_hand else _UNAIDED, seed=pose.seed)
+    if pose.friction is not None:
+        options = replace(options, friction=pose.friction)
+    options = true_options(options, departure)
+    tool = true_tool(pose.tool or _PLATE, departure)
+    q = _where_it_is(constants, departure, is_at_rest=pose.is_at_rest)
+    plant = ArmPlant(constants, tool, pose.frame, q, options)
     plant.t_ns = now_ns // PERIOD_NS * PERIOD_NS
     rng = trial_generator(_SEED, "home", 0)
     errors = SensorErrors(rng, SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS)
@@ -73,22 +97,26 @@ def build_home_server(port: Port, pose: HomePose, clock: Clock) -> PuckServer:
         safety_vers=pose.firmware[1],
         mt=constants.mt,
     )
-    load = Load(plant.sensor_load, errors)
-    network = PuckNetwork(plant, found, now_ns, load)
+    source = shown_load(plant.sensor_load, departure)
+    network = PuckNetwork(
+        plant, true_network(found, departure), now_ns, Load(source, errors)
+    )
+    # Its zeros are those of the pose that it is zeroed in.
+    depart(plant, network, replace(departure, zeros=np.zeros(7)), believed)
     sensor = None
     if pose.line is not None:
-        sensor = SensorServer(pose.line, plant.sensor_load, clock)
-    return PuckServer(network, plant, port, clock, sensor)
+        sensor = SensorServer(pose.line, source, clock)
+    return PuckServer(network, plant, port, clock, sensor, plant)
 
 
-def _constants_around_home() -> ArmConstants:
-    """Return the arm with its stops no further in than home, which lies beyond two.
+def _where_it_is(
+    constants: ArmConstants, departure: Departure, *, is_at_rest: bool
+) -> Array:
+    """Return where a person puts the arm to zero it [rad], shape (7,).
 
-    A simulated spring would throw the arm off them.
+    At home but for the errors of its zeros, and no further than its stops let it.
     """
-    constants = load_constants()
-    return replace(
-        constants,
-        q_lower=np.minimum(constants.q_lower, constants.home),
-        q_upper=np.maximum(constants.q_upper, constants.home),
-    )
+    q = constants.home - departure.zeros
+    if is_at_rest:
+        q[_JOINT_6] = constants.q_upper[_JOINT_6]
+    return np.clip(q, constants.q_lower, constants.q_upper)

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Protocol
 
 from acquisition.clock import Clock
+from acquisition.simulation import Hands
 from fakes.bus.hub import CanPort, Frame, SocketHub
 from fakes.pucks.bank import MotorSide
 from fakes.pucks.network import PuckNetwork
@@ -62,6 +63,7 @@ class PuckServer:
     Attributes:
         network: the pucks.
         sensor: a serial wrist sensor that is served beside them; None = none.
+        hands: at the arm; None = it has no body that they could take.
     """
 
     def __init__(
@@ -71,6 +73,7 @@ class PuckServer:
         port: Port,
         clock: Clock,
         sensor: SensorServer | None = None,
+        hands: Hands | None = None,
     ) -> None:
         self.network = network
         self._wired = WiredNetwork(network, is_far=True)
@@ -78,6 +81,7 @@ class PuckServer:
         self._port = port
         self._clock = WorldClock(clock)
         self.sensor = sensor
+        self.hands = hands
 
     @property
     def name(self) -> str:

@@ -272,7 +272,7 @@ class LocalSimulation:
 
     def hang(self, mass: float) -> None:
         """Hang `mass` [kg] on a string from the centre of the sole; 0 = nothing."""
-        self.rig.plant.hung = mass
+        self.rig.plant.hang(mass)
 
     def push_with(self, force: Sequence[float], seconds: float) -> None:
         """Push the sole with `force` [N], base frame, for `seconds`."""

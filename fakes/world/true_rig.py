@@ -137,7 +137,7 @@ def wiring_of(
     torn = departure.torn
     if is_built and is_told and not torn:
         return None
-    wiring = Wiring(departure.torque, departure.counts, true_home, shift)
+    wiring = Wiring(departure.torque, departure.counts, true_home, shift=shift)
     if not torn:
         return wiring
     torn_at = float(wiring.told_of(np.array(plant.counts()))[torn - 1])

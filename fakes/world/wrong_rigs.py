@@ -250,8 +250,8 @@ _BUS = (
     WrongRig("poller", 59, _B, "another program asks for positions", "second program", ("C1",), Departure(bus=BusTrouble(poller=_POLLER))),
 )
 _MECHANICS = (
-    WrongRig("cable-2-torn", 60, _M, "the cable of motor 2 is off its drum", "broke", ("C9",), Departure(torn=2)),
-    WrongRig("cable-4-torn", 60, _M, "the cable of motor 4 is off its drum", "broke", ("C9",), Departure(torn=4)),
+    WrongRig("cable-2-torn", 60, _M, "the cable of motor 2 is off its drum", "broke", ("C5", "C9"), Departure(torn=2)),
+    WrongRig("cable-4-torn", 60, _M, "the cable of motor 4 is off its drum", "broke", ("C5", "C9"), Departure(torn=4)),
     WrongRig("tendon-4-slipped", 61, _M, "the cable of motor 4 has slipped by 5 degrees of the joint", "slack", ("C5", "C7"), _zero(j4=5.0)),
     WrongRig("friction-threefold", 62, _M, "the joints rub three times as much", "pulley", ("C9",), Departure(friction=3.0)),
     WrongRig("torque-15-weak", 62, _M, "motors 2 and 3 make 85 % of their torque", "magnets", ("C10",), Departure(torque=scaled(m2=0.85, m3=0.85))),

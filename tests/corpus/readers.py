@@ -49,7 +49,7 @@ from wam.bus.frames import (
     decode_torques,
     split_id,
 )
-from wam.bus.log import parse_log
+from wam.bus.log import CanLogError, parse_log
 from wam.calibration.gravity_file import gravity_from_toml
 from wam.model.constants import load_constants
 
@@ -169,9 +169,13 @@ def _presses(data: bytes, folder: Path) -> None:
 
 def _bus_log(data: bytes, _: Path) -> None:
     reader = BusReader()
-    for frame in parse_log(data.decode(errors="replace").splitlines()):
+    problems: list[CanLogError] = []
+    text = data.decode(errors="replace")
+    for frame in parse_log(text.splitlines(), problems.append):
         reader.read(frame)
     reader.finish()
+    if problems:
+        raise problems[0]
 
 
 def _frames(data: bytes, _: Path) -> None:

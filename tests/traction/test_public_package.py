@@ -246,8 +246,8 @@ def test_one_trial_alone_cannot_be_left_out(session):
 
 
 def test_a_model_of_several_terrains_is_refused(session, tmp_path):
-    rows = "t,v_t,F_n,F_t\n" + "".join(
-        f"{0.002 * k:.3f},0.05,4.0,{2 + 0.01 * k:.2f}\n" for k in range(500)
+    rows = "t,v_t,F_n,F_t,simulated\n" + "".join(
+        f"{0.002 * k:.3f},0.05,4.0,{2 + 0.01 * k:.2f},1\n" for k in range(500)
     )
     (tmp_path / "a.csv").write_text(rows)
     other = tr.load_tables(tmp_path / "a.csv", terrain="gravel")

@@ -9,10 +9,12 @@ from heapq import heapify, heappop, heappushpop
 from acquisition.clock import NS_PER_S, Clock, utc_offset_ns
 from acquisition.errors import TractionError
 
-LONGEST_LINE = 120  # characters
+LONGEST_LINE = 200  # characters; a CAN FD frame has 128 of data
+# Microseconds as candump writes them; other programs write more of the fraction.
 _LINE = re.compile(
-    r"\((\d{1,10})\.(\d{6})\) ([!-~]{1,32}) "
-    r"([0-7][0-9A-F]{2}|[0-3][0-9A-F]{7})#((?:[0-9A-F]{2}){0,8}|R[0-8]?)(?: [RT])?",
+    r"\((\d{1,10})\.(\d{6})\d{0,3}\) ([!-~]{1,32}) "
+    r"([0-7][0-9A-F]{2}|[0-3][0-9A-F]{7})#"
+    r"((?:[0-9A-F]{2}){0,8}|R[0-8]?|#[0-9A-F](?:[0-9A-F]{2}){0,64})(?: [RT])?",
     re.ASCII | re.IGNORECASE,
 )
 _WRITE_AT = 4096  # frames kept back at most
@@ -34,8 +36,9 @@ class LoggedFrame:
         line: its line in the log, 1 is the first.
         channel: name of the bus.
         can_id: identifier.
-        data: payload, empty for a remote frame.
-        is_of_wam: a data frame with an 11-bit identifier; a WAM uses no others.
+        data: payload, empty for a remote frame and one of CAN FD.
+        is_of_wam: a classic data frame with an 11-bit identifier; a WAM uses no
+            others.
     """
 
     utc_ns: int
@@ -60,7 +63,7 @@ class BusSummary:
 
     Attributes:
         frames: all of them.
-        foreign: frames no WAM uses: extended, remote.
+        foreign: frames no WAM uses: extended, remote, of CAN FD.
         questions: answers asked for; a group is asked once per member.
         answers: those that came.
         late: those that came after more than 1 ms.
@@ -130,33 +133,35 @@ def parse_frame(text: str, line: int) -> LoggedFrame:
             hint="Expected candump's format, e.g. (1699999999.123456) can0 404#30.",
         )
     seconds, micros, channel, can_id, data = match.groups()
-    is_remote = data[:1] in ("R", "r")
+    is_other = data[:1] in ("R", "r", "#")
     return LoggedFrame(
         utc_ns=int(seconds) * NS_PER_S + int(micros) * 1000,
         line=line,
         channel=channel,
         can_id=int(can_id, 16),
-        data=b"" if is_remote else bytes.fromhex(data),
-        is_of_wam=len(can_id) == 3 and not is_remote,
+        data=b"" if is_other else bytes.fromhex(data),
+        is_of_wam=len(can_id) == 3 and not is_other,
     )
 
 
-def parse_log(lines: Iterable[str]) -> Iterator[LoggedFrame]:
+def parse_log(
+    lines: Iterable[str], tell: Callable[[CanLogError], None]
+) -> Iterator[LoggedFrame]:
     """Return the frames of a log in the order of their times.
 
-    Raises:
-        CanLogError: a line is malformed; the frames above it have been returned.
+    Args:
+        lines: of the log, with or without their ends.
+        tell: hears of each line that is malformed, which is left out.
     """
     waiting: list[LoggedFrame] = []
-    problem: CanLogError | None = None
     for number, text in enumerate(lines, 1):
         if not text.strip():
             continue
         try:
             frame = parse_frame(text.rstrip("\r\n"), number)
         except CanLogError as error:
-            problem = error
-            break
+            tell(error)
+            continue
         if len(waiting) < _REORDERED:
             waiting.append(frame)
             if len(waiting) == _REORDERED:
@@ -166,8 +171,6 @@ def parse_log(lines: Iterable[str]) -> Iterator[LoggedFrame]:
     heapify(waiting)
     while waiting:
         yield heappop(waiting)
-    if problem is not None:
-        raise problem
 
 
 class CanLog:

@@ -1,4 +1,4 @@
-"""Recovery: all before the first broken record, as a new file, never a traceback."""
+"""Recovery: every sound record, as a new file, never a traceback."""
 
 import errno
 import hashlib
@@ -8,13 +8,14 @@ import struct
 
 import numpy as np
 import pytest
+from mcap.records import Message
 
 from acquisition.errors import TrialFileError
 from acquisition.recording.recorder import seal
 from acquisition.sample import Flag
 from acquisition.schema import CYCLE, TRUTH
 from acquisition.trial_file.reader import TrialReader
-from acquisition.trial_file.recover import recover_file, recovered_path
+from acquisition.trial_file.recover import Loss, recover_file, recovered_path
 from acquisition.trial_file.salvage import SoundRecords, recorded_seconds
 from acquisition.trial_file.verify import verify_file
 from acquisition.trial_file.writer import TRUTH_TOPICS, TrialWriter
@@ -95,7 +96,9 @@ def test_a_file_cut_at_any_byte_of_its_last_chunk_keeps_all_before(tmp_path):
     for end in range(last.start, last.end):
         found, salvage = salvaged_messages(data[:end], tmp_path)
         assert found == before, end
-        assert salvage.kept_bytes == last.start
+        # cut right behind the chunk before, nothing of it was there to be lost
+        gaps = [(gap.start, gap.end) for gap in salvage.gaps]
+        assert gaps == ([(last.start, end)] if end > last.start else [])
     assert salvaged_messages(data[: last.end], tmp_path)[0] == whole
 
 
@@ -133,23 +136,29 @@ def test_what_was_known_before_the_trial_is_saved(put, left):
     assert {"clock", "provenance", "channels"} <= reader.metadata.keys()
 
 
-def test_a_broken_chunk_ends_what_is_saved(put, sealed, cycles):
+def test_a_broken_chunk_costs_itself_alone(put, sealed, cycles):
     third = chunks(sealed)[2]
     path = put(flipped(sealed, (third.body + third.end) // 2), "T01.mcap")
     recovery = recover_file(path)
-    assert recovery.verified.cycles == 2 * BLOCK
-    assert recovery.bytes_dropped == len(sealed) - third.start
+    found = TrialReader(recovery.path).cycles().data
+    kept = np.delete(cycles["position"], slice(2 * BLOCK, 3 * BLOCK), 0)
+    assert found["position"].tobytes() == kept.tobytes()
+    assert recovery.bytes_dropped == third.end - third.start
+    # 102 cycles of 2 ms passed before it: two of them were missed
+    assert recovery.losses == (Loss(0.204, 0.1),)
+    assert recover_file(path).losses == recovery.losses
     assert "chunk whose checksum" in recovery.reason or "decompress" in recovery.reason
 
 
-def test_a_chunk_that_passes_for_another_record_ends_it_too(put, sealed):
-    """Skipping what is unknown would leave a hole that looks like lost cycles."""
+def test_a_chunk_that_passes_for_another_record_is_said_to_be_lost(put, sealed):
+    """Or its hole would look like cycles that were missed."""
     third = chunks(sealed)[2].start
     for opcode in (MESSAGE_INDEX, 1, 0x86, 99):
         data = bytearray(sealed)
         data[third] = opcode
         recovery = recover_file(put(bytes(data), f"T{opcode}.mcap"))
-        assert recovery.verified.cycles == 2 * BLOCK
+        assert recovery.verified.cycles == 5 * BLOCK
+        assert recovery.losses == (Loss(0.204, 0.1),)
 
 
 def test_a_damaged_attachment_costs_itself_alone(put, sealed):
@@ -381,15 +390,14 @@ MAGIC_BYTES = b"\x89MCAP0\r\n"
         (message_record(7), "messages without a channel"),
     ],
 )
-def test_a_record_that_refers_to_nothing_ends_what_is_salvaged(
-    tmp_path, records, reason
-):
+def test_a_record_that_refers_to_nothing_is_left_out(tmp_path, records, reason):
     sound = channel_record(1, 0) + message_record(1)
     data = MAGIC_BYTES + sound + records + message_record(1)
     salvage = SoundRecords(data, tmp_path / "T01.mcap")
-    assert len(list(salvage)) == 2
+    kinds = [type(record).__name__ for record in salvage]
+    assert kinds == ["Channel", "Message", "Gap", "Message"]
     assert reason in salvage.reason
-    assert salvage.kept_bytes == len(MAGIC_BYTES + sound)
+    assert salvage.lost_bytes == len(records)
 
 
 def test_nothing_of_a_chunk_is_given_that_breaks_in_its_middle(tmp_path):
@@ -408,7 +416,6 @@ def test_what_begins_otherwise_is_no_mcap_file(tmp_path):
     salvage = SoundRecords(data, tmp_path / "T01.mcap")
     assert list(salvage) == []
     assert "no MCAP file" in salvage.reason
-    assert salvage.kept_bytes == 0
 
 
 def test_a_file_that_is_whole_lost_no_second(put, sealed):
@@ -434,11 +441,10 @@ def test_a_chunk_that_ends_in_a_record_is_not_sound(tmp_path):
         (b"\x01\x00", False),
     ],
 )
-def test_an_index_of_messages_is_whole_or_ends_what_is_salvaged(
-    tmp_path, index, is_sound
-):
+def test_an_index_of_messages_is_whole_or_said_to_be_broken(tmp_path, index, is_sound):
     before = channel_record(1, 0) + message_record(1)
     data = MAGIC_BYTES + before + record(MESSAGE_INDEX, index) + message_record(1)
     salvage = SoundRecords(data, tmp_path / "T01.mcap")
-    assert len(list(salvage)) == (3 if is_sound else 2)
+    assert sum(isinstance(record, Message) for record in salvage) == 2
+    assert len(salvage.gaps) == (0 if is_sound else 1)
     assert ("broken record, kind 7" in salvage.reason) is not is_sound

@@ -173,7 +173,7 @@ def test_a_parquet_table_of_other_columns_says_which_it_has(tmp_path):
 
 def test_words_in_the_place_of_numbers_are_refused(tmp_path):
     content = columns() | {"F_t": np.array(list("abcdef"))}
-    with pytest.raises(SettingsError, match="not a readable Parquet"):
+    with pytest.raises(SettingsError, match="column F_t holds string"):
         load_tables([parquet(tmp_path / "a.parquet", content)])
 
 

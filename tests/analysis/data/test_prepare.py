@@ -179,3 +179,26 @@ def test_a_smoothing_wider_than_a_second_is_refused():
     assert PrepareOptions(smoothing=501).smoothing == 501
     with pytest.raises(SettingsError, match="nothing of a slip"):
         PrepareOptions(smoothing=503)
+
+
+def test_nothing_is_averaged_or_integrated_across_a_gap():
+    t = 0.002 * np.arange(1000.0)
+    v_t = np.where(t < 1.0, 0.05, 0.15)
+    late = np.where(t < 1.0, t, t + 3600.0)
+    series = TractionSeries("S0", "gap", late, v_t, v_t, v_t)
+    trial = prepare_trial(series, PrepareOptions())
+    np.testing.assert_allclose(trial.smooth.v_t, v_t)
+    # two stretches of 499 steps
+    assert trial.travel == pytest.approx(0.998 * 0.05 + 0.998 * 0.15)
+
+
+def test_uneven_rows_are_averaged_over_seconds():
+    rng = np.random.default_rng(0)
+    t = np.cumsum(rng.exponential(0.002, 2000))
+    series = TractionSeries("S0", "uneven", t, t, t, t)
+    smooth = prepare_trial(series, PrepareOptions()).smooth
+    row = 1000
+    near = np.abs(t - t[row]) <= 0.011
+    assert smooth.v_t[row] == pytest.approx(t[near].mean())
+    kept = np.diff(t[prepare_trial(series, PrepareOptions(fastest=100.0)).indices])
+    assert np.median(kept) == pytest.approx(0.010, rel=0.05)

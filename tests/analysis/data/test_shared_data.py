@@ -5,10 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from analysis.data.columns import parse_columns
 from analysis.data.prepare import PrepareOptions
 from analysis.data.series import TractionSeries
 from analysis.data.tables import load_tables
+from analysis.dialects.columns import parse_columns
 from analysis.report.paper_tables import table_one, verdicts
 from analysis.study.fits import to_fits
 from analysis.study.models import GP_SE, GP_SE_NOISE, PAPER_MODELS, TUSTIN, FitOptions

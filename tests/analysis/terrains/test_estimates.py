@@ -19,7 +19,7 @@ def test_a_value_that_is_no_finite_number_is_refused(point):
     with pytest.raises(SettingsError, match="finite"):
         TERRAIN.risk_in_motion(1.0, *point)
     with pytest.raises(SettingsError, match="finite"):
-        TERRAIN.predict_many(np.array(point[:1]), np.array(point[1:]))
+        TERRAIN.predict(np.array(point[:1]), np.array(point[1:]))
 
 
 @pytest.mark.parametrize(
@@ -34,7 +34,7 @@ POINTS = np.array([(2.0, 0.1), (5.0, 0.2), (6.0, 0.1), (0.5, 0.1), (2.0, 0.3)])
 
 
 def test_many_estimates_say_which_of_them_lie_outside_the_table():
-    many = TERRAIN.predict_many(*POINTS.T)
+    many = TERRAIN.predict(*POINTS.T)
     single = [TERRAIN.predict(*point).is_extrapolated for point in POINTS.tolist()]
     assert many.is_extrapolated.tolist() == single == [False, False, True, True, True]
 

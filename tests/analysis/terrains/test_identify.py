@@ -221,7 +221,7 @@ def test_one_point_and_many_points_agree(path):
     known = load(path).terrain("TF")
     rng = np.random.default_rng(2)
     F_n, v_t = rng.uniform(-2.0, 20.0, 50), rng.uniform(0.0, 0.4, 50)
-    many = known.predict_many(F_n, v_t)
+    many = known.predict(F_n, v_t)
     single = [known.predict(f, v) for f, v in zip(F_n, v_t, strict=True)]
     assert many.mean == pytest.approx([a.mean for a in single], abs=1e-9)
     assert many.sd == pytest.approx([a.sd for a in single], abs=1e-9)
@@ -243,7 +243,7 @@ def test_the_tables_are_close_to_the_model_between_their_points(study, path):
     F_n = np.linspace(2.6, 4.4, 37)
     v_t = np.linspace(0.021, 0.079, 37)
     exact = model.predict(F_n, v_t)
-    tabled = load(path).terrain("S0").predict_many(F_n, v_t)
+    tabled = load(path).terrain("S0").predict(F_n, v_t)
     assert np.abs(tabled.mean - exact.mean).max() < 0.05 * exact.sd.min()
     assert np.abs(tabled.sd / exact.sd - 1.0).max() < 0.05
 

@@ -63,7 +63,7 @@ def test_every_frame_decodes_to_its_words():
     reader = BusReader()
     said = []
     for number, (frame, _) in enumerate(frames()):
-        (logged,) = parse_log([f"({1e-4 * number:.6f}) can0 {frame}"])
+        (logged,) = parse_log([f"({1e-4 * number:.6f}) can0 {frame}"], print)
         said.append(reader.read(logged)[-1].text)
     told = [re.sub(r", (LATE: )?\d+ us after the question$", "", text) for text in said]
     assert told == [words for _, words in frames()]

@@ -116,3 +116,67 @@ def test_a_sensor_that_there_is_not_is_refused_with_the_kinds(tmp_path):
     done = traction("fake", "--serial", tmp_path / "line", "--sensor", "bosch")
     assert done.code == 2
     assert "bota, robotous, optoforce" in done.err
+
+
+def test_without_options_nothing_is_drawn_or_wrong(serve):
+    pose = serve()
+    assert (pose.is_at_rest, pose.friction, pose.seed) == (False, None, None)
+    assert pose.departure is None
+
+
+def test_an_arm_can_be_at_rest_mounted_otherwise_and_rub(serve):
+    pose = serve("--pose", "rest", "--mount", "90", "0", "-5", "--friction", "0.7")
+    assert (pose.is_at_rest, pose.friction) == (True, 0.7)
+    assert pose.departure.mount == pytest.approx([1.5708, 0.0, -0.0873], abs=1e-4)
+    assert (pose.departure.zeros == 0.0).all()
+
+
+def test_a_seed_draws_one_of_many_sound_arms(serve):
+    one, two, again = (serve("--seed", n).departure for n in ("1", "2", "1"))
+    assert (one.zeros == again.zeros).all()
+    assert (one.zeros != two.zeros).all()
+
+
+def test_a_wrong_arm_is_one_of_many_with_something_wrong(serve):
+    departure = serve("--wrong", "motor-2-reversed").departure
+    assert departure.torque[1, 1] == -1.0
+    assert departure.zeros.any()
+
+
+@pytest.mark.parametrize("command", ["fake", "run", "check", "calibrate", "rehearse"])
+def test_a_wrong_rig_that_there_is_not_is_refused_with_all_names(command):
+    more = {"run": ["S0"], "calibrate": ["sensor"]}.get(command, [])
+    done = traction(command, *more, "--wrong", "motor-9-reversed")
+    assert done.code == 2
+    assert "Did you mean motor-" in done.err
+    assert "encoders-5-6-swapped" in done.err
+
+
+def test_help_on_wrong_rigs_lists_them():
+    done = traction("check", "--wrong", "help")
+    assert done.code == 0
+    assert "sensor-scale-95" in done.out
+
+
+@pytest.mark.parametrize("option", [("--wrong", "mt-700"), ("--mount", "1", "2", "3")])
+@pytest.mark.parametrize("command", [("run", "S0"), ("check",), ("calibrate", "foot")])
+def test_a_real_rig_cannot_be_made_wrong(command, option):
+    done = traction(*command, *option)
+    assert done.code == 2
+    assert "work only with --fake" in done.err
+
+
+def test_a_mount_is_three_angles():
+    done = traction("check", "--fake", "--mount", "0", "400", "0")
+    assert done.code == 2
+    assert "degrees -180..180" in done.err
+
+
+def test_a_script_that_orders_nonsense_starts_nothing(tmp_path):
+    script = tmp_path / "script"
+    script.write_text("idle\n2 hang much\n")
+    where = ("--can", f"traction-fake:{tmp_path}/bus", "--script", script)
+    done = traction("fake", *where)
+    assert done.code == 2
+    assert "line 2: '2 hang much' - expected hang KG" in done.err
+    assert not (tmp_path / "bus").exists()

@@ -9,6 +9,7 @@ import pytest
 
 from acquisition.trial_file.reader import TrialReader
 from experiments.report.checksums import ChangedFile, write_sums
+from experiments.report.crate import METADATA
 from experiments.session.kept_files import Deviation
 from experiments.tools.bench import BenchReport
 from tests.acquisition.trials import make_cycles, write_trial
@@ -64,6 +65,7 @@ def test_status_prints_the_documented_keys(recorded, config):
 
 def test_verify_prints_the_documented_keys(tmp_path):
     (tmp_path / "a.txt").write_text("a")
+    (tmp_path / METADATA).write_text('{"@graph": []}')
     write_sums(tmp_path)
     (tmp_path / "a.txt").write_text("b")
     done = traction("verify", tmp_path, "--json")

@@ -80,7 +80,7 @@ def odd(tmp_path_factory):
         "load: F_n never varies",
         "100% sticking",
         "stuck: 0 trial with kept samples",
-        "holes: 60 rows were not finite; dropped",
+        "holes/01: 30 rows without a value dropped",
         "twice: 1400 duplicate rows were dropped",
         "short, fold 1, Tustin: 2 samples are too few",
         "short, fold 1, GP (SE): No Gaussian process from 2 samples",

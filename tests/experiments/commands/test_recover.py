@@ -1,9 +1,20 @@
+import json
+
 import pytest
 
 from acquisition.recording.recorder import seal
 from acquisition.trial_file.reader import TrialReader
-from tests.acquisition.trials import make_cycles, summary_start, write_trial
+from tests.acquisition.trials import (
+    make_cycles,
+    make_header,
+    span_of,
+    spans,
+    summary_start,
+    write_trial,
+)
 from tests.experiments.program import traction
+
+CHUNK, ATTACHMENT = 6, 9
 
 
 @pytest.fixture(scope="module")
@@ -31,8 +42,8 @@ def test_it_says_what_was_saved_and_lost(folder):
     done = traction("recover", folder / "trials" / "T07.mcap.partial")
     assert done.code == 0
     assert "saved 0.50 s, 250 cycles, 351 messages -> T07.recovered.mcap" in done.out
-    assert (
-        "bytes at the end, 0.10 s or about 50 cycles. The source is kept." in done.out
+    assert "bytes; 0.10 s of the recording (0.10 s at 0.50 s). The source is" in (
+        done.out
     )
     reader = TrialReader(folder / "trials" / "T07.recovered.mcap")
     assert not reader.is_complete
@@ -131,3 +142,34 @@ def test_a_trial_of_a_program_without_checksums_is_copied_with_them(folder):
     assert "It has data without a checksum" in done.out
     copied = TrialReader(folder / "trials" / "T09.recovered.mcap").cycles()
     assert copied.data.tobytes() == TrialReader(source).cycles().data.tobytes()
+
+
+def test_what_is_lost_in_the_middle_is_said_where_it_was(folder):
+    path = folder / "trials" / "T09.mcap"
+    seal(write_trial(path, make_cycles(300), block=50), "travel")
+    data = bytearray(path.read_bytes())
+    third = [span for span in spans(bytes(data)) if span.opcode == CHUNK][2]
+    data[third.body + 90] ^= 1
+    path.chmod(0o644)
+    path.write_bytes(bytes(data))
+    done = traction("recover", path, "--json")
+    (result,) = json.loads(done.out)
+    assert result["cycles"] == 250
+    assert result["gaps"] == [{"start": 0.2, "seconds": 0.1}]
+    again = traction("recover", path)
+    assert "0.10 s of the recording (0.10 s at 0.20 s)" in again.out
+
+
+def test_an_attachment_that_is_gone_is_named(folder):
+    path = folder / "trials" / "T09.mcap"
+    header = make_header(attachments={"config.toml": b"[rig]  # no other file has it"})
+    seal(write_trial(path, make_cycles(300), header), "travel")
+    data = bytearray(path.read_bytes())
+    data[span_of(bytes(data), ATTACHMENT).end - 6] ^= 1
+    path.chmod(0o644)
+    path.write_bytes(bytes(data))
+    done = traction("recover", path)
+    assert "Lost: config.toml, which no file beside it holds." in done.out
+    assert json.loads(traction("recover", path, "--json").out)[0][
+        "attachments_missing"
+    ] == ["config.toml"]

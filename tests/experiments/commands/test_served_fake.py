@@ -215,11 +215,15 @@ def test_a_log_is_never_written_over_a_file(config, tmp_path):
 
 def test_a_malformed_log_names_its_line(tmp_path):
     log = tmp_path / "bus.log"
-    log.write_text("(1.000000) can0 404#30\n\x00\x01nonsense\n")
+    asked = "(1.000000) can0 404#30\n"
+    log.write_text(f"\ufeff{asked}\x00\x01nonsense\n(2.12345678) can0 404#30\ncut (16")
     done = traction("replay", "--can", log)
     assert done.code == 6
     assert "Line 2 of the bus log" in done.err
-    assert "host asks the arm for P" in done.out
+    assert "Line 4 of the bus log" in done.err
+    assert done.err.endswith("2 malformed lines were left out.\n")
+    assert done.out.count("host asks the arm for P") == 2
+    assert "2 frames, 0 of other kinds." in done.out
 
 
 def test_a_log_that_is_not_there_is_a_usage_error(tmp_path):

@@ -120,7 +120,7 @@ def test_flags_are_columns_and_the_safety_mode_is_a_word(
 def test_the_kept_samples_are_those_inside_the_window(exported, recorded):
     path = exported / recorded.folder.name / "T01.kept.csv"
     names = ["t [s]", "v_t [m/s]", "F_n [N]", "F_t [N]", "kept_row [1]"]
-    assert table(path)[0] == names
+    assert table(path)[0] == [*names, "simulated [1]"]
     v_t = numbers(path, "v_t [m/s]")
     assert 0.005 <= v_t.min() <= v_t.max() <= 0.2
     rows = numbers(path, "kept_row [1]").astype(int)
@@ -278,10 +278,25 @@ def test_fit_reports_an_exported_folder_as_simulated(in_parquet, tmp_path):
 def test_fit_mixes_no_simulated_with_recorded_tables(exported, recorded, tmp_path):
     name = f"{recorded.folder.name}/T01.csv"
     real = tmp_path / "real.csv"
-    real.write_bytes((exported / name).read_bytes())
+    with (exported / name).open() as file:
+        rows = list(csv.DictReader(file))
+    with real.open("w") as file:
+        writer = csv.DictWriter(file, rows[0])
+        writer.writeheader()
+        writer.writerows(row | {"simulated [1]": "0"} for row in rows)
     done = traction("fit", exported / name, real, "--to", tmp_path / "fit")
     assert done.code == 2
     assert not (tmp_path / "fit").exists()
+
+
+@pytest.mark.parametrize("name", ["T01.csv", "T01.kept.csv"])
+def test_a_table_copied_out_of_its_folder_stays_simulated(
+    exported, recorded, tmp_path, name
+):
+    copy = tmp_path / name
+    copy.write_bytes((exported / recorded.folder.name / name).read_bytes())
+    ((series,),) = load_tables([copy]).values()
+    assert series.is_simulated
 
 
 def test_without_pyarrow_the_extra_is_named_and_nothing_written(

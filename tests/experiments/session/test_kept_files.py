@@ -1,5 +1,6 @@
 import json
 import shutil
+from pathlib import Path
 
 import pytest
 
@@ -232,3 +233,50 @@ def test_a_report_without_a_kept_trial_says_so_at_its_top(data, config):
     assert done.code == 0, done.err
     page = (only_session(data) / "report" / "index.html").read_text()
     assert "T01.json" in page.partition("<h2")[0]
+
+
+# --- the same recording twice ---------------------------------------------------------
+
+
+@pytest.fixture
+def copied(data):
+    """Return data in which the session was copied under another number."""
+    folder = only_session(data)
+    name = folder.name.replace("_S001_", "_S002_")
+    shutil.copytree(folder, folder.with_name(name))
+    return data
+
+
+def test_a_copied_session_is_named(copied):
+    done = traction("verify", "--all", "--data", copied)
+    assert done.code == 6
+    assert "S002 session.json is of S001: a copy, or a renamed session" in done.err
+    assert done.err.count("✘") == 1
+
+
+def test_the_trials_of_a_copy_are_counted_once(copied):
+    done = traction("status", "--json", "--data", copied)
+    (row,) = [row for row in json.loads(done.out) if row["sessions"]]
+    assert (row["kept"], row["sessions"]) == (2, ["S001", "S002"])
+    assert traction("status", "--data", copied).code == 6
+
+
+def test_a_report_counts_a_recording_once(copied, config):
+    where = ("--data", copied, "--config", config)
+    refused = traction("report", "--all", *where)
+    assert refused.code == 6
+    assert "S002 session.json is of S001" in refused.err
+    done = traction("report", "--all", "--allow-missing", "--json", *where)
+    assert done.code == 0, done.err
+    assert "S002 T01 is the same recording as S001 T01" in done.err + done.out
+    fits = json.loads(Path(json.loads(done.out)["fits"]).read_text())
+    (terrain,) = fits["terrains"].values()
+    assert len(terrain["trials"]) == 2
+
+
+def test_a_session_under_another_number_alone_counts(data):
+    folder = only_session(data)
+    folder.rename(folder.with_name(folder.name.replace("_S001_", "_S004_")))
+    done = traction("status", "--json", "--data", data)
+    (row,) = [row for row in json.loads(done.out) if row["sessions"]]
+    assert (row["kept"], row["sessions"]) == (2, ["S004"])

@@ -157,7 +157,7 @@ def test_a_console_that_nobody_reads_any_more_is_noticed(monkeypatch):
             return False
 
     monkeypatch.setattr("sys.stdout", Closed())
-    monkeypatch.setattr("experiments.operator.console._discard_output", lambda: None)
+    monkeypatch.setattr("experiments.operator.console.discard", lambda _: None)
     console = Console()
     assert not console.is_lost
     console.say("anybody?")

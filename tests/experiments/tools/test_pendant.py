@@ -28,7 +28,19 @@ def test_a_script_has_times_and_buttons():
 
 @pytest.mark.parametrize(
     "line",
-    ["fly", "x activate", "-1 idle", "nan idle", "inf quit", "1e9 quit", "1 2 idle"],
+    [
+        "fly",
+        "x activate",
+        "-1 idle",
+        "nan idle",
+        "inf quit",
+        "1e9 quit",
+        "1 2 idle",
+        "3",
+        "3 pose 1 2",
+        "hang",
+        "stop 8 low",
+    ],
 )
 def test_a_line_that_is_no_press_is_named(line):
     with pytest.raises(SettingsError, match="line 2"):
@@ -91,7 +103,8 @@ def test_stdin_presses_and_names_what_it_does_not_know(pipe):
     pendant = Pendant(None, Lines(descriptor), 0)
     writer.write(b"Activate\nfly\n idle \n")
     assert pendant.due(0) == ["activate", "idle"]
-    assert pendant.take_unknown() == ["fly"]
+    (unknown,) = pendant.take_unknown()
+    assert unknown.startswith("'fly' is none of activate, idle, estop, quit, pose")
     assert pendant.take_unknown() == []
 
 

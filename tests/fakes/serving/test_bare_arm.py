@@ -29,9 +29,9 @@ ARRIVED = 5e-3  # rad
 class ServedArm:
     """An arm served on a socket, on stepped time: a stall takes none of it."""
 
-    def __init__(self, folder, *, tool=None, has_hand=False):
+    def __init__(self, folder, *, tool=None, has_hand=False, **found):
         self.clock = LimitedClock()
-        pose = HomePose(tool, FRAME, None, is_idle_first=True, has_hand=has_hand)
+        pose = HomePose(tool, FRAME, None, True, has_hand, **found)
         self.server = build_home_server(SocketHub(folder / "bus"), pose, self.clock)
         self.bus = SocketBus(str(folder / "bus"))
         self.client = StrictClient(self.bus, self.rest, has_sensor=tool is not None)

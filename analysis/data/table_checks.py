@@ -1,0 +1,195 @@
+"""What is doubtful in the rows of a table, before any work is done on them; pure.
+
+A time in another unit, a hole, a spike or a column that misses most of its values is
+refused or named here, with its line.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from acquisition.clock import RATE_HZ
+from acquisition.errors import SettingsError
+from analysis.data.series import Array
+from analysis.dialects.columns import COLUMNS
+from analysis.dialects.reading import TrialTable
+from analysis.dialects.refusals import refusal
+
+MOST_MISSING = 0.2  # share of the rows without a value
+GAP = 1.0  # s between two rows
+_STEPS = 10.0  # of the table's own, below which no step is a gap
+_SLOWEST, _FASTEST = 0.2, 2e-5  # s between rows of a table that states no unit of t
+_USUAL = (5e-5, 0.2)  # s between the rows of a table
+_WILD = 20.0  # times the 99.9 % quantile
+_FLOORS = (0.05, 1.0, 1.0)  # m/s, N, N; smaller quantiles count as that
+# Column, the unit that a larger number suggests, and how large [m/s, N].
+_UNUSUAL = (("v_t", "mm/s", 2.0), ("F_n", "mN", 500.0), ("F_t", "mN", 2500.0))
+_FEWEST = 20  # rows below which no value is wild
+_LOWEST_RATE = 90.0  # Hz; below it one sample is 22 ms wide
+_OWN_RATE = 0.02  # share that the rate may differ from the rig's
+
+
+def check_clock(path: Path, rows: Array, is_stated: bool) -> None:
+    """Refuse times that are no seconds, where nothing says that they are.
+
+    Args:
+        path: of the file.
+        rows: in s, m/s and N by what the table and the user say, shape (n, 4).
+        is_stated: the unit of t is stated.
+
+    Raises:
+        SettingsError: it looks like another unit.
+    """
+    step = _step(rows)
+    if is_stated or step is None or _FASTEST <= step <= _SLOWEST:
+        return
+    units = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}
+    low, high = _USUAL
+    likely = [name for name, unit in units.items() if low <= step * unit <= high]
+    looks = f"these look like {likely[0]}" if likely else "no unit of t is stated"
+    raise refusal(
+        path,
+        f"column t: {step:.6g} s between two rows; {looks}",
+        f"Say it: --unit t={likely[0] if likely else 's'}"
+        + ("; or --unit t=s where they are seconds." if likely else ""),
+    )
+
+
+def check_order(path: Path, table: TrialTable, rows: Array) -> None:
+    """Refuse a time that goes back or stands, repeated rows apart.
+
+    Raises:
+        SettingsError: it does, and where.
+    """
+    kept = np.flatnonzero(np.isfinite(rows).all(axis=1))
+    if kept.size < 2:
+        return
+    t = rows[kept, 0]
+    is_same = (rows[kept[1:]] == rows[kept[:-1]]).all(axis=1)
+    backward = np.flatnonzero((np.diff(t) <= 0.0) & ~is_same)
+    if not backward.size:
+        return
+    row = int(backward[0]) + 1
+    where = table.place(int(kept[row]))
+    before, now = float(t[row - 1]), float(t[row])
+    if now == before:
+        hint = "The times have too few digits: leave t out and give --rate HZ."
+    elif backward.size > kept.size // 2:
+        hint = "Sort the rows by time; or --negate t where it counts down."
+    elif now <= t[0] + abs(before - t[0]) / 2.0:
+        hint = f"A trial seems to begin there: split the file at {where}."
+    else:
+        hint = "Sort the rows by time, each time once."
+    raise SettingsError(
+        f"{path}, {where}, column t: time does not increase ({before:.9g} s, then "
+        f"{now:.9g} s).",
+        hint=hint,
+    )
+
+
+def notes_of(path: Path, table: TrialTable, rows: Array) -> Iterator[str]:
+    """Give what a reader should know of a table.
+
+    Raises:
+        SettingsError: too many rows lack a value.
+    """
+    yield from _missing(path, table, rows)
+    yield from _units(table, rows)
+    yield from _wild(table, rows)
+    if not table.is_prepared:
+        yield from _gaps(table, rows)
+        yield from _rate(rows)
+
+
+def _missing(path: Path, table: TrialTable, rows: Array) -> Iterator[str]:
+    is_missing = np.isnan(rows)
+    lacking = is_missing.any(axis=1)
+    count = int(np.count_nonzero(lacking))
+    if count > MOST_MISSING * len(rows):
+        column = COLUMNS[int(is_missing.sum(axis=0).argmax())]
+        first = table.place(int(lacking.argmax()))
+        raise refusal(
+            path,
+            f"{count} of {len(rows)} rows lack a value, most of them in {column}; the "
+            f"first is {first}",
+            "Columns of different rates? Bring them to one rate, e.g. "
+            f"pandas.read_csv('{path}').interpolate().",
+        )
+    if count:
+        first = table.place(int(lacking.argmax()))
+        yield f"{_counted(count)} without a value dropped, the first is {first}"
+    infinite = np.isinf(rows).any(axis=1)
+    if infinite.any():
+        first = table.place(int(infinite.argmax()))
+        count = int(np.count_nonzero(infinite))
+        yield f"{_counted(count)} with an infinite value dropped, the first is {first}"
+
+
+def _units(table: TrialTable, rows: Array) -> Iterator[str]:
+    """Name columns that no foot can give in the unit that was assumed."""
+    for k, (name, looks, most) in enumerate(_UNUSUAL, 1):
+        size = np.abs(rows[np.isfinite(rows[:, k]), k])
+        if name in table.units or not size.size:
+            continue
+        common = float(np.quantile(size, 0.9))
+        if common > most:
+            yield (
+                f"{name} is {common:.3g} or more in a tenth of the rows; in {looks}? "
+                f"--unit {name}={looks}"
+            )
+
+
+def _counted(rows: int) -> str:
+    return f"{rows} row{'' if rows == 1 else 's'}"
+
+
+def _wild(table: TrialTable, rows: Array) -> Iterator[str]:
+    """Name values far beyond nearly all others: spikes, and words for "no value"."""
+    if len(rows) < _FEWEST:
+        return
+    for k, floor in enumerate(_FLOORS, 1):
+        size = np.abs(rows[:, k])
+        size[~np.isfinite(size)] = 0.0
+        spared = max(3, -(-size.size // 1000))
+        usual = float(np.partition(size, -spared - 1)[-spared - 1])
+        wild = np.flatnonzero(size > _WILD * max(usual, floor))
+        if wild.size:
+            first = int(wild[0])
+            yield (
+                f"{COLUMNS[k]} is {rows[first, k]:.6g} in {table.place(first)}"
+                f"{f' and wild in {wild.size - 1} more rows' if wild.size > 1 else ''}"
+                f", elsewhere {usual:.3g} at most: a spike? Leave the cell empty"
+            )
+
+
+def _gaps(table: TrialTable, rows: Array) -> Iterator[str]:
+    kept = np.flatnonzero(np.isfinite(rows).all(axis=1))
+    if kept.size < 3:
+        return
+    steps = np.diff(rows[kept, 0])
+    wide = np.flatnonzero(steps > max(GAP, _STEPS * float(np.median(steps))))
+    if wide.size:
+        first = int(wide[0])
+        more = f", and {wide.size - 1} more gaps" if wide.size > 1 else ""
+        yield (
+            f"gap of {steps[first]:.4g} s before {table.place(int(kept[first + 1]))}"
+            f"{more}; nothing is averaged or integrated across it"
+        )
+
+
+def _rate(rows: Array) -> Iterator[str]:
+    step = _step(rows)
+    if step is None or step <= 0.0:
+        return
+    rate = 1.0 / step
+    if rate < _LOWEST_RATE:
+        yield f"{rate:.3g} Hz: nothing is smoothed, and slips are not seen"
+    elif abs(rate / RATE_HZ - 1.0) > _OWN_RATE:
+        yield f"{rate:.4g} Hz, not {RATE_HZ}: averaged over 22 ms, kept every 10 ms"
+
+
+def _step(rows: Array) -> float | None:
+    """Return the median step of time [s]; None where there is none."""
+    t = rows[np.isfinite(rows[:, 0]), 0]
+    return float(np.median(np.abs(np.diff(t)))) if t.size > 2 else None

@@ -1,0 +1,215 @@
+"""Names and units of the columns of a table: of its header or the command line."""
+
+import re
+from collections.abc import Mapping, Sequence
+
+from acquisition.errors import SettingsError
+
+COLUMNS = ("t", "v_t", "F_n", "F_t")
+PREPARED = "kept_row"  # a column of tables that were prepared before
+SIMULATED = "simulated"  # 1 in every row where the devices were simulated
+_TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}
+_SPEEDS = {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3, "um/s": 1e-6}
+_GRAM_FORCE = 9.80665e-3  # N
+_FORCES = {
+    "N": 1.0,
+    "mN": 1e-3,
+    "kN": 1e3,
+    "gf": _GRAM_FORCE,
+    "kgf": 1e3 * _GRAM_FORCE,
+    "lbf": 4.4482216152605,
+}
+_MASSES = {"g": "gf", "kg": "kgf", "lb": "lbf", "lbs": "lbf"}
+# Factor from each unit that a column may have to its own.
+UNITS: Mapping[str, Mapping[str, float]] = {
+    "t": _TIMES,
+    "v_t": _SPEEDS,
+    "F_n": _FORCES,
+    "F_t": _FORCES,
+}
+_EVERY_UNIT = {unit for units in UNITS.values() for unit in units} | {*_MASSES}
+# Signs that other programs write for minus, micro and blank.
+_SIGNS = str.maketrans(
+    {"\u2212": "-", "\u00b5": "u", "\u03bc": "u", "\u00a0": " ", "\u2007": " "}
+)
+_HEADER = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*)[\])]")
+_BRACKETED = re.compile(r"[\[(](?P<unit>[^\[\]()]*)[\])]")
+_PART = re.compile(
+    r"\s*(?P<name>[^=,]*?)\s*=\s*(?:\"(?P<quoted>(?:[^\"]|\"\")*)\"|(?P<bare>[^,\"]*?))"
+    r"\s*(?:,|$)"
+)
+# Names that other programs give the columns, without case, blanks and signs.
+_KNOWN_AS = {
+    "t": {"t", "time", "times", "timestamp", "ts", "seconds", "sec", "zeit", "temps"},
+    "v_t": {"vt", "v", "vel", "velocity", "speed", "vx", "vslip", "slipvelocity"},
+    "F_n": {"fn", "fz", "normal", "normalforce", "load", "normalload"},
+    "F_t": {"ft", "fx", "tangential", "traction", "friction", "tangentialforce"},
+}
+
+
+def plain(text: str) -> str:
+    """Return a text with ASCII signs for minus, micro and the blanks of a fixed width.
+
+    U+2212 is a minus, U+00B5 and U+03BC are u, U+00A0 and U+2007 are blanks.
+    """
+    return text if text.isascii() else text.translate(_SIGNS)
+
+
+def parse_columns(text: str) -> dict[str, str]:
+    """Return the names of the columns from `t=t_s,v_t="Speed, foot",F_n=3,...`.
+
+    A name with commas stands in quotes; a number that is no name is a place, from 1.
+    Columns that are not mentioned keep their own name.
+
+    Raises:
+        SettingsError: a part is not NAME=COLUMN, or names no column of the analysis.
+    """
+    columns = {name: name for name in COLUMNS}
+    at = 0
+    while at < len(text):
+        part = _PART.match(text, at)
+        if part is None:
+            raise _not_named(text, text[at:])
+        quoted = part["quoted"]
+        column = part["bare"] if quoted is None else quoted.replace('""', '"')
+        if not column or part["name"] not in columns:
+            raise _not_named(text, part[0].strip(" ,"))
+        columns[part["name"]] = plain(column)
+        at = part.end()
+    return columns
+
+
+def _not_named(text: str, part: str) -> SettingsError:
+    return SettingsError(
+        f"--columns {text}: {part!r} does not name a column.",
+        hint="Write e.g. --columns t=t_s,v_t=vt_mps,F_n=Fn_N,F_t=Ft_N",
+    )
+
+
+def parse_units(text: str) -> dict[str, str]:
+    """Return the units of columns from `v_t=mm/s,F_t=mN`.
+
+    Raises:
+        SettingsError: a part is not NAME=UNIT, or the column has no such unit.
+    """
+    units: dict[str, str] = {}
+    for part in filter(None, plain(text).split(",")):
+        name, equals, unit = (piece.strip() for piece in part.partition("="))
+        if not equals or unit not in UNITS.get(name, {}):
+            raise SettingsError(
+                f"--unit {text}: {part!r} does not give the unit of a column.",
+                hint="; ".join(f"{n}: {', '.join(UNITS[n])}" for n in COLUMNS),
+            )
+        units[name] = unit
+    return units
+
+
+def parse_names(text: str) -> tuple[str, ...]:
+    """Return columns of the analysis from `F_n,F_t`.
+
+    Raises:
+        SettingsError: one is none.
+    """
+    names = tuple(part.strip() for part in text.split(",") if part.strip())
+    strangers = [name for name in names if name not in COLUMNS]
+    if strangers or not names:
+        raise SettingsError(
+            f"--negate {text}: {', '.join(strangers) or 'nothing'} is no column of "
+            "the analysis.",
+            hint="Write e.g. --negate F_n,F_t",
+        )
+    return names
+
+
+def split_header(header: str) -> tuple[str, str]:
+    """Return name and unit of `v_t [mm/s]` or `v_t (mm/s)`; no unit is empty."""
+    match = _HEADER.fullmatch(header)
+    return (match["name"], match["unit"].strip()) if match else (header, "")
+
+
+def unit_of_cell(cell: str) -> str | None:
+    """Return the unit that a cell of a row of units states, "" for none.
+
+    None where the cell is no unit that any column can have.
+    """
+    match = _BRACKETED.fullmatch(cell)
+    unit = match["unit"].strip() if match else cell
+    return unit if unit in _EVERY_UNIT or unit in {"", "-", "1"} else None
+
+
+def factor(name: str, stated: str, asked: str) -> float:
+    """Return what turns a column into its own unit.
+
+    Args:
+        name: of the column.
+        stated: its unit as the table says; empty where it says none.
+        asked: its unit as the command line says; empty where it says none.
+
+    Raises:
+        SettingsError: the two differ, or the table's unit is not known.
+    """
+    stated = plain(stated)
+    if stated and asked and asked not in {stated, _MASSES.get(stated)}:
+        raise SettingsError(
+            f"{name} is in {stated} by the table's header and in {asked} by --unit.",
+            hint="Leave --unit out, or mend the header.",
+        )
+    unit = stated or asked
+    if asked and asked == _MASSES.get(stated):
+        return UNITS[name][asked]
+    if unit in _MASSES and name.startswith("F"):
+        raise SettingsError(
+            f"{name} is in {unit!r}, which is a mass and no force.",
+            hint=f"If a scale shows the force so: --unit {name}={_MASSES[unit]}; 1 "
+            f"{_MASSES[unit]} is {_FORCES[_MASSES[unit]]:.9g} N.",
+        )
+    if unit and unit not in UNITS[name]:
+        raise SettingsError(
+            f"{name} is in {unit!r}, which is not a unit of it.",
+            hint=f"It may be in {', '.join(UNITS[name])}.",
+        )
+    return UNITS[name][unit] if unit else 1.0
+
+
+def find_column(header: Sequence[str], column: str) -> list[int]:
+    """Return the places of a column in a header, from 0; none, one or several.
+
+    A header `v_t [mm/s]` is the column v_t, or a column of that whole name. A number
+    that is no name is a place, from 1.
+    """
+    bare = [split_header(name)[0] for name in header]
+    for among in (header, bare):
+        if places := [k for k, name in enumerate(among) if name == column]:
+            return places
+    if column.isdecimal() and 1 <= int(column) <= len(header):
+        return [int(column) - 1]
+    return []
+
+
+def columns_hint(header: Sequence[str], wanted: Mapping[str, str]) -> str:
+    """Return `--columns ...` for a header that lacks some of the wanted columns.
+
+    Columns that go by a usual name are named; the others are left to be filled in.
+
+    Args:
+        header: the names that the table has.
+        wanted: names that were looked for, by column of the analysis.
+    """
+    parts: list[str] = []
+    for name, column in wanted.items():
+        known = [column] if find_column(header, column) else _usual(header, name)
+        parts.append(f"{name}={_quoted(known[0]) if len(known) == 1 else '...'}")
+    return "Name them: --columns " + ",".join(parts)
+
+
+def _usual(header: Sequence[str], name: str) -> list[str]:
+    bare = [split_header(column)[0] for column in header]
+    return [
+        column
+        for column in bare
+        if re.sub(r"[^a-z]", "", column.lower()) in _KNOWN_AS[name]
+    ]
+
+
+def _quoted(name: str) -> str:
+    return f"'\"{name}\"'" if "," in name or " " in name else name

@@ -1,0 +1,282 @@
+"""Layouts of text tables: encoding, header, delimiter, units row, missing rows."""
+
+import gzip
+
+import numpy as np
+
+from tests.borders.row import Border
+from tests.borders.tables import (
+    COUNT,
+    NAMES,
+    ROWS,
+    VALUES,
+    flagged,
+    refused,
+    table,
+    text,
+    values,
+    with_cell,
+    with_column,
+    without,
+)
+
+_PLAIN = text()
+_HEAD = "t,v_t,F_n,F_t\n"
+_LINES = _PLAIN.splitlines()
+_MM = with_column(1, lambda k, old: f"{float(old) * 1e3:.2f}")
+_WIDE = [[*row, "7.5", "on"] for row in ROWS]
+_MIXED = [[row[3], "9", row[1], row[2], row[0]] for row in ROWS]
+_PADDED = "\n".join("".join(f"{cell:>12}" for cell in row) for row in [NAMES, *ROWS])
+
+LAYOUTS: tuple[Border, ...] = (
+    table("commas and points", _PLAIN),
+    table("lines that end in CR LF", _PLAIN.replace("\n", "\r\n")),
+    table("lines that end in CR", _PLAIN.replace("\n", "\r")),
+    table("no line end after the last row", _PLAIN[:-1]),
+    table("blank lines between the rows", _PLAIN.replace("\n", "\n\n")),
+    table("UTF-8 with a byte-order mark", "\ufeff" + _PLAIN),
+    table("UTF-16 LE with a byte-order mark", b"\xff\xfe" + _PLAIN.encode("utf-16-le")),
+    table("UTF-16 BE with a byte-order mark", b"\xfe\xff" + _PLAIN.encode("utf-16-be")),
+    refused(
+        "UTF-16 without a byte-order mark",
+        _PLAIN.encode("utf-16-le"),
+        "iconv -f UTF-16LE",
+    ),
+    refused("UTF-32", b"\xff\xfe\0\0" + _PLAIN.encode("utf-32-le"), "UTF-32"),
+    refused(
+        "a byte of Windows-1252 in a comment",
+        b"# Kr\xe4fte\n" + _PLAIN.encode(),
+        "line 1: byte 0xe4",
+    ),
+    refused("a zero byte in line 3", "t,v_t,F_n,F_t\n1,2,3,4\n5,\0,6,7\n", "line 3"),
+    table("semicolons and points", text(delimiter=";")),
+    table("semicolons and decimal commas", text(delimiter=";", mark=",")),
+    table("tabs and points", text(delimiter="\t")),
+    table("tabs and decimal commas", text(delimiter="\t", mark=",")),
+    table("single blanks", text(delimiter=" ")),
+    table("columns padded with blanks", _PADDED),
+    table("blanks after the commas", text(delimiter=", ")),
+    table(
+        "quoted cells with decimal commas, between commas",
+        text([['"' + c.replace(".", ",") + '"' for c in row] for row in ROWS]),
+    ),
+    table("sep=; in the first line", "sep=;\n" + text(delimiter=";")),
+    table("sep=| in the first line", "sep=|\n" + text(delimiter="|")),
+    table("a delimiter at the end of every row", text([[*row, ""] for row in ROWS])),
+    table("further columns", text(_WIDE, names=(*NAMES, "T", "state"))),
+    table(
+        "columns in another order", text(_MIXED, names=("F_t", "x", "v_t", "F_n", "t"))
+    ),
+    table("quoted names", text(names=[f'"{name}"' for name in NAMES])),
+    table(
+        "a quoted name with a comma, by columns",
+        text(names=['"Time, elapsed"', *NAMES[1:]]),
+        columns={"t": "Time, elapsed"},
+    ),
+    table(
+        "other names, by columns",
+        text(names="abcd"),
+        columns=dict(zip(NAMES, "abcd", strict=True)),
+    ),
+    refused(
+        "other names without columns",
+        text(names=("Time", "v", "Fz", "Fx")),
+        "--columns t=Time,v_t=v,F_n=Fz,F_t=Fx",
+    ),
+    refused(
+        "a column that is missing",
+        text(names=("t", "v_t", "F_n", "state")),
+        "no column F_t; it has t, v_t, F_n, state",
+    ),
+    refused(
+        "a name that stands there twice",
+        text(_WIDE, names=(*NAMES, "F_t", "x")),
+        "--columns F_t=4 or F_t=5",
+    ),
+    table(
+        "one of two equal names, by its place",
+        text(_WIDE, names=(*NAMES, "F_t", "x")),
+        columns={"F_t": "4"},
+    ),
+    refused(
+        "no header",
+        "\n".join(_LINES[1:]),
+        "counted from 1: --columns t=1,v_t=2,F_n=3,F_t=4",
+    ),
+    table(
+        "no header, columns by place",
+        "\n".join(_LINES[1:]),
+        columns=dict(zip(NAMES, "1234", strict=True)),
+    ),
+    table(
+        "columns by place keep the header's unit",
+        text(_MM, names=("a", "b [mm/s]", "c", "d")),
+        columns=dict(zip(NAMES, "1234", strict=True)),
+    ),
+    flagged(
+        "lines that begin with # before the header",
+        "# rig: demo\n# date: today\n" + _PLAIN,
+        "2 lines before the header skipped",
+    ),
+    flagged(
+        "lines that begin with % before the header",
+        "% demo\n" + _PLAIN,
+        "1 line before the header skipped",
+    ),
+    flagged(
+        "free lines before the header",
+        "Machine 7\nOperator: mk, room 3\n\n" + _PLAIN,
+        "2 lines before the header skipped",
+    ),
+    table("a header behind # (numpy.savetxt)", "# " + text(delimiter=" ")),
+    refused(
+        "a header behind 70 other lines",
+        "# x\n" * 70 + _PLAIN,
+        "within the first 64 lines",
+    ),
+    table(
+        "units in square brackets",
+        text(_MM, names=("t [s]", "v_t [mm/s]", "F_n [N]", "F_t [N]")),
+    ),
+    table(
+        "units in round brackets",
+        text(_MM, names=("t (s)", "v_t(mm/s)", "F_n (N)", "F_t")),
+    ),
+    table(
+        "units in the header, beside blanks",
+        text(_MM, " ", ("t [s]", "v_t [mm/s]", "F_n [N]", "F_t [N]")),
+    ),
+    table("a row of units", text([["s", "mm/s", "N", "N"], *_MM])),
+    table(
+        "a row of units in brackets, one empty",
+        text([["[s]", "[mm/s]", "", "[N]"], *_MM]),
+    ),
+    refused(
+        "a row of units that contradicts the header",
+        text([["s", "m/s", "N", "N"], *_MM], names=("t", "v_t [mm/s]", "F_n", "F_t")),
+        "line 2: v_t is in m/s here and in mm/s in the header",
+    ),
+    table(
+        "micro as U+03BC",
+        text(
+            with_column(0, lambda k, _: str(2000 * k)),
+            names=("t [\u03bcs]", *NAMES[1:]),
+        ),
+    ),
+    table(
+        "micro as U+00B5",
+        text(
+            with_column(0, lambda k, _: str(2000 * k)),
+            names=("t [\u00b5s]", *NAMES[1:]),
+        ),
+    ),
+    table(
+        "minus as U+2212",
+        text(with_column(1, lambda k, old: "\u2212" + old)),
+        expected=values(v_t=-VALUES[:, 1]),
+    ),
+    table(
+        "no-break spaces around the numbers",
+        text(with_column(2, lambda k, old: f"\u00a0{old}\u00a0")),
+    ),
+    refused("a row that is cut off", _PLAIN[:-20], f"line {COUNT + 1}: "),
+    refused(
+        "a row with one cell more",
+        _PLAIN.replace(_LINES[9], _LINES[9] + ",1"),
+        "line 10: 5 cells below 4 names",
+    ),
+    refused(
+        "row names without a name (write.table of R)",
+        text([[str(k), *row] for k, row in enumerate(ROWS, 1)], " "),
+        "line 2: 5 cells below 4 names",
+    ),
+    refused(
+        "decimal commas between commas",
+        text(mark=","),
+        "line 2: 8 cells below 4 names: commas stand between the columns and inside",
+    ),
+    refused(
+        "a quote that never closes",
+        _PLAIN.replace(_LINES[9], '"' + _LINES[9]),
+        "line 10: its quotes do not fit",
+    ),
+    refused(
+        "a second header in the middle (two files joined)",
+        _PLAIN + _PLAIN,
+        f"line {COUNT + 2}, column t: 't' stands where",
+    ),
+    refused(
+        "a footer", _PLAIN + "end of file\n", f"line {COUNT + 2}: 1 cells below 4 names"
+    ),
+    refused("an empty file", "", "the file is empty"),
+    refused("a header alone", _HEAD, "no rows"),
+    refused(
+        "prose",
+        "Dear colleague,\nplease find the data below.\n",
+        "A table has a header",
+    ),
+    refused(
+        "a line of 70,000 characters", _HEAD + "1" * 70_000, "line 2: a line exceeds"
+    ),
+    table(
+        "a CSV that gzip packed",
+        gzip.compress(_PLAIN.encode(), mtime=0),
+        file="trial.csv.gz",
+    ),
+    refused(
+        "a packed CSV that is cut off",
+        gzip.compress(_PLAIN.encode(), mtime=0)[:-30],
+        "gzip cannot unpack it",
+    ),
+    refused(
+        "30 kB that unpack to 30 MB",
+        gzip.compress(b"0" * 30_000_000, mtime=0),
+        "unpacks to more than 24 MB",
+    ),
+    flagged(
+        "an empty cell",
+        text(with_cell(4, 2, "")),
+        "1 row without a value dropped, the first is line 6",
+        expected=without(4),
+    ),
+    flagged(
+        "NaN, NA, N/A, #N/A, null and - for no value",
+        text(
+            with_column(
+                3,
+                lambda k, old: (
+                    ("NaN", "NA", "N/A", "#N/A", "null", "-")[k] if k < 6 else old
+                ),
+            )
+        ),
+        "6 rows without a value dropped",
+        expected=without(*range(6)),
+    ),
+    flagged(
+        "inf",
+        text(with_cell(8, 1, "inf")),
+        "1 row with an infinite value dropped, the first is line 10",
+        expected=without(8),
+    ),
+    refused(
+        "every other row without a force",
+        text(with_column(2, lambda k, old: "" if k % 2 else old)),
+        "30 of 60 rows lack a value, most of them in F_n; the first is line 3",
+    ),
+    table(
+        "a missing value in a column that is not asked for",
+        text([[*row, ""] for row in ROWS], names=(*NAMES, "T")),
+    ),
+    table(
+        "rows without a time, and a rate",
+        text([row[1:] for row in ROWS], names=NAMES[1:]),
+        rate=500.0,
+        expected=values(t=np.arange(COUNT) / 500.0),
+    ),
+    refused(
+        "rows without a time",
+        text([row[1:] for row in ROWS], names=NAMES[1:]),
+        "--rate HZ",
+    ),
+    refused("a rate beside a time", _PLAIN, "has a time of its own", rate=500.0),
+)

@@ -1,0 +1,148 @@
+"""Sound rigs as they differ from each other."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fakes.clock import SteppedClock
+from fakes.plant.model import PlantOptions
+from fakes.world.departure import (
+    AXES,
+    CABLE,
+    CENTRE,
+    GAINS,
+    MASS,
+    STOPS,
+    TILT,
+    ZEROS,
+    Departure,
+    draw_sound,
+    turned_axes,
+)
+from fakes.world.rig import FakeRig, SimulatedScene
+from fakes.world.true_rig import true_constants, true_options, true_tool
+from tests.fakes.scenes import CONSTANTS, FRAME, START_Q, TOOL, make_rig
+
+RIGS = 300
+DRAWN = [draw_sound(seed) for seed in range(RIGS)]
+
+
+def spread_of(values):
+    """Return the standard deviation over many rigs, of what has mean 0."""
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+@pytest.mark.parametrize(
+    ("quantity", "scale"),
+    [
+        (lambda rig: rig.zeros, ZEROS),
+        (lambda rig: rig.stops, STOPS),
+        (lambda rig: rig.mount[:2], TILT),
+        (lambda rig: rig.foot_mass - 1.0, MASS),
+        (lambda rig: rig.foot_centre, CENTRE),
+        (lambda rig: rig.cable, CABLE),
+        (lambda rig: np.linalg.norm(rig.shown, axis=1) - 1.0, GAINS),
+        (lambda rig: (rig.shown[0, 1] - rig.shown[1, 0]) / 2.0, AXES),
+    ],
+)
+def test_sound_rigs_spread_as_stated(quantity, scale):
+    values = [quantity(rig) for rig in DRAWN]
+    # Three standard errors of a standard deviation of 300 values and more: 12 %.
+    assert spread_of(values) == pytest.approx(scale, rel=0.125)
+    assert abs(np.mean(values)) < 0.2 * scale
+
+
+def test_scales_are_those_of_the_plan():
+    degrees = np.degrees([ZEROS, STOPS, TILT, AXES])
+    assert degrees == pytest.approx([0.3, 0.7, 0.3, 0.5])
+    assert (GAINS, MASS, CENTRE, CABLE) == (0.005, 0.005, 1e-3, 0.08)
+
+
+def test_nothing_but_what_is_stated_differs():
+    rig, plain = DRAWN[3], Departure()
+    assert rig.mount[2] == 0.0
+    for same in ("ratios", "links", "sole", "torque", "counts"):
+        assert (np.array(vars_of(rig)[same]) == vars_of(plain)[same]).all()
+    for same in ("friction", "torn", "properties", "versions", "module", "bus"):
+        assert vars_of(rig)[same] == vars_of(plain)[same]
+
+
+def vars_of(departure):
+    return {name: getattr(departure, name) for name in departure.__slots__}
+
+
+def test_the_same_seed_is_the_same_rig():
+    again = draw_sound(7)
+    assert (again.zeros == DRAWN[7].zeros).all()
+    assert (again.shown == DRAWN[7].shown).all()
+    assert (again.zeros != DRAWN[8].zeros).all()
+
+
+def spread_rig(departure):
+    scene = SimulatedScene("S0", "small", "tread", FRAME, START_Q, 5)
+    scene = replace(scene, departure=departure)
+    clock = SteppedClock()
+    rig = FakeRig(scene, CONSTANTS, TOOL, clock)
+    clock.attach(rig)
+    return rig
+
+
+def test_a_rig_without_a_departure_is_the_one_of_the_drawings():
+    rig, _ = make_rig(5)
+    assert rig.plant.wiring is None
+    assert (rig.plant.ends.lower == CONSTANTS.q_lower).all()
+    rig.bus.shutdown()
+
+
+def test_ground_hand_and_friction_of_a_seed_stay_when_it_is_spread():
+    plain, _ = make_rig(5)
+    spread = spread_rig(draw_sound(5))
+    assert spread.ground.truth() == plain.ground.truth()
+    numbers = [rig.random.hand.random(5).tolist() for rig in (spread, plain)]
+    assert numbers[0] == numbers[1]
+    assert spread.plant.friction.coulomb == pytest.approx(
+        plain.plant.friction.coulomb, rel=1e-3
+    )
+    for rig in (plain, spread):
+        rig.bus.shutdown()
+
+
+def test_positions_are_off_by_the_zeros_and_stops_by_their_own():
+    sound = draw_sound(5)
+    rig = spread_rig(sound)
+    turns = 2.0 * np.pi / np.array(CONSTANTS.cts)
+    believed = np.linalg.solve(CONSTANTS.j2mp, turns * np.array(rig.plant.counts()))
+    # A count is 0.15 mrad at least; two motors share a joint.
+    assert believed - rig.plant.q == pytest.approx(sound.zeros, abs=2e-4)
+    lower = np.minimum(CONSTANTS.q_lower, CONSTANTS.home) + sound.stops[0]
+    assert rig.plant.ends.lower == pytest.approx(lower)
+    rig.bus.shutdown()
+
+
+def test_what_is_true_of_a_rig_adds_up():
+    one = Departure(zeros=np.full(7, 0.1), foot_mass=1.1, friction=2.0)
+    other = Departure(zeros=np.full(7, 0.2), foot_mass=0.5, torn=2)
+    both = other.on(one)
+    assert both.zeros == pytest.approx(np.full(7, 0.3))
+    assert (both.foot_mass, both.friction, both.torn) == (0.55, 2.0, 2)
+
+
+def test_a_base_that_is_turned_about_y_lets_gravity_point_elsewhere():
+    turned = Departure(mount=np.radians([0.0, 90.0, 0.0]))
+    down = true_options(PlantOptions(), turned).down
+    # Its z axis lies along the true x: what is down is its own -z turned back.
+    assert down == pytest.approx((1.0, 0.0, 0.0), abs=1e-12)
+
+
+def test_axes_of_a_sensor_show_a_turned_load():
+    shown = turned_axes([0.0, 0.0, np.pi / 2]) @ [1.0, 0.0, 3.0, 0.0, 2.0, 0.0]
+    assert shown == pytest.approx([0.0, -1.0, 3.0, 2.0, 0.0, 0.0], abs=1e-12)
+
+
+def test_foot_and_links_are_as_heavy_as_stated():
+    departure = Departure(foot_mass=2.0, links=np.array([0.0, 0, 1, 0, 0, 0, 0]))
+    assert true_tool(TOOL, departure).foot.mass == 2.0 * TOOL.foot.mass
+    links = true_constants(CONSTANTS, departure).links
+    more = [a.mass - b.mass for a, b in zip(links, CONSTANTS.links, strict=True)]
+    assert more == pytest.approx([0, 0, 1, 0, 0, 0, 0])
