@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import argparse
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from experiments.arguments import add_simulated_arm, friction_share
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from pathlib import Path
 
+    from experiments.commissioning.record import Commissioning
     from experiments.commissioning.steps import ProofStep
     from experiments.operator.console import Console
     from experiments.operator.prompts import OperatorInput
@@ -41,6 +42,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--recheck",
         action="store_true",
         help="judge the recordings again, no device is touched",
+    )
+    parser.add_argument(
+        "--beside",
+        type=Path,
+        metavar="FILE",
+        help="earlier commissioning.json that the page draws the values beside (the "
+        "last signed one)",
     )
     parser.add_argument("--operator", metavar="NAME", help="who does it (login name)")
     parser.add_argument("--witness", metavar="NAME", help="who stands by")
@@ -74,8 +82,11 @@ def run(args: argparse.Namespace) -> int:
     console = Console(color=not args.no_color)
     folder = _folder(settings, is_fake=args.fake)
     files = RecordFolder.open(folder, is_simulated=args.fake)
+    earlier = _earlier(args.beside, folder)
     if args.recheck:
-        return 0 if recheck(files, console) else 6
+        is_sound = recheck(files, console)
+        _write_page(files, earlier, console)
+        return 0 if is_sound else 6
     operator = choose_operator(args.operator_script, is_fake=args.fake)
     fake: FakeOptions | None = None
     if args.fake:
@@ -93,7 +104,38 @@ def run(args: argparse.Namespace) -> int:
     code = _sittings(args, settings, fake, steps, files, persons, console, operator)
     if code == 0:
         _end(files, console, persons)
+    _write_page(files, earlier, console)
     return code
+
+
+def _earlier(given: Path | None, folder: Path) -> Commissioning | None:
+    """Return the record that the page draws the values beside; None = there is none.
+
+    Raises:
+        SettingsError: `given` is no record.
+    """
+    from acquisition.errors import SettingsError
+    from experiments.commissioning.record import newest_kept, read_record
+
+    path = given or newest_kept(folder)
+    record = read_record(path) if path is not None else None
+    if given is not None and record is None:
+        raise SettingsError(f"There is no file {given}.", hint="Nothing was started.")
+    return record
+
+
+def _write_page(
+    files: RecordFolder, earlier: Commissioning | None, console: Console
+) -> None:
+    from experiments.commissioning.gate import lacks
+    from experiments.report.commissioning import write_page
+
+    if not files.record.steps:
+        return
+    last = max(done.ended for done in files.record.steps)
+    lacking = [lack.text for lack in lacks(files.record, {}, last)]
+    page = write_page(files.folder, files.record, lacking, earlier)
+    console.say(f"Page: {page}")
 
 
 def _sittings(

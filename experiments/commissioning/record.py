@@ -175,7 +175,11 @@ def read_commissioning(folder: Path) -> Commissioning | None:
     Raises:
         SettingsError: it cannot be read, is no such file, or was changed.
     """
-    path = folder / NAME
+    return read_record(folder / NAME)
+
+
+def read_record(path: Path) -> Commissioning | None:
+    """Return what stands in a file; None, Raises: as `read_commissioning`."""
     try:
         found = Commissioning.model_validate_json(read_regular(path, _LARGEST))
     except FileNotFoundError:
@@ -198,7 +202,17 @@ def _unreadable(path: Path, why: str) -> SettingsError:
     return SettingsError(f"{path} cannot be read: {why}.", hint=_ANEW)
 
 
-def write_commissioning(folder: Path, content: Commissioning) -> None:
+def newest_kept(folder: Path) -> Path | None:
+    """Return the last signed record that a later one took the place of."""
+    return max(folder.glob(f"{Path(NAME).stem}_*.json"), default=None)
+
+
+def kept_name(content: Commissioning) -> str:
+    """Return the name of a signed record once a later one takes its place."""
+    return f"{Path(NAME).stem}_{content.steps[-1].ended:%Y%m%dT%H%M%S}.json"
+
+
+def write_commissioning(folder: Path, content: Commissioning, name: str = NAME) -> None:
     """Write it whole, or leave the earlier one.
 
     Raises:
@@ -206,4 +220,4 @@ def write_commissioning(folder: Path, content: Commissioning) -> None:
     """
     text = json.dumps(content.model_dump(mode="json"), indent=1) + "\n"
     with open_directory(folder) as directory:
-        replace_file(directory, NAME, text.encode())
+        replace_file(directory, name, text.encode())

@@ -35,12 +35,7 @@ class ProofStep(StrEnum):
 
 ORDER = tuple(ProofStep)
 # Without these no torque is sent to a real arm.
-GATED = tuple(
-    step
-    for step in ORDER[: ORDER.index(ProofStep.GRAVITY_RAMP) + 1]
-    # Designed, and not done by `traction commission` yet.
-    if step not in (ProofStep.OWN_WEIGHT, ProofStep.HUNG_WEIGHT)
-)
+GATED = ORDER[: ORDER.index(ProofStep.GRAVITY_RAMP) + 1]
 
 
 def _from(first: ProofStep, last: ProofStep = ProofStep.PLATE) -> tuple[ProofStep, ...]:

@@ -59,8 +59,9 @@ def collect(scene: Scene) -> Values:
     return {
         "low": np.array(lows),
         "high": np.array(highs),
-        "q_lower": constants.q_lower.copy(),
-        "q_upper": constants.q_upper.copy(),
+        # Joints 2 and 4 lie on a stop at home, beyond the ends of the drawings.
+        "q_lower": np.minimum(constants.q_lower, constants.home),
+        "q_upper": np.maximum(constants.q_upper, constants.home),
     }
 
 
@@ -88,3 +89,9 @@ def judge(values: Values) -> Judgement:
             found("stop_angle", np.degrees(off), joint=i + 1),
         ]
     return judged(rows)
+
+
+def stop_errors(values: Values) -> Array:
+    """Return by how much the zero of each joint is off by its stops [rad], (7,)."""
+    low, high = np.diag(values["low"]), np.diag(values["high"])
+    return ((low - values["q_lower"]) + (high - values["q_upper"])) / 2

@@ -12,12 +12,14 @@ from experiments.commissioning.record import (
     Commissioning,
     Measured,
     StepRecord,
+    kept_name,
     read_commissioning,
     write_commissioning,
 )
 from experiments.commissioning.steps import ProofStep
 from experiments.messages import preflight_error
 from experiments.operator.console import BAD, GOOD, Console
+from experiments.proving import by_hand
 from experiments.proving.limits import Judgement
 from experiments.proving.recording import read_raw, write_raw
 from experiments.proving.scene import Scene
@@ -53,7 +55,9 @@ class RecordFolder:
         return cls(folder, record)
 
     def keep(self, done: StepRecord) -> None:
-        """Write the record with a step in its place."""
+        """Write the record with a step in its place; a signed one is kept beside."""
+        if self.record.signed:
+            write_commissioning(self.folder, self.record, kept_name(self.record))
         self.record = self.record.with_step(done)
         write_commissioning(self.folder, self.record)
 
@@ -83,6 +87,10 @@ def do_step(
         scene.start()
     if work.needs_zero and scene.info is not None and not scene.info.is_zeroed:
         raise preflight_error("not-zeroed")
+    by_hand_before = files.record.of(ProofStep.BY_HAND)
+    if by_hand_before is not None and by_hand_before.raw:
+        stops = read_raw(files.folder, by_hand_before.raw[0])
+        scene.stops = by_hand.stop_errors(stops)
     started = _now(scene.rig)
     values = work.collect(scene)
     judgement = work.judge(values)

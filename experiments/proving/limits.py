@@ -198,6 +198,78 @@ LIMITS: Mapping[str, Limit] = {
         low=-3.0,
         high=3.0,
     ),
+    # C6
+    "lever": Limit(
+        "moments over forces, from pose to pose",
+        "mm",
+        "Units of the sensor's forces or moments",
+        high=250.0,
+    ),
+    "force_left": Limit(
+        "force that turns wrongly",
+        "N",
+        "The sensor is turned or its axes are exchanged, or encoders are",
+        high=0.35,
+    ),
+    "foot_mass": Limit(
+        "mass of the foot beyond rig.toml",
+        "%",
+        "Another foot, a wrong number, or units of the sensor",
+        low=-10.0,
+        high=10.0,
+    ),
+    "weight_way": Limit(
+        "weight of the foot beside down",
+        "degrees",
+        "The base stands otherwise, the sensor's sign is the other one, it is turned, "
+        "or its cable pulls",
+        high=6.0,
+    ),
+    "foot_centre": Limit(
+        "centre of the foot beside rig.toml",
+        "mm",
+        "Another foot, a wrong number, or units of the sensor",
+        high=7.0,
+    ),
+    "moment_left": Limit(
+        "moment that turns wrongly",
+        "mN m",
+        "The sensor is turned, or its matrix is another one's",
+        high=20.0,
+    ),
+    # C7
+    "hung_scale": Limit(
+        "hung weight as measured, median",
+        "of it",
+        "Scale of the sensor: its calibration sheet or units",
+        low=0.94,
+        high=1.06,
+    ),
+    "hung_spread": Limit(
+        "hung weight from pose to pose",
+        "of it",
+        "The sensor's matrix is another one's",
+        high=0.09,
+    ),
+    "fitted": Limit(
+        "largest angle of the fit",
+        "degrees",
+        "It is {name}",
+        low=-2.25,
+        high=2.25,
+    ),
+    "sole": Limit(
+        "where the string pulls beside the sole of rig.toml",
+        "mm",
+        "Another sole, or not the middle of it",
+        high=6.0,
+    ),
+    "hung_way": Limit(
+        "hung weight beside down, worst pose",
+        "degrees",
+        "An orientation is wrong: sensor, a zero position, or the base",
+        high=6.0,
+    ),
     # C8
     "active": Limit("active without torque", "s", "The module left it", low=0.9),
     "rest": Limit("way of joint {joint} without torque", "mrad", _MOTION),

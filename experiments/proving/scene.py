@@ -29,6 +29,8 @@ class Scene:
         info: of the arm that was started; None = it was not.
         answers: what its pucks said of themselves.
         is_proving: the arm is active in a proof.
+        stops: by how much each joint's zero is off by its stops [rad], shape (7,);
+            None = not measured.
     """
 
     rig: Rig
@@ -36,6 +38,7 @@ class Scene:
     info: ArmInfo | None = None
     answers: Sequence[Mapping[str, int | None]] = ()
     is_proving: bool = False
+    stops: Array | None = None
 
     @property
     def loop_client(self) -> LoopClient:

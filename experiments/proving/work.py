@@ -10,6 +10,7 @@ from experiments.proving import (
     configuration,
     rest_pose,
     stop_circuit,
+    weights,
 )
 from experiments.proving.limits import Judgement
 from experiments.proving.recording import Values
@@ -105,6 +106,22 @@ WORK: Mapping[ProofStep, StepWork] = {
         needs_loop=True,
         needs_zero=True,
     ),
+    ProofStep.OWN_WEIGHT: StepWork(
+        weights.own_weight,
+        weights.judge_own_weight,
+        8,
+        "Weigh the foot; look at the sensor's mounting, sign, sheet and cable.",
+        needs_loop=True,
+        needs_zero=True,
+    ),
+    ProofStep.HUNG_WEIGHT: StepWork(
+        weights.hung_weight,
+        weights.judge_hung_weight,
+        12,
+        "Zero the arm again where a zero is named; look at base and sensor.",
+        needs_loop=True,
+        needs_zero=True,
+    ),
     ProofStep.REST_POSE: StepWork(
         rest_pose.rest,
         rest_pose.judge_rest,
@@ -142,6 +159,6 @@ WORK: Mapping[ProofStep, StepWork] = {
 SITTINGS: tuple[tuple[ProofStep, ...], ...] = (
     (ProofStep.CONFIGURATION, ProofStep.LISTEN, ProofStep.IDENTITY, ProofStep.TIMING),
     (ProofStep.STOP_CIRCUIT,),
-    (ProofStep.BY_HAND,),
+    (ProofStep.BY_HAND, ProofStep.OWN_WEIGHT, ProofStep.HUNG_WEIGHT),
     (ProofStep.REST_POSE, ProofStep.RAMPS, ProofStep.LIFT, ProofStep.GRAVITY_RAMP),
 )
