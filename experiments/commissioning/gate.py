@@ -14,6 +14,9 @@ from experiments.commissioning.steps import (
     ProofStep,
 )
 
+FIELD = "commissioning"  # of the metadata of a recording
+COMPLETE = "complete"  # what it says of an arm that lacks nothing
+
 
 @dataclass(frozen=True, slots=True)
 class Lack:

@@ -4,7 +4,7 @@ from collections.abc import Collection
 from datetime import UTC, datetime
 
 from acquisition.errors import IDLE_ARM, PreflightError, TractionError
-from experiments.commissioning.gate import lacks, require
+from experiments.commissioning.gate import COMPLETE, FIELD, lacks, require
 from experiments.commissioning.inputs import present_inputs
 from experiments.commissioning.record import read_commissioning
 from experiments.commissioning.steps import GATED
@@ -12,8 +12,6 @@ from experiments.operator.console import BAD, GOOD, WARNING
 from experiments.preflight.page import Add
 from experiments.rig.rig import Rig
 from wam.driver.startup import ArmInfo
-
-FIELD = "commissioning"  # of the metadata of a recording
 
 
 def check_commissioned(
@@ -50,4 +48,4 @@ def check_commissioned(
         add(WARNING, FIELD, text)
         return {FIELD: text}
     add(GOOD, FIELD, "all steps, sound and not stale")
-    return {FIELD: "complete"}
+    return {FIELD: COMPLETE}

@@ -12,7 +12,9 @@ from experiments.commissioning.record import (
 )
 from experiments.commissioning.steps import GATED
 from experiments.preflight.connecting import connect_rig
+from experiments.rig.rig import Rig
 from experiments.settings.load import load_settings
+from wam.driver.startup import ArmInfo
 
 
 def take_as_commissioned(config: Path) -> None:
@@ -29,11 +31,16 @@ def take_as_commissioned(config: Path) -> None:
     settings = load_settings(config)
     rig = connect_rig(settings, settings.matrix.terrains[0], None)
     try:
-        info = rig.backend.start_arm()
-        present = present_inputs(rig, rig.backend.arm.answers(), info)
-        now = datetime.fromtimestamp(rig.clock.utc_ns() // 1_000_000_000, UTC)
+        record = sound_record(rig, rig.backend.start_arm())
     finally:
         rig.backend.close()
+    write_commissioning(config.parent, record)
+
+
+def sound_record(rig: Rig, info: ArmInfo) -> Commissioning:
+    """Return a record by which an arm that was started may be driven."""
+    present = present_inputs(rig, rig.backend.arm.answers(), info)
+    now = datetime.fromtimestamp(rig.clock.utc_ns() // 1_000_000_000, UTC)
     record = Commissioning(program="a test")
     for step in GATED:
         done = StepRecord(
@@ -46,4 +53,4 @@ def take_as_commissioned(config: Path) -> None:
             verdict="sound",
         )
         record = record.with_step(done)
-    write_commissioning(config.parent, record)
+    return record
