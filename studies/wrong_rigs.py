@@ -52,7 +52,7 @@ LIMITS = guard_limits(
 
 
 @dataclass(frozen=True, slots=True)
-class WrongRig:
+class GuardRig:
     """What is wrong with a rig.
 
     Attributes:
@@ -76,10 +76,10 @@ class WrongRig:
     free_rotor: int = 0
 
 
-def known(name: str, words: str) -> WrongRig:
+def known(name: str, words: str) -> GuardRig:
     """Return a rig of the catalogue, called `words`."""
     rig = wrong_rig(name).departure
-    return WrongRig(
+    return GuardRig(
         words,
         torque=rig.torque,
         counts=rig.counts,
@@ -91,7 +91,7 @@ def known(name: str, words: str) -> WrongRig:
 
 
 RIGS = (
-    WrongRig("activated while the program is idle", is_asked=False),
+    GuardRig("activated while the program is idle", is_asked=False),
     known("motor-2-reversed", "motor 2 reversed"),
     known("motor-3-reversed", "motor 3 reversed"),
     known("motor-4-reversed", "motor 4 reversed"),
@@ -104,23 +104,23 @@ RIGS = (
     known("pidx-2-is-1", "PIDX 1 on puck 2"),
     known("mt-700", "MT 700 on pucks 2, 3"),
     known("mt-400", "MT 400 on puck 2"),
-    WrongRig("IPNM of puck 2 a tenth", torque=scaled(m2=0.1)),
-    WrongRig("IPNM of puck 2 tenfold", torque=scaled(m2=10.0)),
+    GuardRig("IPNM of puck 2 a tenth", torque=scaled(m2=0.1)),
+    GuardRig("IPNM of puck 2 tenfold", torque=scaled(m2=10.0)),
     known("motor-2-dead", "motor 2 without torque"),
     known("motors-2-3-half", "motors 2 and 3 at half torque"),
     known("foot-typed-4.5kg", "foot typed 4.5 kg"),
-    WrongRig("foot typed 2.95 kg", foot_mass=2.95),
+    GuardRig("foot typed 2.95 kg", foot_mass=2.95),
     known("base-on-wall", "base on a wall"),
     known("base-on-ceiling", "base on the ceiling"),
     known("cable-2-torn", "cable of motor 2 torn"),
 )
 OTHERS = (
-    WrongRig("sound"),
-    WrongRig("base on a wall, foot down", down=(1.0, 0.0, 0.0)),
-    WrongRig("base tilted by 45 degrees", down=(0.7071, 0.0, -0.7071)),
-    WrongRig("base tilted by 10 degrees", down=(0.1736, 0.0, -0.9848)),
+    GuardRig("sound"),
+    GuardRig("base on a wall, foot down", down=(1.0, 0.0, 0.0)),
+    GuardRig("base tilted by 45 degrees", down=(0.7071, 0.0, -0.7071)),
+    GuardRig("base tilted by 10 degrees", down=(0.1736, 0.0, -0.9848)),
     *(
-        WrongRig(f"motor {k} without torque", torque=scaled(**{f"m{k}": 0.0}))
+        GuardRig(f"motor {k} without torque", torque=scaled(**{f"m{k}": 0.0}))
         for k in (1, 3, 4, 5, 6, 7)
     ),
     *(known(f"motor-{k}-reversed", f"motor {k} reversed") for k in (1, 6, 7)),
@@ -192,7 +192,7 @@ class _NoSensor:
         return []
 
 
-def _wiring(rig: FakeRig, wrong: WrongRig) -> Wiring:
+def _wiring(rig: FakeRig, wrong: GuardRig) -> Wiring:
     """Return what passes between pucks and motors of a rig that stands."""
     turns = CONSTANTS.j2mp @ CONSTANTS.home / (2.0 * np.pi)
     home = turns * np.array(CONSTANTS.cts)  # where the arm was zeroed
@@ -201,7 +201,7 @@ def _wiring(rig: FakeRig, wrong: WrongRig) -> Wiring:
     return Wiring(wrong.torque, wrong.counts, home, torn, torn_at)
 
 
-def run(wrong: WrongRig, friction: float, state: ArmState = ArmState.HOLD) -> RunAway:
+def run(wrong: GuardRig, friction: float, state: ArmState = ArmState.HOLD) -> RunAway:
     """Return what a wrong rig does when it is activated and nobody holds it."""
     clock = SteppedClock()
     scene = SimulatedScene("S0", "small", "tread", FRAME, START_Q, 1)

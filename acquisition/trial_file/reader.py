@@ -22,8 +22,10 @@ from acquisition.schema import (
 )
 from acquisition.trial_file.chunks import Unpacker, as_trial_file_error, parse_chunk
 from acquisition.trial_file.contents import read_contents
+from acquisition.trial_file.foreign import foreign_reason
 
 MAX_ROWS = 300_000  # ten minutes
+_FOREIGN = "Write t, v_t, F_n and F_t of it as a table, then: traction fit FILE."
 _HEAD = np.dtype(
     [
         ("op", "u1"),
@@ -70,7 +72,12 @@ class TrialReader:
     """
 
     def __init__(self, path: Path) -> None:
-        self._contents = read_contents(path)
+        try:
+            self._contents = read_contents(path)
+        except TrialFileError as error:
+            if reason := foreign_reason(path):
+                raise TrialFileError(path, reason, hint=_FOREIGN) from error
+            raise
         self._unpacker = Unpacker(path)
         self.path = path
         self.size = self._contents.size
@@ -78,7 +85,8 @@ class TrialReader:
         self.metadata = self._contents.metadata
         self.attachments = self._contents.attachments
         if "trial" not in self.metadata:
-            raise TrialFileError(path, "is an MCAP file, but no trial of Traction")
+            reason = foreign_reason(path) or "is an MCAP file, but no trial of Traction"
+            raise TrialFileError(path, reason, hint=_FOREIGN)
 
     @property
     def is_complete(self) -> bool:

@@ -30,11 +30,13 @@ from acquisition.trial_file.writer import CHUNK_BYTES
 _DIGEST = "sha256:"  # begins the keys of attachments in the provenance
 _CYCLES = {layout.size: layout for layout in (CYCLE, *EARLIER_CYCLES)}
 _MOST_BESIDE = 50  # files that are looked into
+_LONGEST_MISSED = 50_000_000  # ns; a loop that misses cycles for longer has ended
+_SECTION = "has data whose checksum is wrong"  # and no chunk or attachment is
 ROOM = ".recover"  # begins the name of a folder in which a copy grows
 
 
 @dataclass(frozen=True, slots=True)
-class Loss:
+class LostSpan:
     """A part of a recording that is gone.
 
     Attributes:
@@ -46,7 +48,7 @@ class Loss:
     seconds: float
 
 
-_LOSSES = TypeAdapter(tuple[Loss, ...])
+_LOSSES = TypeAdapter(tuple[LostSpan, ...])
 
 
 class TrialCopy:
@@ -110,6 +112,8 @@ class TrialCopy:
         Raises:
             OSError: the disk is full or gone.
         """
+        is_elsewhere = not salvage.reason and self.details["reason"] == _SECTION
+        self.details["is_doubtful"] = "true" if is_elsewhere else "false"
         self.details["reason"] = salvage.reason or self.details["reason"]
         self.details["messages_kept"] = str(self.messages)
         self.details["bytes_dropped"] = str(salvage.lost_bytes)
@@ -139,18 +143,21 @@ class TrialCopy:
         }
 
     @property
-    def losses(self) -> list[Loss]:
+    def losses(self) -> list[LostSpan]:
         """What is missing of the recording, in order."""
-        if not self._gaps:
+        if not self._times:
             return []
         first = self._edges(0)[0] + PERIOD_NS if 0 in self._gaps else self._times[0]
-        found: list[Loss] = []
-        for at in self._gaps:
+        # A chunk that is gone leaves no other trace than its hole in the cycles.
+        steps = np.diff(np.array(self._times))
+        holes = (np.flatnonzero(steps > _LONGEST_MISSED) + 1).tolist()
+        found: list[LostSpan] = []
+        for at in sorted({*self._gaps, *holes}):
             before, after = self._edges(at)
             lost_ns = after - before - PERIOD_NS
             if lost_ns > PERIOD_NS:  # more than a cycle that was missed
                 start_s = max(0, before + PERIOD_NS - first) / NS_PER_S
-                found.append(Loss(round(start_s, 3), round(lost_ns / NS_PER_S, 3)))
+                found.append(LostSpan(round(start_s, 3), round(lost_ns / NS_PER_S, 3)))
         return found
 
     def _edges(self, at: int) -> tuple[int, int]:
@@ -162,7 +169,11 @@ class TrialCopy:
         Args:
             at: how many cycles are before them.
         """
-        stated = [(gap.first_ns, gap.last_ns) for gap in self._gaps[at] if gap.first_ns]
+        stated = [
+            (gap.first_ns, gap.last_ns)
+            for gap in self._gaps.get(at, [])
+            if gap.first_ns
+        ]
         before = self._times[at - 1] if at else None
         behind = self._times[at] if at < len(self._times) else None
         if before is None:
@@ -237,6 +248,8 @@ class Recovery:
         missing_attachments: names of those that are gone, and stand in no other file
             beside it.
         reason: what is broken in the source; empty where it is whole.
+        is_doubtful: something is broken that has no checksum of its own: a description,
+            or an index.
         is_new: the file was written now.
     """
 
@@ -245,9 +258,10 @@ class Recovery:
     verified: VerifiedFile
     messages: int
     bytes_dropped: int = 0
-    losses: tuple[Loss, ...] = ()
+    losses: tuple[LostSpan, ...] = ()
     missing_attachments: tuple[str, ...] = ()
     reason: str = ""
+    is_doubtful: bool = False
     is_new: bool = False
 
     @property
@@ -320,6 +334,7 @@ def _recover(
         losses=tuple(copy.losses),
         missing_attachments=tuple(copy.missing_attachments),
         reason=copy.details["reason"],
+        is_doubtful=copy.details["is_doubtful"] == "true",
         is_new=True,
     )
 
@@ -337,7 +352,7 @@ def _write(
             raise TrialFileError(source, f"cannot be copied ({error})") from error
         if not copy.messages or "trial" not in copy.metadata:
             why = salvage.reason or details["reason"]
-            if copy.messages:
+            if copy.messages and salvage.reason:
                 why += "; what says which trial it is was there"
             raise TrialFileError(source, f"has nothing to save: it {why}")
         for name, digest in copy.missing_attachments.items():
@@ -384,6 +399,7 @@ def _earlier(source: Path, target: Path, details: Mapping[str, str]) -> Recovery
         losses=losses,
         missing_attachments=tuple(earlier.get("attachments_dropped", "").split()),
         reason=earlier.get("reason", details["reason"]),
+        is_doubtful=earlier.get("is_doubtful") == "true",
     )
 
 

@@ -155,9 +155,8 @@ class SoundRecords:
         while at + 9 + _CHUNK_TIMES.size <= end:
             start_ns, end_ns = _CHUNK_TIMES.unpack_from(self._data, at + 9)
             latest = (self.last_ns if self.last_ns > 0 else start_ns) + _LONGEST_NS
-            if self._data[at] == Opcode.CHUNK and (
-                self.last_ns <= start_ns <= end_ns < latest
-            ):
+            is_next = 0 < start_ns <= end_ns and self.last_ns <= start_ns
+            if self._data[at] == Opcode.CHUNK and is_next and end_ns < latest:
                 yield start_ns, end_ns
             raw = record_at(self._view[:end], at)
             if raw is None:

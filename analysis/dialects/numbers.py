@@ -5,7 +5,7 @@ and then a number is read a thousand times too small.
 """
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -74,9 +74,11 @@ class NumberForm:
             return sign * infinite
         return self._ungrouped(cell) if self.has_groups else None
 
-    def numbers(self, cells: Sequence[str]) -> tuple[NDArray[np.float64], int | None]:
-        """Return the numbers of a column, shape (n,), and the first that is none."""
-        values = np.empty(len(cells))
+    def numbers(
+        self, cells: Iterable[str], count: int
+    ) -> tuple[NDArray[np.float64], int | None]:
+        """Return the numbers of `count` cells, and which is the first that is none."""
+        values = np.empty(count)
         for k, cell in enumerate(cells):
             value = self.number(cell)
             if value is None:

@@ -1,7 +1,9 @@
 """A text table as numbers: all rows read exactly, or the file refused with a line."""
 
-from collections.abc import Mapping, Sequence
+import sys
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +24,6 @@ from analysis.dialects.refusals import refusal, refused_cell, refused_line
 from analysis.dialects.times import is_iso, iso_times
 
 Array = NDArray[np.float64]
-MOST_ROWS = 500_000  # of a table; 17 minutes at 500 Hz
 # Beside these delimiters a comma is a usual decimal mark, and points group thousands.
 _CONTINENTAL = (";", "\t")
 _COPY = "Check that it was copied completely."
@@ -94,19 +95,18 @@ def read_text_table(path: Path, request: TextRequest, largest: int) -> TrialTabl
     dialect = find_dialect(path, head, names | marks, optional)
     if request.rate is not None and "t" in dialect.places:
         raise refusal(path, "has a time of its own", "Leave --rate out.")
-    cells, numbers = _columns(path, lines, dialect)
-    if not numbers:
+    count, first = _look(path, lines, dialect)
+    if not count:
         raise refusal(path, "a header but no rows", _COPY)
-    rows = _rows(path, cells, numbers, dialect, request)
-    notes = _notes(dialect)
+    table = _Cells(path, lines, dialect, request, count)
     return TrialTable(
-        rows,
+        table.rows(first.get("t", "")),
         dialect.units,
         is_prepared=PREPARED in dialect.places,
-        is_simulated=_simulated(path, cells.get(SIMULATED), numbers),
-        lines=np.array(numbers, dtype=np.intp),
-        notes=notes,
-        is_in_seconds=is_iso(_first(cells.get("t", ()))),
+        is_simulated=table.simulated(),
+        lines=np.fromiter((line for line, _ in table), np.intp, count),
+        notes=_notes(dialect),
+        is_in_seconds=is_iso(first.get("t", "")),
         header=dialect.header_line + 1 if dialect.header_line >= 0 else None,
     )
 
@@ -118,24 +118,35 @@ def _notes(dialect: Dialect) -> tuple[str, ...]:
     return (f"{lines} before the header skipped",)
 
 
-def _columns(
+def _look(
     path: Path, lines: Sequence[str], dialect: Dialect
-) -> tuple[dict[str, list[str]], list[int]]:
-    """Return the cells of the columns that were found, and the line of every row."""
-    cells: dict[str, list[str]] = {name: [] for name in dialect.places}
-    taken = [(cells[name].append, place) for name, place in dialect.places.items()]
-    numbers: list[int] = []
+) -> tuple[int, dict[str, str]]:
+    """Return how many rows there are, and the first value of every column."""
+    first: dict[str, str] = {}
+    count = 0
+    for _, row in _body(path, lines, dialect):
+        count += 1
+        for name, place in dialect.places.items():
+            if name in first:
+                continue
+            cell = plain(row[place]).strip()
+            if cell.lower() not in MISSING:
+                first.setdefault(name, cell)
+    return count, first
+
+
+def _body(
+    path: Path, lines: Sequence[str], dialect: Dialect
+) -> Iterator[tuple[int, list[str]]]:
+    """Give (line of the file, cells) of every row below the header."""
     width = len(dialect.header)
-    body = lines[dialect.first :]
     try:
-        for begin, row in numbered_rows(body, dialect.delimiter):
+        for begin, row in numbered_rows(lines[dialect.first :], dialect.delimiter):
             if not any(row) and len(row) < width:
                 continue
             if len(row) != width and not is_as_wide(row, width):
                 raise _uneven(path, dialect, row, dialect.first + begin)
-            for append, place in taken:
-                append(plain(row[place]).strip())
-            numbers.append(dialect.first + begin)
+            yield dialect.first + begin, row
     except UnfitQuotesError as error:
         raise refused_line(
             path,
@@ -143,10 +154,6 @@ def _columns(
             f"its quotes do not fit ({error.reason})",
             "Close the quotes that open on this line.",
         ) from error
-    if len(numbers) > MOST_ROWS:
-        reason = f"{len(numbers)} rows, the limit is {MOST_ROWS}"
-        raise refusal(path, reason, "Give one table per trial.")
-    return cells, numbers
 
 
 def _uneven(path: Path, dialect: Dialect, row: Sequence[str], line: int) -> Exception:
@@ -169,84 +176,127 @@ def _uneven(path: Path, dialect: Dialect, row: Sequence[str], line: int) -> Exce
     return refused_line(path, line, names, hint)
 
 
-def _rows(
-    path: Path,
-    cells: Mapping[str, Sequence[str]],
-    lines: Sequence[int],
-    dialect: Dialect,
-    request: TextRequest,
-) -> Array:
-    """Return the four columns as numbers, shape (n, 4)."""
-    columns: dict[str, Array] = {}
-    wanted = [name for name in COLUMNS if name in cells]
-    times = cells.get("t", ())
-    first = _first(times)
-    if is_iso(first):
-        since = iso_times(times, MISSING)
+@dataclass(frozen=True, slots=True)
+class _Cells:
+    """The cells of a table, cut out of its lines as often as they are asked for.
+
+    A million rows as texts would take ten times what they take as numbers.
+
+    Attributes:
+        path: the file.
+        lines: of it.
+        dialect: its layout.
+        request: how it is to be read.
+        count: of its rows.
+    """
+
+    path: Path
+    lines: Sequence[str]
+    dialect: Dialect
+    request: TextRequest
+    count: int
+
+    def __iter__(self) -> Iterator[tuple[int, list[str]]]:
+        """Give (line of the file, cells) of every row."""
+        return _body(self.path, self.lines, self.dialect)
+
+    def column(self, name: str) -> Iterator[str]:
+        """Give the cells of a column."""
+        place = self.dialect.places[name]
+        return (plain(row[place]).strip() for _, row in self)
+
+    def at(self, name: str, row: int) -> tuple[int, str]:
+        """Return (line of the file, cell) of a column in a row."""
+        line, cells = next(islice(self, row, None))
+        return line, plain(cells[self.dialect.places[name]]).strip()
+
+    def rows(self, first_time: str) -> Array:
+        """Return the four columns as numbers, shape (n, 4).
+
+        Raises:
+            SettingsError: a cell is none.
+        """
+        names = [name for name in COLUMNS if name in self.dialect.places]
+        columns: dict[str, Array] = {}
+        if is_iso(first_time):
+            columns["t"] = self._dates(first_time)
+            names.remove("t")
+        elif self.request.rate is not None:
+            columns["t"] = np.arange(self.count) / self.request.rate
+        form = self._form(names)
+        for name in names:
+            columns[name], wrong = form.numbers(self.column(name), self.count)
+            if wrong is not None:
+                line, cell = self.at(name, wrong)
+                raise _no_number(self.path, name, cell, line, self.request)
+        return np.column_stack([columns[name] for name in COLUMNS])
+
+    def _dates(self, first: str) -> Array:
+        since = iso_times(list(self.column("t")), MISSING)
         if since.wrong is not None:
+            line, cell = self.at("t", since.wrong)
             raise refused_cell(
-                path,
-                lines[since.wrong],
-                request.columns["t"],
-                times[since.wrong],
+                self.path,
+                line,
+                self.request.columns["t"],
+                cell,
                 f"a time like the first one, {first},",
                 "Give all times a zone, or none.",
             )
-        columns["t"] = since.seconds
-        wanted.remove("t")
-    texts = {name: cells[name] for name in wanted}
-    form = _form(path, texts, lines, dialect, request)
-    for name in wanted:
-        columns[name], wrong = form.numbers(cells[name])
-        if wrong is not None:
-            raise _no_number(path, name, cells[name][wrong], lines[wrong], request)
-    if request.rate is not None:
-        columns["t"] = np.arange(len(lines)) / request.rate
-    return np.column_stack([columns[name] for name in COLUMNS])
+        return since.seconds
 
+    def _form(self, names: Sequence[str]) -> NumberForm:
+        """Return how the numbers are written: one decimal mark for the whole file."""
+        if self.request.decimal is not None:
+            return NumberForm(self.request.decimal, has_groups=True)
+        places = [self.dialect.places[name] for name in names]
+        by_row = (plain(row[k]).strip() for _, row in self for k in places)
+        marks = marks_in(by_row)
+        if marks.comma is not None and (marks.point is not None or marks.is_grouped):
+            seen = marks.comma if marks.point is None else max(marks.comma, marks.point)
+        elif (
+            marks.point is not None
+            and marks.is_grouped
+            and self.dialect.delimiter in _CONTINENTAL
+        ):
+            seen = marks.point
+        else:
+            return NumberForm("." if marks.comma is None else ",")
+        row, column = divmod(seen, len(names))
+        line, cell = self.at(names[column], row)
+        both = "points and commas stand in one file"
+        alone = "every comma or point stands before three digits"
+        known = marks.comma is not None and marks.point is not None
+        raise refused_cell(
+            self.path,
+            line,
+            self.request.columns[names[column]],
+            cell,
+            f"one decimal mark throughout ({both if known else alone}, so that one may "
+            "group thousands)",
+            "Say which is the decimal mark: --decimal , or --decimal .",
+        )
 
-def _first(cells: Sequence[str]) -> str:
-    """Return the first cell with a value; "" without one."""
-    return next((cell for cell in cells if cell.lower() not in MISSING), "")
+    def simulated(self) -> bool | None:
+        """Return what the column `simulated` says of all rows; None without one.
 
-
-def _form(
-    path: Path,
-    texts: Mapping[str, Sequence[str]],
-    lines: Sequence[int],
-    dialect: Dialect,
-    request: TextRequest,
-) -> NumberForm:
-    """Return how the numbers are written: one decimal mark for the whole file."""
-    if request.decimal is not None:
-        return NumberForm(request.decimal, has_groups=True)
-    names = list(texts)
-    by_row = (cell for row in zip(*texts.values(), strict=True) for cell in row)
-    marks = marks_in(by_row)
-    if marks.comma is not None and (marks.point is not None or marks.is_grouped):
-        seen = marks.comma if marks.point is None else max(marks.comma, marks.point)
-    elif (
-        marks.point is not None
-        and marks.is_grouped
-        and dialect.delimiter in _CONTINENTAL
-    ):
-        seen = marks.point
-    else:
-        return NumberForm("." if marks.comma is None else ",")
-    row, column = divmod(seen, len(names))
-    name = names[column]
-    both = "points and commas stand in one file"
-    alone = "every comma or point stands before three digits"
-    known = marks.comma is not None and marks.point is not None
-    raise refused_cell(
-        path,
-        lines[row],
-        request.columns[name],
-        texts[name][row],
-        f"one decimal mark throughout ({both if known else alone}, so that one may "
-        "group thousands)",
-        "Say which is the decimal mark: --decimal , or --decimal .",
-    )
+        Raises:
+            SettingsError: it does not say the same in all of them.
+        """
+        if SIMULATED not in self.dialect.places:
+            return None
+        cells = list(map(sys.intern, self.column(SIMULATED)))
+        for row, cell in enumerate(cells):
+            if cell not in {"0", "1"} or cell != cells[0]:
+                raise refused_cell(
+                    self.path,
+                    self.at(SIMULATED, row)[0],
+                    SIMULATED,
+                    cell,
+                    "0 in every row, or 1 in every row of a simulated trial,",
+                    "Keep simulated and recorded trials in files of their own.",
+                )
+        return cells[0] == "1"
 
 
 def _no_number(
@@ -269,22 +319,3 @@ def _no_number(
             "counted."
         )
     return refused_cell(path, line, request.columns[name], cell, expected, hint)
-
-
-def _simulated(
-    path: Path, cells: Sequence[str] | None, lines: Sequence[int]
-) -> bool | None:
-    """Return what the column `simulated` says of all rows; None without one."""
-    if cells is None:
-        return None
-    for cell, line in zip(cells, lines, strict=True):
-        if cell not in {"0", "1"} or cell != cells[0]:
-            raise refused_cell(
-                path,
-                line,
-                SIMULATED,
-                cell,
-                "0 in every row, or 1 in every row of a simulated trial,",
-                "Keep simulated and recorded trials in files of their own.",
-            )
-    return cells[0] == "1"

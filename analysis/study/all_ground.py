@@ -22,7 +22,13 @@ from analysis.gp.hierarchy import (
     in_unit,
 )
 from analysis.study.distribution import FEWEST, NewTrialPrediction
-from analysis.study.skew import ShapeMap, choose_shape, log_warp_slope, warped
+from analysis.study.skew import (
+    ShapeMap,
+    bends_for,
+    choose_shape,
+    log_warp_slope,
+    warped,
+)
 
 GIVEN = 300  # rows of a terrain that predictions are made from
 _TUNED = 60  # rows of a terrain that hyperparameters come from
@@ -170,11 +176,13 @@ def fit_all_ground(
     """
     few = [rows.thinned(_TUNED) for rows in known]
     F_t = SampleTable.joined([table for rows in few for table in rows.trials]).F_t
+    bends = bends_for(F_t, _BENDS)
     unit = {c: _unit(F_t, c) for c in _BENDS}
     if start is None:
-        c: float | None = _BENDS[0]
+        c = bends[0]
         process = GroundPosterior(rows_of(few, c), unit[c]).climbed()
-        likeliest = max(_BENDS, key=lambda c: _rated(few, F_t, process, unit, c))
+        rated = {bend: _rated(few, F_t, process, unit, bend, c) for bend in bends}
+        likeliest = max(bends, key=rated.__getitem__)
         if likeliest != c:
             begin = in_unit(process.theta, unit[likeliest] / unit[c])
             c = likeliest
@@ -193,9 +201,19 @@ def _rated(
     process: GroundProcess,
     unit: Mapping[float | None, float],
     c: float | None,
+    fitted: float | None,
 ) -> float:
-    """Return the log posterior density of y under a warp, theta only rescaled."""
-    theta = in_unit(process.theta, unit[c] / unit[_BENDS[0]])
+    """Return the log posterior density of y under a warp, theta only rescaled.
+
+    Args:
+        few: rows of the trials.
+        F_t: their forces [N].
+        process: fitted under the warp `fitted`.
+        unit: dz / dy of every warp.
+        c: of the warp.
+        fitted: see `process`.
+    """
+    theta = in_unit(process.theta, unit[c] / unit[fitted])
     value = GroundPosterior(rows_of(few, c), unit[c])(theta)[0]
     return value + float(log_warp_slope(F_t, c).sum())
 

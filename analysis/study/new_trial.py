@@ -26,6 +26,7 @@ from analysis.study.distribution import FEWEST, NewTrialPrediction
 from analysis.study.metrics import clearly_best
 from analysis.study.skew import (
     ShapeMap,
+    bends_for,
     choose_shape,
     deepest,
     log_warp_slope,
@@ -200,11 +201,12 @@ class NewTrialFit:
             noise = self._noise(LogLinearNoise())
             changing = refit_gp(normal, outputs, noise=noise)
             fitted.append(_Candidate(LOGLINEAR, changing, None))
-        if WARPED in self._families:
-            fitted.append(self._bent(normal))
+        bends = bends_for(self._rows.F_t, _BENDS)
+        if WARPED in self._families and bends:
+            fitted.append(self._bent(normal, bends))
         return fitted
 
-    def _bent(self, normal: GaussianProcess) -> _Candidate:
+    def _bent(self, normal: GaussianProcess, bends: Sequence[float]) -> _Candidate:
         """Return the likeliest warp, by the likelihood of z and its Jacobian."""
         sd = float(self._outputs(self._chosen, None).std())
 
@@ -214,7 +216,7 @@ class NewTrialFit:
             lml = process.lml + float(log_warp_slope(self._rows.F_t, c).sum())
             return lml, _Candidate(WARPED, process, c)
 
-        best = max(map(bent, _BENDS), key=lambda pair: pair[0])[1]
+        best = max(map(bent, bends), key=lambda pair: pair[0])[1]
         z, process = self._outputs(self._chosen, best.c), best.process
         # the same noise as another one: other tops are searched for, too
         return best._replace(process=refit_gp(process, z, noise=process.noise))

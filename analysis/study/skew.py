@@ -10,16 +10,19 @@ S(x) = sinh(delta asinh((x - xi) / eta) - epsilon), which is normal again where 
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
 from analysis.data.series import Array
 
 _CLIPPED = 0.95  # c times this below zero, where the warp would lose its logarithm
+_MOST_CLIPPED = 0.5  # share of the forces
 _STEEPEST = 50.0  # z / c beyond which an exponential is no force any more
 _BOX = ((-1.0, 1.0), (-0.7, 0.7), (-1.0, 1.0), (-0.7, 0.7))  # of a shape
 _RIDGE = 0.005  # half a prior's precision over the number of rows
+
+_Bend = TypeVar("_Bend", float, float | None)
 
 
 class ShapeMap(NamedTuple):
@@ -85,6 +88,14 @@ def warped(F_t: Array, c: float | None) -> Array:
 def deepest(c: float | None) -> float:
     """Return the force [N] below which a warp is clipped."""
     return -np.inf if c is None else -_CLIPPED * c
+
+
+def bends_for(F_t: Array, bends: Sequence[_Bend]) -> list[_Bend]:
+    """Return those of `bends` whose warp leaves most of the forces as they are.
+
+    Forces of the other sign would all be clipped to the same one.
+    """
+    return [c for c in bends if np.mean(F_t < deepest(c)) < _MOST_CLIPPED]
 
 
 def unwarped(z: Array, c: float | None) -> Array:

@@ -73,6 +73,7 @@ def _plain(recovery: Recovery) -> dict[str, object]:
         "source": str(recovery.source),
         "state": "whole" if is_whole else saved,
         "reason": recovery.reason,
+        "is_doubtful": recovery.is_doubtful,
         "path": str(recovery.path),
         "cycles": recovery.verified.cycles,
         "seconds": recovery.verified.duration,
@@ -133,6 +134,11 @@ def _tell(recovery: Recovery, console: Console) -> None:
     verb = "saved" if recovery.is_new else "was recovered before,"
     console.say(f"{GOOD} {source}: {verb} {held} -> {recovery.path.name}, read-only.")
     console.say(f"{WARNING} It {recovery.reason}. {lost_text(recovery)}")
+    if recovery.is_doubtful:
+        console.say(
+            f"{WARNING} What is broken has no checksum of its own: hold what the copy "
+            "says of masses, terrain and times against config.toml and the sidecar."
+        )
     if missing := missing_text(recovery):
         console.say(f"{WARNING} {missing}")
 

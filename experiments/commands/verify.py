@@ -43,7 +43,7 @@ def run(args: argparse.Namespace) -> int:
     from acquisition.errors import SessionError
     from experiments.operator.console import BAD, GOOD, Console
     from experiments.report.crate import is_publication
-    from experiments.session.kept_files import compare_kept
+    from experiments.session.kept_files import compare_kept, repeated_numbers
     from experiments.session.store import find_session, list_sessions
 
     if bool(args.sessions) == args.all:
@@ -62,6 +62,7 @@ def run(args: argparse.Namespace) -> int:
         sessions = [find_session(args.data, name) for name in names]
     console = Console(color=not args.no_color)
     deviations = [d for session in sessions for d in compare_kept(session)]
+    deviations += repeated_numbers(sessions).values()
     if args.json:
         console.say(json.dumps([asdict(d) for d in deviations], indent=1))
         return _NOT_AS_KEPT if deviations else 0

@@ -14,6 +14,7 @@ from acquisition.trial_file.data_files import is_there, list_folder
 from experiments.session.data_files import line_faults, read_json, sha256_of
 from experiments.session.reducer import KEEP, replay
 from experiments.session.sidecar import TrialName
+from experiments.session.states import Event
 from experiments.session.store import JOURNAL_FILE, SUMMARY_FILE, SessionFolder
 from experiments.session.trial_files import (
     decision_of,
@@ -83,13 +84,15 @@ def _compare(
     events, text = folder.events(), folder.journal_text()
     kept = [TrialName(*pair) for pair in sorted(replay(events).kept_attempts)]
     faults = [(JOURNAL_FILE, fault) for fault in line_faults(text)]
-    faults += _unknown_to_journal(folder, text, {name.kept for name in kept})
+    if (otherwise := contradiction(folder, events)) is not None:
+        faults.append((otherwise.file, otherwise.problem))
+    judged = {d.name for d in map(decision_of, events) if d is not None}
+    faults += _unknown_to_journal(folder, text, {name.kept for name in judged})
     for name in kept:
         try:
             faults += _check_trial(folder, name, recorded_facts(events, name), digest)
         except TrialFileError as error:
             faults.append((_below(folder, error), error.reason))
-    judged = {d.name for d in map(decision_of, events) if d is not None}
     for path in list_folder(folder.trials, "T??.json"):
         fields = read_json(path)
         stem, attempt = path.stem, fields.get("attempt")
@@ -104,11 +107,17 @@ def _compare(
 
 
 def _unknown_to_journal(
-    folder: SessionFolder, text: bytes, kept: Collection[str]
+    folder: SessionFolder, text: bytes, told: Collection[str]
 ) -> list[tuple[str, str]]:
     """Return what session.json knows of and the journal does not.
 
-    session.json is written after the journal, so it never knows more.
+    session.json is written after the journal: it may be behind, where a trial was
+    rejected since, and never knows more.
+
+    Args:
+        folder: the session.
+        text: the journal.
+        told: names of the trials of which it has a verdict.
     """
     summary = read_json(folder.path / SUMMARY_FILE)
     listed = summary.get("kept")
@@ -118,7 +127,9 @@ def _unknown_to_journal(
     if origin := stated_id(folder):
         faults.append((SUMMARY_FILE, f"is of {origin}: a copy, or a renamed session"))
     lines, stated = text.count(b"\n"), summary.get("events")
-    lost = [name for name in known if name not in kept]
+    if lines > 1 and not summary:
+        faults.append((SUMMARY_FILE, "is missing or damaged"))
+    lost = [name for name in known if name not in told]
     if not text and (known or stated):
         faults.append((JOURNAL_FILE, f"is missing or empty; {SUMMARY_FILE} is not"))
     elif type(stated) is int and lines < stated:
@@ -128,6 +139,38 @@ def _unknown_to_journal(
             (f"trials/{name}.mcap", f"is kept in {SUMMARY_FILE}, not in the journal")
         )
     return faults
+
+
+def contradiction(folder: SessionFolder, events: Sequence[_Facts]) -> Deviation | None:
+    """Return what the journal says otherwise than the folder's name; None = nothing.
+
+    A name decides where a session counts, and whether as a simulated one.
+    """
+    if not events or events[0].get("event") != Event.STARTED:
+        return None
+    first = events[0]
+    terrain = first.get("terrain", folder.terrain)
+    if terrain != folder.terrain:
+        return Deviation(folder.id, JOURNAL_FILE, f"is of {terrain}: a renamed session")
+    is_simulated = first.get("fake", folder.is_simulated or None) is not None
+    if is_simulated is not folder.is_simulated:
+        kind = "simulated" if is_simulated else "recorded"
+        return Deviation(
+            folder.id, JOURNAL_FILE, f"is of {kind} trials: a renamed session"
+        )
+    return None
+
+
+def repeated_numbers(folders: Sequence[SessionFolder]) -> dict[Path, Deviation]:
+    """Return a deviation for each session that has the number of one before it."""
+    first: dict[str, SessionFolder] = {}
+    return {
+        folder.path: Deviation(
+            folder.id, folder.path.name, f"has the number of {original.path.name}"
+        )
+        for folder in folders
+        if (original := first.setdefault(folder.id, folder)) is not folder
+    }
 
 
 def stated_id(folder: SessionFolder) -> str:

@@ -208,11 +208,32 @@ def find_session(data: Path, name: str) -> SessionFolder:
     matches = [s for s in list_sessions(data) if name in {s.id, s.path.name}]
     if len(matches) == 1:
         return matches[0]
+    if matches:
+        raise SessionError(
+            f"{name} is the number of {len(matches)} sessions: "
+            f"{', '.join(s.path.name for s in matches)}.",
+            hint="Name the folder; give the copy another place.",
+        )
+    if os.path.isfile(name):  # noqa: PTH113 - no error for a name that no file can have
+        raise SessionError(
+            f"{name} is a file, and no session.",
+            hint=_reads_it(Path(name)),
+        )
     known = " ".join(s.id for s in list_sessions(data)) or "none yet"
     raise SessionError(
         f"There is no session {name!r} in {data / 'sessions'}.",
         hint=f"Sessions: {known}.",
     )
+
+
+def _reads_it(path: Path) -> str:
+    """Return what reads a file that was given for a session."""
+    session = _session_at(path.absolute().parent.parent)
+    if session is not None and path.suffix == ".mcap":
+        return f"Name its session: {session.id}; replay takes the trial beside it."
+    if path.suffix == ".mcap":
+        return "A trial is read where it was recorded, in the folder of its session."
+    return "Tables are read by: traction fit FILE."
 
 
 def create_session(

@@ -35,7 +35,8 @@ class SessionSummary:
         operator: who recorded it, as session.json has it.
         phase: where it stands, as session.json has it.
         deviations: what is missing or changed of the kept trials.
-        problem: what leads out of the session or cannot be read; None for nothing.
+        problem: what leads out of the session, cannot be read or contradicts its name;
+            None for nothing.
             Such a session is not counted.
     """
 
@@ -89,12 +90,19 @@ def _summarise(
     folder: SessionFolder, digest: Callable[[Path], str] | None
 ) -> SessionSummary:
     from experiments.session.data_files import read_json
-    from experiments.session.kept_files import compare_kept, unreadable
+    from experiments.session.kept_files import (
+        compare_kept,
+        contradiction,
+        unreadable,
+    )
     from experiments.session.lock import owner_of
+    from experiments.session.reducer import replay
     from experiments.session.trial_files import kept_pushes
+    from experiments.session.unfinished import is_unfinished
 
     deviations = tuple(compare_kept(folder, digest)) if digest else ()
     try:
+        events = folder.events()
         kept = folder.kept_trials(digest or (lambda _: ""))
         rejected = len(folder.rejected_sidecars())
         owner_of(folder)
@@ -104,20 +112,14 @@ def _summarise(
             pushes=len(kept_pushes(folder)),
             rejected=rejected,
             is_of_stances=folder.is_of_stances,
-            is_resumable=_is_resumable(folder),
+            is_resumable=is_unfinished(replay(events)),
             operator=str(fields.get("operator", "")),
             phase=str(fields.get("phase", "opening")),
             deviations=deviations,
+            problem=contradiction(folder, events),
         )
     except TrialFileError as error:
         return SessionSummary(deviations=deviations, problem=unreadable(folder, error))
-
-
-def _is_resumable(folder: SessionFolder) -> bool:
-    from experiments.session.reducer import replay
-    from experiments.session.unfinished import is_unfinished
-
-    return is_unfinished(replay(folder.events()))
 
 
 def glance_sessions(data: Path) -> list[SeenSession]:

@@ -38,9 +38,17 @@ def see_sessions(
 
 
 def _counted_once(seen: list[SeenSession]) -> list[SeenSession]:
-    """Return the sessions without those trials of a copy that its original has."""
-    from experiments.session.kept_files import repeated_trials, stated_id
+    """Return the sessions without those trials of a copy that its original has.
 
+    A session that has the number of another one does not count.
+    """
+    from experiments.session.kept_files import (
+        repeated_numbers,
+        repeated_trials,
+        stated_id,
+    )
+
+    again_numbered = repeated_numbers([session.folder for session in seen])
     folders = {session.folder.id: session.folder for session in seen}
     result: list[SeenSession] = []
     for folder, summary in ((s.folder, s.summary) for s in seen):
@@ -49,7 +57,9 @@ def _counted_once(seen: list[SeenSession]) -> list[SeenSession]:
         original = folders.get(stated_id(folder)) if is_asked else None
         again = set[str]() if original is None else repeated_trials(folder, original)
         kept = tuple(name for name in summary.kept if name not in again)
-        result.append(SeenSession(folder, replace(summary, kept=kept)))
+        problem = summary.problem or again_numbered.get(folder.path)
+        counted = replace(summary, kept=kept, problem=problem)
+        result.append(SeenSession(folder, counted))
     return result
 
 

@@ -81,7 +81,8 @@ def problems(root: Path, wanted: Journals, recorded: int) -> list[str]:
     commands = [("status",), ("verify", "--all"), ("recover", data), ("status",)]
     for words in commands if data.exists() else commands[:2]:
         options = () if words[0] == "recover" else ("--data", data)
-        wrong += _bug(words[0], traction(*words, *options))
+        is_empty = not list_sessions(data)
+        wrong += _bug(words[0], traction(*words, *options), is_empty=is_empty)
     find_unfinished(data)
     sessions = {session.path: session for session in list_sessions(data)}
     wrong += [f"{path} is gone" for path in wanted if root / path not in sessions]
@@ -92,7 +93,8 @@ def problems(root: Path, wanted: Journals, recorded: int) -> list[str]:
     files = [path for path in data.rglob("T*.mcap") if _is_trial(path)]
     wrong += [f"{len(files)} of {recorded} recordings"] * (len(files) < recorded)
     done = traction("verify", "--all", "--data", data)
-    return wrong + ([f"verify: {done.err}{done.out}"] if done.code else [])
+    is_wrong = bool(done.code) and bool(sessions)
+    return wrong + ([f"verify: {done.err}{done.out}"] if is_wrong else [])
 
 
 def put_in_order(data: Path) -> None:
@@ -102,8 +104,9 @@ def put_in_order(data: Path) -> None:
             recover_session(open_journal(session, CLOCK))
 
 
-def _bug(command: str, done: Done) -> list[str]:
-    if done.code in {0, 6}:
+def _bug(command: str, done: Done, *, is_empty: bool) -> list[str]:
+    """Return what is wrong with an answer; where nothing is, verify says so with 2."""
+    if done.code in {0, 6} or (command, is_empty, done.code) == ("verify", True, 2):
         return []
     return [f"{command} ends with {done.code}: {done.err}"]
 

@@ -13,12 +13,19 @@ from mcap.records import Message
 from acquisition.errors import TrialFileError
 from acquisition.recording.recorder import seal
 from acquisition.sample import Flag
-from acquisition.schema import CYCLE, TRUTH
+from acquisition.schema import CYCLE, FORESIGHT, TRUTH
 from acquisition.trial_file.reader import TrialReader
-from acquisition.trial_file.recover import Loss, recover_file, recovered_path
+from acquisition.trial_file.recover import LostSpan, recover_file, recovered_path
 from acquisition.trial_file.salvage import SoundRecords, recorded_seconds
 from acquisition.trial_file.verify import verify_file
-from acquisition.trial_file.writer import TRUTH_TOPICS, TrialWriter
+from acquisition.trial_file.writer import (
+    FLIGHT_TOPICS,
+    FORESIGHT_TOPICS,
+    TRIAL_TOPICS,
+    TRUTH_TOPICS,
+    TrialWriter,
+    topics_by_sizes,
+)
 from tests.acquisition.forged import chunk_content, with_chunk
 from tests.acquisition.ros import messages_of
 from tests.acquisition.trials import (
@@ -32,7 +39,7 @@ from tests.acquisition.trials import (
     write_trial,
 )
 
-MESSAGE, MESSAGE_INDEX, CHUNK, ATTACHMENT = 5, 7, 6, 9
+MESSAGE, MESSAGE_INDEX, CHUNK, ATTACHMENT, METADATA = 5, 7, 6, 9, 12
 BLOCK = 50  # cycles in a chunk
 
 
@@ -145,7 +152,7 @@ def test_a_broken_chunk_costs_itself_alone(put, sealed, cycles):
     assert found["position"].tobytes() == kept.tobytes()
     assert recovery.bytes_dropped == third.end - third.start
     # 102 cycles of 2 ms passed before it: two of them were missed
-    assert recovery.losses == (Loss(0.204, 0.1),)
+    assert recovery.losses == (LostSpan(0.204, 0.1),)
     assert recover_file(path).losses == recovery.losses
     assert "chunk whose checksum" in recovery.reason or "decompress" in recovery.reason
 
@@ -158,7 +165,7 @@ def test_a_chunk_that_passes_for_another_record_is_said_to_be_lost(put, sealed):
         data[third] = opcode
         recovery = recover_file(put(bytes(data), f"T{opcode}.mcap"))
         assert recovery.verified.cycles == 5 * BLOCK
-        assert recovery.losses == (Loss(0.204, 0.1),)
+        assert recovery.losses == (LostSpan(0.204, 0.1),)
 
 
 def test_a_damaged_attachment_costs_itself_alone(put, sealed):
@@ -187,6 +194,32 @@ def test_a_truth_file_is_recovered_too(tmp_path):
     recovery = recover_file(writer.partial)
     assert recovery.path.name == "T07.truth.recovered.mcap"
     assert len(TrialReader(recovery.path).truth().data) == 9
+
+
+def test_a_chunk_that_is_gone_is_said_to_be_lost(put, sealed):
+    third = chunks(sealed)[2]
+    recovery = recover_file(
+        put(sealed[: third.start] + sealed[third.end :], "T01.mcap")
+    )
+    assert recovery.verified.cycles == 5 * BLOCK
+    assert recovery.losses == (LostSpan(0.204, 0.1),)
+
+
+def test_a_zeroed_first_chunk_is_known_from_the_summary(put, sealed):
+    first = chunks(sealed)[0]
+    zeroed = sealed[: first.body] + bytes(first.end - first.body) + sealed[first.end :]
+    assert recover_file(put(zeroed, "T01.mcap")).losses == (LostSpan(0.0, 0.104),)
+
+
+def test_a_description_that_is_damaged_is_doubted(put, sealed):
+    at = span_of(sealed, METADATA).end - 3
+    recovery = recover_file(put(flipped(sealed, at, 2), "T01.mcap"))
+    assert recovery.is_doubtful
+    assert (recovery.verified.cycles, recovery.losses) == (300, ())
+    assert recover_file(recovery.source).is_doubtful
+    third = chunks(sealed)[2]
+    known = recover_file(put(flipped(sealed, third.body + 90), "T02.mcap"))
+    assert not known.is_doubtful
 
 
 # --- what the new file says -----------------------------------------------------------
@@ -448,3 +481,19 @@ def test_an_index_of_messages_is_whole_or_said_to_be_broken(tmp_path, index, is_
     assert sum(isinstance(record, Message) for record in salvage) == 2
     assert len(salvage.gaps) == (0 if is_sound else 1)
     assert ("broken record, kind 7" in salvage.reason) is not is_sound
+
+
+@pytest.mark.parametrize("topics", [TRIAL_TOPICS, FLIGHT_TOPICS, TRUTH_TOPICS])
+@pytest.mark.parametrize("is_foreseen", [False, True])
+def test_topics_are_known_by_the_sizes_of_their_messages(topics, is_foreseen):
+    if is_foreseen and topics is not TRUTH_TOPICS:
+        topics = {**topics, **FORESIGHT_TOPICS}
+    own = {"/cycle": CYCLE.size, "/truth": TRUTH.size, "/foresight": FORESIGHT.size}
+    sizes = {i: own.get(topic, 77) for i, topic in enumerate(topics, 1)}
+    assert topics_by_sizes(sizes) == topics
+
+
+def test_messages_of_another_version_are_not_taken_for_those_of_today():
+    number = list(TRIAL_TOPICS).index("/cycle") + 1
+    assert topics_by_sizes({number: CYCLE.size - 4}) == {}
+    assert topics_by_sizes({number: CYCLE.size, 40: 8}) == {}

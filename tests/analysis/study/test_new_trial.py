@@ -18,7 +18,7 @@ from analysis.study.models import (
     ModelFitter,
 )
 from analysis.study.new_trial import NORMAL, NewTrialFit, family_counts
-from analysis.study.skew import unwarped, warped
+from analysis.study.skew import bends_for, unwarped, warped
 
 PER_TRIAL, CHOSEN = 120, 150
 SE = SquaredExponential()
@@ -164,6 +164,28 @@ def test_what_the_warp_clips_is_counted():
     deep = np.count_nonzero(data.subset.F_t < -0.95 * (model.c or np.inf))
     assert model.choice.clipped == deep
     assert ("forces clipped by the warp" in model.flags) == (deep > 0)
+
+
+@pytest.mark.filterwarnings("error")
+def test_forces_of_the_other_sign_are_not_warped():
+    turned = [
+        SampleTable(rows.F_n, rows.v_t, -10.0 - rows.F_t)
+        for rows in trials_of(normal, 4)
+    ]
+    model = NewTrialFit(training(turned), None).fit(SE)
+    assert model.c is None
+    assert "log warp" not in model.choice.nlpd
+    assert float(model.mean(np.array([4.0]), np.array([0.1]))[0]) == pytest.approx(
+        -14.0, abs=0.3
+    )
+
+
+def test_bends_are_those_that_leave_most_forces_as_they_are():
+    bends = (3.0, 1.0, 9.0, None)
+    F_t = np.array([4.0, -2.0, -2.5, 5.0, -2.0])
+    assert bends_for(F_t, bends) == [3.0, 9.0, None]
+    assert bends_for(-np.abs(F_t) - 20.0, bends) == [None]
+    assert bends_for(np.abs(F_t), bends) == list(bends)
 
 
 def test_every_model_beyond_the_paper_has_a_fitter():

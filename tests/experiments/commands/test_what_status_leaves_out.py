@@ -42,10 +42,18 @@ def test_a_renamed_session_is_said_to_be_left_out(config, data):
     assert str(renamed) in status(config, data).err
 
 
-def test_a_session_of_an_unknown_terrain_is_said_to_be_left_out(config, data):
+def test_a_session_of_an_unknown_terrain_is_said_to_be_left_out(config, tmp_path):
+    create_session(tmp_path, "MOON", is_simulated=True, utc_ns=0)
+    assert "MOON is not a terrain of the matrix" in status(config, tmp_path).err
+
+
+def test_a_session_renamed_to_another_terrain_is_damaged(config, data):
     folder = only_session(data)
     folder.rename(folder.with_name(folder.name.replace("TF", "MOON")))
-    assert "MOON is not a terrain of the matrix" in status(config, data).err
+    done = traction("status", "--config", config, "--data", data)
+    assert done.code == 6
+    assert "MOON is not a terrain of the matrix" in done.err
+    assert "events.jsonl is of TF: a renamed session" in done.err
 
 
 def test_a_condition_that_matches_nothing_is_said(config, data):

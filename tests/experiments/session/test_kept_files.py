@@ -266,12 +266,14 @@ def test_a_report_counts_a_recording_once(copied, config):
     refused = traction("report", "--all", *where)
     assert refused.code == 6
     assert "S002 session.json is of S001" in refused.err
-    done = traction("report", "--all", "--allow-missing", "--json", *where)
+    done = traction("report", "--all", "--allow-missing", *where)
     assert done.code == 0, done.err
-    assert "S002 T01 is the same recording as S001 T01" in done.err + done.out
-    fits = json.loads(Path(json.loads(done.out)["fits"]).read_text())
+    assert "left out: S002 T01 is the same recording as S001 T01" in done.out
+    page = Path(done.out.rpartition("Open in a browser: ")[2].strip())
+    assert "S002 T01 is the same recording as S001 T01" in page.read_text()
+    fits = json.loads((page.parent.parent / "fits.json").read_text())
     (terrain,) = fits["terrains"].values()
-    assert len(terrain["trials"]) == 2
+    assert terrain["trials"] == 2
 
 
 def test_a_session_under_another_number_alone_counts(data):
@@ -280,3 +282,44 @@ def test_a_session_under_another_number_alone_counts(data):
     done = traction("status", "--json", "--data", data)
     (row,) = [row for row in json.loads(done.out) if row["sessions"]]
     assert (row["kept"], row["sessions"]) == (2, ["S004"])
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda name: name.removesuffix(".fake"), "is of simulated trials"),
+        (lambda name: name.replace("_TF", "_S0"), "is of TF"),
+    ],
+)
+def test_a_name_that_says_otherwise_than_the_journal_does_not_count(data, change, said):
+    folder = only_session(data)
+    folder.rename(folder.with_name(change(folder.name)))
+    done = traction("verify", "--all", "--data", data)
+    assert (done.code, said in done.err) == (6, True)
+    status = traction("status", "--json", "--data", data)
+    assert status.code == 6
+    assert [row for row in json.loads(status.out) if row["kept"]] == []
+
+
+def test_a_copy_of_the_same_number_is_named_and_does_not_count(data):
+    folder = only_session(data)
+    shutil.copytree(folder, folder.with_name("2099-01-01" + folder.name[10:]))
+    done = traction("verify", "--all", "--data", data)
+    assert done.code == 6
+    assert f"has the number of {folder.name}" in done.err
+    status = traction("status", "--json", "--data", data)
+    (row,) = [row for row in json.loads(status.out) if row["kept"]]
+    assert (status.code, row["kept"]) == (6, 2)
+    asked = traction("verify", "S001", "--data", data)
+    assert "S001 is the number of 2 sessions" in asked.err
+
+
+@pytest.mark.parametrize("text", [None, "{"])
+def test_a_lost_summary_is_named(data, text):
+    path = only_session(data) / "session.json"
+    path.unlink()
+    if text is not None:
+        path.write_text(text)
+    done = traction("verify", "S001", "--data", data)
+    assert done.code == 6
+    assert "session.json is missing or damaged" in done.err

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition.errors import SettingsError, TrialFileError
+from acquisition.errors import SessionError, SettingsError, TrialFileError
 from experiments.operator.console import Console
 from experiments.session import store
 from experiments.session.data_files import (
@@ -192,3 +192,15 @@ def test_a_new_file_that_does_not_reach_the_disk_is_not_in_the_way(
     with pytest.raises(TrialFileError, match="cannot be written"):
         write_new_text(path, "b")
     assert path.read_text() == "a"
+
+
+def test_a_file_that_is_given_for_a_session_is_told_what_reads_it(tmp_path):
+    folder = create(tmp_path)
+    trial = folder.trials / "T01.mcap"
+    trial.write_bytes(b"")
+    table = tmp_path / "a.csv"
+    table.write_text("t,v_t\n")
+    for path, hint in ((trial, f"Name its session: {folder.id}"), (table, "fit FILE")):
+        with pytest.raises(SessionError, match="is a file, and no session") as caught:
+            find_session(tmp_path, str(path))
+        assert hint in caught.value.hint

@@ -1,0 +1,40 @@
+"""MCAP files of other programs: what they hold, where a trial was expected."""
+
+from itertools import islice
+from pathlib import Path
+
+from mcap.records import Channel, Metadata
+
+from acquisition.errors import TrialFileError
+from acquisition.trial_file.checksums import MAGIC
+from acquisition.trial_file.chunks import read_file
+from acquisition.trial_file.salvage import SoundRecords
+
+_LOOKED_AT = 5_000  # records; channels stand before their messages
+_NAMED = 4  # topics in one message
+_LONGEST_TOPIC = 40  # characters
+
+
+def foreign_reason(path: Path) -> str:
+    """Return why an MCAP file is no trial: what it holds instead.
+
+    Returns:
+        "" for a trial that is damaged, and for what is no MCAP file at all.
+    """
+    try:
+        data = read_file(path)
+    except TrialFileError:
+        return ""
+    if not data.startswith(MAGIC):
+        return ""
+    topics: list[str] = []
+    for record in islice(SoundRecords(data, path), _LOOKED_AT):
+        if isinstance(record, Metadata) and record.name == "trial":
+            return ""
+        if isinstance(record, Channel) and record.topic not in topics:
+            topics.append(record.topic)
+    if not topics or "/cycle" in topics:
+        return ""
+    shown = ", ".join(topic[:_LONGEST_TOPIC] for topic in topics[:_NAMED])
+    more = f" and {len(topics) - _NAMED} more" if len(topics) > _NAMED else ""
+    return f"is no trial of Traction: it holds topics {shown}{more}"
