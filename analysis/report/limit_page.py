@@ -86,6 +86,7 @@ class LimitPage:
         missing: what was not done or does not count, in words.
         raw: recordings: step, file, SHA-256.
         earlier: what it is drawn beside, in words; "" = nothing.
+        offers: settings that were measured otherwise, a sentence each.
     """
 
     title: str
@@ -96,6 +97,7 @@ class LimitPage:
     missing: Sequence[str]
     raw: Sequence[tuple[str, str, str]]
     earlier: str = ""
+    offers: Sequence[str] = ()
 
 
 def limit_html(page: LimitPage) -> str:
@@ -107,11 +109,13 @@ def limit_html(page: LimitPage) -> str:
         is_foreign=False,
         generated_utc=page.written_utc,
     )
+    sentences = [f"Drawn beside {page.earlier}."] if page.earlier else []
+    sentences += [f"Offered, not taken: {text}" for text in page.offers]
     figures = [figure for step in page.steps if (figure := _figure(page, step))]
     sections = [
         PageSection(
             ReportSection.COMMISSIONING,
-            [f"Drawn beside {page.earlier}."] if page.earlier else [],
+            sentences,
             [_table(step, has_before=bool(page.earlier)) for step in page.steps],
             figures,
         ),

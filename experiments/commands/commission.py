@@ -25,6 +25,7 @@ EXAMPLES = """\
   traction commission --fake --fast --until C3    the first steps, simulated devices"""
 
 FAKE_FOLDER = "commissioning.fake"
+_LONGEST_NAME = 100  # characters
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -50,6 +51,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="earlier commissioning.json that the page draws the values beside (the "
         "last signed one)",
     )
+    parser.add_argument(
+        "--moved",
+        action="store_true",
+        help="the arm or its table was moved or bolted again: all steps are stale",
+    )
+    parser.add_argument(
+        "--tensioned",
+        action="store_true",
+        help="a drive cable was tensioned or replaced: C5 to C11 are stale",
+    )
     parser.add_argument("--operator", metavar="NAME", help="who does it (login name)")
     parser.add_argument("--witness", metavar="NAME", help="who stands by")
     parser.add_argument("--fake", action="store_true", help="simulated devices")
@@ -70,7 +81,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Do the steps that are due and return the exit code."""
-    from experiments.operator.console import Console
+    from experiments.operator.console import WARNING, Console
     from experiments.operator.scripted import choose_operator
     from experiments.proving.guide import RecordFolder, recheck
     from experiments.rig.rig import FakeOptions
@@ -85,7 +96,7 @@ def run(args: argparse.Namespace) -> int:
     earlier = _earlier(args.beside, folder)
     if args.recheck:
         is_sound = recheck(files, console)
-        _write_page(files, earlier, console)
+        _write_page(files, earlier, console, _offers(settings, files))
         return 0 if is_sound else 6
     operator = choose_operator(args.operator_script, is_fake=args.fake)
     fake: FakeOptions | None = None
@@ -101,11 +112,43 @@ def run(args: argparse.Namespace) -> int:
     persons = (args.operator or operator.who, args.witness or "")
     kind = "SIMULATED" if args.fake else "LIVE RIG"
     console.say(f"traction commission        {kind} · {files.folder}")
+    if args.fake:
+        console.say("Simulated hands and pendant do what is asked, at [space].")
+    _note_changes(args, files)
     code = _sittings(args, settings, fake, steps, files, persons, console, operator)
+    offers = _offers(settings, files)
+    for text in offers:
+        console.say(f" {WARNING} {text}")
     if code == 0:
-        _end(files, console, persons)
-    _write_page(files, earlier, console)
+        _end(files, console, persons, is_accepting=bool(offers))
+    _write_page(files, earlier, console, offers)
     return code
+
+
+def _note_changes(args: argparse.Namespace, files: RecordFolder) -> None:
+    """Write what a person says that changed; an empty record has nothing stale."""
+    from datetime import UTC, datetime
+
+    from acquisition.clock import SystemClock
+
+    if not files.record.steps:
+        return
+    now = datetime.fromtimestamp(SystemClock().utc_ns() // 1_000_000_000, UTC)
+    for name, is_told in (("mounting", args.moved), ("cables", args.tensioned)):
+        if is_told:
+            files.tell(name, now)
+
+
+def _offers(settings: Settings, files: RecordFolder) -> list[str]:
+    """Return what C6 and C7 offer as values of rig.toml."""
+    from math import radians
+
+    from experiments.proving.offers import Mounted, offers_of
+
+    sensor = settings.rig.ft_sensor
+    foot = settings.matrix.terrains[0].foot
+    mounted = Mounted(foot, sensor.height, radians(sensor.angle_deg))
+    return offers_of(files.recordings(), mounted)
 
 
 def _earlier(given: Path | None, folder: Path) -> Commissioning | None:
@@ -125,7 +168,10 @@ def _earlier(given: Path | None, folder: Path) -> Commissioning | None:
 
 
 def _write_page(
-    files: RecordFolder, earlier: Commissioning | None, console: Console
+    files: RecordFolder,
+    earlier: Commissioning | None,
+    console: Console,
+    offers: Sequence[str],
 ) -> None:
     from experiments.commissioning.gate import lacks
     from experiments.report.commissioning import write_page
@@ -134,7 +180,7 @@ def _write_page(
         return
     last = max(done.ended for done in files.record.steps)
     lacking = [lack.text for lack in lacks(files.record, {}, last)]
-    page = write_page(files.folder, files.record, lacking, earlier)
+    page = write_page(files.folder, files.record, lacking, earlier, offers)
     console.say(f"Page: {page}")
 
 
@@ -168,10 +214,12 @@ def _sittings(
     row = settings.matrix.terrains[0]
     is_anew = args.first is not None
     for sitting in SITTINGS:
+        due = [step for step in sitting if step in steps]
+        if not due:
+            continue
         rig = connect_rig(settings, row, fake)
         with logging_bus(rig, None, console), handle_signals(stop), keyboard(operator):
             scene = Scene(rig, ConsoleLoop(rig, console, operator, stop))
-            due = [step for step in sitting if step in steps]
             try:
                 for step in wanted(scene, due, files, is_anew=is_anew):
                     if do_step(scene, step, files, persons).cause:
@@ -192,23 +240,52 @@ def _sittings(
     return 0
 
 
-def _end(files: RecordFolder, console: Console, persons: tuple[str, str]) -> None:
-    """Ask for the two names once everything is done."""
+def _end(
+    files: RecordFolder,
+    console: Console,
+    persons: tuple[str, str],
+    *,
+    is_accepting: bool,
+) -> None:
+    """Say what is left, or have the record signed by two persons."""
+    from experiments.commissioning.gate import lacks
+    from experiments.commissioning.steps import ORDER
     from experiments.proving.work import WORK
 
-    done = {each.step for each in files.record.steps}
-    missing = [step for step in WORK if step not in done]
+    last = max((done.ended for done in files.record.steps), default=None)
+    lacking = [lack.step for lack in lacks(files.record, {}, last)] if last else ORDER
+    missing = [step for step in WORK if step in lacking]
     if missing:
         console.say(f"Still to do: {', '.join(missing)}.")
         return
-    names = persons if persons[1] else (persons[0], persons[0])
-    if sys.stdin is not None and sys.stdin.isatty() and not persons[1]:
-        console.say("Name of the person who did it, then Enter:")
-        first = sys.stdin.readline().strip() or persons[0]
-        console.say("Name of the person who stood by, then Enter:")
-        names = (first, sys.stdin.readline().strip())
+    later = ", ".join(step for step in lacking if step not in WORK)
+    if later:
+        console.say(f"Not done, and said in every recording: {later}.")
+    names = _two_names(persons, console, is_accepting=is_accepting)
+    if names is None:
+        console.say(
+            "Not signed: that takes two persons. Everything is kept; sign it with "
+            "traction commission, --operator NAME and --witness NAME."
+        )
+        return
     files.sign(names)
     console.say(f"Written and signed: {files.folder / 'commissioning.json'}.")
+
+
+def _two_names(
+    persons: tuple[str, str], console: Console, *, is_accepting: bool
+) -> tuple[str, str] | None:
+    """Return two different names, typed where there is a terminal; None = no two."""
+    typed = persons
+    if sys.stdin is not None and sys.stdin.isatty():
+        accepted = " and accepts rig.toml as it stands" if is_accepting else ""
+        console.say(f"Who signs has seen every step{accepted}.")
+        console.say("Name of the person who did it, then Enter:")
+        first = sys.stdin.readline().strip()
+        console.say("Name of the person who stood by, then Enter:")
+        typed = (first, sys.stdin.readline().strip())
+    one, two = (name[:_LONGEST_NAME] for name in typed)
+    return (one, two) if one and two and one != two else None
 
 
 def _steps(args: argparse.Namespace) -> list[ProofStep]:

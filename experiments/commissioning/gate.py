@@ -66,7 +66,7 @@ def _cause(
     now: datetime,
 ) -> str:
     done = record.of(step) if record is not None else None
-    if done is None:
+    if record is None or done is None:
         return "not done"
     if done.verdict == "wrong":
         return done.cause or "failed"
@@ -74,6 +74,9 @@ def _cause(
         then, current = done.inputs.get(name), inputs.get(name)
         if current is not None and then != current:
             return f"stale: {BASES[name].words} changed"
+        when = record.told.get(name)
+        if when is not None and done.started < when:
+            return f"stale: {BASES[name].words} changed on {when:%Y-%m-%d}, as told"
     if now - done.ended > timedelta(days=LONGEST_DAYS):
         return f"stale: done more than {LONGEST_DAYS} days ago"
     if done.ended > now + timedelta(days=1):

@@ -5,7 +5,7 @@ The chain is evidence, not protection: who can write the file can write a whole 
 
 import hashlib
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Literal, Self
@@ -26,6 +26,7 @@ _ANEW = "Put back the file as it was written, or do it again: traction commissio
 Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 Word = Annotated[str, Field(max_length=400)]
 Number = Annotated[float, Field(allow_inf_nan=False)]
+Moment = Annotated[datetime, Field(strict=False)]  # in a table it is read from a text
 Verdict = Literal["sound", "wrong", "accepted"]
 
 
@@ -128,6 +129,7 @@ class Commissioning(_Part):
         is_simulated: the arm is.
         serials: of the seven motor pucks; None = not known.
         steps: what was done.
+        told: when a person last said of a basis of `steps.BASES` that it changed, UTC.
         signed: the two names typed at the end; () = it has not ended.
     """
 
@@ -136,6 +138,7 @@ class Commissioning(_Part):
     is_simulated: bool = False
     serials: tuple[int | None, ...] = Field(default=(), max_length=7)
     steps: Many[StepRecord] = ()
+    told: Entries[Word, Moment] = {}
     signed: tuple[Word, ...] = Field(default=(), max_length=2)
 
     @model_validator(mode="after")
@@ -153,20 +156,38 @@ class Commissioning(_Part):
         """Return it with a step in its place; the chain is made anew, names go."""
         steps = [old for old in self.steps if old.step is not done.step]
         steps = sorted([*steps, done], key=lambda one: ORDER.index(one.step))
-        return self.model_copy(update={"steps": _chain(steps), "signed": ()})
+        chained = _chain(steps, self.told)
+        return self.model_copy(update={"steps": chained, "signed": ()})
+
+    def with_told(self, name: str, when: datetime) -> Self:
+        """Return it with what a person says of a basis; the chain is made anew."""
+        told = {**self.told, name: when}
+        return self.model_copy(
+            update={"told": told, "steps": _chain(self.steps, told), "signed": ()}
+        )
 
     def first_broken(self) -> ProofStep | None:
         """Return the first step whose digest is not that of what stands there."""
-        pairs = zip(self.steps, _chain(self.steps), strict=True)
+        pairs = zip(self.steps, _chain(self.steps, self.told), strict=True)
         return next((is_.step for is_, was in pairs if is_.digest != was.digest), None)
 
 
-def _chain(steps: Iterable[StepRecord]) -> tuple[StepRecord, ...]:
-    before, chained = _FIRST, list[StepRecord]()
+def _chain(
+    steps: Iterable[StepRecord], told: Mapping[str, datetime]
+) -> tuple[StepRecord, ...]:
+    before, chained = _first(told), list[StepRecord]()
     for done in steps:
         chained.append(done.chained(before))
         before = chained[-1].digest
     return tuple(chained)
+
+
+def _first(told: Mapping[str, datetime]) -> str:
+    """Return what the first step is chained to."""
+    if not told:
+        return _FIRST
+    text = json.dumps({name: told[name].isoformat() for name in sorted(told)})
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def read_commissioning(folder: Path) -> Commissioning | None:

@@ -97,10 +97,11 @@ BASES: dict[str, Basis] = {
         "[can] of rig.toml, the adapter or the kernel", (_S.LISTEN, _S.TIMING)
     ),
     "terrain": Basis("row of the terrain or its calibration", (_S.CONTAINER,)),
-    "mounting": Basis("where the arm stands, as told", ORDER),
+    "mounting": Basis("where the arm stands", ORDER),
     "cables": Basis(
-        "tension of the drive cables, as told",
+        "tension of the drive cables",
         _from(_S.BY_HAND, _S.GRAVITY_RAMP),
     ),
 }
+TOLD = ("mounting", "cables")  # bases that only a person knows of
 LONGEST_DAYS = 30  # after which all steps are stale

@@ -21,7 +21,7 @@ from experiments.messages import preflight_error
 from experiments.operator.console import BAD, GOOD, Console
 from experiments.proving import by_hand
 from experiments.proving.limits import Judgement
-from experiments.proving.recording import read_raw, write_raw
+from experiments.proving.recording import Values, read_raw, write_raw
 from experiments.proving.scene import Scene
 from experiments.proving.work import WORK
 from experiments.rig.rig import Rig
@@ -61,6 +61,25 @@ class RecordFolder:
         self.record = self.record.with_step(done)
         write_commissioning(self.folder, self.record)
 
+    def tell(self, name: str, when: datetime) -> None:
+        """Write that a basis of `steps.BASES` changed, as a person says."""
+        if self.record.signed:
+            write_commissioning(self.folder, self.record, kept_name(self.record))
+        self.record = self.record.with_told(name, when)
+        write_commissioning(self.folder, self.record)
+
+    def recordings(self) -> dict[ProofStep, Values]:
+        """Return what every step recorded that was done.
+
+        Raises:
+            SettingsError: a recording is missing, or is not what was recorded.
+        """
+        return {
+            done.step: read_raw(self.folder, done.raw[0])
+            for done in self.record.steps
+            if done.raw
+        }
+
     def sign(self, names: tuple[str, str]) -> None:
         """Write the two names at its end."""
         self.record = self.record.model_copy(update={"signed": names})
@@ -83,6 +102,10 @@ def do_step(
         StopRequestedError: as `ConsoleLoop.tick`.
     """
     work = WORK[step]
+    scene.say("")
+    scene.say(
+        f"{step} {step.words}, about {work.minutes:g} min   [q]uit, to go on later"
+    )
     if work.needs_loop:
         scene.start()
     if work.needs_zero and scene.info is not None and not scene.info.is_zeroed:

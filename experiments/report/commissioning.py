@@ -20,6 +20,7 @@ def write_page(
     record: Commissioning,
     lacking: Sequence[str],
     earlier: Commissioning | None = None,
+    offers: Sequence[str] = (),
 ) -> Path:
     """Write the page of a record beside it and return its path.
 
@@ -28,18 +29,22 @@ def write_page(
         record: what stands in it.
         lacking: steps that do not count, in words.
         earlier: what it is drawn beside; None = nothing.
+        offers: values of rig.toml that were measured otherwise, a sentence each.
 
     Raises:
         OSError: it cannot be written.
     """
-    text = limit_html(_page(record, lacking, earlier))
+    text = limit_html(_page(record, lacking, earlier, offers))
     with open_directory(folder) as directory:
         replace_file(directory, NAME, text.encode())
     return folder / NAME
 
 
 def _page(
-    record: Commissioning, lacking: Sequence[str], earlier: Commissioning | None
+    record: Commissioning,
+    lacking: Sequence[str],
+    earlier: Commissioning | None,
+    offers: Sequence[str],
 ) -> LimitPage:
     names = " and ".join(record.signed)
     last = record.steps[-1].ended if record.steps else None
@@ -61,6 +66,7 @@ def _page(
             for raw in done.raw
         ],
         earlier=beside,
+        offers=offers,
     )
 
 

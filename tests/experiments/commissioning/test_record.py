@@ -15,7 +15,7 @@ from experiments.commissioning.record import (
     read_commissioning,
     write_commissioning,
 )
-from experiments.commissioning.steps import BASES, GATED, ORDER, ProofStep
+from experiments.commissioning.steps import BASES, GATED, ORDER, TOLD, ProofStep
 
 NOON = datetime(2026, 11, 26, 12, tzinfo=UTC)
 INPUTS = {name: f"{number:064x}" for number, name in enumerate(BASES)}
@@ -144,6 +144,30 @@ def test_what_changed_makes_its_steps_stale_and_no_others(name):
 def test_what_is_not_known_now_contradicts_nothing():
     known = {name: digest for name, digest in INPUTS.items() if name != "module"}
     assert lacks(whole(), known, NOON) == []
+
+
+@pytest.mark.parametrize("name", TOLD)
+def test_what_a_person_says_makes_its_steps_stale_until_they_are_done_again(name):
+    record = whole().with_told(name, NOON + timedelta(hours=1))
+    found = lacks(record, INPUTS, NOON + timedelta(hours=2))
+    assert tuple(lack.step for lack in found) == BASES[name].steps
+    assert "changed on 2026-11-26, as told" in found[0].text
+    later = NOON + timedelta(hours=2)
+    for step in BASES[name].steps:
+        record = record.with_step(done(step, started=later, ended=later))
+    assert lacks(record, INPUTS, later) == []
+
+
+def test_what_a_person_said_is_not_taken_out_unseen(tmp_path):
+    record = whole().with_told("cables", NOON + timedelta(hours=1))
+    write_commissioning(tmp_path, record)
+    assert read_commissioning(tmp_path) == record
+    path = tmp_path / NAME
+    content = json.loads(path.read_text())
+    content["told"] = {}
+    path.write_text(json.dumps(content))
+    with pytest.raises(SettingsError, match="was changed at or before C0 "):
+        read_commissioning(tmp_path)
 
 
 def test_after_a_month_all_is_stale():
