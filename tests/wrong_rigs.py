@@ -18,7 +18,7 @@ import numpy as np
 
 from experiments.commands.commission import FAKE_FOLDER
 from experiments.commissioning.record import Commissioning, read_commissioning
-from experiments.commissioning.steps import ORDER
+from experiments.commissioning.steps import ProofStep
 from experiments.proving.recording import Values, read_raw
 from experiments.proving.work import WORK
 from experiments.rig.build import build_tool
@@ -97,23 +97,25 @@ def _ending(
     folder: Path, record: Commissioning | None, code: int, words: str, first: str
 ) -> Ending:
     steps = record.steps if record is not None else ()
-    moved = [
-        read_raw(folder, done.raw[0])
-        for done in steps
-        if ORDER.index(done.step) >= ORDER.index(_ACTIVE)
-    ]
+    moved = [read_raw(folder, done.raw[0]) for done in steps if done.step in _ACTIVE]
     energy, travel, speed = _moved(moved)
     wrong = next((done for done in steps if done.verdict == "wrong"), None)
     if wrong is not None:
         return Ending(wrong.step, wrong.cause, False, energy, travel, speed)
     if code == 0:
         return Ending("", "", False, energy, travel, speed)
-    began = [step for step in WORK if not first or step >= first]
+    began = list(WORK)[list(WORK).index(ProofStep(first)) if first else 0 :]
     missing = next(step for step in began if all(one.step != step for one in steps))
     return Ending(missing, words.strip(), True, energy, travel, speed)
 
 
-_ACTIVE = next(step for step in ORDER if step == "C8")
+# Steps in which the arm is active; their recordings hold positions in time.
+_ACTIVE = (
+    ProofStep.REST_POSE,
+    ProofStep.RAMPS,
+    ProofStep.LIFT,
+    ProofStep.GRAVITY_RAMP,
+)
 
 
 def _moved(recordings: Sequence[Values]) -> tuple[float, float, float]:

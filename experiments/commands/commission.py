@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from experiments.arguments import add_simulated_arm, friction_share
+from experiments.rig.truth_options import add_truth, check_truth, mount_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -68,12 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--fast", action="store_true", help="stepped time, only with --fake"
     )
     add_simulated_arm(parser)
-    parser.add_argument(
-        "--wrong",
-        default="",
-        metavar="NAME",
-        help="what is wrong with the simulated rig, e.g. motor-2-reversed (nothing)",
-    )
+    add_truth(parser)
     parser.add_argument(
         "--operator-script", metavar="auto", help="simulated operator, only with --fake"
     )
@@ -87,6 +83,7 @@ def run(args: argparse.Namespace) -> int:
     from experiments.rig.rig import FakeOptions
     from experiments.settings.load import load_settings
 
+    check_truth(args)
     steps = _steps(args)
     friction = friction_share(args)
     settings = load_settings(args.config)
@@ -107,6 +104,7 @@ def run(args: argparse.Namespace) -> int:
             friction,
             cables=args.cables,
             spread=True,
+            mount=mount_of(args),
             wrong=args.wrong,
         )
     persons = (args.operator or operator.who, args.witness or "")
@@ -292,9 +290,9 @@ def _steps(args: argparse.Namespace) -> list[ProofStep]:
     from acquisition.errors import SettingsError
     from experiments.proving.work import WORK
 
-    if not args.fake and (args.fast or args.operator_script or args.wrong):
+    if not args.fake and (args.fast or args.operator_script):
         raise SettingsError(
-            "--fast, --wrong and --operator-script work only with --fake.",
+            "--fast and --operator-script work only with --fake.",
             hint="Nothing was started.",
         )
     known = list(WORK)

@@ -81,7 +81,7 @@ class HungFit:
 
 def fit_foot(values: Values) -> FootFit:
     """Return the foot as the recording of C6 shows it."""
-    R = _orientations(values, ArmModel(load_constants()))
+    R = orientations(values, ArmModel(load_constants()))
     loads = number(values, "sign") * values["readings"]
     count = len(R)
     rows = np.zeros((3 * count, 6))
@@ -108,7 +108,7 @@ def fit_foot(values: Values) -> FootFit:
 def fit_hung(values: Values) -> HungFit:
     """Return sensor, sole and angles as the recording of C7 shows them."""
     model = ArmModel(load_constants())
-    R = _orientations(values, model)
+    R = orientations(values, model)
     both = (values["before"] + values["after"]) / 2
     loads = number(values, "sign") * (values["loaded"] - both)
     forces = loads[:, :3]
@@ -132,7 +132,7 @@ def fit_hung(values: Values) -> HungFit:
     )
 
 
-def _orientations(values: Values, model: ArmModel) -> Array:
+def orientations(values: Values, model: ArmModel) -> Array:
     """Return the believed orientations of the sensor in the base, (n, 3, 3)."""
     turned = [model.plate_pose(q)[1] @ values["mounting"] for q in values["q"]]
     return np.array(turned)

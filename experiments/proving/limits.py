@@ -320,6 +320,21 @@ LIMITS: Mapping[str, Limit] = {
         "Compensation moves the arm: masses, mounting, zeros or torque constants",
     ),
     "share": Limit("share of the compensation reached", "", "{text}", low=1.0),
+    # C14
+    "pressed": Limit(
+        "force on the kitchen scale", "N", "Too little to compare", low=15.0
+    ),
+    "scale": Limit(
+        "sensor beyond the kitchen scale",
+        "N",
+        "Scale of the sensor, or the scale was read wrongly",
+    ),
+    "pulled": Limit("pull of the spring balance", "N", "Too little to compare", low=5),
+    "balance": Limit(
+        "sensor beyond the spring balance",
+        "N",
+        "Scale of the sensor across its axis, or the balance was not held level",
+    ),
     "ended": Limit("stops by the guard", "", "{text}", high=0),
 }
 

@@ -11,12 +11,15 @@ from experiments.operator.console import Console
 from experiments.operator.prompts import Prompt
 from experiments.rig.rig import Rig
 from experiments.run.console_loop import TICK, ConsoleLoop
-from experiments.run.stop import ArmFaultError
+from experiments.run.stop import ArmFaultError, StopRequestedError
+from experiments.session.sidecar import TrialName
 from wam.driver.startup import ArmInfo
 from wam.model.constants import Array
 
 _BAR = 24  # characters
 COMMAND = "traction commission"
+_LARGEST_NUMBER = 1000.0  # that a scale shows
+_NO_TRIAL = TrialName(0, 0)
 
 
 @dataclass(slots=True)
@@ -88,6 +91,36 @@ class Scene:
         self.say(text)
         while self.console_loop.tick(Prompt.CLEAR) != " ":
             pass
+
+    def ask_number(self, text: str, simulated: float) -> float:
+        """Return the positive number that a person types after `text`.
+
+        Args:
+            text: what is asked.
+            simulated: what simulated hands read.
+
+        Raises:
+            ArmFaultError, StopRequestedError: as `ConsoleLoop.tick`.
+        """
+        if self.simulation is not None:
+            self.say(f"{text} Simulated: {simulated:g}")
+            return simulated
+        while True:
+            self.say(f"{text} Type the number, then Enter.")
+            try:
+                number = float(self._typed().replace(",", "."))
+            except ValueError:
+                continue
+            if 0.0 < number < _LARGEST_NUMBER:
+                return number
+
+    def _typed(self) -> str:
+        while (line := self.console_loop.line(_NO_TRIAL)) is None:
+            self.console.panel([f" {self.console_loop.operator.draft}"])
+        self.console.end_panel()
+        if self.console_loop.stop.count:
+            raise StopRequestedError
+        return line
 
     def wait(self, seconds: float) -> None:
         """Let `seconds` pass; raises as `ask`."""

@@ -44,8 +44,8 @@ def own_weight(scene: Scene) -> Values:
     readings: list[Array] = []
     for i, pose in enumerate(POSES):
         scene.show_share(i / len(POSES), f"pose {i + 1} of {len(POSES)}")
-        _bring(scene, pose, f"pose {i + 1} of {len(POSES)}")
-        measured = _measure(scene)
+        bring(scene, pose, f"pose {i + 1} of {len(POSES)}")
+        measured = measure(scene)
         q.append(measured[0])
         readings.append(measured[1])
     return {"q": np.array(q), "readings": np.array(readings), **_believed(scene)}
@@ -68,14 +68,14 @@ def hung_weight(scene: Scene) -> Values:
     for i, at in enumerate(HUNG_AT):
         where = f"pose {i + 1} of {len(HUNG_AT)}"
         scene.show_share(i / len(HUNG_AT), where)
-        _bring(scene, POSES[at], where)
-        q, before = _measure(scene)
+        bring(scene, POSES[at], where)
+        q, before = measure(scene)
         _hang(
             scene, HUNG, f"Hang {HUNG:g} kg from the middle of the sole, on a string."
         )
-        q, loaded = _measure(scene)
+        q, loaded = measure(scene)
         _hang(scene, 0.0, "Take the weight off.")
-        _, after = _measure(scene)
+        _, after = measure(scene)
         for part, value in zip(parts, (q, before, loaded, after), strict=True):
             part.append(value)
     names = ("q", "before", "loaded", "after")
@@ -102,7 +102,8 @@ def _believed(scene: Scene) -> dict[str, Array]:
     }
 
 
-def _bring(scene: Scene, pose: Sequence[float], where: str) -> None:
+def bring(scene: Scene, pose: Sequence[float], where: str) -> None:
+    """Have the arm brought to `pose` [rad] and held there; raises as `own_weight`."""
     angles = "  ".join(f"J{i} {angle:.1f}" for i, angle in enumerate(pose, 1))
     scene.ask(
         f"Bring the arm to {where}, about [rad]: {angles}. Hold it by the forearm, "
@@ -121,7 +122,7 @@ def _hang(scene: Scene, mass: float, text: str) -> None:
         scene.wait(SETTLED)
 
 
-def _measure(scene: Scene) -> tuple[Array, Array]:
+def measure(scene: Scene) -> tuple[Array, Array]:
     """Return mean positions [rad] and readings [N, N m] of two seconds, (7,) and (6,).
 
     Raises:

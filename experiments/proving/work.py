@@ -9,6 +9,7 @@ from experiments.proving import (
     by_hand,
     configuration,
     rest_pose,
+    scales,
     stop_circuit,
     weights,
 )
@@ -154,6 +155,14 @@ WORK: Mapping[ProofStep, StepWork] = {
         needs_loop=True,
         needs_zero=True,
     ),
+    ProofStep.PLATE: StepWork(
+        scales.collect,
+        scales.judge,
+        5,
+        "Read the scale again; compare the sensor's calibration sheet.",
+        needs_loop=True,
+        needs_zero=True,
+    ),
 }
 # Steps that share one connection to the rig. A stop takes power and positions away.
 SITTINGS: tuple[tuple[ProofStep, ...], ...] = (
@@ -161,4 +170,5 @@ SITTINGS: tuple[tuple[ProofStep, ...], ...] = (
     (ProofStep.STOP_CIRCUIT,),
     (ProofStep.BY_HAND, ProofStep.OWN_WEIGHT, ProofStep.HUNG_WEIGHT),
     (ProofStep.REST_POSE, ProofStep.RAMPS, ProofStep.LIFT, ProofStep.GRAVITY_RAMP),
+    (ProofStep.PLATE,),
 )

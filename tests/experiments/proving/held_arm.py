@@ -11,6 +11,7 @@ import numpy as np
 
 from experiments.proving.by_hand import CARRIED
 from experiments.proving.recording import Values
+from experiments.proving.scales import PRESSED, PULLED
 from experiments.proving.weights import AVERAGE, HUNG, HUNG_AT, POSES, SETTLED
 from fakes.plant.gauges import WristGauges
 from fakes.randomness import trial_generator
@@ -55,6 +56,7 @@ class HeldArm:
         self._t_ns = 0
         self._q = np.zeros(7)
         self._hung = 0.0
+        self._pushed: Array = np.zeros(3)  # N, at the sole, base frame
 
     def told(self, q: Array) -> Array:
         """Return where the joints are told to be that are truly at `q` [rad], (7,)."""
@@ -102,6 +104,19 @@ class HeldArm:
         hung = {"hung": np.array(HUNG), "stops": stops}
         return {**arrays, **self._believes(), **hung}
 
+    def plate(self, pressed: float = PRESSED * GRAVITY) -> Values:
+        """Return what C14 records where the scale truly bears `pressed` [N]."""
+        parts = [self._bring(POSES[0])]
+        for force in ((0.0, 0.0, pressed), (0.0, PULLED, 0.0)):
+            self._pushed = np.array(force)
+            parts.append((parts[0][0], self._measure()))
+            self._pushed = np.zeros(3)
+            parts.append((parts[0][0], self._measure()))
+        shown = {"pressed": np.array(PRESSED * GRAVITY), "pulled": np.array(PULLED)}
+        q, readings = zip(*parts, strict=True)
+        arrays = {"q": np.array(q), "readings": np.array(readings)}
+        return {**arrays, **self._believes(), **shown}
+
     def _believes(self) -> dict[str, Array]:
         payload = payload_of(self._tool)
         sole = self._tool.sole - np.array([0.0, 0.0, self._tool.sensor_height])
@@ -129,7 +144,7 @@ class HeldArm:
 
     def _read(self) -> Array:
         self._t_ns += round(1e9 * _STEP)
-        force = self._hung * GRAVITY * self._down
+        force = self._hung * GRAVITY * self._down + self._pushed
         turn = self._model.plate_pose(self._q)[1]
         self._gauges.end_cycle(turn, [*force.tolist(), 0.0, 0.0, 0.0], [0.0] * 6)
         shown = self.departure.shown @ np.array(self._gauges.load())
