@@ -70,13 +70,13 @@ def _cause(
         return "not done"
     if done.verdict == "wrong":
         return done.cause or "failed"
+    inputs = {**inputs, **record.told_inputs()}
     for name in bases_of(step):
         then, current = done.inputs.get(name), inputs.get(name)
         if current is not None and then != current:
-            return f"stale: {BASES[name].words} changed"
-        when = record.told.get(name)
-        if when is not None and done.started < when:
-            return f"stale: {BASES[name].words} changed on {when:%Y-%m-%d}, as told"
+            when = record.told.get(name)
+            told = "" if when is None else f" on {when:%Y-%m-%d}, as told"
+            return f"stale: {BASES[name].words} changed{told}"
     if now - done.ended > timedelta(days=LONGEST_DAYS):
         return f"stale: done more than {LONGEST_DAYS} days ago"
     if done.ended > now + timedelta(days=1):

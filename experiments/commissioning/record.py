@@ -166,6 +166,10 @@ class Commissioning(_Part):
             update={"told": told, "steps": _chain(self.steps, told), "signed": ()}
         )
 
+    def told_inputs(self) -> dict[str, str]:
+        """Return digests of what a person said, by the names of `steps.BASES`."""
+        return {name: _first({name: when}) for name, when in self.told.items()}
+
     def first_broken(self) -> ProofStep | None:
         """Return the first step whose digest is not that of what stands there."""
         pairs = zip(self.steps, _chain(self.steps, self.told), strict=True)

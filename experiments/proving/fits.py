@@ -162,12 +162,12 @@ def _fit_angles(
         return np.concatenate(parts)
 
     steps = np.eye(len(angles)) * _STEP
-    J = np.zeros((0, len(angles)))
+    slopes = np.zeros((0, len(angles)))
     for _ in range(_ROUNDS):
         here = left(angles)
-        J = np.array([(left(angles + step) - here) / _STEP for step in steps]).T
-        angles = angles - np.linalg.lstsq(J, here)[0]
-    return angles, np.sqrt(np.diag(np.linalg.inv(J.T @ J)))
+        slopes = np.array([(left(angles + step) - here) / _STEP for step in steps]).T
+        angles = angles - np.linalg.lstsq(slopes, here)[0]
+    return angles, np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)))
 
 
 def _down(values: Values, model: ArmModel, q: Array, x: Array) -> Array:

@@ -121,6 +121,7 @@ def do_step(
     name = f"commissioning_{step}_{ended:%Y%m%dT%H%M%S}.npz"
     raw = write_raw(files.folder, name, values)
     present = present_inputs(scene.rig, scene.answers, scene.info)
+    present |= files.record.told_inputs()
     files.keep(
         StepRecord(
             step=step,

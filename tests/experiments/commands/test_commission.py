@@ -38,6 +38,22 @@ def test_what_was_done_is_kept_drawn_and_not_done_again(kept):
     assert read_commissioning(kept) == record
 
 
+def test_an_arm_that_was_moved_begins_again(kept):
+    before = read_commissioning(kept)
+    config = kept.parent / "rig.toml"
+    done = traction("commission", *FIRST, "--moved", "--config", config)
+    assert done.code == 0, done.err
+    record = read_commissioning(kept)
+    assert list(record.told) == ["mounting"]
+    assert [one.step for one in record.steps] == ["C0", "C1"]
+    assert all(one not in before.steps for one in record.steps)
+
+
+def test_the_catalogue_of_wrong_rigs_is_listed():
+    done = traction("commission", "--fake", "--wrong", "help")
+    assert (done.code, "motor-3-reversed" in done.out) == (0, True)
+
+
 def test_what_was_recorded_is_judged_again(kept):
     before = read_commissioning(kept)
     done = recheck(kept)
