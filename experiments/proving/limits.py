@@ -287,7 +287,7 @@ LIMITS: Mapping[str, Limit] = {
         "torque constant, or its drive cable",
     ),
     "aside": Limit(
-        "way of another joint meanwhile",
+        "way of another joint, joint {pushed} pushed",
         "mrad",
         "Pushed was joint {joint}, moved joint {other}: motors or their cables are "
         "exchanged, or one is reversed",

@@ -150,6 +150,7 @@ def judge_ramps(values: Values) -> Judgement:
                 high=1e3 * most[other],
                 joint=i + 1,
                 other=other + 1,
+                pushed=_signed(i, sense),
             )
         )
         way = sense * (q[:, i] - q[0, i])

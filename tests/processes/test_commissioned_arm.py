@@ -1,5 +1,6 @@
-"""A served arm whose commissioning is not there is not driven."""
+"""A served arm whose commissioning is not there, stale or edited is not driven."""
 
+import json
 import os
 import pty
 import re
@@ -10,7 +11,10 @@ import sys
 import pytest
 
 from acquisition.clock import SystemClock
-from tests.experiments.program import write_config
+from acquisition.errors import TractionError
+from experiments.commissioning.record import NAME
+from lab.guest.commissioned import take_as_commissioned
+from tests.experiments.program import changed, write_config
 
 pytestmark = [pytest.mark.wall_clock, pytest.mark.timeout(400)]
 TRIES = 6
@@ -72,6 +76,17 @@ def run_at_terminal(config, data):
     return re.sub(r"\s+", " ", re.sub(r"\x1b\[[\d;?]*\w", "", seen))
 
 
+def commissioned(config):
+    """Write a record of sound steps beside `config`; a busy machine seems silent."""
+    for left in reversed(range(TRIES)):
+        try:
+            return take_as_commissioned(config)
+        except TractionError:
+            if not left:
+                raise
+    raise AssertionError
+
+
 def page(config, data):
     """Return what `run` shows once the arm answers; a busy machine seems silent."""
     for _ in range(TRIES):
@@ -85,3 +100,34 @@ def test_an_arm_without_a_record_is_not_driven(config, tmp_path):
     seen = page(config, tmp_path)
     assert f"{REFUSED}: C0 configuration: not done, and 11 more" in seen
     assert ASKS not in seen
+
+
+def test_an_arm_with_a_stale_record_is_not_driven(config, tmp_path):
+    commissioned(config)
+    old, new = "foot_speed = 0.8 ", "foot_speed = 0.7 "
+    config.write_text(changed(config.read_text(), old, new))
+    seen = page(config, tmp_path)
+    assert f"{REFUSED}: C0 configuration: stale: [limits] of rig.toml changed" in seen
+    assert ASKS not in seen
+
+
+def test_an_arm_with_an_edited_record_is_not_driven(config, tmp_path):
+    commissioned(config)
+    path = config.parent / NAME
+    content = json.loads(path.read_text())
+    content["steps"][8]["verdict"] = "accepted"
+    path.write_text(json.dumps(content))
+    seen = page(config, tmp_path)
+    assert "was changed at or before C8 rest pose" in seen
+    assert ASKS not in seen
+
+
+def test_an_arm_with_a_sound_record_is_driven(config, tmp_path):
+    commissioned(config)
+    for _ in range(TRIES):
+        seen = run_at_terminal(config, tmp_path)
+        if ASKS in seen:
+            break
+    assert "uncommissioned: C12 lock and clock: not done" in seen
+    assert ASKS in seen
+    assert REFUSED not in seen

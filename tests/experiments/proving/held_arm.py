@@ -44,6 +44,7 @@ class HeldArm:
         foot = tool.foot if typed is None else replace(tool.foot, mass=typed)
         self._tool = replace(tool, foot=foot)
         true = true_tool(tool, self.departure)
+        self.true_tool = true
         self._model = ArmModel(self._constants, true)
         down = rotation(self.departure.mount.tolist()).T @ np.array([0.0, 0.0, -1.0])
         self._down: Array = down.astype(np.float64)

@@ -44,13 +44,13 @@ def one(offers, words):
 
 def test_a_foot_of_another_mass_is_offered_with_its_mass(tool):
     text = one(offered(tool, 1, "foot-half"), "feet.tread.mass = ")
-    true = HeldArm(tool, 1, "foot-half")._model.tool.foot.mass
+    true = HeldArm(tool, 1, "foot-half").true_tool.foot.mass
     assert numbers(text, "mass = ")[0] == pytest.approx(true, rel=0.06)
 
 
 def test_another_sole_is_offered_with_its_place(tool):
     text = one(offered(tool, 1, "sole-20mm-lower"), "feet.tread.sole = ")
-    true = HeldArm(tool, 1, "sole-20mm-lower")._model.tool.sole
+    true = HeldArm(tool, 1, "sole-20mm-lower").true_tool.sole
     assert numbers(text, "sole = ") == pytest.approx(true.tolist(), abs=0.004)
 
 
