@@ -32,6 +32,7 @@ COMMANDS = {
     "status": "kept trials per terrain, counted from verified files",
     "note": "write a remark on a session or a trial",
     "verdict": "change the verdict on a recorded trial",
+    "commission": "the first day of an arm: guided steps, each one proof",
     "zero": "set the home position after confirmation",
     "bench": "measures the control loop on this machine",
     "calibrate": "guided calibrations of the rig",

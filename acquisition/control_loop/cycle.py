@@ -17,6 +17,7 @@ from acquisition.control_loop.guard import GuardState, Observation, check
 from acquisition.control_loop.law import ControlLaw, FootObserver, SoleGoal
 from acquisition.control_loop.limits import GuardLimits, bounded_torque
 from acquisition.control_loop.loop import Tick
+from acquisition.control_loop.proof import ProofGoal
 from acquisition.control_loop.states import (
     REQUESTS,
     TRANSITIONS,
@@ -29,6 +30,7 @@ from acquisition.devices import (
     SHORTED,
     Arm,
     ArmReading,
+    SafetyMode,
     Vector,
     WrenchSample,
     WrenchSensor,
@@ -103,6 +105,7 @@ class Cycle:
         self._requested: ArmEvent | None = None
         self._move: tuple[Vector, float] | None = None
         self._stance: SoleGoal | None = None
+        self._proof: ProofGoal | None = None
         self._reported: GuardVerdict | None = None
         self.is_recording = False
         self.replies_ns = 0
@@ -117,6 +120,7 @@ class Cycle:
         self._requested = REQUESTS[state]
         self._move = None
         self._stance = None
+        self._proof = None
         self.status.verdict = None
 
     def move_to(self, goal: Sequence[float], speed: float) -> None:
@@ -130,6 +134,10 @@ class Cycle:
     def stand(self, goal: SoleGoal) -> None:
         """Ask for what the sole is to do; else as `move_to`."""
         self._stance = goal
+
+    def prove(self, goal: ProofGoal) -> None:
+        """Ask for a proof; else as `move_to`. Any verdict ends it in idle."""
+        self._proof = goal
 
     def set_bias(self, bias: Sequence[float]) -> None:
         """Take the sensor's reading without load [N, N m], six numbers."""
@@ -194,11 +202,12 @@ class Cycle:
         self._handle(event, reading)
 
     def _begin_move(self, reading: ArmReading) -> None:
-        """Begin the move or stance that was asked for, or drop it if a fault stands."""
+        """Begin the move, stance or proof asked for; none if a fault stands."""
         if reading.missing_cycles:
             return
         move, self._move = self._move, None
         stance, self._stance = self._stance, None
+        proof, self._proof = self._proof, None
         if self.status.verdict is not None:
             return
         try:
@@ -206,6 +215,10 @@ class Cycle:
                 self.law.move_to(*move, reading)
             elif stance is not None:
                 self.law.stand(stance, reading)
+            elif proof is not None:
+                self.law.prove(proof, reading)
+                # It was laid onto its stops, from wherever it was.
+                self._guard = replace(self._guard, armed=0)
         except ValueError:
             self.report(verdict_for(Fault.MOVE_REFUSED))
 
@@ -259,13 +272,25 @@ class Cycle:
             energy=self._energy,
         )
         self._guard, verdict = check(self.limits, self._guard, seen)
+        if self.law.is_proving():
+            verdict = self._judge_proof(reading, verdict)
         reported, self._reported = self._reported, None
         if reported is not None and reported.severity > verdict.severity:
             return reported
         return verdict
 
+    def _judge_proof(self, reading: ArmReading, verdict: GuardVerdict) -> GuardVerdict:
+        """Return what the guard says of a proof, or else what the proof itself does."""
+        is_powered = self.status.safety is SafetyMode.ACTIVE
+        excess = self.law.proof_excess(reading, self._energy, is_powered=is_powered)
+        if excess is None or verdict.action is not _NONE:
+            return verdict
+        return verdict_for(Fault.PROOF_MOTION, excess)
+
     def _obey(self, verdict: GuardVerdict, reading: ArmReading) -> None:
         """Enter the state the guard asks for and keep the worst verdict."""
+        if self.law.is_proving():  # nothing else is known to bear this arm
+            verdict = replace(verdict, action=Action.IDLE)
         self._handle(VERDICTS[verdict.action], reading)
         if isinstance(verdict.detail, CircuitCauses):
             # Known only now: idling the arm asks the module for its monitors.

@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from acquisition.control_loop.details import MotionExcess
+from acquisition.control_loop.proof import ProofGoal
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import ArmReading, Vector, WrenchSample
 from acquisition.sample import Sample
@@ -59,6 +61,30 @@ class ControlLaw(Protocol):
 
         Raises:
             ValueError: the arm is not in hold, or `goal` cannot be obeyed.
+        """
+        ...
+
+    def prove(self, goal: ProofGoal, reading: ArmReading) -> None:
+        """Give the arm what `goal` says and nothing else, in hold.
+
+        Raises:
+            ValueError: the arm is not in hold, or `goal` is none.
+        """
+        ...
+
+    def is_proving(self) -> bool:
+        """Return whether the arm is in a proof: any verdict ends it in idle."""
+        ...
+
+    def proof_excess(
+        self, reading: ArmReading, energy: float, *, is_powered: bool
+    ) -> MotionExcess | None:
+        """Return what an arm in a proof does that it should not; None = nothing.
+
+        Args:
+            reading: of this cycle.
+            energy: kinetic energy of the arm [J].
+            is_powered: its motors have power.
         """
         ...
 

@@ -6,6 +6,7 @@ from typing import Protocol
 
 from acquisition.clock import NS_PER_S, PERIOD_NS, Clock
 from acquisition.control_loop.law import SoleGoal
+from acquisition.control_loop.proof import ProofGoal
 from acquisition.control_loop.states import ArmState, ControlStatus
 from acquisition.ipc.commands import CommandKind, CommandQueue, LoopStatus, StatusSlot
 from acquisition.ipc.layout import ProcessRole, SharedLayout
@@ -104,6 +105,10 @@ class LoopClient:
     def stand(self, goal: SoleGoal) -> None:
         """Ask for what the sole is to do, in hold; again at least every 0.1 s."""
         self._commands.post(CommandKind.STAND, values=goal.values)
+
+    def prove(self, goal: ProofGoal) -> None:
+        """Ask for a proof, in hold."""
+        self._asked = self._commands.post(CommandKind.PROVE, values=goal.values)
 
     def set_bias(self, bias: Sequence[float]) -> None:
         """Tell the loop what the sensor reads without load [N, N m], six numbers."""

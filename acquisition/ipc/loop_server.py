@@ -9,6 +9,7 @@ from acquisition.control_loop.cycle import Cycle
 from acquisition.control_loop.faults import Fault, verdict_for
 from acquisition.control_loop.law import SoleGoal
 from acquisition.control_loop.loop import LoopStats, Tick
+from acquisition.control_loop.proof import ProofGoal
 from acquisition.control_loop.states import ArmState
 from acquisition.control_loop.timing import pack_timing
 from acquisition.devices import Arm
@@ -109,6 +110,8 @@ class LoopServer:
             cycle.move_to(tuple(goal), speed)
         elif kind is CommandKind.STAND:
             cycle.stand(SoleGoal(*command.values[:5]))
+        elif kind is CommandKind.PROVE:
+            cycle.prove(ProofGoal.of(command.values))
         else:
             self.is_over = True
         self._status.obeyed = command.number

@@ -13,6 +13,7 @@ class ReportSection(Enum):
     FRICTION = "Friction of the drives"
     LOADS = "Load limits by joint friction"
     STANCES = "Stances"
+    COMMISSIONING = "Steps of the commissioning"
     HEALTH = "Rig health"
     REACH = "Measurement limits"
     ORIGIN = "Analysis settings and provenance"

@@ -108,7 +108,8 @@ def run(args: argparse.Namespace) -> int:
     console.say(f"traction calibrate {args.what}        {kind} · foot {row.foot}")
     stop = StopFlag()
     with logging_bus(rig, None, console), handle_signals(stop), keyboard(operator):
-        run_preflight(rig, Path(args.data), console)
+        made_anew = _MADE_ANEW.get(args.what)
+        run_preflight(rig, Path(args.data), console, made_anew=made_anew)
         hand = SimulatedHand(rig.simulation) if rig.simulation else None
         console_loop = ConsoleLoop(rig, console, operator, stop, hand)
         command = f"traction calibrate {args.what}"
@@ -225,6 +226,13 @@ _WORK = {
     "sensor": _sensor,
     "foot": _sensor,
     "terrain": _terrain,
+}
+# Those that send torque, with what of a commissioning they measure anew.
+_MADE_ANEW = {
+    "gravity": ("[gravity]", "[friction]"),
+    "friction": ("[friction]",),
+    "sensor": ("[ft_sensor]", "[feet]"),
+    "foot": ("[feet]",),
 }
 _FEWEST = {"gravity": 3, "sensor": 6, "foot": 6}  # poses
 

@@ -1,5 +1,6 @@
 """Is the rig fit to run? Every check graded, with what to do beside it."""
 
+from collections.abc import Collection
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from acquisition.errors import IDLE_ARM, TractionError
 from experiments import provenance
 from experiments.messages import preflight_error
 from experiments.operator.console import BAD, GOOD, WARNING, Console
+from experiments.preflight.commissioned import check_commissioned
 from experiments.preflight.connecting import as_preflight, not_reached
 from experiments.preflight.host_checks import (
     DiskProbe,
@@ -61,6 +63,7 @@ def run_preflight(
     console: Console,
     seconds: float | None = None,
     probe: DiskProbe = free_bytes,
+    made_anew: Collection[str] | None = None,
 ) -> Preflight:
     """Check configuration, arm, sensor, loop and disk; print one line each.
 
@@ -72,6 +75,8 @@ def run_preflight(
         console: where the page is printed.
         seconds: how long the loop is tested [s]; None = `[loop] test_time`.
         probe: tells how much room is left on the disk.
+        made_anew: of what a commissioning stands on, what follows measures anew; None =
+            no torque follows, and the arm need not be commissioned.
 
     Raises:
         PreflightError: a check failed; all that do not need it were run.
@@ -79,6 +84,12 @@ def run_preflight(
     page = ChecksPage(console)
     _check_host(rig, data, page, probe)
     info = page.attempt(lambda: _check_arm(rig, page))
+    proofs: dict[str, str] = {}
+    if info is not None and made_anew is not None and not rig.is_simulated:
+        proofs = (
+            page.attempt(lambda: check_commissioned(rig, info, page.add, made_anew))
+            or {}
+        )
     sensor = None
     if info is not None or not rig.settings.rig.ft_sensor.is_on_bus:
         arm_state = "not touched" if info is None else IDLE_ARM
@@ -98,7 +109,9 @@ def run_preflight(
     page.attempt(lambda: _check_stream(rig, page))
     page.require_fit()
     devices = {f"ft_sensor:{key}": value for key, value in sensor.items()}
-    return Preflight(tuple(page.checks), {**devices, **info.metadata(), **grants})
+    return Preflight(
+        tuple(page.checks), {**devices, **info.metadata(), **grants, **proofs}
+    )
 
 
 def _check_host(rig: Rig, data: Path, page: ChecksPage, probe: DiskProbe) -> None:

@@ -37,6 +37,7 @@ from analysis.terrains.export import break_away_batch, break_away_of, database_o
 from analysis.terrains.identify import identify_study
 from experiments.operator.console import Console
 from experiments.report.choices import AnalysisChoices, repeat_study
+from experiments.report.commissioned import uncommissioned
 from experiments.report.foresight import StudyForesight, study_foresight, watched_trials
 from experiments.report.progress import fitting
 from experiments.report.tables import report_tables, summary_table
@@ -301,7 +302,14 @@ def _context(
             "what_if": [plain_choice(c, study, other) for c, other in others],
             "foresight": foresight.numbers,
         },
-        warnings=[*order.missing, *analysed.problems, *unsound],
+        warnings=[
+            *uncommissioned(
+                (t.name, t.metadata) for group in trials.values() for t in group
+            ),
+            *order.missing,
+            *analysed.problems,
+            *unsound,
+        ],
         photos=[BedPhoto(*photo) for photo in photos],
         foresight=foresight.model if len(sessions) > 1 else None,
         foresight_curves=foresight.curves,

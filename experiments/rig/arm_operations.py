@@ -10,10 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition.clock import PERIOD_NS, Clock
+from acquisition.clock import NS_PER_S, PERIOD_NS, Clock
 from acquisition.devices import SafetyMode
 from wam.driver.arm import WamArm
 from wam.driver.startup import ArmInfo
+from wam.driver.survey import Answers, Heard
 
 EXCHANGE_CYCLES = 100  # in which positions are asked for
 UNASKED_EVERY = 20  # in one of so many cycles they are not
@@ -72,6 +73,18 @@ class ArmOperations:
     def start(self) -> ArmInfo:
         """Discover, wake and query the arm; raises as `WamArm.start`."""
         return self._opened().start()
+
+    def listen(self, seconds: float) -> Heard:
+        """Ask for nothing so long; return what was heard. Raises LinkError."""
+        return self._opened().survey().listen(round(seconds * NS_PER_S))
+
+    def count_answers(self, times: int) -> Answers:
+        """Return how often devices answer a question that is asked `times` times."""
+        return self._opened().survey().count_answers(times)
+
+    def answers(self) -> list[dict[str, int | None]]:
+        """Return what pucks 1 to 7 said at the last `start`, by name."""
+        return self._opened().answers
 
     def measure_exchange(self) -> ExchangeTimes:
         """Ask 100 times for the positions, one period apart, without torque.

@@ -204,7 +204,8 @@ def _check_rig(request: SessionRequest, rig: Rig, host_faults: HostFaults) -> Pr
     foot = confirm_foot(rig.row, before, request.operator, console)
     console.check(foot.mark, foot.name, foot.text)
     probe = host_faults.free_bytes
-    return run_preflight(rig, request.data, console, probe=probe).after(foot)
+    page = run_preflight(rig, request.data, console, probe=probe, made_anew=())
+    return page.after(foot)
 
 
 def _check_conditions(

@@ -7,6 +7,7 @@ from pathlib import Path
 from acquisition.clock import PERIOD_NS
 from acquisition.trial_file.reader import TrialReader
 from lab.guest.commands import Program, ScenarioError, require
+from lab.guest.commissioned import take_as_commissioned
 from lab.guest.machine_room import MachineRoom
 
 _START = 60.0  # s of guest time until the arm is to be activated
@@ -130,6 +131,7 @@ class LedSession:
 
 def begin(room: MachineRoom, arm: Program, trials: int, *options: str) -> LedSession:
     """Return a session of `trials` trials, before its preflight."""
+    take_as_commissioned(room.config)
     program = room.traction("run", TERRAIN, "--trials", str(trials), *options)
     return LedSession(room, program, arm)
 

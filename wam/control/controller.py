@@ -4,7 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from acquisition.control_loop.details import MotionExcess
 from acquisition.control_loop.law import ControlLaw, SoleGoal
+from acquisition.control_loop.proof import ProofGoal
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import ArmReading, Vector
 from wam.control.friction_compensation import FrictionCompensation
@@ -17,6 +19,7 @@ from wam.control.position_control import (
     joint_pd,
     move_reference,
 )
+from wam.control.proof import Proof
 from wam.control.soft_walls import SoftWalls
 from wam.control.sole_impedance import SoleImpedance
 from wam.model.arm_model import ArmModel
@@ -59,8 +62,9 @@ class Standing:
     tau: Vector
 
 
-# In hold an arm may move or stand by itself; every other mode is its bare state.
-Mode = ArmState | Moving | Standing
+# In hold an arm may move or stand by itself, or be in a proof; every other mode is its
+# bare state.
+Mode = ArmState | Moving | Standing | Proof
 
 
 class FootController(ControlLaw):
@@ -132,7 +136,9 @@ class FootController(ControlLaw):
                 `speed` is not within 0..0.5 rad/s.
         """
         constants, mode = self._model.constants, self._mode
-        if isinstance(mode, ArmState) and mode is not ArmState.HOLD:
+        if self.is_proving() or (
+            isinstance(mode, ArmState) and mode is not ArmState.HOLD
+        ):
             raise ValueError("the arm moves in hold only")
         is_inside = goal.shape == (7,) and bool(
             ((goal >= constants.q_lower) & (goal <= constants.q_upper)).all()
@@ -173,6 +179,30 @@ class FootController(ControlLaw):
         self._hold.release()
         self._mode = Standing(self.impedance, np.zeros(7))
 
+    def prove(self, goal: ProofGoal, reading: ArmReading) -> None:
+        """Give the arm what `goal` says and nothing else; only in hold.
+
+        Raises:
+            ValueError: the arm does not hold, moves or stands, or `goal` is none.
+        """
+        if self._mode is not ArmState.HOLD and not self.is_proving():
+            raise ValueError("an arm is proved in hold only")
+        self._mode = Proof(goal, self._model.constants, reading)
+        self._hold.release()
+        self._lock.release(reading.host_ns)
+
+    def is_proving(self) -> bool:
+        """Return whether the arm is in a proof: any verdict ends it in idle."""
+        return isinstance(self._mode, Proof)
+
+    def proof_excess(
+        self, reading: ArmReading, energy: float, *, is_powered: bool
+    ) -> MotionExcess | None:
+        """Return what an arm in a proof does that it should not; None = nothing."""
+        if not isinstance(self._mode, Proof):
+            return None
+        return self._mode.excess(reading, energy, is_powered=is_powered)
+
     def torque(self, reading: ArmReading) -> tuple[Vector, Vector]:
         """Return (tau, gravity part) [N m], shapes (7,).
 
@@ -181,6 +211,9 @@ class FootController(ControlLaw):
         """
         now = reading.host_ns
         gravity = compensation(self._model, reading.q, self._mass.at(now))
+        if isinstance(self._mode, Proof):
+            tau = self._mode.torque(reading, gravity)
+            return tau, tau.copy()
         if reading.jump is not None:
             return gravity.copy(), gravity
         lock = self._lock_torque(reading)
@@ -204,7 +237,7 @@ class FootController(ControlLaw):
 
     def is_moving(self) -> bool:
         """Return whether a move or stance is made, or the goal of one is kept."""
-        return not isinstance(self._mode, ArmState)
+        return isinstance(self._mode, Moving | Standing)
 
     def stuck_motor(self) -> int:
         """Return the motor that the move turns in vain, 1-7; 0 = none."""

@@ -33,6 +33,7 @@ from wam.driver.joint_estimator import JointEstimator
 from wam.driver.safety_module import SafetyModule
 from wam.driver.settings import ArmSettings
 from wam.driver.startup import ArmInfo, StartUp
+from wam.driver.survey import BusSurvey
 from wam.driver.transmission import MOTORS, Transmission
 
 _MS = NS_PER_MS
@@ -73,11 +74,17 @@ class WamArm:
         self._late_in_a_row = 0
         self._is_commanded = True
         self._is_closed = False
+        self._answers: list[dict[str, int | None]] = []
 
     @property
     def transmission(self) -> Transmission:
         """The transmission with the constants read from the pucks."""
         return self._started().transmission
+
+    @property
+    def answers(self) -> list[dict[str, int | None]]:
+        """What pucks 1 to 7 said of themselves at the last start, refused or not."""
+        return self._answers
 
     @property
     def sent_ns(self) -> int:
@@ -88,6 +95,10 @@ class WamArm:
     def safety(self) -> SafetyModule:
         """The safety module, for use outside the loop."""
         return self._safety
+
+    def survey(self) -> BusSurvey:
+        """Return what counts who is on the bus; not while the loop runs."""
+        return BusSurvey(self._link, self._clock)
 
     def attach_device(self, bus_device: BusDevice) -> None:
         """Ask a device on the arm's bus along with the positions from now on."""
@@ -104,6 +115,7 @@ class WamArm:
             LinkError: the bus is down.
         """
         start_up = StartUp(self._properties, self._clock, self._settings)
+        self._answers = start_up.answers
         info = start_up.run()
         self._safety = SafetyModule(self._properties, self._clock, info.safety_vers)
         self._poller.set_firmware(info.safety_vers)

@@ -3,6 +3,7 @@
 import tomllib
 
 from lab.guest.commands import Program, require
+from lab.guest.commissioned import take_as_commissioned
 from lab.guest.machine_room import CAN, MachineRoom
 from lab.guest.network import set_up
 from lab.guest.promises import hold_to, promise
@@ -52,6 +53,7 @@ def _moving(room: MachineRoom, arm: Program) -> LedSession:
     """Return a calibration whose arm has begun to move by itself."""
     poses = str(room.folder / "poses.toml")
     words = ("calibrate", "gravity", "--terrain", "TF", "--pose-file", poses, "--force")
+    take_as_commissioned(room.config)
     session = LedSession(room, room.traction(*words), arm)
     session.wait_idle()
     session.activate()

@@ -31,6 +31,7 @@ RECORDED_NAMES = {
     "activation-motion",
     "hold-motion",
     "damp-motion",
+    "proof-motion",
     "kinetic-energy",
     "not-a-number",
     "joint-limit",

@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 
 from acquisition.control_loop import contact
+from acquisition.control_loop.proof import ProofGoal, ProofKind
+from acquisition.control_loop.states import ArmState
 from acquisition.devices import SafetyMode
 from acquisition.ipc.child import ProcessLostError
 from experiments.fault_injection.host_faults import COMPUTER_FAULTS
@@ -290,6 +292,12 @@ def _allow_no(travel):
     return allow
 
 
+def _prove(scene):
+    """Give an arm that a hand carries no torque, as if it lay on its stops."""
+    scene.built.cycle.request(ArmState.HOLD)
+    scene.built.cycle.prove(ProofGoal(ProofKind.REST))
+
+
 def _damp_in_vain(scene):
     """Let joint 6 be too fast, and damping not stop it at once."""
     _allow_no("damp_travel")(scene)
@@ -521,6 +529,7 @@ CASES = {
     "kinetic-energy": acted(Prompt.RECORDING, _swing_hard, 4, "kinetic energy was"),
     "damp-motion": acted(Prompt.RECORDING, _damp_in_vain, 4, "the sole's way was"),
     "hold-motion": acted(Prompt.LIFT, _allow_no("hold_travel"), 4, "(limit 0.00)"),
+    "proof-motion": acted(Prompt.RECORDING, _prove, 4, "kinetic energy was"),
     "activation-motion": acted(
         Prompt.SUPPORT, _allow_no("activation_travel"), 4, "(limit 0.00)", since=-1.0
     ),

@@ -18,7 +18,7 @@ def measured(tmp_path, capsys, *seconds):
     given = load_settings(None)
     loop = given.rig.loop.model_copy(update={"test_time": 0.7})
     settings = replace(given, rig=given.rig.model_copy(update={"loop": loop}))
-    rig = build_rig(settings, settings.matrix.terrains[0], FakeOptions(True, seed=1))
+    rig = build_rig(settings, settings.matrix.terrains[0], FakeOptions("fast", seed=1))
     # Simulated time, but as long as on the wall clock.
     rig = replace(rig, is_stepped=False)
     console = Console(color=False)

@@ -31,6 +31,7 @@ the settings, which refuse it where rig.toml would be refused.
 Made by `python -m tests.fakes.world.wrong_rigs_page > docs/wrong-rigs.md`; tests in
 `tests/fakes/world/test_wrong_rigs.py` hold that every rig differs as it is named. Some
 are refused at every start already, by what the pucks say or by who is on the bus.
+`python -m tests.wrong_rigs [NAME ...]` commissions them and says which step found them.
 
 ## Sound rigs
 

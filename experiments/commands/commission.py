@@ -1,0 +1,317 @@
+"""traction commission: the first day of an arm, guided, each step one proof."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from experiments.arguments import (
+    add_simulated_arm,
+    add_time,
+    asked_time,
+    friction_share,
+)
+from experiments.rig.truth_options import add_truth, check_truth, mount_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from experiments.commissioning.record import Commissioning
+    from experiments.commissioning.steps import ProofStep
+    from experiments.operator.console import Console
+    from experiments.operator.prompts import OperatorInput
+    from experiments.proving.guide import RecordFolder
+    from experiments.rig.rig import FakeOptions
+    from experiments.settings.load import Settings
+
+EXAMPLES = """\
+  traction commission --config lab/rig.toml what is not done or stale, step by step
+  traction commission --fake --fast --until C3    the first steps, simulated devices"""
+
+FAKE_FOLDER = "commissioning.fake"
+_LONGEST_NAME = 100  # characters
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `commission`."""
+    parser.add_argument(
+        "--from",
+        dest="first",
+        metavar="STEP",
+        help="begin with this step and do all from there again, e.g. C8",
+    )
+    parser.add_argument(
+        "--until", dest="last", metavar="STEP", help="end after this step, e.g. C4"
+    )
+    parser.add_argument(
+        "--recheck",
+        action="store_true",
+        help="judge the recordings again, no device is touched",
+    )
+    parser.add_argument(
+        "--beside",
+        type=Path,
+        metavar="FILE",
+        help="earlier commissioning.json that the page draws the values beside (the "
+        "last signed one)",
+    )
+    parser.add_argument(
+        "--moved",
+        action="store_true",
+        help="the arm or its table was moved or bolted again: all steps are stale",
+    )
+    parser.add_argument(
+        "--tensioned",
+        action="store_true",
+        help="a drive cable was tensioned or replaced: C5 to C11 are stale",
+    )
+    parser.add_argument("--operator", metavar="NAME", help="who does it (login name)")
+    parser.add_argument("--witness", metavar="NAME", help="who stands by")
+    parser.add_argument("--fake", action="store_true", help="simulated devices")
+    add_time(parser)
+    add_simulated_arm(parser)
+    add_truth(parser)
+    parser.add_argument(
+        "--operator-script", metavar="auto", help="simulated operator, only with --fake"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Do the steps that are due and return the exit code."""
+    from experiments.operator.console import WARNING, Console
+    from experiments.operator.scripted import choose_operator
+    from experiments.proving.guide import RecordFolder, recheck
+    from experiments.rig.rig import FakeOptions
+    from experiments.settings.load import load_settings
+
+    check_truth(args)
+    steps = _steps(args)
+    friction = friction_share(args)
+    settings = load_settings(args.config)
+    console = Console(color=not args.no_color)
+    folder = _folder(settings, is_fake=args.fake)
+    files = RecordFolder.open(folder, is_simulated=args.fake)
+    earlier = _earlier(args.beside, folder)
+    if args.recheck:
+        is_sound = recheck(files, console)
+        _write_page(files, earlier, console, _offers(settings, files))
+        return 0 if is_sound else 6
+    operator = choose_operator(args.operator_script, is_fake=args.fake)
+    fake: FakeOptions | None = None
+    if args.fake:
+        fake = FakeOptions(
+            asked_time(args) or "paced",
+            args.seed,
+            friction,
+            cables=args.cables,
+            spread=True,
+            mount=mount_of(args),
+            wrong=args.wrong,
+        )
+    persons = (args.operator or operator.who, args.witness or "")
+    kind = "SIMULATED" if args.fake else "LIVE RIG"
+    console.say(f"traction commission        {kind} · {files.folder}")
+    if args.fake:
+        console.say("Simulated hands and pendant do what is asked, at [space].")
+    _note_changes(args, files)
+    code = _sittings(args, settings, fake, steps, files, persons, console, operator)
+    offers = _offers(settings, files)
+    for text in offers:
+        console.say(f" {WARNING} {text}")
+    if code == 0:
+        _end(files, console, persons, is_accepting=bool(offers))
+    _write_page(files, earlier, console, offers)
+    return code
+
+
+def _note_changes(args: argparse.Namespace, files: RecordFolder) -> None:
+    """Write what a person says that changed; an empty record has nothing stale."""
+    from datetime import UTC, datetime
+
+    from acquisition.clock import SystemClock
+
+    if not files.record.steps:
+        return
+    now = datetime.fromtimestamp(SystemClock().utc_ns() // 1_000_000_000, UTC)
+    for name, is_told in (("mounting", args.moved), ("cables", args.tensioned)):
+        if is_told:
+            files.tell(name, now)
+
+
+def _offers(settings: Settings, files: RecordFolder) -> list[str]:
+    """Return what C6 and C7 offer as values of rig.toml."""
+    from math import radians
+
+    from experiments.proving.offers import Mounted, offers_of
+
+    sensor = settings.rig.ft_sensor
+    foot = settings.matrix.terrains[0].foot
+    mounted = Mounted(foot, sensor.height, radians(sensor.angle_deg))
+    return offers_of(files.recordings(), mounted)
+
+
+def _earlier(given: Path | None, folder: Path) -> Commissioning | None:
+    """Return the record that the page draws the values beside; None = there is none.
+
+    Raises:
+        SettingsError: `given` is no record.
+    """
+    from acquisition.errors import SettingsError
+    from experiments.commissioning.record import newest_kept, read_record
+
+    path = given or newest_kept(folder)
+    record = read_record(path) if path is not None else None
+    if given is not None and record is None:
+        raise SettingsError(f"There is no file {given}.", hint="Nothing was started.")
+    return record
+
+
+def _write_page(
+    files: RecordFolder,
+    earlier: Commissioning | None,
+    console: Console,
+    offers: Sequence[str],
+) -> None:
+    from experiments.commissioning.gate import lacks
+    from experiments.report.commissioning import write_page
+
+    if not files.record.steps:
+        return
+    last = max(done.ended for done in files.record.steps)
+    lacking = [lack.text for lack in lacks(files.record, {}, last)]
+    page = write_page(files.folder, files.record, lacking, earlier, offers)
+    console.say(f"Page: {page}")
+
+
+def _sittings(
+    args: argparse.Namespace,
+    settings: Settings,
+    fake: FakeOptions | None,
+    steps: Sequence[ProofStep],
+    files: RecordFolder,
+    persons: tuple[str, str],
+    console: Console,
+    operator: OperatorInput,
+) -> int:
+    """Do the steps, as many on one connection as can be; return the exit code."""
+    from experiments.operator.terminal import keyboard
+    from experiments.preflight.connecting import connect_rig
+    from experiments.proving.guide import do_step, wanted
+    from experiments.proving.scene import Scene
+    from experiments.proving.work import SITTINGS
+    from experiments.rig.bus_log import logging_bus
+    from experiments.run.console_loop import ConsoleLoop
+    from experiments.run.pose_walk import INTERRUPTED
+    from experiments.run.stop import (
+        ArmFaultError,
+        StopFlag,
+        StopRequestedError,
+        handle_signals,
+    )
+
+    stop = StopFlag()
+    row = settings.matrix.terrains[0]
+    is_anew = args.first is not None
+    for sitting in SITTINGS:
+        due = [step for step in sitting if step in steps]
+        if not due:
+            continue
+        rig = connect_rig(settings, row, fake)
+        with logging_bus(rig, None, console), handle_signals(stop), keyboard(operator):
+            scene = Scene(rig, ConsoleLoop(rig, console, operator, stop))
+            try:
+                for step in wanted(scene, due, files, is_anew=is_anew):
+                    if do_step(scene, step, files, persons).cause:
+                        return 3
+                    if stop.count:
+                        raise StopRequestedError
+            except StopRequestedError:
+                console.say(
+                    "Stopped as asked. The steps that were done are kept; "
+                    "traction commission goes on with the next."
+                )
+                return INTERRUPTED
+            except ArmFaultError as fault:
+                console.problem(scene.fault_words(fault))
+                return 4
+            finally:
+                scene.console_loop.make_safe()
+    return 0
+
+
+def _end(
+    files: RecordFolder,
+    console: Console,
+    persons: tuple[str, str],
+    *,
+    is_accepting: bool,
+) -> None:
+    """Say what is left, or have the record signed by two persons."""
+    from experiments.commissioning.gate import lacks
+    from experiments.commissioning.steps import ORDER
+    from experiments.proving.work import WORK
+
+    last = max((done.ended for done in files.record.steps), default=None)
+    lacking = [lack.step for lack in lacks(files.record, {}, last)] if last else ORDER
+    missing = [step for step in WORK if step in lacking]
+    if missing:
+        console.say(f"Still to do: {', '.join(missing)}.")
+        return
+    later = ", ".join(step for step in lacking if step not in WORK)
+    if later:
+        console.say(f"Not done, and said in every recording: {later}.")
+    names = _two_names(persons, console, is_accepting=is_accepting)
+    if names is None:
+        console.say(
+            "Not signed: that takes two persons. Everything is kept; sign it with "
+            "traction commission, --operator NAME and --witness NAME."
+        )
+        return
+    files.sign(names)
+    console.say(f"Written and signed: {files.folder / 'commissioning.json'}.")
+
+
+def _two_names(
+    persons: tuple[str, str], console: Console, *, is_accepting: bool
+) -> tuple[str, str] | None:
+    """Return two different names, typed where there is a terminal; None = no two."""
+    typed = persons
+    if sys.stdin is not None and sys.stdin.isatty():
+        accepted = " and accepts rig.toml as it stands" if is_accepting else ""
+        console.say(f"Who signs has seen every step{accepted}.")
+        console.say("Name of the person who did it, then Enter:")
+        first = sys.stdin.readline().strip()
+        console.say("Name of the person who stood by, then Enter:")
+        typed = (first, sys.stdin.readline().strip())
+    one, two = (name[:_LONGEST_NAME] for name in typed)
+    return (one, two) if one and two and one != two else None
+
+
+def _steps(args: argparse.Namespace) -> list[ProofStep]:
+    from acquisition.errors import SettingsError
+    from experiments.proving.work import WORK
+
+    if not args.fake and (asked_time(args) or args.operator_script):
+        raise SettingsError(
+            "--fast, --processes and --operator-script work only with --fake.",
+            hint="Nothing was started.",
+        )
+    known = list(WORK)
+    ends = [args.first or known[0], args.last or known[-1]]
+    for name in ends:
+        if name not in known:
+            raise SettingsError(
+                f"There is no step {name!r}.",
+                hint=f"Steps: {' '.join(known)}. Nothing was started.",
+            )
+    first, last = (known.index(name) for name in ends)
+    return known[first : last + 1]
+
+
+def _folder(settings: Settings, *, is_fake: bool) -> Path:
+    folder = settings.folder / FAKE_FOLDER if is_fake else settings.folder
+    if is_fake:
+        folder.mkdir(exist_ok=True)
+    return folder

@@ -1,0 +1,77 @@
+"""What the steps stand on, as it is now: digests by the names of `steps.BASES`."""
+
+import hashlib
+import json
+import platform
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from experiments.commissioning.gate import bases_of
+from experiments.commissioning.steps import ProofStep
+from experiments.rig.rig import Rig
+from experiments.settings.calibrations import PREFIX
+from wam.driver.startup import ArmInfo
+
+_PUCK = ("SN", "VERS", "ROLE", "CTS", "PIDX", "GRPA", "GRPB", "GRPC")
+_MOTOR = ("IPNM", "POLES", "MT")
+
+
+def present_inputs(
+    rig: Rig,
+    answers: Sequence[Mapping[str, int | None]] = (),
+    info: ArmInfo | None = None,
+) -> dict[str, str]:
+    """Return the digest of everything that is known.
+
+    Args:
+        rig: with its settings and calibrations.
+        answers: what pucks 1 to 7 said of themselves; () = they were not asked.
+        info: of the start; None = it was not started.
+    """
+    section = rig.settings.rig
+    arm = section.arm.model_dump(mode="json")
+    zero = arm.pop("mech_at_home")
+    texts, feet = rig.settings.calibrations, section.feet
+    names = (section.ft_sensor, feet.tread, feet.bare)
+    sensor, *of_feet = (texts.get(f"{PREFIX}{each.calibration}", "") for each in names)
+    content: dict[str, Any] = {
+        "zero": zero,
+        "[safety]": section.safety.model_dump(mode="json"),
+        "[limits]": section.limits.model_dump(mode="json"),
+        "[arm]": arm,
+        "[feet]": [feet.model_dump(mode="json"), of_feet],
+        "[ft_sensor]": [section.ft_sensor.model_dump(mode="json"), sensor],
+        "[gravity]": [
+            section.gravity.model_dump(mode="json"),
+            rig.calibrations.gravity,
+        ],
+        "[friction]": [
+            section.friction.model_dump(mode="json"),
+            rig.calibrations.friction,
+        ],
+        "[control]": section.control.model_dump(mode="json"),
+        "[can]": [section.can.model_dump(mode="json"), platform.release()],
+        "terrain": rig.row.model_dump(mode="json"),
+    }
+    if answers:
+        content["pucks"] = _properties(answers, _PUCK)
+        content["motors"] = _properties(answers, _MOTOR)
+    if info is not None:
+        content["module"] = info.safety_vers
+    return {name: _digest(each) for name, each in content.items()}
+
+
+def inputs_of(step: ProofStep, present: Mapping[str, str]) -> dict[str, str]:
+    """Return of the present digests those that a step stands on."""
+    return {name: present[name] for name in bases_of(step) if name in present}
+
+
+def _properties(
+    answers: Sequence[Mapping[str, int | None]], names: Sequence[str]
+) -> list[list[int | None]]:
+    return [[answer.get(name) for name in names] for answer in answers]
+
+
+def _digest(content: object) -> str:
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()

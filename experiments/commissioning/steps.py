@@ -1,0 +1,107 @@
+"""The steps of a commissioning in their order, and what makes which of them stale.
+
+Each step proves what later ones use, with the least energy. A step that was passed is
+repeated only where something it stands on has changed.
+"""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class ProofStep(StrEnum):
+    """A step by its number; in the order in which they are done."""
+
+    CONFIGURATION = "C0"
+    LISTEN = "C1"
+    IDENTITY = "C2"
+    TIMING = "C3"
+    STOP_CIRCUIT = "C4"
+    BY_HAND = "C5"
+    OWN_WEIGHT = "C6"
+    HUNG_WEIGHT = "C7"
+    REST_POSE = "C8"
+    RAMPS = "C9"
+    LIFT = "C10"
+    GRAVITY_RAMP = "C11"
+    LOCK_AND_CLOCK = "C12"
+    CONTAINER = "C13"
+    PLATE = "C14"
+
+    @property
+    def words(self) -> str:
+        """What it looks at, in words."""
+        return self.name.replace("_", " ").lower()
+
+
+ORDER = tuple(ProofStep)
+# Without these no torque is sent to a real arm.
+GATED = ORDER[: ORDER.index(ProofStep.GRAVITY_RAMP) + 1]
+
+
+def _from(first: ProofStep, last: ProofStep = ProofStep.PLATE) -> tuple[ProofStep, ...]:
+    return ORDER[ORDER.index(first) : ORDER.index(last) + 1]
+
+
+@dataclass(frozen=True, slots=True)
+class Basis:
+    """Something that steps stand on.
+
+    Attributes:
+        words: what it is.
+        steps: those that are stale when it has changed.
+    """
+
+    words: str
+    steps: tuple[ProofStep, ...]
+
+
+_S = ProofStep
+BASES: dict[str, Basis] = {
+    "pucks": Basis(
+        "serial number, firmware, role, counts, slot or groups of a motor puck",
+        (_S.IDENTITY, *_from(_S.BY_HAND)),
+    ),
+    "motors": Basis(
+        "torque units, poles or largest torque of a motor puck",
+        (_S.IDENTITY, *_from(_S.REST_POSE, _S.LOCK_AND_CLOCK)),
+    ),
+    "module": Basis(
+        "serial number, firmware or defaults of the safety module",
+        (_S.IDENTITY, _S.STOP_CIRCUIT),
+    ),
+    "zero": Basis(
+        "zero position of the joints",
+        (_S.BY_HAND, _S.OWN_WEIGHT, _S.HUNG_WEIGHT, _S.CONTAINER),
+    ),
+    "[safety]": Basis(
+        "[safety] of rig.toml", (_S.CONFIGURATION, _S.IDENTITY, _S.STOP_CIRCUIT)
+    ),
+    "[limits]": Basis("[limits] of rig.toml", (_S.CONFIGURATION, _S.GRAVITY_RAMP)),
+    "[arm]": Basis("[arm] of rig.toml", (_S.CONFIGURATION, _S.BY_HAND)),
+    "[feet]": Basis(
+        "the foot of rig.toml or its calibration",
+        (_S.OWN_WEIGHT, _S.HUNG_WEIGHT, *_from(_S.RAMPS, _S.GRAVITY_RAMP)),
+    ),
+    "[ft_sensor]": Basis(
+        "[ft_sensor] of rig.toml, the sensor or its calibration",
+        (_S.OWN_WEIGHT, _S.HUNG_WEIGHT, _S.LOCK_AND_CLOCK, _S.PLATE),
+    ),
+    "[gravity]": Basis(
+        "[gravity] of rig.toml or its calibration", (_S.LIFT, _S.GRAVITY_RAMP)
+    ),
+    "[friction]": Basis(
+        "[friction] of rig.toml or its calibration", (_S.LIFT, _S.GRAVITY_RAMP)
+    ),
+    "[control]": Basis("[control] of rig.toml", (_S.GRAVITY_RAMP, _S.LOCK_AND_CLOCK)),
+    "[can]": Basis(
+        "[can] of rig.toml, the adapter or the kernel", (_S.LISTEN, _S.TIMING)
+    ),
+    "terrain": Basis("row of the terrain or its calibration", (_S.CONTAINER,)),
+    "mounting": Basis("where the arm stands", ORDER),
+    "cables": Basis(
+        "tension of the drive cables",
+        _from(_S.BY_HAND, _S.GRAVITY_RAMP),
+    ),
+}
+TOLD = ("mounting", "cables")  # bases that only a person knows of
+LONGEST_DAYS = 30  # after which all steps are stale

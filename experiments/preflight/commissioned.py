@@ -1,0 +1,51 @@
+"""May this command send torque to this arm? Its commissioning tells."""
+
+from collections.abc import Collection
+from datetime import UTC, datetime
+
+from acquisition.errors import IDLE_ARM, PreflightError, TractionError
+from experiments.commissioning.gate import COMPLETE, FIELD, lacks, require
+from experiments.commissioning.inputs import present_inputs
+from experiments.commissioning.record import read_commissioning
+from experiments.commissioning.steps import GATED
+from experiments.operator.console import BAD, GOOD, WARNING
+from experiments.preflight.page import Add
+from experiments.rig.rig import Rig
+from wam.driver.startup import ArmInfo
+
+
+def check_commissioned(
+    rig: Rig, info: ArmInfo, add: Add, made_anew: Collection[str] = ()
+) -> dict[str, str]:
+    """Refuse torque for an arm that is not commissioned; return words for recordings.
+
+    Args:
+        rig: a real one, started, its loop not running.
+        info: of the start.
+        add: takes the line for the page.
+        made_anew: names of `steps.BASES` that the command measures anew.
+
+    Raises:
+        PreflightError: a step that it needs is missing, wrong or stale.
+    """
+    now = datetime.fromtimestamp(rig.clock.utc_ns() // 1_000_000_000, UTC)
+    try:
+        record = read_commissioning(rig.settings.folder)
+        if record is not None and record.is_simulated:
+            record = None  # of no real arm
+        present = present_inputs(rig, rig.backend.arm.answers(), info)
+        known = {name: each for name, each in present.items() if name not in made_anew}
+        found = lacks(record, known, now)
+        require(found)
+    except TractionError as error:
+        add(BAD, FIELD, error.message)
+        raise PreflightError(
+            error.message, hint=error.hint, arm_state=IDLE_ARM
+        ) from error
+    further = [lack.text for lack in found if lack.step not in GATED]
+    if further:
+        text = f"uncommissioned: {'; '.join(further)}"
+        add(WARNING, FIELD, text)
+        return {FIELD: text}
+    add(GOOD, FIELD, "all steps, sound and not stale")
+    return {FIELD: COMPLETE}

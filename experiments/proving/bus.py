@@ -1,0 +1,168 @@
+"""C1 to C3: who is on the bus, what they say of themselves, and when."""
+
+from collections.abc import Iterator
+from dataclasses import asdict
+
+import numpy as np
+
+from acquisition.errors import TractionError, UnfitDeviceError
+from acquisition.sample import Flag
+from experiments.proving.limits import Judgement, found, judged
+from experiments.proving.recording import Values, number, texts, words
+from experiments.rig.build import read_properties
+from experiments.rig.rig import Rig
+from wam.bus.frames import MOTOR_NODES, SAFETY_NODE
+from wam.driver.puck_properties import (
+    compare,
+    known_table,
+    shipped_table,
+)
+
+LISTENED = 10  # s
+_PORTION = 0.5  # s, between two looks at the screen
+ASKED = 3  # times that each device is asked for the same
+LOOPED = 60  # s
+_SILENT = -(2**31)  # in the place of a property that was not told
+
+
+def listen(rig: Rig) -> Iterator[tuple[float, Values]]:
+    """Ask for nothing; yield the share that is done and what was heard so far."""
+    frames, seconds = 0, 0.0
+    while seconds < LISTENED:
+        heard = rig.backend.arm.listen(_PORTION)
+        seconds += _PORTION
+        frames += heard.frames
+        yield (
+            seconds / LISTENED,
+            {
+                "seconds": np.array(seconds),
+                "frames": np.array(frames),
+                "master": np.array(-1 if heard.master is None else heard.master),
+                "error_frames": np.array(heard.error_frames),
+            },
+        )
+
+
+def judge_silence(values: Values) -> Judgement:
+    """Judge what `listen` heard."""
+    master = int(values["master"])
+    return judged(
+        [
+            found("masters", int(master >= 0), id=max(master, 0)),
+            found("error_frames", number(values, "error_frames")),
+            found("frames", number(values, "frames")),
+            found("listened", number(values, "seconds")),
+        ]
+    )
+
+
+def identify(rig: Rig) -> Values:
+    """Ask every device what it is, also one that the start refuses."""
+    refusal, warnings, nodes = "", list[str](), list[int]()
+    try:
+        info = rig.backend.start_arm()
+        warnings, nodes = list(info.warnings), list(info.nodes)
+    except TractionError as error:
+        refusal = error.message
+        if not isinstance(error, UnfitDeviceError):
+            refusal = str(error)
+    answers = rig.backend.arm.answers()
+    names = sorted({name for answer in answers for name in answer})
+    rows = [[answer.get(name) for name in names] for answer in answers]
+    table = [[_SILENT if value is None else value for value in row] for row in rows]
+    counted = asdict(rig.backend.arm.count_answers(ASKED))
+    return {
+        "names": texts(names),
+        "properties": np.array(table, dtype=np.int64).reshape(len(answers), len(names)),
+        "nodes": np.array(nodes, dtype=np.int64),
+        "asked": np.array(counted["nodes"], dtype=np.int64),
+        "answers": np.array(counted["counts"], dtype=np.int64),
+        "differing": np.array(counted["differing"], dtype=np.int64),
+        "warnings": texts(warnings),
+        "refusal": texts([refusal] if refusal else []),
+        "expected": texts([_expected(rig)]),
+    }
+
+
+def _expected(rig: Rig) -> str:
+    """Return the table of this arm, "" for that of the factory."""
+    return "" if rig.is_simulated else read_properties(rig.settings)
+
+
+def told(values: Values) -> dict[str, list[int | None]]:
+    """Return by name what the seven pucks said; None = nothing."""
+    rows = values["properties"].tolist()
+    return {
+        name: [None if row[i] == _SILENT else int(row[i]) for row in rows]
+        for i, name in enumerate(words(values, "names"))
+    }
+
+
+def judge_identity(values: Values) -> Judgement:
+    """Judge what `identify` was told."""
+    counts = dict(
+        zip(values["asked"].tolist(), values["answers"].tolist(), strict=True)
+    )
+    motors = [counts.get(node, 0) for node in MOTOR_NODES]
+    properties = told(values)
+    complete = len(values["properties"]) == len(MOTOR_NODES)
+    (text,) = words(values, "expected")
+    table = known_table(text, "[arm] properties") if text else shipped_table()
+    differences = compare(table, properties) if complete else []
+    severe = [each.text for each in differences if not each.is_warning]
+    unkept = [each for each in words(values, "warnings") if "safety module" in each]
+    refusal = words(values, "refusal")
+    serials = [each for each in properties.get("SN", []) if each is not None]
+    rows = [
+        found("module", int(counts.get(SAFETY_NODE, 0) > 0)),
+        found("nodes", sum(count > 0 for count in motors)),
+        found("twice", max(*counts.values(), 0)),
+        found("properties", len(severe), text="; ".join(severe)),
+        found("module_limits", len(unkept), text=" ".join(unkept)),
+        found("refused", len(refusal), text=" ".join(refusal)),
+    ]
+    if complete and len(serials) == len(MOTOR_NODES):
+        rows.append(found("serials", len(set(serials))))
+    return judged(rows)
+
+
+def time_replies(rig: Rig) -> Iterator[tuple[float, Values]]:
+    """Ask for positions, leave questions out, then let the loop run, the arm idle."""
+    measured = rig.backend.arm.measure_exchange()
+    rig.backend.open_sensor()
+    rig.backend.begin()
+    loop_client = rig.backend.loop_client
+    reader = rig.shared.cycles.reader()
+    cycles = incomplete = 0
+    for second in range(1, LOOPED + 1):
+        loop_client.advance(1.0)
+        flags = reader.read()["flags"]
+        cycles += len(flags)
+        incomplete += int((flags & (Flag.ARM_FRESH | Flag.ARM_UNASKED) == 0).sum())
+        yield (
+            second / LOOPED,
+            {
+                "replies_ns": np.array(measured.replies_ns, dtype=np.int64),
+                "unasked": np.array(measured.unasked),
+                "late": np.array(measured.late),
+                "age_ns": np.array(measured.age_ns),
+                "answer_ns": np.array(measured.answer_ns),
+                "jumps": np.array(measured.jumps),
+                "cycles": np.array(cycles),
+                "incomplete": np.array(incomplete),
+            },
+        )
+
+
+def judge_timing(values: Values) -> Judgement:
+    """Judge what `time_replies` measured."""
+    return judged(
+        [
+            found("answered", number(values, "unasked")),
+            found("late", number(values, "late")),
+            found("jumps", number(values, "jumps")),
+            found("answer", number(values, "answer_ns") / 1e6),
+            found("cycles", number(values, "cycles")),
+            found("incomplete", number(values, "incomplete")),
+        ]
+    )

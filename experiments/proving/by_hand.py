@@ -1,0 +1,97 @@
+"""C5: every joint turned by hand from stop to stop, the arm idle."""
+
+import numpy as np
+
+from experiments.proving.limits import Found, Judgement, found, judged
+from experiments.proving.recording import Values
+from experiments.proving.scene import Scene
+from wam.model.constants import Array
+
+# Where the arm is before its joints are turned [rad]: nothing is in the way of one.
+POSE = (0.0, -0.6, 0.0, 2.0, 0.0, 0.0, 0.0)
+CARRIED = 4.0  # s, a simulated hand takes from pose to pose
+_LOW_WORDS = {  # the way to the stop of the smaller angle
+    1: "clockwise, seen from above",
+    2: "backwards, over the base",
+    3: "clockwise about the upper arm, seen from the elbow",
+    4: "until forearm and upper arm are stretched, and on",
+    5: "clockwise about the forearm, seen from the foot",
+    6: "backwards, as joint 2 bends the arm",
+    7: "clockwise about the foot's axis, seen from the foot",
+}
+_HIGH_WORDS = {4: "until the forearm is folded onto the upper arm"}
+_OTHER_WAY = "the other way, onto the stop there"
+_MEANT = 0.3  # s, of positions that are averaged
+
+
+def collect(scene: Scene) -> Values:
+    """Have each joint turned onto both stops; return where all joints were told to be.
+
+    Raises:
+        ArmFaultError, StopRequestedError: as `ConsoleLoop.tick`.
+    """
+    scene.ask(
+        "One person supports the arm throughout: it is idle. Bring it up, the elbow "
+        "bent, so that every joint can be turned freely. [space]"
+    )
+    lows: list[Array] = []
+    highs: list[Array] = []
+    for joint in range(1, 8):
+        scene.show_share((joint - 1) / 7, f"joint {joint}")
+        if scene.simulation is not None:
+            scene.simulation.pose(POSE, CARRIED)
+            scene.await_hand()
+        scene.ask(
+            f"Joint {joint} {_LOW_WORDS[joint]}, onto its stop, the others as they "
+            "are. [space] while it is there."
+        )
+        if scene.simulation is not None:
+            scene.simulation.turn_to_stop(joint, "low")
+            scene.await_hand()
+        lows.append(_mean(scene))
+        words = _HIGH_WORDS.get(joint, _OTHER_WAY)
+        scene.ask(f"Joint {joint} {words}. [space] while it is there.")
+        if scene.simulation is not None:
+            scene.simulation.turn_to_stop(joint, "high")
+            scene.await_hand()
+        highs.append(_mean(scene))
+    constants = scene.rig.model.constants
+    return {
+        "low": np.array(lows),
+        "high": np.array(highs),
+        # Joints 2 and 4 lie on a stop at home, beyond the ends of the drawings.
+        "q_lower": np.minimum(constants.q_lower, constants.home),
+        "q_upper": np.maximum(constants.q_upper, constants.home),
+    }
+
+
+def _mean(scene: Scene) -> Array:
+    scene.wait(_MEANT)
+    return scene.loop_client.last(_MEANT)["position"].mean(axis=0)
+
+
+def judge(values: Values) -> Judgement:
+    """Judge order, sense, scale and zero of every encoder."""
+    lower, upper = values["q_lower"], values["q_upper"]
+    low, high = values["low"], values["high"]
+    rows: list[Found] = []
+    for i in range(7):
+        travel = high[i, i] - low[i, i]
+        others = np.abs(high[i] - low[i])
+        others[i] = 0.0
+        beside = int(others.argmax())
+        off = max(low[i, i] - lower[i], high[i, i] - upper[i], key=abs)
+        share = travel / (upper[i] - lower[i]) - 1.0
+        rows += [
+            found("sense", float(np.sign(travel)), joint=i + 1),
+            found("beside", np.degrees(others[beside]), joint=i + 1, other=beside + 1),
+            found("travel", 100.0 * share, joint=i + 1),
+            found("stop_angle", np.degrees(off), joint=i + 1),
+        ]
+    return judged(rows)
+
+
+def stop_errors(values: Values) -> Array:
+    """Return by how much the zero of each joint is off by its stops [rad], (7,)."""
+    low, high = np.diag(values["low"]), np.diag(values["high"])
+    return ((low - values["q_lower"]) + (high - values["q_upper"])) / 2

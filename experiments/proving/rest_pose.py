@@ -1,0 +1,278 @@
+"""C8 to C11: little torque for an arm that lies on its stops."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.control_loop.proof import (
+    PROOF_LIMITS,
+    ProofGoal,
+    ProofKind,
+)
+from acquisition.control_loop.states import ArmState
+from acquisition.devices import SafetyMode
+from acquisition.errors import PreflightError
+from acquisition.sample import SAFETY_MODE_MASK
+from experiments.messages import preflight_error
+from experiments.proving.limits import Found, Judgement, found, judged
+from experiments.proving.recording import Values, texts, words
+from experiments.proving.scene import Scene
+from wam.model.constants import ArmConstants, Array
+
+# Joints as they are pushed, the sign is that of the motion: what bears least first.
+RAMPS = (1, -1, 3, -3, 5, -5, 7, -7, 2, -4, -6)
+LIFTED = (2, -4, -6)  # those that bear weight on the rest pose
+_RAMP_SECONDS = 1.0
+_AFTER = 0.3  # s, recorded beyond the end of a ramp
+_REST = 0.6  # s, without torque at the end of a proof
+_STILL = 1.0  # s, C8
+_LIFT_SECONDS = 2 * PROOF_LIMITS.lift_way / PROOF_LIMITS.lift_speed + 0.6
+_GRAVITY_SECONDS, _GRAVITY_KEPT = 1.4, 0.6
+_ON_POSE = 0.12  # rad
+_PATIENCE = 120.0  # s
+_MIDDLE = (0.3, 0.8)  # share of the way of a lift in which its torque is averaged
+_CARRIED = 8.0  # s, a simulated hand takes to lay the arm down
+
+
+def rest_pose(constants: ArmConstants) -> Array:
+    """Return the pose in which all joints that bear weight lie on stops [rad], (7,)."""
+    q = constants.home.copy()
+    q[5] = constants.q_upper[5]
+    return q
+
+
+def lay_down(scene: Scene) -> None:
+    """Have the arm laid into its rest pose, then activated without torque.
+
+    Raises:
+        PreflightError: it does not lie there, or was not activated in time.
+        ArmFaultError, StopRequestedError: as `ConsoleLoop.tick`.
+    """
+    if scene.is_proving:
+        return
+    q = rest_pose(scene.rig.model.constants)
+    scene.ask(
+        "Lay the arm into its rest pose: home, and joint 6 turned onto its stop at "
+        f"{q[5]:+.2f} rad. Take the hands off it. [space] when it lies there."
+    )
+    if scene.simulation is not None:
+        scene.simulation.pose(q.tolist(), _CARRIED)
+        scene.await_hand()
+        scene.simulation.let_go()
+        scene.wait(1.0)
+    here = scene.loop_client.latest()["position"][0]
+    joint = int(np.abs(here - q).argmax())
+    if abs(here[joint] - q[joint]) > _ON_POSE:
+        raise PreflightError(
+            f"Joint {joint + 1} is at {here[joint]:.2f} rad, in the rest pose it is at "
+            f"{q[joint]:.2f}.",
+            hint="Lay the arm onto its stops and begin the step again.",
+            arm_state="idle; it sinks slowly, support it",
+        )
+    scene.loop_client.request(ArmState.HOLD)
+    scene.prove(ProofGoal(ProofKind.REST))
+    scene.wait(0.1)
+    scene.say("Press Shift-activate. Keep the hands off the arm: it gets no torque.")
+    if scene.simulation is not None:
+        scene.simulation.pendant("activate")
+    waited = 0.0
+    while scene.loop_client.status.safety is not SafetyMode.ACTIVE:
+        scene.wait(0.1)
+        waited += 0.1
+        if waited > _PATIENCE:
+            raise preflight_error("not-active", seconds=_PATIENCE)
+    scene.is_proving = True
+
+
+def rest(scene: Scene) -> Values:
+    """Activate the arm and give it nothing."""
+    reader = scene.rig.shared.cycles.reader()
+    ended = scene.until_fault(lambda: lay_down(scene), _STILL)
+    record = reader.read()
+    active = record[record["flags"] & SAFETY_MODE_MASK == SafetyMode.ACTIVE]
+    return {
+        "t_ns": active["host_ns"].astype(np.int64),
+        "q": active["position"].copy(),
+        "tau": active["torque_command"].copy(),
+        "ended": texts(ended),
+    }
+
+
+def judge_rest(values: Values) -> Judgement:
+    """Judge an arm without torque from its first active cycle."""
+    seconds = _seconds(values["t_ns"])
+    rows = [
+        found("rest", 1e3 * way, high=1e3 * PROOF_LIMITS.rest[i], joint=i + 1)
+        for i, way in enumerate(_ways(values["q"]))
+    ]
+    return judged([*rows, *_ended(values), found("active", seconds)])
+
+
+def ramps(scene: Scene) -> Values:
+    """Push one joint after the other, each until it moves."""
+    lay_down(scene)
+    constants, q = scene.rig.model.constants, scene.position()
+    weights = scene.rig.law_model.gravity(q)
+    goals: list[ProofGoal] = []
+    for signed in RAMPS:
+        i = abs(signed) - 1
+        torque = 2.0 * float(constants.coulomb[i])
+        if signed in LIFTED:
+            torque += 1.3 * abs(float(weights[i]))
+        torque = min(torque, 0.9 * scene.rig.settings.rig.limits.torque[i])
+        sense = 1.0 if signed > 0 else -1.0
+        goals.append(ProofGoal(ProofKind.RAMP, i + 1, sense * torque, _RAMP_SECONDS))
+    values = _proofs(scene, goals, _RAMP_SECONDS + _AFTER)
+    return {**values, "weights": weights}
+
+
+def judge_ramps(values: Values) -> Judgement:
+    """Judge whether each joint moved as it was pushed, and at which torque."""
+    rows: list[Found] = []
+    for number, (joint, torque) in enumerate(
+        zip(values["joints"].tolist(), values["torques"].tolist(), strict=True)
+    ):
+        part = values["proof"] == number
+        if not part.any():
+            break
+        i, sense = int(joint) - 1, 1.0 if torque > 0 else -1.0
+        q, tau = values["q"][part], values["tau"][part]
+        ways = np.abs(q - q[0]).max(axis=0)
+        ways[i] = 0.0
+        most = np.array([PROOF_LIMITS.aside_of(i + 1, j) for j in range(1, 8)])
+        other = int((ways / most).argmax())
+        rows.append(
+            found(
+                "aside",
+                1e3 * ways[other],
+                high=1e3 * most[other],
+                joint=i + 1,
+                other=other + 1,
+                pushed=_signed(i, sense),
+            )
+        )
+        way = sense * (q[:, i] - q[0, i])
+        reach = PROOF_LIMITS.reach[i]
+        rows.append(
+            found("moved", 1e3 * way.max(), low=1e3 * reach, joint=_signed(i, sense))
+        )
+        if int(sense) * (i + 1) in LIFTED:
+            needed = float(np.abs(tau[:, i]).max())  # it ends where the joint moves
+            weight = abs(float(values["weights"][i]))
+            rows.append(found("liftoff", needed / weight, joint=i + 1))
+    return judged([*rows, *_ended(values)])
+
+
+def lift(scene: Scene) -> Values:
+    """Lift the joints that bear weight off their stops and lay them back."""
+    lay_down(scene)
+    constants, q = scene.rig.model.constants, scene.position()
+    weights = scene.rig.law_model.gravity(q)
+    goals: list[ProofGoal] = []
+    for signed in LIFTED:
+        i = abs(signed) - 1
+        most = 1.5 * (abs(float(weights[i])) + float(constants.coulomb[i]))
+        most = min(most, 0.9 * scene.rig.settings.rig.limits.torque[i])
+        goals.append(ProofGoal(ProofKind.LIFT, i + 1, most if signed > 0 else -most))
+    values = _proofs(scene, goals, _LIFT_SECONDS)
+    model = scene.rig.law_model
+    predicted = np.array([model.gravity(row) for row in values["q"]]).reshape(-1, 7)
+    return {**values, "predicted": predicted}
+
+
+def judge_lift(values: Values) -> Judgement:
+    """Judge what the joints weigh: the middle of up and down, friction cancels."""
+    rows: list[Found] = []
+    for number, (joint, torque) in enumerate(
+        zip(values["joints"].tolist(), values["torques"].tolist(), strict=True)
+    ):
+        part = values["proof"] == number
+        if not part.any():
+            break
+        i, sense = int(joint) - 1, 1.0 if torque > 0 else -1.0
+        q, tau = values["q"][part][:, i], sense * values["tau"][part][:, i]
+        way = sense * (q - q[0])
+        rows.append(found("lifted", 1e3 * way.max(), joint=i + 1))
+        low, high = (share * PROOF_LIMITS.lift_way for share in _MIDDLE)
+        inside = (way > low) & (way < high)
+        before = np.arange(len(way)) < int(way.argmax())
+        up, down = tau[inside & before], tau[inside & ~before]
+        if len(up) and len(down):
+            weight = (up.mean() + down.mean()) / 2
+            predicted = sense * values["predicted"][part][inside, i].mean()
+            rows.append(found("weight", weight / predicted, joint=i + 1))
+    return judged([*rows, *_ended(values)])
+
+
+def gravity_ramp(scene: Scene) -> Values:
+    """Let the compensation of gravity grow to the whole."""
+    lay_down(scene)
+    goal = ProofGoal(ProofKind.GRAVITY, seconds=_GRAVITY_SECONDS)
+    return _proofs(scene, [goal], _GRAVITY_SECONDS + _GRAVITY_KEPT)
+
+
+def judge_gravity_ramp(values: Values) -> Judgement:
+    """Judge whether the compensation moves an arm that lies."""
+    most = [1e3 * PROOF_LIMITS.gravity * way for way in PROOF_LIMITS.rest]
+    rows = [
+        found("gravity", 1e3 * way, high=most[i], joint=i + 1)
+        for i, way in enumerate(_ways(values["q"]))
+    ]
+    share = _seconds(values["t_ns"]) / _GRAVITY_SECONDS
+    return judged(
+        [*rows, *_ended(values), found("share", share, text="It ended early")]
+    )
+
+
+def _proofs(scene: Scene, goals: Sequence[ProofGoal], seconds: float) -> Values:
+    """Do one proof after the other until one ends in idle; return what was seen."""
+    parts: list[NDArray[Any]] = []
+    numbers: list[NDArray[Any]] = []
+    ended: list[str] = []
+    for number, goal in enumerate(goals):
+        scene.show_share(number / len(goals), _words(goal))
+        scene.prove(goal)
+        reader = scene.rig.shared.cycles.reader()
+        # It ends without torque, and lies down again within its own limits.
+        ended = scene.until_fault(lambda: None, seconds + _REST)
+        part = reader.read()
+        parts.append(part)
+        numbers.append(np.full(len(part), number))
+        if ended:
+            break
+    record = np.concatenate(parts)
+    return {
+        "proof": np.concatenate(numbers),
+        "joints": np.array([goal.joint for goal in goals]),
+        "torques": np.array([goal.torque for goal in goals]),
+        "t_ns": record["host_ns"].astype(np.int64),
+        "q": record["position"].copy(),
+        "tau": record["torque_command"].copy(),
+        "ended": texts(ended),
+    }
+
+
+def _words(goal: ProofGoal) -> str:
+    if goal.kind is ProofKind.GRAVITY:
+        return "compensation grows"
+    return f"joint {goal.joint}, up to {goal.torque:+.1f} N m"
+
+
+def _signed(i: int, sense: float) -> str:
+    return f"{i + 1}{'+' if sense > 0 else '-'}"
+
+
+def _ways(q: NDArray[Any]) -> Array:
+    """Return how far each joint went from where it was first [rad], shape (7,)."""
+    return np.abs(q - q[0]).max(axis=0) if len(q) else np.zeros(7)
+
+
+def _seconds(t_ns: NDArray[Any]) -> float:
+    return float(t_ns[-1] - t_ns[0]) * 1e-9 if len(t_ns) else 0.0
+
+
+def _ended(values: Values) -> list[Found]:
+    ended = words(values, "ended")
+    return [found("ended", len(ended), text=" ".join(ended))]

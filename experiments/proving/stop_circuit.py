@@ -1,0 +1,136 @@
+"""C4: the stop button, the pendant and the module, the arm idle and supported."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.clock import PERIOD_NS
+from acquisition.control_loop.faults import Fault
+from acquisition.devices import SafetyMode
+from acquisition.errors import PreflightError
+from acquisition.sample import MOTOR_FRESH_SHIFT, SAFETY_MODE_MASK
+from experiments.proving.limits import Judgement, found, judged
+from experiments.proving.recording import Values
+from experiments.proving.scene import Scene
+
+_PATIENCE = 60.0  # s, for each press
+_RELEASED = 2.0  # s, that a released stop has to last
+_AFTER = 0.5  # s, that are recorded after the last press
+_SILENT_CYCLES = 20  # in which no puck answers: it has no power
+_MS = PERIOD_NS / 1e6
+
+
+def collect(scene: Scene) -> Values:
+    """Have the pendant pressed four times and record what came of it.
+
+    Raises:
+        PreflightError: a press was not seen.
+        StopRequestedError: as `ConsoleLoop.tick`.
+    """
+    simulation = scene.simulation
+    reader = scene.rig.shared.cycles.reader()
+    seen: list[bool] = []
+    scene.say("One person supports the arm throughout: it is idle, it sinks slowly.")
+    scene.say("1/4 Press Shift-activate, though nobody has asked for it.")
+    if simulation is not None:
+        simulation.pendant("activate")
+    seen.append(_see(scene, SafetyMode.ACTIVE, "Shift-activate"))
+    scene.wait_through(1.0)
+    scene.say("2/4 Press the stop button.")
+    if simulation is not None:
+        simulation.pendant("estop")
+    seen.append(_see(scene, SafetyMode.E_STOP, "the stop button"))
+    scene.ask_through("3/4 Release the stop button, press nothing else, then [space].")
+    released_ns = scene.rig.clock.now_ns()
+    scene.wait_through(_RELEASED)
+    idled_ns = scene.rig.clock.now_ns()
+    scene.say("4/4 Press Shift-idle.")
+    if simulation is not None:
+        simulation.pendant("idle")
+    seen.append(_see(scene, SafetyMode.IDLE, "Shift-idle"))
+    scene.wait_through(_AFTER)
+    record = reader.read()
+    return {
+        "t_ns": record["host_ns"].astype(np.int64),
+        "mode": (record["flags"] & SAFETY_MODE_MASK).astype(np.int64),
+        "fresh": (record["flags"] >> MOTOR_FRESH_SHIFT & 0x7F).astype(np.int64),
+        "seen": np.array(seen),
+        "released_ns": np.array(released_ns),
+        "idled_ns": np.array(idled_ns),
+    }
+
+
+def _see(scene: Scene, mode: SafetyMode, button: str) -> bool:
+    """Wait until the module has been in `mode`.
+
+    Raises:
+        PreflightError: it was not within a minute.
+    """
+    reader = scene.rig.shared.cycles.reader()
+
+    def is_seen() -> bool:
+        modes = reader.read()["flags"] & SAFETY_MODE_MASK
+        verdict = scene.loop_client.status.verdict
+        is_early = verdict is not None and verdict.fault is Fault.NOT_ASKED_ACTIVE
+        return bool((modes == mode).any()) or (mode is SafetyMode.ACTIVE and is_early)
+
+    if not _await(scene, is_seen):
+        raise PreflightError(
+            f"{button[0].upper()}{button[1:]} was not seen within {_PATIENCE:.0f} s.",
+            hint="Check the pendant and its cable, then begin the step again.",
+            arm_state="idle; it sinks slowly, support it",
+        )
+    return True
+
+
+def _await(scene: Scene, is_done: Callable[[], bool]) -> bool:
+    waited = 0.0
+    while not is_done():
+        scene.show_share(waited / _PATIENCE, "waiting for the pendant")
+        scene.wait_through(0.02)
+        waited += 0.02
+        if waited > _PATIENCE:
+            return False
+    return True
+
+
+def judge(values: Values) -> Judgement:
+    """Judge what `collect` recorded."""
+    t_ns, mode, fresh = values["t_ns"], values["mode"], values["fresh"]
+    stop = mode == SafetyMode.E_STOP
+    first = int(stop.argmax()) if stop.any() else len(stop)
+    early = _longest(mode[:first] == SafetyMode.ACTIVE) * _MS
+    silent = _silent_since(fresh, first)
+    stopped = 1e9 if silent is None else max(0.0, float(silent - first) * _MS)
+    kept = (t_ns > int(values["released_ns"])) & (t_ns < int(values["idled_ns"]))
+    is_idle = bool(len(mode)) and int(mode[-1]) == SafetyMode.IDLE
+    return judged(
+        [
+            found("seen", int(values["seen"].sum())),
+            found("early", early),
+            found("stop", stopped),
+            found("stays", int((mode[kept] != SafetyMode.E_STOP).sum())),
+            found("idles", int(is_idle)),
+            found("asleep", int(fresh[-1]).bit_count() if len(fresh) else 0),
+        ]
+    )
+
+
+def _longest(is_so: NDArray[np.bool_]) -> int:
+    """Return the length of the longest run of True."""
+    best = run = 0
+    for each in is_so.tolist():
+        run = run + 1 if each else 0
+        best = max(best, run)
+    return best
+
+
+def _silent_since(fresh: NDArray[np.int64], stop: int) -> int | None:
+    """Return from which cycle on no puck answers, about a stop; None = they go on."""
+    run = 0
+    for i in range(max(0, stop - _SILENT_CYCLES), len(fresh)):
+        run = run + 1 if fresh[i] == 0 else 0
+        if run == _SILENT_CYCLES:
+            return i - _SILENT_CYCLES + 1
+    return None

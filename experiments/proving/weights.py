@@ -1,0 +1,177 @@
+"""C6 and C7: the foot's own weight and a known one, in poses held by hand, arm idle.
+
+What their recordings tell is computed in `fits`.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from acquisition.errors import PreflightError
+from acquisition.ipc.shared_sensor import unpack_wrenches
+from experiments.proving.by_hand import CARRIED
+from experiments.proving.fits import FITTED, fit_foot, fit_hung
+from experiments.proving.limits import Judgement, found, judged
+from experiments.proving.recording import Values, number
+from experiments.proving.scene import Scene
+from wam.model.constants import Array
+
+# Poses in which the foot points down, ahead, to the sides and up [rad].
+POSES: Sequence[Sequence[float]] = (
+    (0.0, -0.6, 0.0, 2.2, 0.0, 1.4, 0.0),
+    (0.0, -0.6, 0.0, 2.2, 0.0, 0.0, 0.0),
+    (0.0, -0.6, 0.0, 2.2, 0.0, 0.0, 1.6),
+    (0.0, -0.6, 0.0, 2.2, 0.0, 0.0, -1.6),
+    (0.0, -0.6, 0.0, 1.2, 0.0, -0.5, 0.0),
+    (0.0, -0.6, 0.0, 2.2, -1.6, 1.4, 0.0),
+    (0.0, -0.6, 0.0, 2.2, 1.1, 1.4, 1.0),
+    (0.0, -0.6, 0.5, 1.8, 0.0, -0.5, 2.8),
+)
+HUNG_AT = (0, 1, 2, 3, 5, 6)
+HUNG = 2.0  # kg
+SETTLED, AVERAGE = 1.0, 2.0  # s
+_FEWEST = 100  # readings in an average
+
+
+def own_weight(scene: Scene) -> Values:
+    """Have the arm brought to eight poses; return joints and readings.
+
+    Raises:
+        PreflightError: too few readings.
+        ArmFaultError, StopRequestedError: as `ConsoleLoop.tick`.
+    """
+    q: list[Array] = []
+    readings: list[Array] = []
+    for i, pose in enumerate(POSES):
+        scene.show_share(i / len(POSES), f"pose {i + 1} of {len(POSES)}")
+        bring(scene, pose, f"pose {i + 1} of {len(POSES)}")
+        measured = measure(scene)
+        q.append(measured[0])
+        readings.append(measured[1])
+    return {"q": np.array(q), "readings": np.array(readings), **_believed(scene)}
+
+
+def hung_weight(scene: Scene) -> Values:
+    """Have a known weight hung from the sole in six poses, without it before and after.
+
+    Raises:
+        PreflightError: too few readings, or the stops were not measured.
+        ArmFaultError, StopRequestedError: as `ConsoleLoop.tick`.
+    """
+    if scene.stops is None:
+        raise PreflightError(
+            "The stops of the joints were not measured.",
+            hint="traction commission --from C5",
+            arm_state="idle; it sinks slowly, support it",
+        )
+    parts: list[list[Array]] = [[], [], [], []]
+    for i, at in enumerate(HUNG_AT):
+        where = f"pose {i + 1} of {len(HUNG_AT)}"
+        scene.show_share(i / len(HUNG_AT), where)
+        bring(scene, POSES[at], where)
+        q, before = measure(scene)
+        _hang(
+            scene, HUNG, f"Hang {HUNG:g} kg from the middle of the sole, on a string."
+        )
+        q, loaded = measure(scene)
+        _hang(scene, 0.0, "Take the weight off.")
+        _, after = measure(scene)
+        for part, value in zip(parts, (q, before, loaded, after), strict=True):
+            part.append(value)
+    names = ("q", "before", "loaded", "after")
+    arrays = {name: np.array(part) for name, part in zip(names, parts, strict=True)}
+    return {
+        **arrays,
+        **_believed(scene),
+        "hung": np.array(HUNG),
+        "stops": scene.stops,
+    }
+
+
+def _believed(scene: Scene) -> dict[str, Array]:
+    """Return what rig.toml says of foot and sensor."""
+    payload, tool = scene.rig.payload, scene.rig.model.tool
+    assert tool is not None
+    sole = tool.sole - np.array([0.0, 0.0, tool.sensor_height])
+    return {
+        "sign": np.array(payload.sign),
+        "mounting": payload.rotation,
+        "mass": np.array(payload.mass),
+        "centre": payload.com,
+        "sole": payload.rotation.T @ sole,
+    }
+
+
+def bring(scene: Scene, pose: Sequence[float], where: str) -> None:
+    """Have the arm brought to `pose` [rad] and held there; raises as `own_weight`."""
+    angles = "  ".join(f"J{i} {angle:.1f}" for i, angle in enumerate(pose, 1))
+    scene.ask(
+        f"Bring the arm to {where}, about [rad]: {angles}. Hold it by the forearm, "
+        "nothing touches the foot. [space] when it is still."
+    )
+    if scene.simulation is not None:
+        scene.simulation.pose(pose, CARRIED)
+        scene.await_hand()
+        scene.wait(SETTLED)
+
+
+def _hang(scene: Scene, mass: float, text: str) -> None:
+    scene.ask(f"{text} [space] when it is still.")
+    if scene.simulation is not None:
+        scene.simulation.hang(mass)
+        scene.wait(SETTLED)
+
+
+def measure(scene: Scene) -> tuple[Array, Array]:
+    """Return mean positions [rad] and readings [N, N m] of two seconds, (7,) and (6,).
+
+    Raises:
+        PreflightError: too few readings.
+    """
+    reader = scene.loop_client.wrenches()
+    scene.wait(AVERAGE)
+    sound = [
+        sample.wrench
+        for sample in unpack_wrenches(reader.read())
+        if sample.is_valid and not sample.saturated
+    ]
+    if len(sound) < _FEWEST:
+        raise PreflightError(
+            f"{len(sound)} readings of the F/T sensor in {AVERAGE:g} s (at least "
+            f"{_FEWEST}).",
+            hint="Check the sensor's cable and load, then begin the step again.",
+            arm_state="idle; it sinks slowly, support it",
+        )
+    q = scene.loop_client.last(AVERAGE)["position"].mean(axis=0)
+    return q, np.array(sound).mean(axis=0)
+
+
+def judge_own_weight(values: Values) -> Judgement:
+    """Judge axes and sign of the sensor, mass and centre of the foot, the base."""
+    fit = fit_foot(values)
+    apart = 1e3 * float(np.linalg.norm(fit.centre - values["centre"]))
+    return judged(
+        [
+            found("lever", 1e3 * fit.lever),
+            found("force_left", fit.force_left),
+            found("foot_mass", 100.0 * (fit.mass / number(values, "mass") - 1.0)),
+            found("weight_way", fit.way),
+            found("foot_centre", apart),
+            found("moment_left", 1e3 * fit.moment_left),
+        ]
+    )
+
+
+def judge_hung_weight(values: Values) -> Judgement:
+    """Judge orientations and scale of the sensor, the sole, and twelve angles."""
+    fit = fit_hung(values)
+    angles = np.degrees(fit.angles)
+    return judged(
+        [
+            found("hung_scale", float(np.median(fit.scale))),
+            found("hung_spread", float(np.ptp(fit.scale))),
+            found("fitted", float(angles[fit.worst]), name=FITTED[fit.worst]),
+            found("sole", 1e3 * float(np.linalg.norm(fit.sole - values["sole"]))),
+            found("hung_way", fit.way),
+        ]
+    )

@@ -1,0 +1,107 @@
+"""The first day by the command, simulated: what is found where, kept, rechecked."""
+
+import json
+
+import pytest
+
+from experiments.commands.commission import FAKE_FOLDER
+from experiments.commissioning.record import NAME, read_commissioning
+from experiments.report import commissioning as page
+from tests.experiments.program import traction, write_config
+from tests.wrong_rigs import commissioned
+
+FIRST = ("--fake", "--fast", "--operator-script", "auto", "--until", "C1")
+
+
+@pytest.fixture
+def kept(tmp_path):
+    """Return the folder of a record of two steps."""
+    config = write_config(tmp_path)
+    done = traction("commission", *FIRST, "--config", config)
+    assert done.code == 0, done.err
+    return tmp_path / FAKE_FOLDER
+
+
+def recheck(folder):
+    options = ("--fake", "--recheck", "--config", folder.parent / "rig.toml")
+    return traction("commission", *options)
+
+
+def test_what_was_done_is_kept_drawn_and_not_done_again(kept):
+    record = read_commissioning(kept)
+    assert [done.step for done in record.steps] == ["C0", "C1"]
+    assert record.is_simulated
+    assert record.signed == ()
+    assert "C1 listen" in (kept / page.NAME).read_text()
+    config = kept.parent / "rig.toml"
+    assert traction("commission", *FIRST, "--config", config).code == 0
+    assert read_commissioning(kept) == record
+
+
+def test_an_arm_that_was_moved_begins_again(kept):
+    before = read_commissioning(kept)
+    config = kept.parent / "rig.toml"
+    done = traction("commission", *FIRST, "--moved", "--config", config)
+    assert done.code == 0, done.err
+    record = read_commissioning(kept)
+    assert list(record.told) == ["mounting"]
+    assert [one.step for one in record.steps] == ["C0", "C1"]
+    assert all(one not in before.steps for one in record.steps)
+
+
+def test_the_catalogue_of_wrong_rigs_is_listed():
+    done = traction("commission", "--fake", "--wrong", "help")
+    assert (done.code, "motor-3-reversed" in done.out) == (0, True)
+
+
+def test_what_was_recorded_is_judged_again(kept):
+    before = read_commissioning(kept)
+    done = recheck(kept)
+    assert done.code == 0, done.err
+    assert "C1 listen" in done.out
+    assert read_commissioning(kept) == before
+
+
+def test_a_recording_that_was_changed_is_not_judged(kept):
+    raw = read_commissioning(kept).steps[1].raw[0]
+    (kept / raw.file).write_bytes(b"other")
+    done = recheck(kept)
+    assert done.code != 0
+    assert "not what was recorded" in done.err
+
+
+def test_a_record_that_was_edited_is_not_gone_on_with(kept):
+    content = json.loads((kept / NAME).read_text())
+    content["steps"][0]["operator"] = "another"
+    (kept / NAME).write_text(json.dumps(content))
+    done = recheck(kept)
+    assert done.code != 0
+    assert "was changed at or before C0" in done.err
+
+
+def test_nothing_is_begun_beside_a_file_that_is_not_there(tmp_path):
+    config = write_config(tmp_path)
+    options = ("--beside", tmp_path / "none.json", "--config", config)
+    done = traction("commission", *FIRST, *options)
+    assert done.code != 0
+    assert "There is no file" in done.err
+    assert read_commissioning(tmp_path / FAKE_FOLDER) is None
+
+
+# Name of the catalogue, the step that finds it, words of its cause.
+WRONG = [
+    ("foot-typed-4.5kg", "C0", "feet.tread.mass = 4.5"),
+    ("other-master", "C1", "Another program drives this arm"),
+    ("pidx-3-is-2", "C2", "PIDX of puck 3 is 2"),
+    ("mixed-firmware", "C2", "firmware versions of the pucks are incompatible"),
+    ("duplicate-node", "C2", "Two devices have one number"),
+    ("vl2-doubled", "C2", "VL2 = 8192"),
+]
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1200)
+@pytest.mark.parametrize(("name", "step", "words"), WRONG)
+def test_a_wrong_rig_is_found_where_it_should_be(name, step, words):
+    ending = commissioned(name, 1, 0.7, last=step)
+    assert (ending.step, words in ending.cause) == (step, True), ending

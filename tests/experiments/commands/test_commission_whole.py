@@ -1,0 +1,73 @@
+"""A whole first day by the command, simulated: every step, the end, and going on."""
+
+import pytest
+
+from experiments.commands.commission import FAKE_FOLDER
+from experiments.commissioning.gate import lacks
+from experiments.commissioning.record import read_commissioning, write_commissioning
+from experiments.commissioning.steps import GATED, ProofStep
+from experiments.proving.work import WORK
+from experiments.report import commissioning as page
+from tests.experiments.program import traction, write_config
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(1800)]
+OPTIONS = ("--fake", "--fast", "--operator-script", "auto", "--seed", 1)
+NAMES = ("--operator", "Ada", "--witness", "Grace")
+
+
+def commission(folder, *more):
+    """Go on with what is due."""
+    config = folder / "rig.toml"
+    return traction("commission", *OPTIONS, "--config", config, *more)
+
+
+@pytest.fixture(scope="module")
+def day(tmp_path_factory):
+    """Return the folder of a sound arm that was commissioned in one run."""
+    folder = tmp_path_factory.mktemp("day")
+    write_config(folder)
+    done = commission(folder, *NAMES)
+    assert done.code == 0, (done.out, done.err)
+    return folder, done
+
+
+def test_a_sound_arm_passes_every_step_in_one_run_and_is_signed(day):
+    folder, done = day
+    record = read_commissioning(folder / FAKE_FOLDER)
+    assert [(each.step, each.cause) for each in record.steps] == [
+        (step, "") for step in WORK
+    ]
+    assert record.signed == ("Ada", "Grace")
+    assert {each.operator for each in record.steps} == {"Ada"}
+    lacking = lacks(record, {}, record.steps[-1].ended)
+    assert not [lack for lack in lacking if lack.step in GATED]
+    assert "Not done, and said in every recording: C12, C13." in done.out
+    assert "signed by Ada and Grace" in (folder / FAKE_FOLDER / page.NAME).read_text()
+
+
+def test_its_recordings_pass_again(day):
+    folder, _ = day
+    before = read_commissioning(folder / FAKE_FOLDER)
+    config = folder / "rig.toml"
+    done = traction("commission", "--fake", "--recheck", "--config", config)
+    assert done.code == 0, (done.out, done.err)
+    assert read_commissioning(folder / FAKE_FOLDER) == before
+
+
+def test_what_was_left_after_a_step_goes_on_with_the_next(day):
+    kept = day[0] / FAKE_FOLDER
+    record = read_commissioning(kept)
+    middle = ProofStep.HUNG_WEIGHT
+    count = list(WORK).index(middle) + 1
+    first = record.steps[:count]
+    assert first[-1].step is middle
+    left = record.model_copy(update={"steps": first, "signed": ()})
+    write_commissioning(kept, left)
+    done = commission(day[0], *NAMES, "--until", "C9")
+    assert done.code == 0, (done.out, done.err)
+    again = read_commissioning(kept)
+    assert again.steps[: len(first)] == first
+    gone_on = [done.step for done in again.steps[len(first) :]]
+    assert gone_on == [ProofStep.REST_POSE, ProofStep.RAMPS]
+    assert again.signed == ()
+    assert "Still to do: C10, C11, C14." in done.out

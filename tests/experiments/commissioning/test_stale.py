@@ -1,0 +1,117 @@
+"""Every row of the table of staleness, changed where it truly stands.
+
+Settings are changed in rig.toml and matrix.toml, properties in what the pucks answer;
+the digests of both are those that commands make.
+"""
+
+from dataclasses import replace
+
+import pytest
+
+from experiments.commissioning.gate import lacks
+from experiments.commissioning.inputs import inputs_of, present_inputs
+from experiments.commissioning.record import Commissioning, StepRecord
+from experiments.commissioning.steps import BASES, ORDER, TOLD
+from experiments.preflight.connecting import connect_rig
+from experiments.rig.rig import FakeOptions
+from experiments.settings.load import load_settings
+from tests.experiments.commissioning.test_record import NOON
+from tests.experiments.program import changed, write_config
+
+SETTINGS = {  # name of the basis: file, what stands there, what stands there then
+    "[safety]": ("rig.toml", "speed_fault = 1.0", "speed_fault = 0.9"),
+    "[limits]": ("rig.toml", "foot_speed = 0.8 ", "foot_speed = 0.7 "),
+    "[arm]": ("rig.toml", "[arm]\n", "[arm]\nrest = [0, -2, 0, 3, 0, 0, 0]\n"),
+    "zero": ("rig.toml", "[arm]\n", "[arm]\nmech_at_home = [1, 2, 3, 4, 5, 6, 7]\n"),
+    "[feet]": ("rig.toml", "mass = 0.45  ", "mass = 0.46  "),
+    "[ft_sensor]": ("rig.toml", "angle_deg = 0.0", "angle_deg = 1.0"),
+    "[gravity]": ("rig.toml", 'model = "cad"', 'model = "shipped"'),
+    "[friction]": ("rig.toml", "compensation = 0.7", "compensation = 0.6"),
+    "[control]": ("rig.toml", "lock_kp = 20.0", "lock_kp = 21.0"),
+    "[can]": ("rig.toml", 'channel = "can0"', 'channel = "can1"'),
+    "terrain": ("matrix.toml", "heading_deg = 0.0", "heading_deg = 1.0"),
+}
+PUCK = ("SN", "VERS", "ROLE", "CTS", "PIDX", "GRPA", "GRPB", "GRPC")
+MOTOR = ("IPNM", "POLES", "MT")
+
+
+def connected(folder):
+    """Return the rig of rig.toml, what it answers, and its start."""
+    settings = load_settings(folder / "rig.toml")
+    rig = connect_rig(
+        settings, settings.matrix.terrains[0], FakeOptions("fast", 1, 0.7)
+    )
+    try:
+        info = rig.backend.start_arm()
+        return rig, rig.backend.arm.answers(), info
+    finally:
+        rig.backend.close()
+
+
+def commissioned(present):
+    """Return a record of all steps that stand on what is `present`."""
+    record = Commissioning(program="a test")
+    for step in ORDER:
+        done = StepRecord(
+            step=step,
+            started=NOON,
+            ended=NOON,
+            operator="one",
+            witness="two",
+            inputs=inputs_of(step, present),
+            verdict="sound",
+        )
+        record = record.with_step(done)
+    return record
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory):
+    """Return a rig as it was commissioned."""
+    folder = tmp_path_factory.mktemp("sound")
+    write_config(folder)
+    return connected(folder)
+
+
+def stale(sound, present):
+    """Return the steps that are stale now."""
+    found = lacks(commissioned(present_inputs(*sound)), present, NOON)
+    assert all(": stale: " in lack.text for lack in found)
+    return tuple(lack.step for lack in found)
+
+
+def test_nothing_is_stale_where_nothing_changed(sound, tmp_path):
+    write_config(tmp_path)
+    assert stale(sound, present_inputs(*connected(tmp_path))) == ()
+
+
+@pytest.mark.parametrize("name", SETTINGS)
+def test_a_section_that_was_changed(sound, tmp_path, name):
+    write_config(tmp_path)
+    file, old, new = SETTINGS[name]
+    path = tmp_path / file
+    path.write_text(changed(path.read_text(), old, new))
+    present = present_inputs(*connected(tmp_path))
+    assert stale(sound, present) == BASES[name].steps
+
+
+@pytest.mark.parametrize("joint", [1, 7])
+@pytest.mark.parametrize("name", [*PUCK, *MOTOR])
+def test_a_puck_that_says_something_else(sound, joint, name):
+    rig, answers, info = sound
+    other = [dict(answer) for answer in answers]
+    assert other[joint - 1][name] is not None
+    other[joint - 1][name] += 1
+    basis = "pucks" if name in PUCK else "motors"
+    assert stale(sound, present_inputs(rig, other, info)) == BASES[basis].steps
+
+
+def test_a_module_with_another_firmware(sound):
+    rig, answers, info = sound
+    other = replace(info, safety_vers=info.safety_vers + 1)
+    assert stale(sound, present_inputs(rig, answers, other)) == BASES["module"].steps
+
+
+def test_every_basis_is_changed_by_a_test():
+    # What only persons know stands in tests/experiments/commissioning/test_record.py.
+    assert {*SETTINGS, *TOLD, "pucks", "motors", "module"} == set(BASES)

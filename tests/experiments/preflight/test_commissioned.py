@@ -1,0 +1,121 @@
+"""May torque be sent? The record beside rig.toml and the arm that answers tell."""
+
+import json
+
+import pytest
+
+from acquisition.errors import PreflightError
+from experiments.commissioning.inputs import inputs_of, present_inputs
+from experiments.commissioning.record import NAME, write_commissioning
+from experiments.commissioning.steps import GATED, ORDER
+from experiments.operator.console import BAD, WARNING
+from experiments.preflight.commissioned import check_commissioned
+from experiments.preflight.connecting import connect_rig
+from experiments.rig.rig import FakeOptions
+from experiments.settings.load import load_settings
+from lab.guest.commissioned import sound_record
+from tests.experiments.program import changed, write_config
+
+FRICTION = ("compensation = 0.7", "compensation = 0.6")  # of rig.toml
+
+
+class Arm:
+    """An arm in stepped time that is asked as a real one is."""
+
+    def __init__(self, config, wrong=""):
+        settings = load_settings(config)
+        fake = FakeOptions("fast", 1, 0.7, wrong=wrong)
+        self.rig = connect_rig(settings, settings.matrix.terrains[0], fake)
+        self.info = self.rig.backend.start_arm()
+        self.lines = []
+
+    def check(self, made_anew=()):
+        self.lines.clear()
+
+        def add(*line):
+            self.lines.append(line)
+
+        try:
+            return check_commissioned(self.rig, self.info, add, made_anew)
+        finally:
+            self.rig.backend.close()
+
+    def refusal(self):
+        with pytest.raises(PreflightError) as refused:
+            self.check()
+        assert self.lines[-1][0] == BAD
+        return refused.value
+
+
+@pytest.fixture
+def config(tmp_path):
+    """Return a rig.toml with a record of the arm that it names."""
+    path = write_config(tmp_path)
+    arm = Arm(path)
+    write_commissioning(tmp_path, sound_record(arm.rig, arm.info))
+    arm.rig.backend.close()
+    return path
+
+
+def test_an_arm_without_a_record_is_refused(config):
+    (config.parent / NAME).unlink()
+    refusal = Arm(config).refusal()
+    assert "C0 configuration: not done, and 11 more" in refusal.message
+    assert refusal.hint == "traction commission --from C0"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("foot_speed = 0.8 ", "foot_speed = 0.7 ", "C0 configuration: stale: [limits]"),
+        ("speed_fault = 1.0", "speed_fault = 0.9", "C0 configuration: stale: [safety]"),
+        (*FRICTION, "C10 lift: stale: [friction]"),
+    ],
+)
+def test_a_record_that_settings_made_stale_is_refused(config, old, new, words):
+    config.write_text(changed(config.read_text(), old, new))
+    assert words in Arm(config).refusal().message
+
+
+def test_another_arm_with_the_same_files_is_refused(config):
+    refusal = Arm(config, "another-arm").refusal()
+    assert "C2 identity: stale: serial number" in refusal.message
+
+
+def test_an_edited_record_is_refused(config):
+    path = config.parent / NAME
+    content = json.loads(path.read_text())
+    content["steps"][8]["operator"] = "another"
+    path.write_text(json.dumps(content))
+    assert "was changed at or before C8 rest pose" in Arm(config).refusal().message
+
+
+def test_a_record_of_a_simulated_arm_is_none_of_a_real_one(config):
+    arm = Arm(config)
+    record = sound_record(arm.rig, arm.info)
+    simulated = record.model_copy(update={"is_simulated": True})
+    write_commissioning(config.parent, simulated)
+    assert "C0 configuration: not done" in arm.refusal().message
+
+
+def test_a_sound_record_lets_through_and_recordings_say_what_is_open(config):
+    arm = Arm(config)
+    said = arm.check()["commissioning"]
+    assert arm.lines[-1][0] == WARNING
+    assert said.startswith("uncommissioned: C12 lock and clock: not done")
+
+
+def test_a_record_of_every_step_is_complete(config):
+    arm = Arm(config)
+    record = sound_record(arm.rig, arm.info)
+    present = present_inputs(arm.rig, arm.rig.backend.arm.answers(), arm.info)
+    for step in ORDER[len(GATED) :]:
+        changes = {"step": step, "inputs": inputs_of(step, present)}
+        record = record.with_step(record.steps[0].model_copy(update=changes))
+    write_commissioning(config.parent, record)
+    assert arm.check() == {"commissioning": "complete"}
+
+
+def test_what_a_command_measures_anew_is_not_stale_for_it(config):
+    config.write_text(changed(config.read_text(), *FRICTION))
+    assert Arm(config).check(("[friction]",))

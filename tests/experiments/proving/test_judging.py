@@ -1,0 +1,104 @@
+import numpy as np
+import pytest
+
+from acquisition.devices import SafetyMode
+from acquisition.errors import SettingsError
+from experiments.proving import bus, by_hand, rest_pose, stop_circuit
+from experiments.proving.recording import read_raw, texts, write_raw
+from wam.model.constants import load_constants
+
+CONSTANTS = load_constants()
+EXCHANGE = {
+    "unasked": np.array(5),
+    "late": np.array(0),
+    "jumps": np.array(0),
+    "answer_ns": np.array(290_000),
+    "cycles": np.array(30_000),
+    "incomplete": np.array(0),
+}
+
+
+def test_a_sound_exchange_passes():
+    assert bus.judge_timing(EXCHANGE).cause == ""
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("late", 2, "earlier question"),
+        ("answer_ns", 2_290_000, "adapter is slow"),
+        ("incomplete", 13, "Frames are lost"),
+        ("unasked", 0, "Too few"),
+    ],
+)
+def test_a_wrong_exchange_is_named(name, value, words):
+    wrong = {**EXCHANGE, name: np.array(value)}
+    assert words in bus.judge_timing(wrong).cause
+
+
+def turned(joint=0, off=0.0, scale=1.0):
+    low, high = np.zeros((7, 7)), np.zeros((7, 7))
+    np.fill_diagonal(low, CONSTANTS.q_lower)
+    np.fill_diagonal(high, CONSTANTS.q_upper)
+    for row in (low, high):
+        row[joint, joint] = scale * row[joint, joint] + off
+    ends = {"q_lower": CONSTANTS.q_lower, "q_upper": CONSTANTS.q_upper}
+    return {"low": low, "high": high, **ends}
+
+
+def test_joints_that_stop_where_they_should_pass():
+    assert by_hand.judge(turned()).cause == ""
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        (turned(1, off=np.radians(5.0)), "joint 2 on its stop"),
+        (turned(2, scale=-1.0), "sense of joint 3"),
+        (turned(3, scale=0.5), "travel of joint 4"),
+    ],
+)
+def test_an_encoder_that_is_wrong_is_named(values, words):
+    assert words in by_hand.judge(values).cause
+
+
+def test_a_joint_that_goes_along_is_named():
+    values = turned()
+    values["high"][4, 5] = 1.0
+    assert "Turned was joint 5, joint 6 went along" in by_hand.judge(values).cause
+
+
+def pressed(*, silent_after=0):
+    modes = [SafetyMode.IDLE] * 100 + [SafetyMode.E_STOP] * 1000
+    modes += [SafetyMode.IDLE] * 100
+    fresh = [0x7F] * (100 + silent_after) + [0] * (1100 - silent_after)
+    return {
+        "t_ns": np.arange(1200) * 2_000_000,
+        "mode": np.array(modes, dtype=np.int64),
+        "fresh": np.array(fresh),
+        "seen": np.array([True] * 3),
+        "released_ns": np.array(1_000_000_000),
+        "idled_ns": np.array(2_190_000_000),
+    }
+
+
+def test_a_sound_stop_passes_and_one_that_leaves_the_power_does_not():
+    assert stop_circuit.judge(pressed()).cause == ""
+    assert "stop button" in stop_circuit.judge(pressed(silent_after=200)).cause
+
+
+def test_an_arm_that_moves_without_torque_is_named():
+    q = np.tile(CONSTANTS.home, (500, 1))
+    values = {"t_ns": np.arange(500) * 2_000_000, "q": q, "ended": texts([])}
+    assert rest_pose.judge_rest(values).cause == ""
+    q[-1, 2] += 0.016
+    assert "way of joint 3" in rest_pose.judge_rest(values).cause
+
+
+def test_a_recording_is_read_as_written_or_refused(tmp_path):
+    raw = write_raw(tmp_path, "one.npz", {"q": np.arange(3.0), "t": texts(["a"])})
+    found = read_raw(tmp_path, raw)
+    assert found["q"].tolist() == [0.0, 1.0, 2.0]
+    (tmp_path / "one.npz").write_bytes(b"other")
+    with pytest.raises(SettingsError, match="not what was recorded"):
+        read_raw(tmp_path, raw)

@@ -1,0 +1,73 @@
+"""C5 to C7 on arms that are held still: sound ones pass, wrong ones are named."""
+
+import pytest
+
+from experiments.proving import by_hand, weights
+from experiments.rig.build import build_tool
+from experiments.settings.load import load_settings
+from tests.experiments.proving.held_arm import HeldArm
+
+SOUND = 40
+WRONG = {  # name of the catalogue: words of the first cause, one of them
+    "zero-2-off-10deg": ("joint 2 on its stop",),
+    "zero-7-off-90deg": ("joint 7 on its stop",),
+    "wrist-9.48": ("travel of joint",),
+    "ratios-low": ("travel of joint", "on its stop"),
+    "encoder-4-reversed": ("sense of joint 4",),
+    "base-on-wall": ("The base stands otherwise",),
+    "base-on-ceiling": ("The base stands otherwise",),
+    "base-tilted-5deg": ("It is the base", "The base stands otherwise"),
+    "foot-typed-4.5kg": ("mass of the foot",),
+    "foot-half": ("mass of the foot",),
+    "foot-heavier": ("mass of the foot",),
+    "centre-off-50mm": ("centre of the foot",),
+    "sole-20mm-lower": ("sole of rig.toml",),
+    "sensor-turned-90deg": ("The sensor is turned",),
+    "sensor-turned-20deg": ("The sensor is turned", "it is turned", "the sensor about"),
+    "sensor-turned-10deg": ("The sensor is turned", "it is turned", "the sensor about"),
+    "sensor-tilted-10deg": ("The sensor is turned", "it is turned", "the sensor about"),
+    "sensor-axes-swapped": ("The sensor is turned",),
+    "sensor-sign": ("the sensor's sign",),
+    "sensor-sign-x": ("The sensor is turned",),
+    "sensor-lbf": ("mass of the foot",),
+    "sensor-kgf": ("Units of the sensor",),
+    "sensor-nmm": ("Units of the sensor",),
+    "sensor-lbf-in": ("Units of the sensor",),
+    "sensor-scale-110": ("Scale of the sensor", "mass of the foot"),
+    "sensor-foreign-matrix": ("matrix is another one's", "The sensor is turned"),
+    "sensor-cable-pulls": ("its cable pulls",),
+}
+
+
+@pytest.fixture(scope="module")
+def tool():
+    return build_tool(load_settings(None).rig, "tread")
+
+
+def causes(tool, seed, wrong=""):
+    """Return what the three steps find, each "" or a cause, until the first."""
+    arm = HeldArm(tool, seed, wrong)
+    stops = arm.stops()
+    yield by_hand.judge(stops).cause
+    yield weights.judge_own_weight(arm.own_weight()).cause
+    off = by_hand.stop_errors(stops)
+    yield weights.judge_hung_weight(arm.hung_weight(off)).cause
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_sound_arm_passes(tool, seed):
+    assert list(causes(tool, seed)) == ["", "", ""]
+
+
+@pytest.mark.slow
+def test_no_sound_arm_of_many_is_stopped(tool):
+    stopped = [seed for seed in range(SOUND) if any(causes(tool, seed))]
+    assert stopped == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("wrong", WRONG)
+def test_a_wrong_arm_is_named(tool, wrong):
+    for seed in (1, 2, 3):
+        cause = next(filter(None, causes(tool, seed, wrong)))
+        assert any(words in cause for words in WRONG[wrong])
