@@ -42,6 +42,7 @@ from experiments.session.lock import session_lock
 from experiments.session.stance_task import StanceTask
 from experiments.session.states import Event
 from experiments.session.store import create_session, session_utc_ns
+from experiments.session.unbegun import clear_unbegun
 from experiments.settings.load import Settings
 from experiments.settings.matrix import TerrainRow
 from experiments.status_table.session_summaries import glance_sessions
@@ -229,11 +230,13 @@ def _open_journal(
     if mode.journal is not None:
         host_faults.enter_session(mode.journal.folder)
         return replace(mode.journal, clock=rig.clock)
+    utc_ns = session_utc_ns()
+    clear_unbegun(request.data, utc_ns)
     folder = create_session(
         request.data,
         request.row.name,
         is_simulated=rig.is_simulated,
-        utc_ns=session_utc_ns(),
+        utc_ns=utc_ns,
     )
     host_faults.enter_session(folder)
     host_faults.hold_lock(folder)
