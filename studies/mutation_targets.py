@@ -15,6 +15,10 @@ _SALVAGED = (
     f"{_FILE_TESTS}/test_hostile_files.py",
     "tests/corpus/test_stated_limits.py",
 )
+_PUBLISHED = (
+    "tests/experiments/report/test_checksums.py",
+    "tests/experiments/report/test_witnesses.py",
+)
 
 TESTS = {
     f"{_LOOP}/guard.py": (
@@ -119,6 +123,11 @@ TESTS = {
     "ft_sensor/tare.py": ("tests/ft_sensor/test_tare.py",),
     "ft_sensor/weighing.py": ("tests/ft_sensor/test_tare.py",),
     "experiments/session/reducer.py": ("tests/experiments/session/test_reducer.py",),
+    "experiments/session/kept_files.py": (
+        "tests/experiments/session/test_witnesses.py",
+    ),
+    "experiments/report/checksums.py": _PUBLISHED,
+    "experiments/report/witnesses.py": _PUBLISHED,
     "experiments/session/crash_recovery.py": (
         "tests/experiments/session/test_crash_recovery.py",
     ),

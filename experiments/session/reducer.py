@@ -254,9 +254,17 @@ def _start_trial(state: SessionState, event: _Facts) -> SessionState:
 
 def _keep(state: SessionState, event: _Facts) -> SessionState:
     number = _whole(event, "trial")
-    kept = (*state.kept_attempts, (number, state.attempt(number)))
+    # A line that is lost may have begun an attempt: this one states its own.
+    attempt = max(state.attempt(number), _whole(event, "attempt"))
+    attempts = {**dict(state.attempts), number: attempt}
     redoing = None if state.redoing == number else state.redoing
-    return replace(state, running=None, kept_attempts=kept, redoing=redoing)
+    return replace(
+        state,
+        running=None,
+        kept_attempts=(*state.kept_attempts, (number, attempt)),
+        attempts=tuple(sorted(attempts.items())),
+        redoing=redoing,
+    )
 
 
 def _reject(state: SessionState, event: _Facts) -> SessionState:

@@ -1,0 +1,318 @@
+"""Each thing that may be wrong with the files of a session, and who tells of it.
+
+A small session of two kept trials and a rejected one, damaged in one way at a time.
+"""
+
+import json
+
+import pytest
+
+from acquisition.errors import TrialFileError
+from experiments.session.data_files import journal_line, parse_line, sha256_of
+from experiments.session.kept_files import (
+    KeptDataError,
+    check_kept,
+    compare_kept,
+    compare_trial,
+    repeated_numbers,
+    repeated_trials,
+)
+from experiments.session.store import find_session, list_sessions
+from tests.corpus.used_session import session_files
+
+SIZE = len(session_files()["sessions/2027-01-15_S001_TF.fake/trials/T01.mcap"])
+CHECKSUM = "is changed: its checksum is wrong"
+
+
+@pytest.fixture
+def data(tmp_path):
+    for name, content in session_files().items():
+        target = tmp_path / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_bytes(content)
+    return tmp_path
+
+
+@pytest.fixture
+def session(data):
+    return find_session(data, "S001")
+
+
+def deviations(session):
+    return {(d.file, d.problem) for d in compare_kept(session)}
+
+
+def lines(session):
+    return (session.path / "events.jsonl").read_bytes().splitlines(keepends=True)
+
+
+def write_lines(session, kept):
+    (session.path / "events.jsonl").write_bytes(b"".join(kept))
+
+
+def change_json(path, **fields):
+    path.write_text(json.dumps({**json.loads(path.read_text()), **fields}))
+
+
+def drop(name):
+    return lambda session: (session.path / name).unlink()
+
+
+def replace(name, old, new):
+    def spoil(session):
+        path = session.path / name
+        path.write_bytes(path.read_bytes().replace(old, new, 1))
+
+    return spoil
+
+
+def cut_lines(count):
+    return lambda session: write_lines(session, lines(session)[:count])
+
+
+def lose_line(number):
+    def spoil(session):
+        every = lines(session)
+        write_lines(session, every[: number - 1] + every[number:])
+
+    return spoil
+
+
+def without_numbers(session):
+    """Write the journal as older versions did, of whose lines one could be lost."""
+    events = [parse_line(line) for line in lines(session)]
+    old = [{k: v for k, v in e.items() if k not in {"line", "crc"}} for e in events]
+    texts = [json.dumps(event).encode() + b"\n" for event in old]
+    write_lines(session, texts[:-4])
+
+
+def set_json(name, **fields):
+    return lambda session: change_json(session.path / name, **fields)
+
+
+def flip(name):
+    def spoil(session):
+        path = session.path / name
+        content = bytearray(path.read_bytes())
+        content[len(content) // 2] ^= 1
+        path.write_bytes(content)
+
+    return spoil
+
+
+def shorten(session):
+    path = session.path / "trials/T01.mcap"
+    path.write_bytes(path.read_bytes()[:-100])
+
+
+def add_trial(session):
+    """Add a kept trial that no journal knows, and spoil its recording."""
+    for suffix in (".json", ".mcap"):
+        source = (session.path / "trials/T01.json").with_suffix(suffix)
+        (session.path / "trials/T03").with_suffix(suffix).write_bytes(
+            source.read_bytes()
+        )
+    change_json(session.path / "trials/T03.json", trial="T03", attempt=1)
+    flip("trials/T03.mcap")(session)
+
+
+def link_out(session):
+    path = session.path / "trials/T01.mcap"
+    path.rename(session.path.parent / "elsewhere.mcap")
+    path.symlink_to(session.path.parent / "elsewhere.mcap")
+
+
+def say_recorded(session):
+    """Let the journal's first line be of a recorded session of another terrain."""
+    first, *rest = lines(session)
+    event = {k: v for k, v in parse_line(first).items() if k not in {"line", "crc"}}
+    write_lines(session, [journal_line({**event, "terrain": "S0"}, 1), *rest])
+
+
+DAMAGES = {
+    "journal empty": (
+        cut_lines(0),
+        {("events.jsonl", "is missing or empty; session.json is not")},
+    ),
+    "journal gone": (
+        drop("events.jsonl"),
+        {("events.jsonl", "is missing or empty; session.json is not")},
+    ),
+    "journal cut": (cut_lines(9), {("events.jsonl", "ends after 9 of 12 lines")}),
+    "line of T02 lost": (
+        lose_line(11),
+        {
+            ("events.jsonl", "lacks lines or has others: line 11 was line 12"),
+            ("events.jsonl", "ends after 11 of 12 lines"),
+            ("trials/T02.json", "is kept, but is not in the journal"),
+        },
+    ),
+    "line changed": (
+        replace("events.jsonl", b'"who": "mk"', b'"who": "km"'),
+        {("events.jsonl", "has a wrong checksum in line 5")},
+    ),
+    "rejection lost": (
+        lose_line(5),
+        {("events.jsonl", "lacks lines or has others: line 5 was line 6")},
+    ),
+    "lines without numbers": (
+        without_numbers,
+        {("events.jsonl", "ends after 8 of 12 lines")},
+    ),
+    "summary gone": (
+        drop("session.json"),
+        {("session.json", "is missing or damaged")},
+    ),
+    "summary of another": (
+        set_json("session.json", id="S007"),
+        {("session.json", "is of S007: a copy, or a renamed session")},
+    ),
+    "summary knows more": (
+        set_json("session.json", kept=["T01", "T02", "T04"]),
+        {("trials/T04.mcap", "is kept in session.json, not in the journal")},
+    ),
+    "sidecar gone": (
+        drop("trials/T01.json"),
+        {("trials/T01.json", "is missing or unreadable")},
+    ),
+    "sidecar of other bytes": (
+        set_json("trials/T01.json", sha256="0" * 64),
+        {("trials/T01.json", "states another checksum")},
+    ),
+    "recording gone": (drop("trials/T01.mcap"), {("trials/T01.mcap", "is missing")}),
+    "bit of a recording": (flip("trials/T02.mcap"), {("trials/T02.mcap", CHECKSUM)}),
+    "recording cut": (
+        shorten,
+        {("trials/T01.mcap", f"is changed: {SIZE - 100} bytes, {SIZE} were kept")},
+    ),
+    "trial of no journal": (
+        add_trial,
+        {
+            ("trials/T03.json", "is kept, but is not in the journal"),
+            ("trials/T03.mcap", CHECKSUM),
+        },
+    ),
+    "another terrain inside": (
+        say_recorded,
+        {("events.jsonl", "is of S0: a renamed session")},
+    ),
+}
+
+
+def test_a_sound_session_has_no_deviation(session):
+    assert deviations(session) == set()
+
+
+@pytest.mark.parametrize("name", DAMAGES)
+def test_a_damage_is_named(session, name):
+    spoil, wanted = DAMAGES[name]
+    spoil(session)
+    found = deviations(session)
+    assert wanted <= found
+    others = {problem for file, problem in found - wanted if file != "events.jsonl"}
+    missing = "is kept, but is not in the journal"
+    assert others <= {missing, "is kept in session.json, not in the journal"}
+
+
+def test_a_recording_that_leads_elsewhere_is_named(session):
+    link_out(session)
+    assert {d.file for d in compare_kept(session)} == {"trials/T01.mcap"}
+
+
+def test_a_summary_behind_the_journal_is_no_deviation(session):
+    change_json(session.path / "session.json", kept=["T01"], events=8)
+    assert deviations(session) == set()
+
+
+def test_a_torn_last_line_is_no_deviation(session):
+    with (session.path / "events.jsonl").open("ab") as journal:
+        journal.write(b'{"event": "trial-sta')
+    assert deviations(session) == set()
+
+
+@pytest.mark.parametrize("name", ["2027-01-15_S001_TF", "2027-01-15_S001_S0.fake"])
+def test_a_name_that_contradicts_the_journal_is_named(data, session, name):
+    first = parse_line(lines(session)[0])
+    plain = {k: v for k, v in first.items() if k not in {"line", "crc"}}
+    line = journal_line({**plain, "fake": {"seed": 1}}, 1)
+    write_lines(session, [line, *lines(session)[1:]])
+    session.path.rename(session.path.with_name(name))
+    (renamed,) = list_sessions(data)
+    problems = {d.problem for d in compare_kept(renamed)}
+    assert any("a renamed session" in problem for problem in problems)
+
+
+def test_a_trial_whose_files_follow_the_journal_later_is_no_deviation(session):
+    """A verdict is in the journal before the files are moved."""
+    for suffix in (".json", ".mcap"):
+        kept = session.path / f"trials/T01{suffix}"
+        kept.rename(session.path / f"rejected/T01b{suffix}")
+    assert deviations(session) == set()
+
+
+def test_what_is_asked_of_one_trial_is_that_trial(session):
+    flip("trials/T02.mcap")(session)
+    assert compare_trial(session, session.path / "trials/T01.mcap") == []
+    (found,) = compare_trial(session, session.path / "trials/T02.mcap")
+    assert found.text() == f"S001 trials/T02.mcap {CHECKSUM}"
+
+
+def test_deviations_are_refused_unless_they_are_allowed(session):
+    assert check_kept([session], allow_missing=False) == []
+    drop("trials/T01.mcap")(session)
+    (found,) = check_kept([session], allow_missing=True)
+    assert found.problem == "is missing"
+    with pytest.raises(KeptDataError, match=r"S001 trials/T01\.mcap is missing\."):
+        check_kept([session], allow_missing=False)
+
+
+def test_no_more_than_six_deviations_are_named(session):
+    for number in range(3, 12):
+        name = f"trials/T{number:02d}.json"
+        content = json.loads((session.path / "trials/T01.json").read_text())
+        (session.path / name).write_text(
+            json.dumps({**content, "trial": f"T{number:02d}", "attempt": 1})
+        )
+    with pytest.raises(KeptDataError) as refusal:
+        check_kept([session], allow_missing=False)
+    assert str(refusal.value).count("is kept, but is not in the journal") <= 6
+    assert "; and 12 more." in str(refusal.value)
+
+
+def test_the_second_folder_of_a_number_is_named_with_the_first(data, session):
+    copy = session.path.with_name("2027-01-16_S001_TF.fake")
+    copy.mkdir()
+    repeated = repeated_numbers(list_sessions(data))
+    assert [d.text() for d in repeated.values()] == [
+        f"S001 {copy.name} has the number of {session.path.name}"
+    ]
+
+
+def test_trials_of_a_copy_are_told_by_their_content(data, session):
+    copy = session.path.with_name("2027-01-15_S002_TF.fake")
+    (copy / "trials").mkdir(parents=True)
+    for name in ("T01.json", "T02.json"):
+        content = (session.path / "trials" / name).read_bytes()
+        (copy / "trials" / name).write_bytes(content)
+    change_json(copy / "trials/T02.json", sha256="0" * 64)
+    assert repeated_trials(find_session(data, "S002"), session) == {"T01"}
+
+
+def test_checksums_are_computed_by_whom_is_asked(session):
+    asked = []
+
+    def digest(path):
+        asked.append(path.name)
+        return sha256_of(path)
+
+    assert compare_kept(session, digest) == []
+    assert asked == ["T01.mcap", "T02.mcap"]
+
+
+def test_a_folder_that_cannot_be_read_is_a_deviation(session):
+    (session.path / "trials").rename(session.path / "old")
+    (session.path / "trials").symlink_to(session.path / "old")
+    with pytest.raises(TrialFileError):
+        session.journal_text()
+    (found,) = compare_kept(session)
+    assert found.file == "trials"
