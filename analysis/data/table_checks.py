@@ -20,6 +20,7 @@ MOST_MISSING = 0.2  # share of the rows without a value
 GAP = 1.0  # s between two rows
 _STEPS = 10.0  # of the table's own, below which no step is a gap
 _SLOWEST, _FASTEST = 0.2, 2e-5  # s between rows of a table that states no unit of t
+_WORDS = {"d": "days"}
 _USUAL = (5e-5, 0.2)  # s between the rows of a table
 _WILD = 20.0  # times the 99.9 % quantile
 _FLOORS = (0.05, 1.0, 1.0)  # m/s, N, N; smaller quantiles count as that
@@ -44,10 +45,10 @@ def check_clock(path: Path, rows: Array, is_stated: bool) -> None:
     step = _step(rows)
     if is_stated or step is None or _FASTEST <= step <= _SLOWEST:
         return
-    units = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}
+    units = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "d": 86_400.0}
     low, high = _USUAL
     likely = [name for name, unit in units.items() if low <= step * unit <= high]
-    looks = f"these look like {likely[0]}" if likely else "no unit of t is stated"
+    looks = f"these look like {_WORDS.get(likely[0], likely[0])}" if likely else "no unit of t is stated"
     raise refusal(
         path,
         f"column t: {step:.6g} s between two rows; {looks}",

@@ -6,6 +6,7 @@ How text is read stands in `analysis.dialects`.
 """
 
 import glob
+import math
 import os
 import zipfile
 import zlib
@@ -87,6 +88,8 @@ def load_tables(
     _check_names({*(columns or {}), *(units or {}), *negate})
     if decimal not in {None, ".", ","}:
         raise SettingsError(f"{decimal!r} is no decimal mark.", hint='Give "." or ",".')
+    if not (rate is None or (type(rate) in {int, float} and 0.0 < rate < math.inf)):
+        raise SettingsError(f"{rate!r} is no rate.", hint="Give rows per second [Hz].")
     columns = {name: name for name in COLUMNS} | dict(columns or {})
     request = TextRequest(columns, rate, decimal)
     form = _TableForm(request, terrain, stones or {}, units or {}, frozenset(negate))
@@ -114,6 +117,8 @@ def _expanded(path: Path) -> list[Path]:
     Raises:
         SettingsError: a pattern fits no file, or there is no such user.
     """
+    if os.path.lexists(path):
+        return [path]
     try:
         path = path.expanduser()
     except RuntimeError as error:

@@ -8,7 +8,7 @@ from acquisition.errors import SettingsError
 COLUMNS = ("t", "v_t", "F_n", "F_t")
 PREPARED = "kept_row"  # a column of tables that were prepared before
 SIMULATED = "simulated"  # 1 in every row where the devices were simulated
-_TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}
+_TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "d": 86_400.0}
 _SPEEDS = {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3, "um/s": 1e-6}
 _GRAM_FORCE = 9.80665e-3  # N
 _FORCES = {
@@ -122,9 +122,15 @@ def parse_names(text: str) -> tuple[str, ...]:
 
 
 def split_header(header: str) -> tuple[str, str]:
-    """Return name and unit of `v_t [mm/s]` or `v_t (mm/s)`; no unit is empty."""
-    match = _HEADER.fullmatch(header)
-    return (match["name"], match["unit"].strip()) if match else (header, "")
+    """Return name and unit of `v_t [mm/s]`, `v_t (mm/s)` or `v_t/mm/s`.
+
+    No unit is empty; behind a stroke stands one only where it is a unit.
+    """
+    if match := _HEADER.fullmatch(header):
+        return match["name"], match["unit"].strip()
+    name, _, unit = header.partition("/")
+    unit = unit.strip()
+    return (name.strip(), unit) if unit in _EVERY_UNIT else (header, "")
 
 
 def unit_of_cell(cell: str) -> str | None:

@@ -22,6 +22,7 @@ BLANKS = " "  # the delimiter of columns that runs of blanks part
 _DELIMITERS = ("\t", ";", ",", BLANKS)  # the first one that fits is taken
 _COMMENTS = ("#", "%", "//", ";")
 _SEPARATOR = "sep="
+_BLANK = 3  # empty lines between a header and its units
 _SEARCHED = 64  # lines for the header
 _COMPARED = 20  # rows whose cells are counted
 _FEWEST = 3  # cells of a table without a time
@@ -115,9 +116,12 @@ def find_dialect(
         for name, place in places.items()
         if name in COLUMNS and (unit := split_header(header[place])[1])
     }
-    below = _units_row(path, lines, first, delimiter, places, units)
+    row = first
+    while row < min(len(lines), first + _BLANK) and not lines[row].strip():
+        row += 1
+    below = _units_row(path, lines, row, delimiter, places, units)
     if below is not None:
-        first, units = first + 1, {**units, **below}
+        first, units = row + 1, {**units, **below}
     skipped = sum(bool(line.strip()) for line in lines[start : max(header_line, start)])
     return Dialect(delimiter, header, header_line, first, places, units, skipped)
 

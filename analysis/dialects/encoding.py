@@ -11,6 +11,7 @@ GZIP = b"\x1f\x8b"
 LONGEST_LINE = 65_536  # characters
 MOST_LINES = 1_000_000
 _PROBED = 1000  # bytes in which zeros tell UTF-16 from UTF-8
+_END_OF_FILE = "\x1a"  # old programs end a text with it
 _COPY = "Check that it was copied completely."
 
 
@@ -24,7 +25,7 @@ def lines_of(path: Path, largest: int) -> list[str]:
     Raises:
         SettingsError: it is no text, or a line or their number is out of bounds.
     """
-    text = _decoded(path, _content(path, largest))
+    text = _decoded(path, _content(path, largest)).rstrip(_END_OF_FILE)
     text = text.replace("\r\n", "\n").replace("\r", "\n")
     if (count := text.count("\n")) > MOST_LINES:
         hint = "Give one table per trial."
@@ -60,6 +61,9 @@ def _decoded(path: Path, content: bytes) -> str:
     except UnicodeDecodeError as error:
         before = content[: error.start].decode(encoding, errors="replace")
         line = before.count("\n") + 1
+        if encoding == "utf-16" and len(content) % 2:
+            reason = "the file ends in the middle of a character of UTF-16"
+            raise refused_line(path, line, reason, _COPY) from error
         reason = f"byte 0x{content[error.start]:02x} is not {encoding[:6].upper()}"
         raise refused_line(path, line, reason, _converted("WINDOWS-1252", path)) from (
             error

@@ -1,5 +1,6 @@
 """A text table as numbers: all rows read exactly, or the file refused with a line."""
 
+import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -26,6 +27,7 @@ from analysis.dialects.times import is_iso, iso_times
 Array = NDArray[np.float64]
 # Beside these delimiters a comma is a usual decimal mark, and points group thousands.
 _CONTINENTAL = (";", "\t")
+_DATE = re.compile(r"\d{1,4}[./-]\d{1,2}[./-]\d{2,4}\b|\d{1,2}:\d\d\b")
 _COPY = "Check that it was copied completely."
 
 
@@ -303,7 +305,10 @@ def _no_number(
     path: Path, name: str, cell: str, line: int, request: TextRequest
 ) -> Exception:
     """Return why a cell is not read as a number."""
-    if request.decimal is not None:
+    if name == "t" and _DATE.match(cell):
+        expected = "a number or a time as in 2026-11-26T10:00:00.002Z"
+        hint = "Give the times so, or leave the column out and give --rate HZ."
+    elif request.decimal is not None:
         expected = f"a number with the decimal mark {request.decimal!r}"
         hint = "Leave --decimal out, or mend the number."
     elif any(sign.isdigit() for sign in cell) and not any(map(str.isalpha, cell)):
