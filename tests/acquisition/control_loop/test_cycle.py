@@ -141,6 +141,9 @@ class Law:
     def is_moving(self):
         return self.moves
 
+    def is_proving(self):
+        return False
+
     def stuck_motor(self):
         return self.stuck
 

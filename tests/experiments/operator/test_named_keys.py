@@ -17,8 +17,15 @@ CODE = Path(experiments.__file__).parent
 # Where texts of a module appear; several for a screen with a key for each.
 SHOWN_AT = {
     "calibrating/terrain.py": {Prompt.TOUCH},
+    "commands/commission.py": {Prompt.CLEAR},
     "operator/keys.py": set(KEYS),
     "operator/screens.py": {Prompt.READY},
+    "proving/by_hand.py": {Prompt.CLEAR},
+    "proving/guide.py": {Prompt.CLEAR},
+    "proving/rest_pose.py": {Prompt.CLEAR},
+    "proving/scales.py": {Prompt.CLEAR},
+    "proving/stop_circuit.py": {Prompt.PAUSED},
+    "proving/weights.py": {Prompt.CLEAR},
     "run/context.py": {Prompt.LIFT, Prompt.READY, Prompt.UNDO},
     "run/console_loop.py": {Prompt.DAMPED, Prompt.LAY_DOWN},
     "run/pose_walk.py": {Prompt.CLEAR, Prompt.MOVING},
