@@ -48,7 +48,11 @@ def check_clock(path: Path, rows: Array, is_stated: bool) -> None:
     units = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "d": 86_400.0}
     low, high = _USUAL
     likely = [name for name, unit in units.items() if low <= step * unit <= high]
-    looks = f"these look like {_WORDS.get(likely[0], likely[0])}" if likely else "no unit of t is stated"
+    looks = (
+        f"these look like {_WORDS.get(likely[0], likely[0])}"
+        if likely
+        else "no unit of t is stated"
+    )
     raise refusal(
         path,
         f"column t: {step:.6g} s between two rows; {looks}",

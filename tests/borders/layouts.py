@@ -42,6 +42,20 @@ LAYOUTS: tuple[Border, ...] = (
         _PLAIN.encode("utf-16-le"),
         "iconv -f UTF-16LE",
     ),
+    refused(
+        "UTF-16 that was cut within a character",
+        b"\xff\xfe" + _PLAIN.encode("utf-16-le")[:-1],
+        "the file ends in the middle of a character",
+    ),
+    table("a Ctrl-Z behind the last row", _PLAIN + "\x1a"),
+    table(
+        "units behind a stroke",
+        text(_MM, names=("t/s", "v_t/mm/s", "F_n/N", "F_t/N")),
+    ),
+    table(
+        "units below an empty line",
+        text(_MM).replace("\n", "\n\ns,mm/s,N,N\n", 1),
+    ),
     refused("UTF-32", b"\xff\xfe\0\0" + _PLAIN.encode("utf-32-le"), "UTF-32"),
     refused(
         "a byte of Windows-1252 in a comment",

@@ -293,6 +293,16 @@ NUMBERS: tuple[Border, ...] = (
         "gap of 3.15e+08 s before line 32",
         expected=_DECADE[1],
     ),
+    refused(
+        "dates of one country",
+        text(with_column(0, lambda k, _: f"11/26/2026 10:00:00.{2 * k:03d}")),
+        "leave the column out and give --rate HZ",
+    ),
+    refused(
+        "days of a spreadsheet",
+        text(with_column(0, lambda k, _: f"{46352.5 + 0.002 * k / 86400:.10f}")),
+        "these look like days. Say it: --unit t=d",
+    ),
     flagged(
         "9999 for a missing value, in 4 % of the rows",
         text(with_column(2, lambda k, old: "9999" if k in {20, 21} else old)),
