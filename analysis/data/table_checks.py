@@ -159,7 +159,8 @@ def _wild(table: TrialTable, rows: Array) -> Iterator[str]:
         same = size == size.max()
         others = float(size[~same].max(initial=0.0))
         count = int(np.count_nonzero(same))
-        if 1 < count < size.size and size.max() > _WILD * max(others, floor):
+        is_rare = 1 < count <= MOST_MISSING * size.size
+        if is_rare and size.max() > _WILD * max(others, floor):
             first = int(same.argmax())
             yield (
                 f"{COLUMNS[k]} is {rows[first, k]:.6g} in {_counted(count)}, the first "

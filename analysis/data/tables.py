@@ -12,6 +12,7 @@ import zipfile
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from numbers import Real
 from pathlib import Path
 from typing import NamedTuple
 
@@ -88,7 +89,7 @@ def load_tables(
     _check_names({*(columns or {}), *(units or {}), *negate})
     if decimal not in {None, ".", ","}:
         raise SettingsError(f"{decimal!r} is no decimal mark.", hint='Give "." or ",".')
-    if not (rate is None or (type(rate) in {int, float} and 0.0 < rate < math.inf)):
+    if not (rate is None or _is_rate(rate)):
         raise SettingsError(f"{rate!r} is no rate.", hint="Give rows per second [Hz].")
     columns = {name: name for name in COLUMNS} | dict(columns or {})
     request = TextRequest(columns, rate, decimal)
@@ -100,6 +101,13 @@ def load_tables(
     if not trials:
         raise SettingsError("No table was given.", hint="Name at least one file.")
     return trials
+
+
+def _is_rate(rate: object) -> bool:
+    """Return whether rows can come at that rate [Hz]."""
+    if isinstance(rate, bool) or not isinstance(rate, Real):
+        return False
+    return 0.0 < float(rate) < math.inf
 
 
 def _check_names(names: set[str]) -> None:

@@ -124,13 +124,16 @@ def parse_names(text: str) -> tuple[str, ...]:
 def split_header(header: str) -> tuple[str, str]:
     """Return name and unit of `v_t [mm/s]`, `v_t (mm/s)` or `v_t/mm/s`.
 
-    No unit is empty; behind a stroke stands one only where it is a unit.
+    No unit is empty. A stroke begins one only where a unit is behind it, and where the
+    stroke is not within one itself, as in `speed m/s`.
     """
     if match := _HEADER.fullmatch(header):
         return match["name"], match["unit"].strip()
     name, _, unit = header.partition("/")
-    unit = unit.strip()
-    return (name.strip(), unit) if unit in _EVERY_UNIT else (header, "")
+    name, unit = name.strip(), unit.strip()
+    within = f"{re.split(r'[ _]', name)[-1]}/{unit}"
+    is_stated = unit in _EVERY_UNIT and within not in _EVERY_UNIT
+    return (name, unit) if is_stated else (header, "")
 
 
 def unit_of_cell(cell: str) -> str | None:

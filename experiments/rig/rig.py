@@ -95,7 +95,6 @@ class Rig:
         settings: all settings.
         calibrations: of gravity and friction.
         simulation: handle of the simulation; None on the real rig.
-        is_stepped: time passes only while the loop runs.
         pace: of stepped time, against the wall's; None where that is the clock.
     """
 
@@ -111,7 +110,6 @@ class Rig:
     settings: Settings
     calibrations: LawCalibrations
     simulation: SimulationControl | None
-    is_stepped: bool
     pace: WallPace | None = None
     serials: tuple[int, ...] | None = None
     tared_ns: int = 0
@@ -121,6 +119,11 @@ class Rig:
     def is_simulated(self) -> bool:
         """Whether the devices are simulated."""
         return self.simulation is not None
+
+    @property
+    def is_stepped(self) -> bool:
+        """Whether time passes only while the loop runs."""
+        return self.pace is not None
 
     @property
     def identity(self) -> RigIdentity:
@@ -196,7 +199,6 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
         settings=settings,
         calibrations=calibrations,
         simulation=simulation,
-        is_stepped=pace is not None,
         pace=pace,
     )
 

@@ -42,8 +42,8 @@ _LED_ASTRAY = frozenset(
 # Of an arm whose motors work.
 _DRIVEN = frozenset({ArmState.FLOAT, ArmState.HOLD, ArmState.DAMP, ArmState.GUIDE})
 LAY_DOWN_SECONDS = 60.0  # the arm waits so long for a hand before it goes idle
-# At these the simulated world moves for as long as it takes.
-_WORLD_ACTS = frozenset({Prompt.RECORDING, Prompt.MOVING, Prompt.LIFT})
+# At these simulated time decides what comes next, not a key.
+_WORLD_ACTS = frozenset({Prompt.RECORDING, Prompt.MOVING, Prompt.LIFT, Prompt.UNDO})
 _SETTLED_NS = 5_000_000_000  # at any other, it has come to rest within this
 _REST_TICKS = 25  # of the wall to one of a world at rest
 _SLOW = 0.95  # of real time; below it the screen says so

@@ -1,5 +1,6 @@
 """A served arm whose commissioning is taken for granted, so that torque may be sent."""
 
+from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -10,7 +11,7 @@ from experiments.commissioning.record import (
     StepRecord,
     write_commissioning,
 )
-from experiments.commissioning.steps import GATED
+from experiments.commissioning.steps import GATED, ProofStep
 from experiments.preflight.connecting import connect_rig
 from experiments.rig.rig import Rig
 from experiments.settings.load import load_settings
@@ -41,14 +42,21 @@ def sound_record(rig: Rig, info: ArmInfo) -> Commissioning:
     """Return a record by which an arm that was started may be driven."""
     present = present_inputs(rig, rig.backend.arm.answers(), info)
     now = datetime.fromtimestamp(rig.clock.utc_ns() // 1_000_000_000, UTC)
+    return record_of(GATED, present, now)
+
+
+def record_of(
+    steps: Iterable[ProofStep], present: Mapping[str, str], when: datetime
+) -> Commissioning:
+    """Return a record in which these steps were sound on what was `present`."""
     record = Commissioning(program="a test")
-    for step in GATED:
+    for step in steps:
         done = StepRecord(
             step=step,
-            started=now,
-            ended=now,
-            operator="a test",
-            witness="",
+            started=when,
+            ended=when,
+            operator="one",
+            witness="two",
             inputs=inputs_of(step, present),
             verdict="sound",
         )

@@ -53,6 +53,11 @@ LAYOUTS: tuple[Border, ...] = (
         text(_MM, names=("t/s", "v_t/mm/s", "F_n/N", "F_t/N")),
     ),
     table(
+        "a name with a unit of its own, by columns",
+        text(names=("t", "speed m/s", "F_n", "F_t")),
+        columns={"v_t": "speed m/s"},
+    ),
+    table(
         "units below an empty line",
         text(_MM).replace("\n", "\n\ns,mm/s,N,N\n", 1),
     ),

@@ -303,6 +303,11 @@ NUMBERS: tuple[Border, ...] = (
         text(with_column(0, lambda k, _: f"{46352.5 + 0.002 * k / 86400:.10f}")),
         "these look like days. Say it: --unit t=d",
     ),
+    table(
+        "a foot that stands in a third of the rows, and slides evenly else",
+        text(with_column(1, lambda k, _: "1.5" if k % 3 else "0")),
+        expected=values(v_t=np.array([1.5 if k % 3 else 0.0 for k in range(COUNT)])),
+    ),
     flagged(
         "9999 for a missing value, in 4 % of the rows",
         text(with_column(2, lambda k, old: "9999" if k in {20, 21} else old)),

@@ -3,15 +3,12 @@
 What is damaged here can be read without an error; the harm would be silence.
 """
 
-import contextlib
-import io
 import json
 import os
 import re
 from pathlib import Path
 
-from experiments.__main__ import main
-from tests.corpus.used_session import session_file, session_files
+from tests.corpus.used_session import printed, session_file, session_files
 
 KEPT = 2  # trials of the session
 _SOUND_NAME = re.compile(r"\d{4}-\d\d-\d\d_S001_TF\.fake")  # a date is no identity
@@ -84,20 +81,10 @@ def _write(folder: Path, name: str, journal: bytes) -> None:
 
 def _require(folder: Path, *, is_sound: bool) -> None:
     """Require that `verify` tells what is not sound, and `status` counts once."""
-    code, out = _run("verify", "--all", "--data", str(folder))
+    code, out = printed("verify", "--all", "--data", str(folder))
     if code not in ({0} if is_sound else {_REFUSED, _NOT_AS_KEPT}):
         raise SilentError(f"verify ended with {code}: {out}")
-    code, out = _run("status", "--json", "--data", str(folder))
-    if code not in {0, _REFUSED, _NOT_AS_KEPT}:
-        raise SilentError(f"status ended with {code}: {out}")
+    code, out = printed("status", "--json", "--data", str(folder))
     kept = sum(row["kept"] for row in json.loads(out)) if code == 0 else 0
     if kept > KEPT or (is_sound and kept != KEPT):
         raise SilentError(f"status counts {kept} trials of {KEPT}")
-
-
-def _run(*command: str) -> tuple[int, str]:
-    """Return the exit code of a command and what it printed on its output."""
-    out, err = io.StringIO(), io.StringIO()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-        code = main(command)
-    return code, out.getvalue() or err.getvalue()

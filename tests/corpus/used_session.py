@@ -85,19 +85,25 @@ def use(name: str, data: bytes, folder: Path) -> None:
         target.write_bytes(data if path.endswith(name) else content)
     before = _sums(folder)
     for command in COMMANDS:
-        _run(command)
+        printed(*command)
         if not name.endswith(".mcap") and _sums(folder) != before:
             raise HalfDoneError(f"{command[0]} lost or doubled a recording")
         if name.endswith(".json"):
             _check_pairs(folder, command[0])
 
 
-def _run(command: tuple[str, ...]) -> None:
-    out = io.StringIO()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out):
+def printed(*command: str) -> tuple[int, str]:
+    """Return the exit code of a command and what it printed, its errors if nothing.
+
+    Raises:
+        HalfDoneError: it ended as a bug.
+    """
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         code = main(command)
     if code not in SOUND_CODES:
-        raise HalfDoneError(f"{command} ended with {code}: {out.getvalue()}")
+        raise HalfDoneError(f"{command} ended with {code}: {err.getvalue()}")
+    return code, out.getvalue() or err.getvalue()
 
 
 def _sums(folder: Path) -> list[str]:

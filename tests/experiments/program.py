@@ -64,6 +64,14 @@ def write_config(folder: Path, *, rig=None, matrix=None, travel=TRAVEL) -> Path:
     return folder / "rig.toml"
 
 
+def served_config(folder):
+    """Write settings of a real rig whose bus and sensor are served in `folder`."""
+    path = write_config(folder, rig=('"socketcan" ', '"traction-fake" '))
+    text = path.read_text().replace('"can0"', f'"{folder}/bus"')
+    path.write_text(text.replace('"/dev/ttyUSB0"', f'"{folder}/sensor"'))
+    return path
+
+
 def only_session(data: Path) -> Path:
     """Return the folder of the one session below `data`."""
     (folder,) = [path for path in (data / "sessions").iterdir() if path.is_dir()]

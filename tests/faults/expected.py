@@ -190,6 +190,12 @@ def _creeping(motor: int) -> Row:
     return _row(stopped, preflight=late, idle=late, end=replace(OK, arm=arm))
 
 
+_BEGUN = replace(
+    OK,
+    why="for 0.15 s after a hold began only the energy is judged; a wrist has little",
+)
+
+
 def _lying(motor: int) -> Row:
     """Return the row of an encoder that jumps by what the driver believes."""
     if motor == 4:  # the arm turns too little about its joint
@@ -200,8 +206,8 @@ def _lying(motor: int) -> Row:
         arm=_IDLE,
         why="the jump seems a motion, and the arm idles",
     )
-    if motor in {5, 6}:  # of the wrist: a review finds the arm better at rest
-        return _row(OK, tare=stopped)
+    if motor in {5, 6}:
+        return _row(OK, tare=stopped, review=_BEGUN)
     return _row(OK, tare=stopped, review=replace(stopped, rejected=AT_REVIEW))
 
 

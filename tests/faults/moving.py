@@ -22,7 +22,9 @@ _IN_VAIN = Cell(
     " does not turn although the arm is commanded to move.",
     why="seen when the move turns the motor in vain, at the latest in the next move",
 )
-_STEP = Cell(End.COMPLETE, why="in a move the step is followed like any other way")
+_STEP = Cell(
+    End.COMPLETE, why="in a move only the energy is judged; half of 1 J is seen"
+)
 _MET = Cell(
     End.UNMEASURED,
     " N on the foot beyond its weight (limit 40)",

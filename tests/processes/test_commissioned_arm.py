@@ -14,7 +14,7 @@ from acquisition.clock import SystemClock
 from acquisition.errors import TractionError
 from experiments.commissioning.record import NAME
 from lab.guest.commissioned import take_as_commissioned
-from tests.experiments.program import changed, write_config
+from tests.experiments.program import changed, served_config
 
 pytestmark = [pytest.mark.wall_clock, pytest.mark.timeout(400)]
 TRIES = 6
@@ -26,10 +26,7 @@ REFUSED = "This arm is not commissioned"
 @pytest.fixture
 def config(tmp_path):
     """Return settings of a real rig whose bus is served at `tmp_path`/bus."""
-    path = write_config(tmp_path, rig=('"socketcan" ', '"traction-fake" '))
-    text = path.read_text().replace('"can0"', f'"{tmp_path}/bus"')
-    path.write_text(text.replace('"/dev/ttyUSB0"', f'"{tmp_path}/sensor"'))
-    return path
+    return served_config(tmp_path)
 
 
 @pytest.fixture(autouse=True)

@@ -272,3 +272,16 @@ def test_a_table_of_kept_samples_is_known_by_its_column(tmp_path):
     path = write(tmp_path, "\n".join([f"{header},kept_row [1]", *rows, ""]))
     assert load_tables([path])["table"][0].is_prepared
     assert not load_tables([write(tmp_path, GOOD)])["table"][0].is_prepared
+
+
+@pytest.mark.parametrize("rate", [0, -200.0, np.nan, np.inf, True, "200"])
+def test_a_rate_that_is_none_is_refused(tmp_path, rate):
+    path = write(tmp_path, "v_t,F_n,F_t\n" + "0.1,2,1\n" * 5)
+    with pytest.raises(SettingsError, match="is no rate"):
+        load_tables([path], rate=rate)
+
+
+@pytest.mark.parametrize("rate", [200, np.float64(200.0), np.int64(200)])
+def test_a_rate_may_be_any_number(tmp_path, rate):
+    path = write(tmp_path, "v_t,F_n,F_t\n" + "0.1,2,1\n" * 5)
+    assert load_tables([path], rate=rate)["table"][0].t[1] == 0.005

@@ -20,7 +20,7 @@ from fakes.pucks.network import PuckNetwork
 from fakes.pucks.options import NetworkOptions
 from fakes.serving.puck_server import PuckServer
 from tests.experiments.messages import pattern
-from tests.experiments.program import traction, write_config
+from tests.experiments.program import served_config, traction
 from tests.fakes.buses import COUNTS
 from tests.fakes.stepped import Motors
 from tests.wam.bus.test_link import message
@@ -41,10 +41,7 @@ SET_MODE = " fake0 00A#88"
 @pytest.fixture
 def config(tmp_path):
     """Return settings of a real rig whose bus is served at `tmp_path`/bus."""
-    path = write_config(tmp_path, rig=('"socketcan" ', '"traction-fake" '))
-    text = path.read_text().replace('"can0"', f'"{tmp_path}/bus"')
-    path.write_text(text.replace('"/dev/ttyUSB0"', f'"{tmp_path}/sensor"'))
-    return path
+    return served_config(tmp_path)
 
 
 @pytest.fixture

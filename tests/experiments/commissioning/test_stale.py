@@ -9,12 +9,12 @@ from dataclasses import replace
 import pytest
 
 from experiments.commissioning.gate import lacks
-from experiments.commissioning.inputs import inputs_of, present_inputs
-from experiments.commissioning.record import Commissioning, StepRecord
+from experiments.commissioning.inputs import present_inputs
 from experiments.commissioning.steps import BASES, ORDER, TOLD
 from experiments.preflight.connecting import connect_rig
 from experiments.rig.rig import FakeOptions
 from experiments.settings.load import load_settings
+from lab.guest.commissioned import record_of
 from tests.experiments.commissioning.test_record import NOON
 from tests.experiments.program import changed, write_config
 
@@ -50,19 +50,7 @@ def connected(folder):
 
 def commissioned(present):
     """Return a record of all steps that stand on what is `present`."""
-    record = Commissioning(program="a test")
-    for step in ORDER:
-        done = StepRecord(
-            step=step,
-            started=NOON,
-            ended=NOON,
-            operator="one",
-            witness="two",
-            inputs=inputs_of(step, present),
-            verdict="sound",
-        )
-        record = record.with_step(done)
-    return record
+    return record_of(ORDER, present, NOON)
 
 
 @pytest.fixture(scope="module")

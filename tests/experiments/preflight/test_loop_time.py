@@ -20,7 +20,7 @@ def measured(tmp_path, capsys, *seconds):
     settings = replace(given, rig=given.rig.model_copy(update={"loop": loop}))
     rig = build_rig(settings, settings.matrix.terrains[0], FakeOptions("fast", seed=1))
     # Simulated time, but as long as on the wall clock.
-    rig = replace(rig, is_stepped=False)
+    rig = replace(rig, pace=None)
     console = Console(color=False)
     with logging_bus(rig, None, console):
         run_preflight(rig, tmp_path, console, *seconds)

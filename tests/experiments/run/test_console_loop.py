@@ -172,7 +172,9 @@ def test_a_key_wakes_a_world_at_rest(keyboard):
     assert waited(loop, Prompt.READY, 4.0) == pytest.approx(4.0)
 
 
-@pytest.mark.parametrize("prompt", [Prompt.RECORDING, Prompt.MOVING, Prompt.LIFT])
+@pytest.mark.parametrize(
+    "prompt", [Prompt.RECORDING, Prompt.MOVING, Prompt.LIFT, Prompt.UNDO]
+)
 def test_a_world_that_acts_does_not_rest(keyboard, prompt):
     loop = make_loop(TerminalInput(keyboard[0]), wall=SteppedClock())
     assert waited(loop, prompt, 60.0) == pytest.approx(60.0)
