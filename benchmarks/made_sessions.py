@@ -64,6 +64,6 @@ def _make_session(
         for number, event in enumerate(events, 1)
     ]
     (folder / "events.jsonl").write_bytes(b"".join(lines))
-    summary = {"id": folder.name[11:15], "phase": "complete", "operator": "made"}
+    summary = {"id": folder.name.split("_")[1], "phase": "complete", "operator": "made"}
     (folder / "session.json").write_text(json.dumps(summary))
     (folder / ".lock").write_text("{}")

@@ -7,6 +7,7 @@ swapped column or a wrong unit breaks one of these, and no fit notices.
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,21 +40,37 @@ _OF_TABLES = {
 }
 _TURNED = "the sensor is turned by 180 degrees about z, or F_t has the other sign"
 
+DoubtName = Literal[
+    "power",
+    "ratio",
+    "no-traction",
+    "direction",
+    "normal",
+    "friction",
+    "lateral",
+    "moment",
+    "unit",
+    "lag",
+    "swapped",
+    "incline",
+    "heading",
+    "pressure",
+]
+DOUBTS: tuple[DoubtName, ...] = get_args(DoubtName)
+
 
 @dataclass(frozen=True, slots=True)
 class Doubt:
     """One reason why a trial cannot be what it says it is.
 
     Attributes:
-        name: "power", "ratio", "no-traction", "direction", "normal", "friction",
-            "lateral", "moment", "unit", "lag", "swapped", "incline", "heading" or
-            "pressure".
+        name: which one.
         seen: what was measured, with the number.
         cause: the likely cause.
         remedy: what to do.
     """
 
-    name: str
+    name: DoubtName
     seen: str
     cause: str
     remedy: str = "traction calibrate sensor"
@@ -234,15 +251,11 @@ def _way(recorded: RecordedTrial, moving: NDArray[np.bool_]) -> Iterator[Doubt]:
         float(np.degrees(np.arctan(np.polyfit(ahead, other, 1)[0])))
         for other in (aside, above)
     )
-    for name, angle, limit, what in (
+    sides: tuple[tuple[DoubtName, float, float, str], ...] = (
         ("heading", turned, HEADING, "the container is rotated, or its heading is"),
-        (
-            "incline",
-            tilted,
-            INCLINE,
-            "the incline differs, or was",
-        ),
-    ):
+        ("incline", tilted, INCLINE, "the incline differs, or was"),
+    )
+    for name, angle, limit, what in sides:
         beside = float(np.ptp(ahead)) * np.tan(np.radians(abs(angle)))
         if abs(angle) > limit and beside > UNEVEN:
             yield Doubt(

@@ -146,7 +146,7 @@ def _show_log(args: argparse.Namespace) -> int:
     from acquisition.errors import SettingsError
     from experiments.operator.console import Console
     from wam.bus.decoder import BusReader
-    from wam.bus.log import LONGEST_LINE, parse_log
+    from wam.bus.log import parse_log, read_lines
 
     console = Console(color=not args.no_color)
     reader = BusReader()
@@ -167,9 +167,7 @@ def _show_log(args: argparse.Namespace) -> int:
 
     try:
         with args.can.open(encoding="utf-8-sig", errors="replace") as file:
-            # A line is cut: a file without line ends must not fill the memory.
-            lines = iter(lambda: file.readline(LONGEST_LINE), "")
-            for frame in parse_log(lines, leave_out):
+            for frame in parse_log(read_lines(file), leave_out):
                 start_ns = frame.utc_ns if start_ns is None else start_ns
                 tell(reader.read(frame))
                 if console.is_lost:
@@ -193,6 +191,16 @@ def _sum_up(tally: BusSummary, console: Console) -> None:
         f"answers requested: {tally.answers} came, {tally.late} of them after more "
         f"than 1 ms, {silent} did not come; {tally.unasked} came without a request."
     )
+    if tally.gaps:
+        longest = tally.longest_gap_ns / 1e9
+        console.say(
+            f"Gaps of more than 1 s: {tally.gaps}, the longest {longest:.1f} s."
+        )
+    if tally.jumps:
+        console.problem(
+            f"Time goes back {tally.jumps} times: the clock was set, or it is several "
+            "logs in one. No answer is counted across it."
+        )
     if tally.errors:
         counts = ", ".join(f"{name} {n}" for name, n in sorted(tally.errors.items()))
         console.say(f"Error frames of the controller: {counts}.")

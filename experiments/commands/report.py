@@ -123,6 +123,7 @@ def _as_json(page: Path, sessions: list[str], missing: list[str]) -> str:
         "fits": str(fits),
         "terrains": terrains,
         "missing": missing,
+        "left_out": numbers["left_out"],
         "warnings": numbers["warnings"],
         "notes": numbers["notes"],
     }

@@ -87,14 +87,14 @@ def _load_trials(
     """Return kept trials by terrain, oldest session first; truths; what is left out."""
     trials: dict[str, list[HeldTrial]] = {}
     truths: dict[Path, TruthErrors] = {}
-    problems: list[str] = []
+    left_out: list[str] = []
     first: dict[bytes, str] = {}  # by what was recorded, whatever file it is in
     for session in sorted(sessions, key=lambda s: (s.path.name[:10], int(s.id[1:]))):
         for path in session.kept_trials():
             try:
                 trial = load_trial(path)
             except TrialFileError as error:
-                problems.append(str(error))
+                left_out.append(str(error))
                 console.say(f"▲ left out: {error}")
                 continue
             if trial.is_simulated is not session.is_simulated:
@@ -107,14 +107,13 @@ def _load_trials(
             name = f"{session.id} {path.stem}"
             original = first.setdefault(blake2b(trial.cycles.tobytes()).digest(), name)
             if original is not name:
-                problems.append(f"{name} is the same recording as {original}")
-                console.say(f"▲ left out: {problems[-1]}")
+                left_out.append(f"{name} is the same recording as {original}")
+                console.say(f"▲ left out: {left_out[-1]}")
                 continue
             trials.setdefault(trial.terrain, []).append(HeldTrial.of(trial))
             if (truth := compare_with_truth(trial)) is not None:
                 truths[path] = truth
-    judged = ((t.name, t.doubts) for ts in trials.values() for t in ts)
-    return trials, truths, problems + summed_up(judged)
+    return trials, truths, left_out
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,19 +123,24 @@ class StudySession:
     Attributes:
         study: the result.
         trials: the kept trials by terrain, in the matrix's order.
-        problems: what was left out, and why.
+        left_out: recordings that are not in it, and why.
         truths: how far trials are from their truth files, by path of the trial.
     """
 
     study: Study
     trials: dict[str, list[HeldTrial]]
-    problems: list[str]
+    left_out: list[str]
     truths: dict[Path, TruthErrors]
 
     @property
     def files(self) -> dict[str, TrialFiles]:
         """The trials on disk, by terrain."""
         return {name: TrialFiles(group) for name, group in self.trials.items()}
+
+    @property
+    def doubts(self) -> list[str]:
+        """Why trials cannot be what they say they are, a line for each reason."""
+        return summed_up((t.name, t.doubts) for ts in self.trials.values() for t in ts)
 
 
 def results_below(data: Path) -> ResultStore:
@@ -156,7 +160,7 @@ def study_sessions(
     Raises:
         SessionError: no session has a kept trial.
     """
-    trials, truths, problems = _load_trials(sessions, console)
+    trials, truths, left_out = _load_trials(sessions, console)
     count = sum(len(group) for group in trials.values())
     if not count:
         ids = ", ".join(s.id for s in sessions)
@@ -181,7 +185,7 @@ def study_sessions(
 
     with fitting(console) as progress:
         study = run_study(series, options, is_simulated, progress, store, beside)
-    return StudySession(study, trials, problems, truths)
+    return StudySession(study, trials, left_out, truths)
 
 
 def require_samples(study: Study) -> None:
@@ -301,13 +305,15 @@ def _context(
         further_numbers={
             "what_if": [plain_choice(c, study, other) for c, other in others],
             "foresight": foresight.numbers,
+            "left_out": analysed.left_out,
         },
         warnings=[
             *uncommissioned(
                 (t.name, t.metadata) for group in trials.values() for t in group
             ),
             *order.missing,
-            *analysed.problems,
+            *analysed.left_out,
+            *analysed.doubts,
             *unsound,
         ],
         photos=[BedPhoto(*photo) for photo in photos],

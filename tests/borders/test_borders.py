@@ -1,5 +1,6 @@
 """Nothing foreign is read wrongly or in silence; the page says what happens."""
 
+import resource
 import warnings
 from pathlib import Path
 
@@ -8,15 +9,19 @@ import pytest
 from tests.borders.page import SUBJECTS, page
 from tests.borders.row import Outcome
 
+MOST_KB = 500_000  # that a row may add to the most memory ever held
 ROWS = [(subject, row) for subject, rows in SUBJECTS.items() for row in rows]
 
 
 @pytest.mark.timeout(60)
 @pytest.mark.parametrize(("subject", "row"), ROWS, ids=[str(row) for _, row in ROWS])
 def test_what_is_given_is_read_exactly_flagged_or_refused(subject, row, tmp_path):
+    before_kb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         answer = row.act(tmp_path)
+    after_kb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    assert after_kb - before_kb < MOST_KB
     assert answer.outcome is row.outcome, answer.words
     assert row.says in answer.words
 

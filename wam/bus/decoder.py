@@ -7,6 +7,7 @@ a question asked again after the answer's time limit replaces the one before.
 
 from enum import Enum
 
+from acquisition.clock import NS_PER_S
 from acquisition.devices import SafetyMode
 from wam.bus.error_frames import ERROR_FLAG, EXTENDED_FLAG, error_names
 from wam.bus.frames import (
@@ -28,7 +29,7 @@ from wam.bus.frames import (
     decode_torques,
     split_id,
 )
-from wam.bus.log import BusSummary, DecodedLine, LoggedFrame
+from wam.bus.log import JUMP_NS, BusSummary, DecodedLine, LoggedFrame
 from wam.bus.properties import FIRST_RELEASED, Device, PuckMode, PuckStatus, names
 
 LIMIT_NS = 1_000_000  # an answer is late after this
@@ -109,8 +110,8 @@ class BusReader:
     def read(self, frame: LoggedFrame) -> list[DecodedLine]:
         """Return what `frame` says, after the questions it shows to be unanswered."""
         self.tally.frames += 1
-        self._newest_ns = frame.utc_ns
         spoken = self._give_up(frame.utc_ns - _GIVE_UP_NS)
+        spoken += self._hear_clock(frame.utc_ns)
         if not frame.is_of_wam:
             text = self._say_foreign(frame)
             return [*spoken, DecodedLine(frame.utc_ns, text)]
@@ -129,6 +130,23 @@ class BusReader:
         spoken = self._give_up(self._newest_ns - LIMIT_NS)
         self.tally.questions -= sum(map(len, self._open.values()))
         return spoken
+
+    def _hear_clock(self, utc_ns: int) -> list[DecodedLine]:
+        """Return what is to be said of the time since the frame before."""
+        passed_ns = utc_ns - self._newest_ns if self._newest_ns else 0
+        self._newest_ns = utc_ns
+        if passed_ns > JUMP_NS:
+            self.tally.gaps += 1
+            self.tally.longest_gap_ns = max(self.tally.longest_gap_ns, passed_ns)
+            text = f"{passed_ns / NS_PER_S:.3f} s without a frame"
+            return [DecodedLine(utc_ns, text)]
+        if passed_ns < -JUMP_NS:
+            self.tally.jumps += 1
+            self.tally.questions -= sum(map(len, self._open.values()))
+            self._open.clear()  # when they were asked says nothing any more
+            text = f"TIME GOES BACK by {-passed_ns / NS_PER_S:.3f} s"
+            return [DecodedLine(utc_ns, text)]
+        return []
 
     def _say(
         self, frame: LoggedFrame, address: Address, spoken: list[DecodedLine]

@@ -4,7 +4,8 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from heapq import heapify, heappop, heappushpop
+from heapq import heappush, heappushpop
+from typing import TextIO
 
 from acquisition.clock import NS_PER_S, Clock, utc_offset_ns
 from acquisition.errors import TractionError
@@ -19,6 +20,7 @@ _LINE = re.compile(
 )
 _WRITE_AT = 4096  # frames kept back at most
 _REORDERED = 256  # frames; a log has replies after later questions, never by more
+JUMP_NS = NS_PER_S  # back by more: the clock was set, or a second log begins
 
 
 class CanLogError(TractionError):
@@ -69,6 +71,9 @@ class BusSummary:
         late: those that came after more than 1 ms.
         slowest_ns: the longest wait for an answer.
         unasked: answers without a question.
+        jumps: times at which the log's clock goes back by more than 1 s.
+        gaps: times without a frame of more than 1 s.
+        longest_gap_ns: the longest of them.
         errors: what error frames of the controller reported, by name.
         silent: questions without an answer, by device and property.
     """
@@ -80,6 +85,9 @@ class BusSummary:
     late: int = 0
     slowest_ns: int = 0
     unasked: int = 0
+    jumps: int = 0
+    gaps: int = 0
+    longest_gap_ns: int = 0
     errors: Counter[str] = field(default_factory=Counter[str])
     silent: Counter[str] = field(default_factory=Counter[str])
 
@@ -144,16 +152,30 @@ def parse_frame(text: str, line: int) -> LoggedFrame:
     )
 
 
+def read_lines(file: TextIO) -> Iterator[str]:
+    """Return the lines of a log; the rest of one that is too long is passed over.
+
+    A file without line ends must not fill the memory.
+    """
+    while line := file.readline(LONGEST_LINE):
+        yield line
+        while line and not line.endswith("\n"):
+            line = file.readline(LONGEST_LINE)
+
+
 def parse_log(
     lines: Iterable[str], tell: Callable[[CanLogError], None]
 ) -> Iterator[LoggedFrame]:
     """Return the frames of a log in the order of their times.
+
+    Where time goes back by more than `JUMP_NS`, what follows keeps its place.
 
     Args:
         lines: of the log, with or without their ends.
         tell: hears of each line that is malformed, which is left out.
     """
     waiting: list[LoggedFrame] = []
+    newest_ns = 0
     for number, text in enumerate(lines, 1):
         if not text.strip():
             continue
@@ -162,15 +184,15 @@ def parse_log(
         except CanLogError as error:
             tell(error)
             continue
+        if frame.utc_ns < newest_ns - JUMP_NS:
+            yield from sorted(waiting)
+            waiting, newest_ns = [], 0
+        newest_ns = max(newest_ns, frame.utc_ns)
         if len(waiting) < _REORDERED:
-            waiting.append(frame)
-            if len(waiting) == _REORDERED:
-                heapify(waiting)
+            heappush(waiting, frame)
         else:
             yield heappushpop(waiting, frame)
-    heapify(waiting)
-    while waiting:
-        yield heappop(waiting)
+    yield from sorted(waiting)
 
 
 class CanLog:

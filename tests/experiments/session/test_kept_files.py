@@ -274,6 +274,13 @@ def test_a_report_counts_a_recording_once(copied, config):
     fits = json.loads((page.parent.parent / "fits.json").read_text())
     (terrain,) = fits["terrains"].values()
     assert terrain["trials"] == 2
+    told = json.loads(
+        traction("report", "--all", "--allow-missing", "--json", *where).out
+    )
+    assert told["left_out"] == [
+        "S002 T01 is the same recording as S001 T01",
+        "S002 T02 is the same recording as S001 T02",
+    ]
 
 
 def test_a_session_under_another_number_alone_counts(data):

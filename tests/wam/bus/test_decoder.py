@@ -168,3 +168,20 @@ def test_an_error_frame_of_the_controller_is_put_into_words(log):
     assert "the controller reports: passive" in said
     assert log.reader.tally.errors == {"passive": 1}
     assert log.reader.tally.foreign == 0
+
+
+def test_a_jump_of_the_clock_is_said_and_no_answer_counted_across_it(log):
+    log(5000 * MS, "001 05")
+    log(1000 * MS, "426 85 00 02 00 00 00")
+    assert "TIME GOES BACK by 4.000 s" in log.said
+    tally = log.reader.tally
+    assert (tally.jumps, tally.questions, tally.answers) == (1, 0, 0)
+    assert (tally.unasked, tally.silent.total()) == (1, 0)
+
+
+def test_a_gap_is_said_and_leaves_its_question_unanswered(log):
+    log(1000 * MS, "001 05")
+    log(4500 * MS, "001 05")
+    assert log.said[1:3] == ["UNANSWERED puck 1: STAT", "3.500 s without a frame"]
+    tally = log.reader.tally
+    assert (tally.gaps, tally.longest_gap_ns, tally.jumps) == (1, 3500 * MS, 0)

@@ -3,7 +3,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.fakes.stepped import SteppedClock
-from wam.bus.log import CanLog, CanLogError, format_frame, parse_frame, parse_log
+from wam.bus.log import (
+    CanLog,
+    CanLogError,
+    format_frame,
+    parse_frame,
+    parse_log,
+    read_lines,
+)
 
 KNOWN = "(1699999999.123456) can0 404#30"
 KNOWN_NS = 1_699_999_999_123_456_000
@@ -100,6 +107,23 @@ def test_a_long_log_is_read_as_it_comes():
         pytest.fail("the first frame needed the whole log")
 
     assert next(parse_log(lines(), pytest.fail)).can_id == 0
+
+
+def test_what_follows_a_jump_back_keeps_its_place():
+    times = [2_000_000, 5_000_000, 1, 3, 2, 2_500_000]
+    lines = [format_frame(t * 1000, "can0", k, b"") for k, t in enumerate(times)]
+    frames = list(parse_log(lines, pytest.fail))
+    assert [frame.can_id for frame in frames] == [0, 1, 2, 4, 3, 5]
+
+
+def test_a_line_without_an_end_counts_as_one(tmp_path):
+    log = tmp_path / "bus.log"
+    log.write_text(f"{KNOWN}\n{'x' * 5_000_000}\n{KNOWN}\n")
+    problems = []
+    with log.open() as file:
+        frames = list(parse_log(read_lines(file), problems.append))
+    assert [frame.line for frame in frames] == [1, 3]
+    assert [problem.message[:7] for problem in problems] == ["Line 2 "]
 
 
 class Sink:
