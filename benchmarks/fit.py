@@ -187,7 +187,7 @@ def rows() -> list[BenchRow]:
     least_squares_of = "Tustin fit against 20-start least squares"
     equal = "against scikit-learn, three starts"
     return [
-        BenchRow(f"SE fit, n = 300, {equal}", ratio["SE fit"], "times", 15, True),
+        BenchRow(f"SE fit, n = 300, {equal}", ratio["SE fit"], "times", 8, True),
         *rivals,
         BenchRow(f"NN fit, n = 300, {equal}", ratio["NN fit"], "times"),
         BenchRow("NN fit, n = 300", spent["NN fit"], "ms", 80),

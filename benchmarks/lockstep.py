@@ -34,7 +34,7 @@ from ft_sensor.serial_line.sensor import SerialSensor
 from wam.control.controller import FootController
 from wam.driver.arm import WamArm
 
-GOAL = 15.0  # times real time, with recorder
+GOAL = 8.0  # times real time, with recorder
 TERRAIN = "S0"
 LOOP = "loop, guard, sample"
 P = ParamSpec("P")
