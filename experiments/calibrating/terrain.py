@@ -35,29 +35,41 @@ class TerrainGuide:
             PreflightError: not activated.
             StopRequestedError, ArmFaultError: as `ConsoleLoop.tick`.
         """
-        activate(self._console_loop)
-        self._console_loop.loop_client.request(ArmState.FLOAT)
-        points = self._touch()
-        self._console_loop.loop_client.request(ArmState.HOLD)
-        self._console_loop.lay_down()
-        self._console_loop.make_safe()
+        points = self.touch()
         fit = fit_terrain(np.array(points))
         self._say(fit, len(points))
         check_terrain(fit, self._rig.frame, is_forced=is_forced)
         return fit, points
 
-    def _touch(self) -> list[Array]:
+    def touch(self) -> list[Array]:
+        """Activate the arm, take the points, lay the arm down; return them.
+
+        Raises:
+            PreflightError: not activated.
+            StopRequestedError, ArmFaultError: as `ConsoleLoop.tick`.
+        """
+        activate(self._console_loop)
+        self._console_loop.loop_client.request(ArmState.FLOAT)
+        points = self._points()
+        self._console_loop.loop_client.request(ArmState.HOLD)
+        self._console_loop.lay_down()
+        self._console_loop.make_safe()
+        return points
+
+    def _points(self) -> list[Array]:
         points: list[Array] = []
         while len(points) < MOST:
             number = len(points) + 1
             is_corner = number <= len(CORNERS)
-            place = f"{CORNERS[number - 1]} corner" if is_corner else "one more point"
+            place = (
+                f"the {CORNERS[number - 1]} corner" if is_corner else "one more point"
+            )
             done = "" if is_corner else ", [d] when done"
             self._console.say(
-                f"Touch the {place} with the sole, then [space]{done}.   (far left = "
+                f"Touch {place} with the sole, then [space]{done}.   (far left = "
                 "away from the arm, its left)"
                 if number == 1
-                else f"Touch the {place} with the sole, then [space]{done}."
+                else f"Touch {place} with the sole, then [space]{done}."
             )
             point = self._point(TrialName(number, 1), is_corner=is_corner)
             if point is None:

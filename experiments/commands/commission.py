@@ -46,6 +46,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--until", dest="last", metavar="STEP", help="end after this step, e.g. C4"
     )
     parser.add_argument(
+        "--terrain",
+        metavar="NAME",
+        help="whose container C13 looks at (the first of matrix.toml)",
+    )
+    parser.add_argument(
         "--recheck",
         action="store_true",
         help="judge the recordings again, no device is touched",
@@ -212,7 +217,7 @@ def _sittings(
     )
 
     stop = StopFlag()
-    row = settings.matrix.terrains[0]
+    row = settings.row(args.terrain or settings.matrix.terrains[0].name)
     is_anew = args.first is not None
     for sitting in SITTINGS:
         due = [step for step in sitting if step in steps]

@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from experiments import provenance
-from experiments.commissioning.gate import lacks
+from experiments.commissioning.gate import lacks, require
 from experiments.commissioning.inputs import inputs_of, present_inputs
 from experiments.commissioning.record import (
     Commissioning,
@@ -110,6 +110,9 @@ def do_step(
         scene.start()
     if work.needs_zero and scene.info is not None and not scene.info.is_zeroed:
         raise preflight_error("not-zeroed")
+    if work.needs_proof and scene.simulation is None:
+        present = present_inputs(scene.rig, scene.answers, scene.info)
+        require(lacks(files.record, present, _now(scene.rig)))
     by_hand_before = files.record.of(ProofStep.BY_HAND)
     if by_hand_before is not None and by_hand_before.raw:
         stops = read_raw(files.folder, by_hand_before.raw[0])

@@ -320,6 +320,40 @@ LIMITS: Mapping[str, Limit] = {
         "Compensation moves the arm: masses, mounting, zeros or torque constants",
     ),
     "share": Limit("share of the compensation reached", "", "{text}", low=1.0),
+    # C13
+    "corners": Limit("corners make a container", "", "{text}", low=1.0),
+    "flat": Limit(
+        "points off the plane, rms",
+        "mm",
+        "A corner was not touched with the sole on the ground",
+        high=6.0,
+    ),
+    "incline": Limit(
+        "incline beyond the matrix's",
+        "degrees",
+        "Incline typed wrong, another container, or the base is tilted",
+        low=-2.0,
+        high=2.0,
+    ),
+    "heading": Limit(
+        "heading beyond the matrix's",
+        "degrees",
+        "Heading typed wrong, the container is turned, or the base is",
+        low=-3.0,
+        high=3.0,
+    ),
+    "far_end": Limit(
+        "far end from the matrix's",
+        "mm",
+        "far_end typed wrong, or the container stands elsewhere",
+        high=25.0,
+    ),
+    "short": Limit(
+        "travel of the matrix beyond the container",
+        "mm",
+        "travel is longer than the container: the foot would meet its wall",
+        high=25.0,
+    ),
     # C14
     "pressed": Limit(
         "force on the kitchen scale", "N", "Too little to compare", low=15.0

@@ -1,6 +1,7 @@
 """What a step works with: the rig, the terminal, the hands of a simulation."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 from acquisition.control_loop.proof import ProofGoal
@@ -10,6 +11,7 @@ from experiments.messages import FaultContext, fault_text
 from experiments.operator.console import Console
 from experiments.operator.prompts import Prompt
 from experiments.rig.rig import Rig
+from experiments.rig.simulation import SimulatedHand
 from experiments.run.console_loop import TICK, ConsoleLoop
 from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.session.sidecar import TrialName
@@ -171,6 +173,16 @@ class Scene:
             state=self.loop_client.status.state,
         )
         return fault_text(fault.verdict, context, "").strip()
+
+    @contextmanager
+    def followed(self) -> Generator[None]:
+        """Let a simulated hand follow the prompts meanwhile, as in a session."""
+        if self.simulation is not None:
+            self.console_loop.hand = SimulatedHand(self.simulation)
+        try:
+            yield
+        finally:
+            self.console_loop.hand = None
 
     def prove(self, goal: ProofGoal) -> None:
         """Ask the loop for a proof."""

@@ -8,6 +8,7 @@ from experiments.proving import (
     bus,
     by_hand,
     configuration,
+    container,
     rest_pose,
     scales,
     stop_circuit,
@@ -29,6 +30,7 @@ class StepWork:
         needs_loop: the loop runs, the arm is zeroed or not.
         minutes: it takes about so long.
         way_back: what to do where it fails.
+        needs_proof: the arm is driven in the open: steps C0 to C11 have to count.
     """
 
     collect: Callable[[Scene], Values]
@@ -37,6 +39,7 @@ class StepWork:
     way_back: str
     needs_loop: bool = False
     needs_zero: bool = False
+    needs_proof: bool = False
 
 
 def _shown(
@@ -155,6 +158,15 @@ WORK: Mapping[ProofStep, StepWork] = {
         needs_loop=True,
         needs_zero=True,
     ),
+    ProofStep.CONTAINER: StepWork(
+        container.collect,
+        container.judge,
+        5,
+        "Correct the terrain's row of the matrix, or put the container where it says.",
+        needs_loop=True,
+        needs_zero=True,
+        needs_proof=True,
+    ),
     ProofStep.PLATE: StepWork(
         scales.collect,
         scales.judge,
@@ -170,5 +182,6 @@ SITTINGS: tuple[tuple[ProofStep, ...], ...] = (
     (ProofStep.STOP_CIRCUIT,),
     (ProofStep.BY_HAND, ProofStep.OWN_WEIGHT, ProofStep.HUNG_WEIGHT),
     (ProofStep.REST_POSE, ProofStep.RAMPS, ProofStep.LIFT, ProofStep.GRAVITY_RAMP),
+    (ProofStep.CONTAINER,),
     (ProofStep.PLATE,),
 )

@@ -1,0 +1,57 @@
+"""C13: the container as touched against the row of the matrix, arm afloat.
+
+The first step in which a person drives the foot under gravity compensation: it needs
+what C0 to C11 prove.
+"""
+
+from dataclasses import asdict
+
+import numpy as np
+
+from acquisition.errors import SettingsError
+from experiments.calibrating.terrain import TerrainGuide
+from experiments.proving.limits import Judgement, found, judged
+from experiments.proving.recording import Values, number
+from experiments.proving.scene import Scene
+from ft_sensor.calibration.fit import fit_terrain
+
+
+def collect(scene: Scene) -> Values:
+    """Have the corners touched; return the points and what the matrix says of them.
+
+    Raises:
+        PreflightError: not activated, or an earlier step does not count.
+        ArmFaultError, StopRequestedError: as `ConsoleLoop.tick`.
+    """
+    row, frame = scene.rig.row, scene.rig.frame
+    scene.say(
+        f"Put up the container of {row.name} as its row says: incline "
+        f"{row.incline_deg:g} degrees, heading {row.heading_deg:g}."
+    )
+    with scene.followed():
+        points = TerrainGuide(scene.console_loop).touch()
+    expected = {name: np.array(value) for name, value in asdict(frame).items()}
+    return {"points": np.array(points), **expected}
+
+
+def judge(values: Values) -> Judgement:
+    """Judge what was touched against the row that a session on it takes."""
+    try:
+        fit = fit_terrain(values["points"])
+    except SettingsError as error:
+        return judged([found("corners", 0.0, text=error.message)])
+    touched, far_end = fit.frame, values["far_end"]
+    apart = touched.heading - number(values, "heading")
+    turned = (apart + np.pi) % (2.0 * np.pi) - np.pi
+    tilted = touched.incline - number(values, "incline")
+    away = float(np.linalg.norm(np.subtract(touched.far_end, far_end)))
+    return judged(
+        [
+            found("corners", 1.0, text=""),
+            found("flat", 1e3 * fit.residual),
+            found("incline", float(np.degrees(tilted))),
+            found("heading", float(np.degrees(turned))),
+            found("far_end", 1e3 * away),
+            found("short", 1e3 * (number(values, "travel") - touched.travel)),
+        ]
+    )

@@ -1,0 +1,70 @@
+"""C13: a container as its row says passes, what was typed wrong is named."""
+
+from dataclasses import asdict, replace
+
+import numpy as np
+import pytest
+
+from experiments.proving import container
+from experiments.rig.build import terrain_frame
+from experiments.settings.load import load_settings
+
+HALF_WIDTH = 0.12  # m
+
+
+@pytest.fixture(scope="module")
+def frame():
+    """Return the frame of a container that is inclined."""
+    rows = load_settings(None).matrix.terrains
+    return terrain_frame(next(row for row in rows if row.name == "S10"))
+
+
+def touched(true, typed, noise=0.0):
+    """Return what C13 records where the corners of `true` are touched."""
+    along, across, _ = true.axes()
+    far = np.array(true.far_end)
+    corners = [
+        far + along * way + across * side
+        for way in (0.0, true.travel)
+        for side in (HALF_WIDTH, -HALF_WIDTH)
+    ]
+    points = np.array(corners) + np.random.default_rng(1).normal(0.0, noise, (4, 3))
+    return {"points": points, **{k: np.array(v) for k, v in asdict(typed).items()}}
+
+
+def test_a_container_as_typed_passes(frame):
+    assert container.judge(touched(frame, frame, noise=0.001)).cause == ""
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"incline": np.radians(5.0)}, "Incline typed wrong"),
+        ({"incline": np.radians(-20.0)}, "Incline typed wrong"),
+        ({"heading": np.radians(20.0)}, "Heading typed wrong"),
+        ({"far_end": np.array([0.0, 0.0, -0.1])}, "far_end typed wrong"),
+        ({"travel": -0.1}, "travel is longer than the container"),
+    ],
+)
+def test_what_was_typed_wrong_is_named(frame, changes, words):
+    was = {name: np.add(getattr(frame, name), by) for name, by in changes.items()}
+    true = replace(frame, **was)
+    assert words in container.judge(touched(true, frame)).cause
+
+
+def test_a_heading_is_compared_over_the_turn(frame):
+    true = replace(frame, heading=np.pi - 0.01)
+    typed = replace(frame, heading=-np.pi + 0.01, far_end=true.far_end)
+    assert container.judge(touched(true, typed)).cause == ""
+
+
+def test_corners_that_make_no_container_are_named(frame):
+    values = touched(frame, frame)
+    values["points"][1] = values["points"][0]
+    assert "corners are too close" in container.judge(values).cause
+
+
+def test_points_off_a_plane_are_named(frame):
+    values = touched(frame, frame)
+    values["points"][0, 2] += 0.03
+    assert "points off the plane" in container.judge(values).cause
