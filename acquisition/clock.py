@@ -4,6 +4,8 @@ import ctypes
 import errno
 import select
 import time
+from collections.abc import Callable
+from contextlib import suppress
 from typing import Protocol, runtime_checkable
 
 NS_PER_S = 1_000_000_000
@@ -65,9 +67,11 @@ class SystemClock:
 
     def __init__(self, spin_ns: int = 0) -> None:
         self._spin_ns = spin_ns
-        libc = ctypes.CDLL(None, use_errno=True)
-        libc.prctl(_PR_SET_TIMERSLACK, ctypes.c_ulong(_SLACK_NS))
-        self._nanosleep = libc.clock_nanosleep
+        self._nanosleep: Callable[..., int] | None = None
+        with suppress(AttributeError, OSError, TypeError):  # only Linux has both
+            libc = ctypes.CDLL(None, use_errno=True)
+            libc.prctl(_PR_SET_TIMERSLACK, ctypes.c_ulong(_SLACK_NS))
+            self._nanosleep = libc.clock_nanosleep
         self._deadline = _Timespec()
         deadline = ctypes.byref(self._deadline)
         self._until = (_CLOCK_MONOTONIC, _TIMER_ABSTIME, deadline, None)
@@ -86,6 +90,9 @@ class SystemClock:
         A signal does not shorten it; its Python handler runs in between.
         """
         wake_ns = t_ns - self._spin_ns
+        if self._nanosleep is None:
+            time.sleep(max(0, wake_ns - time.monotonic_ns()) / NS_PER_S)
+            return
         self._deadline.sec, self._deadline.nsec = divmod(wake_ns, NS_PER_S)
         while self._nanosleep(*self._until) == errno.EINTR:
             pass

@@ -14,10 +14,17 @@ from contextlib import contextmanager, suppress
 from io import BufferedReader
 from pathlib import Path
 
-# follows no link at the last name, waits for no pipe, takes no terminal
-UNFOLLOWED = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC | os.O_NOCTTY
-FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC
-_NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
+
+def _flags(*names: str) -> int:
+    """Return flags of `os.open`; systems lack those of what they do not have."""
+    return sum(getattr(os, f"O_{name}", 0) for name in names)
+
+
+NO_LINK = _flags("NOFOLLOW")  # at the last name of a path
+# follows no link, waits for no pipe, takes no terminal
+UNFOLLOWED = NO_LINK | _flags("NONBLOCK", "CLOEXEC", "NOCTTY", "BINARY")
+FOLDER = _flags("RDONLY", "DIRECTORY", "CLOEXEC")
+_NEW = _flags("WRONLY", "CREAT", "EXCL", "CLOEXEC", "BINARY")
 
 
 class UnfitFileError(ValueError):
@@ -43,7 +50,7 @@ def open_regular(path: Path, *, is_link_followed: bool = False) -> BufferedReade
     status = path.stat() if is_link_followed else path.lstat()
     if not stat.S_ISLNK(status.st_mode):  # a link is refused by `open`
         _check_regular(status)
-    flags = UNFOLLOWED & ~os.O_NOFOLLOW if is_link_followed else UNFOLLOWED
+    flags = UNFOLLOWED & ~NO_LINK if is_link_followed else UNFOLLOWED
     file = os.fdopen(os.open(path, os.O_RDONLY | flags), "rb")
     try:
         _check_regular(os.fstat(file.fileno()))  # it may have been exchanged meanwhile

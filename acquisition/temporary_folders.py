@@ -4,7 +4,6 @@ A folder carries the number of its process in its name and is locked while it is
 Whoever makes the next one removes those of the same user whose process is gone.
 """
 
-import fcntl
 import os
 import re
 import shutil
@@ -13,8 +12,10 @@ from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from acquisition.files import FOLDER, NO_LINK
+from acquisition.locks import try_lock
+
 _PID = re.compile(r"-(?P<pid>[1-9]\d{0,9})-\w+$")
-_FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
 
 
 @contextmanager
@@ -26,10 +27,9 @@ def temporary_folder(prefix: str, parent: Path) -> Generator[Path]:
     """
     remove_abandoned(prefix, parent)
     path = Path(tempfile.mkdtemp(prefix=f"{prefix}-{os.getpid()}-", dir=parent))
-    descriptor = os.open(path, _FOLDER)
+    descriptor = os.open(path, FOLDER | NO_LINK)
     try:
-        with suppress(OSError):  # a file system without locks: the number counts alone
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        try_lock(descriptor)
         yield path
     finally:
         os.close(descriptor)
@@ -68,14 +68,12 @@ def _is_running(pid: int) -> bool:
 def _remove(path: Path) -> None:
     """Remove a folder of this user that nobody has locked."""
     try:
-        descriptor = os.open(path, _FOLDER)
+        descriptor = os.open(path, FOLDER | NO_LINK)
     except OSError:
         return
     try:
-        if os.fstat(descriptor).st_uid == os.getuid():
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        # one that is locked is in use, e.g. by a process of another container
+        if os.fstat(descriptor).st_uid == os.getuid() and try_lock(descriptor):
             shutil.rmtree(path, ignore_errors=True)
-    except OSError:
-        return  # in use, e.g. by a process of another container
     finally:
         os.close(descriptor)

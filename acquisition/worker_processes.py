@@ -50,7 +50,9 @@ class WorkerLostError(SettingsError):
 
 def available_cores() -> int:
     """Return the number of cores this process may use."""
-    return max(1, len(os.sched_getaffinity(0)))
+    if hasattr(os, "sched_getaffinity"):
+        return max(1, len(os.sched_getaffinity(0)))
+    return os.cpu_count() or 1
 
 
 def prepare_workers(imports: Sequence[str]) -> None:
@@ -208,6 +210,9 @@ def _environment_of_workers() -> Generator[None]:
 @contextmanager
 def _no_interrupt() -> Generator[None]:
     """Let what is started be deaf to Ctrl-C; it reaches this process afterwards."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield

@@ -3,6 +3,7 @@
 import os
 import tomllib
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from importlib import resources
 from pathlib import Path
@@ -18,6 +19,7 @@ from acquisition.control_loop.faults import (
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import BusCondition, SafetyMode
 from acquisition.errors import IDLE_ARM, PreflightError, UnfitDeviceError
+from acquisition.worker_processes import available_cores
 from experiments.operator.keys import AFTER_FAULT
 from experiments.operator.prompts import Prompt
 from ft_sensor.weighing import WeightCause
@@ -176,9 +178,11 @@ class ComputerLoad:
     @classmethod
     def now(cls) -> "ComputerLoad":
         """Return the load of this computer."""
-        words = Path("/proc/loadavg").read_text().split()
-        running = int(words[3].partition("/")[0])
-        return cls(max(float(words[0]), running), len(os.sched_getaffinity(0)))
+        load = os.getloadavg()[0]
+        with suppress(OSError):  # only Linux tells what runs at this moment
+            words = Path("/proc/loadavg").read_text().split()
+            load = max(load, int(words[3].partition("/")[0]))
+        return cls(load, available_cores())
 
     @property
     def is_too_much(self) -> bool:

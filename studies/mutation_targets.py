@@ -11,6 +11,7 @@ _POSES = (
 )
 _SALVAGED = (
     f"{_FILE_TESTS}/test_recover.py",
+    f"{_FILE_TESTS}/test_damaged_blocks.py",
     f"{_FILE_TESTS}/test_damaged_files.py",
     f"{_FILE_TESTS}/test_hostile_files.py",
     "tests/corpus/test_stated_limits.py",

@@ -54,6 +54,8 @@ class Grant:
 
 def choose_cores() -> tuple[int | None, int | None]:
     """Return (core of the loop, core of everything else); None where one is all."""
+    if not hasattr(os, "sched_getaffinity"):
+        return None, None
     cores = sorted(os.sched_getaffinity(0))
     return (cores[-1], cores[0]) if len(cores) > 1 else (None, None)
 

@@ -9,6 +9,7 @@ Processes are refused there; a rig in one thread has no second processor to mind
 import mmap
 import os
 import platform
+import tempfile
 from contextlib import suppress
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from acquisition.errors import PreflightError
 
 LINE = 64  # bytes of a cache line
 ORDERED_MACHINES = frozenset({"x86_64", "AMD64", "i386", "i686"})
+_STEPPED = "Simulations run here with --fake, without --processes."
 _MEMORY_NAME = "traction"
 _MEMORY_LINK = f"/memfd:{_MEMORY_NAME} (deleted)"  # as /proc shows it
 
@@ -26,19 +28,34 @@ def lines(size: int) -> int:
 
 
 def require_ordered_stores() -> None:
-    """Refuse a machine whose processors may see stores in another order.
+    """Refuse a system without what processes need, or whose stores may be reordered.
 
     Raises:
-        PreflightError: it is no x86.
+        PreflightError: it is no Linux, or no x86.
     """
+    if not hasattr(os, "memfd_create"):
+        raise PreflightError(
+            f"This system is {platform.system() or 'unknown'}: an arm, and processes "
+            "that share memory, need Linux.",
+            hint=_STEPPED,
+            arm_state="not touched",
+        )
     machine = platform.machine()
     if machine not in ORDERED_MACHINES:
         raise PreflightError(
             f"This machine is {machine or 'unknown'}: processes that share memory need "
             "an x86 (64 or 32 bit), which keeps the order of stores.",
-            hint="Use an x86 machine; simulations run here with --fake --fast.",
+            hint=f"Use an x86 machine. {_STEPPED}",
             arm_state="not touched",
         )
+
+
+def _anonymous_file() -> int:
+    """Return the descriptor of an empty file in memory, or of one without a name."""
+    if hasattr(os, "memfd_create"):
+        return os.memfd_create(_MEMORY_NAME, os.MFD_CLOEXEC)
+    with tempfile.TemporaryFile() as file:
+        return os.dup(file.fileno())
 
 
 class SharedMemory:
@@ -63,7 +80,7 @@ class SharedMemory:
     @classmethod
     def create(cls, size: int) -> "SharedMemory":
         """Return new memory of `size` bytes, all zero."""
-        descriptor = os.memfd_create(_MEMORY_NAME, os.MFD_CLOEXEC)
+        descriptor = _anonymous_file()
         os.truncate(descriptor, size)
         return cls(descriptor)
 

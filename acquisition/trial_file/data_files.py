@@ -7,7 +7,6 @@ the session's is reached through a link.
 
 import contextlib
 import errno
-import fcntl
 import os
 import stat
 from collections.abc import Generator, Mapping
@@ -16,7 +15,8 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from acquisition.errors import TrialFileError
-from acquisition.files import FOLDER, UNFOLLOWED, open_directory
+from acquisition.files import FOLDER, NO_LINK, UNFOLLOWED, open_directory
+from acquisition.locks import try_lock
 
 SUBFOLDERS = ("trials", "rejected", "faults")
 # Most bytes of a file, by how its name ends.
@@ -63,7 +63,7 @@ def open_folder(path: Path) -> Generator[int]:
         return
     with open_directory(path.parent) as outer:
         _check_kind(path, _stat(path.name, outer), is_folder=True)
-        descriptor = os.open(path.name, FOLDER | os.O_NOFOLLOW, dir_fd=outer)
+        descriptor = os.open(path.name, FOLDER | NO_LINK, dir_fd=outer)
     try:
         yield descriptor
     finally:
@@ -84,8 +84,7 @@ def claimed_folder(path: Path) -> Generator[None]:
             raise TrialFileError(
                 path, f"cannot be opened ({error.strerror})"
             ) from error
-        with contextlib.suppress(OSError):  # a file system without locks
-            fcntl.flock(folder, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        try_lock(folder, is_shared=True)
         yield
 
 
@@ -97,20 +96,10 @@ def is_claimed(path: Path) -> bool:
     """
     try:
         with open_folder(path) as folder:
-            return not _is_free(folder)
+            return not try_lock(folder)
     except OSError as error:
         check_absent(path, error)
         return False
-
-
-def _is_free(folder: int) -> bool:
-    try:
-        fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    except OSError:  # a file system without locks
-        return True
-    return True
 
 
 def open_data(path: Path, flags: int = os.O_RDONLY) -> int:

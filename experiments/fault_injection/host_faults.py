@@ -1,6 +1,5 @@
 """Faults of the computer in a rehearsed session: disk, lock, kill, bug."""
 
-import fcntl
 import os
 import resource
 import signal
@@ -9,6 +8,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from acquisition.locks import wait_for_lock
 from experiments.preflight.host_checks import free_bytes
 from experiments.rig.rig import Rig
 from experiments.session.lock import LOCK_FILE, sign
@@ -79,7 +79,7 @@ def _occupied(path: Path) -> Generator[None]:
     """Hold a lock through a description of its own: a lock belongs to the open file."""
     descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX)
+        wait_for_lock(descriptor)
         sign(descriptor)
         yield
     finally:

@@ -7,7 +7,6 @@ nothing in it is believed but the lock of the kernel: its words only name the ow
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import json
 import os
@@ -66,6 +65,8 @@ class ArmLock:
         Raises:
             PreflightError: another process has the arm, or the file cannot be used.
         """
+        import fcntl  # Linux has it; what has no arm starts without
+
         self.path = lock_folder(folders) / lock_name(interface, channel)
         self._descriptor = _open_safely(self.path)
         try:

@@ -1,6 +1,5 @@
 """One process per session: a lock that its owner's death opens."""
 
-import fcntl
 import json
 import os
 from collections.abc import Generator
@@ -10,6 +9,7 @@ from pathlib import Path
 
 from acquisition.clock import SystemClock
 from acquisition.errors import SessionError
+from acquisition.locks import try_lock
 from acquisition.trial_file.data_files import check_absent, check_folders, open_data
 from experiments.session.data_files import read_json
 from experiments.session.store import SessionFolder, iso_utc
@@ -70,14 +70,10 @@ def owner_of(folder: SessionFolder) -> LockOwner | None:
         check_absent(path, error)
         return None
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return _signature(path)
-    except OSError:  # a file system without locks
-        return None
+        is_free = try_lock(descriptor, is_shared=True)
     finally:
         os.close(descriptor)
-    return None
+    return None if is_free else _signature(path)
 
 
 def locked_error(folder: SessionFolder) -> SessionError:
@@ -97,14 +93,9 @@ def locked_error(folder: SessionFolder) -> SessionError:
 def _take(descriptor: int) -> bool:
     clock = SystemClock()
     for _ in range(_TRIES):
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            clock.sleep_until(clock.now_ns() + _PAUSE_NS)
-        except OSError:  # a file system without locks
+        if try_lock(descriptor):
             return True
-        else:
-            return True
+        clock.sleep_until(clock.now_ns() + _PAUSE_NS)
     return False
 
 

@@ -1,6 +1,5 @@
 """Folders and files of sessions: numbered, written atomically, never overwritten."""
 
-import fcntl
 import os
 import re
 import shutil
@@ -14,6 +13,7 @@ from typing import Any
 from acquisition.clock import SystemClock
 from acquisition.errors import SessionError, SettingsError, TrialFileError
 from acquisition.files import make_directories, sync_directory
+from acquisition.locks import wait_for_lock
 from acquisition.trial_file.data_files import (
     check_absent,
     check_folders,
@@ -281,7 +281,7 @@ def _session_at(path: Path) -> SessionFolder | None:
 def _locked(path: Path) -> Generator[None, None, None]:
     descriptor = open_data(path, os.O_RDWR | os.O_CREAT)
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX)
+        wait_for_lock(descriptor)
         yield
     finally:
         os.close(descriptor)

@@ -1,5 +1,7 @@
 import ctypes
 import errno
+import time
+from types import SimpleNamespace
 
 import pytest
 
@@ -64,6 +66,17 @@ def test_a_signal_does_not_shorten_a_sleep(monkeypatch):
     monkeypatch.setattr(clock, "_nanosleep", lambda *_: answers.pop(0))
     clock.sleep_until(5)
     assert answers == []
+
+
+def test_a_system_without_such_a_sleep_sleeps_as_long(monkeypatch):
+    monkeypatch.setattr(ctypes, "CDLL", lambda *_, **__: SimpleNamespace())
+    clock = SystemClock()
+    slept = []
+    monkeypatch.setattr(time, "sleep", slept.append)
+    clock.sleep_until(clock.now_ns() + 5_000_000_000)
+    clock.sleep_until(0)
+    assert slept[0] == pytest.approx(5.0, abs=0.5)
+    assert slept[1] == 0.0
 
 
 def test_a_sleep_is_asked_for_as_an_absolute_time(monkeypatch):

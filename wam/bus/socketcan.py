@@ -6,7 +6,6 @@ Python's socket module has no names for most of them.
 
 import contextlib
 import errno
-import fcntl
 import socket
 import struct
 from collections.abc import Iterable
@@ -69,6 +68,8 @@ def interface_state(channel: str) -> InterfaceState:
     Raises:
         OSError: it does not exist.
     """
+    import fcntl  # Linux has it, as it has the sockets; simulations need neither
+
     name = channel.encode()
     if not 0 < len(name) <= _NAME_AT_MOST or b"\0" in name:
         raise OSError(errno.ENODEV, "No such device")

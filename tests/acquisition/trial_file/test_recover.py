@@ -8,7 +8,7 @@ import struct
 
 import numpy as np
 import pytest
-from mcap.records import Message
+from mcap.records import Message, Metadata
 
 from acquisition.errors import TrialFileError
 from acquisition.recording.recorder import seal
@@ -194,6 +194,40 @@ def test_a_truth_file_is_recovered_too(tmp_path):
     recovery = recover_file(writer.partial)
     assert recovery.path.name == "T07.truth.recovered.mcap"
     assert len(TrialReader(recovery.path).truth().data) == 9
+
+
+def test_a_truth_file_whose_definitions_are_lost_is_known_by_its_messages(tmp_path):
+    records = np.frombuffer(bytearray(TRUTH.template * 9), TRUTH.dtype)
+    records["host_ns"] = START_NS + np.arange(9)
+    path = tmp_path / "T07.truth.mcap"
+    writer = TrialWriter(path, make_header(), TRUTH_TOPICS)
+    for part in (records[:4], records[4:]):
+        writer.write_truth(part)
+        writer.flush()
+    writer.close_partial()
+    data = writer.partial.read_bytes()
+    first = chunks(data)[0]
+    writer.partial.write_bytes(flipped(data, first.end - 9))
+    recovery = recover_file(writer.partial)
+    assert len(TrialReader(recovery.path).truth().data) == 5
+
+
+@pytest.mark.parametrize(
+    ("texts", "is_sound"),
+    [
+        ((b"key", b"value"), True),
+        ((b"key", b"value", b"key"), False),  # a key without a value
+        ((), False),
+        ((b"key", b"value", b""), False),
+    ],
+)
+def test_a_description_is_whole_or_proves_nothing(tmp_path, texts, is_sound):
+    """What was skipped ends at a description only if that one is whole."""
+    pairs = b"".join(struct.pack("<I", len(text)) + text for text in texts)
+    body = struct.pack("<I", 4) + b"name" + struct.pack("<I", len(pairs)) + pairs
+    data = MAGIC_BYTES + b"\xff" * 30 + record(METADATA, body)
+    found = list(SoundRecords(data, tmp_path / "T01.mcap"))
+    assert any(isinstance(r, Metadata) for r in found) is is_sound
 
 
 def test_a_chunk_that_is_gone_is_said_to_be_lost(put, sealed):

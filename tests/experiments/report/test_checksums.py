@@ -3,6 +3,7 @@
 import pytest
 
 from acquisition.errors import TrialFileError
+from experiments.report import checksums
 from experiments.report.checksums import SUMS, changed_files, write_sums
 
 
@@ -69,3 +70,20 @@ def test_a_changed_digit_in_the_list_is_seen(folder):
     digit = "0" if text[0] != "0" else "1"
     (folder / SUMS).write_text(digit + text[1:])
     assert texts(folder) == ["a.txt is changed"]
+
+
+def test_a_folder_of_too_many_files_is_refused(folder, monkeypatch):
+    monkeypatch.setattr(checksums, "_MOST", 3)
+    assert changed_files(folder) == []
+    (folder / "new.txt").touch()
+    with pytest.raises(TrialFileError, match="holds more than 3 files"):
+        changed_files(folder)
+
+
+def test_a_list_that_is_too_long_is_refused(folder, monkeypatch):
+    size = (folder / SUMS).stat().st_size
+    monkeypatch.setattr(checksums, "_LARGEST", size)
+    assert changed_files(folder) == []
+    monkeypatch.setattr(checksums, "_LARGEST", size - 1)
+    with pytest.raises(TrialFileError, match="is larger than"):
+        changed_files(folder)

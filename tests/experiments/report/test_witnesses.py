@@ -109,3 +109,27 @@ def test_what_is_no_file_is_not_looked_for(crate):
     describe(crate, [{"@type": "Person", "@id": "somebody"}])
     sum_again(crate)
     assert texts(crate) == []
+
+
+def test_a_trial_that_description_and_journal_name_is_missed_once(crate):
+    (crate / SESSION / "trials" / "T02.mcap").unlink()
+    sum_again(crate)
+    assert texts(crate) == [
+        f"{SESSION}/trials/T02.mcap is missing; {METADATA} names it"
+    ]
+
+
+def test_a_file_that_the_description_names_twice_is_missed_once(crate):
+    (crate / "fits.csv").unlink()
+    describe(crate, [{"@type": "File", "@id": "fits.csv"}] * 2)
+    sum_again(crate)
+    assert texts(crate) == [f"fits.csv is missing; {METADATA} names it"]
+
+
+def test_a_journal_with_two_faults_is_named_once(crate):
+    journal = crate / SESSION / "events.jsonl"
+    every = journal.read_bytes().splitlines(keepends=True)
+    journal.write_bytes(b"".join(every[:4] + every[5:8]))
+    sum_again(crate)
+    found = [text for text in texts(crate) if "events.jsonl" in text]
+    assert len(found) == 1

@@ -219,6 +219,30 @@ def test_a_recording_that_leads_elsewhere_is_named(session):
     assert {d.file for d in compare_kept(session)} == {"trials/T01.mcap"}
 
 
+def test_a_journal_of_two_lines_needs_its_summary(session):
+    write_lines(session, lines(session)[:2])
+    drop("session.json")(session)
+    assert ("session.json", "is missing or damaged") in deviations(session)
+    write_lines(session, lines(session)[:1])
+    assert ("session.json", "is missing or damaged") not in deviations(session)
+
+
+@pytest.mark.parametrize("fields", [{"kept": ["T01"]}, {"events": 12}])
+def test_an_empty_journal_is_missed_by_whatever_the_summary_says(session, fields):
+    write_lines(session, [])
+    (session.path / "session.json").write_text(json.dumps({"id": "S001", **fields}))
+    missing = ("events.jsonl", "is missing or empty; session.json is not")
+    assert missing in deviations(session)
+
+
+def test_a_kept_file_of_another_name_is_named_and_not_counted(session):
+    sidecar = json.loads((session.path / "trials/T01.json").read_text())
+    (session.path / "trials/Tab.json").write_text(json.dumps(sidecar))
+    assert deviations(session) == {
+        ("trials/Tab.json", "is kept, but is not in the journal")
+    }
+
+
 def test_a_summary_behind_the_journal_is_no_deviation(session):
     change_json(session.path / "session.json", kept=["T01"], events=8)
     assert deviations(session) == set()
