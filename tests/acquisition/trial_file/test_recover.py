@@ -177,6 +177,49 @@ def test_a_damaged_attachment_costs_itself_alone(put, sealed):
     assert reader.metadata["recovered"]["attachments_dropped"] == "config.toml"
 
 
+def test_a_lost_attachment_is_taken_from_a_file_beside_it(put, sealed):
+    put(sealed, "T02.mcap")
+    at = span_of(sealed, ATTACHMENT).end - 10
+    recovery = recover_file(put(flipped(sealed, at), "T01.mcap"))
+    reader = TrialReader(recovery.path)
+    assert (reader.attachments, recovery.missing_attachments) == (ATTACHMENTS, ())
+    assert reader.metadata["recovered"]["attachments_dropped"] == ""
+
+
+def test_another_attachment_of_the_same_name_is_not_taken(put, sealed, tmp_path):
+    others = make_header(attachments={"config.toml": b"[rig]  # of another day"})
+    seal(write_trial(tmp_path / "T00.mcap", make_cycles(100), others), "travel")
+    at = span_of(sealed, ATTACHMENT).end - 10
+    recovery = recover_file(put(flipped(sealed, at), "T01.mcap"))
+    assert recovery.missing_attachments == ("config.toml",)
+    assert "config.toml" not in TrialReader(recovery.path).attachments
+
+
+def test_a_description_that_stands_there_twice_is_copied_once(put, sealed):
+    first = span_of(sealed, METADATA)
+    again = sealed[first.start : first.end]
+    recovery = recover_file(
+        put(sealed[: first.end] + again + sealed[first.end :], "T01.mcap")
+    )
+    copied = recovery.path.read_bytes()
+    found = [s for s in spans(copied) if s.opcode == METADATA]
+    names = [copied[span.body + 4 : span.end] for span in found]
+    assert sum(name.startswith(again[13:17]) for name in names) == 1
+
+
+@pytest.mark.parametrize("reason", ["", "has a broken record"])
+def test_what_says_which_trial_it_is_cannot_be_done_without(put, sealed, reason):
+    head = [s for s in spans(sealed) if s.opcode == METADATA and s.end < len(sealed)]
+    trial = next(s for s in head if sealed[s.body + 4 : s.body + 9] == b"trial")
+    data = sealed[: trial.start] + sealed[trial.end :]
+    if reason:
+        data = flipped(sealed, trial.body + 3)
+    with pytest.raises(TrialFileError, match=r"nothing to save: it .+") as refused:
+        recover_file(put(data, "T01.mcap"))
+    told = "; what says which trial it is was there" in refused.value.message
+    assert told is bool(reason)
+
+
 def test_a_lost_summary_loses_nothing_else(put, sealed):
     recovery = recover_file(put(sealed[:-50]))
     assert (recovery.verified.cycles, recovery.bytes_dropped) == (300, 0)
