@@ -200,27 +200,29 @@ class TrialWriter:
     def _start(self, topics: Mapping[str, str]) -> None:
         header = self._header
         self._writer.start(profile="ros2", library="traction")
-        self._writer.add_metadata(
-            "trial", {"format_version": FORMAT_VERSION, **header.trial}
-        )
         clock = {
             "utc_offset_ns": str(header.utc_offset_ns),
             "offset_uncertainty_ns": str(header.offset_uncertainty_ns),
             "rate_hz": str(header.rate_hz),
         }
-        self._writer.add_metadata("clock", clock)
         digests = {
             f"sha256:{name}": hashlib.sha256(content).hexdigest()
             for name, content in header.attachments.items()
         }
-        self._writer.add_metadata("provenance", {**header.provenance, **digests})
         meanings = (*CHANNELS, *(FORESIGHT_CHANNELS if header.foresight else ()))
         channels = {c.field: f"{c.unit} in {c.frame}; {c.sign}" for c in meanings}
-        self._writer.add_metadata("channels", channels)
+        metadata: dict[str, dict[str, str]] = {
+            "trial": {"format_version": FORMAT_VERSION, **header.trial},
+            "clock": clock,
+            "provenance": {**header.provenance, **digests},
+            "channels": channels,
+        }
         if header.foresight:
-            self._writer.add_metadata("foresight", dict(header.foresight))
+            metadata["foresight"] = dict(header.foresight)
+        self._describe(metadata)
         for name, content in header.attachments.items():
             self._writer.add_attachment(0, 0, name, "text/plain", content)
+        self._describe(metadata)  # a block that a disk loses takes one of both
         self._channels: dict[str, int] = {}
         for topic, type_name in topics.items():
             schema = self._writer.register_schema(
@@ -228,6 +230,10 @@ class TrialWriter:
             )
             self._channels[topic] = self._writer.register_channel(topic, "cdr", schema)
         self._description_pending = "/robot_description" in topics
+
+    def _describe(self, metadata: Mapping[str, dict[str, str]]) -> None:
+        for name, content in metadata.items():
+            self._writer.add_metadata(name, content)
 
     def _count_cycles(self, records: Record) -> None:
         counts = self.counts

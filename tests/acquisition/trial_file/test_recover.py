@@ -207,13 +207,28 @@ def test_a_description_that_stands_there_twice_is_copied_once(put, sealed):
     assert sum(name.startswith(again[13:17]) for name in names) == 1
 
 
+def test_a_lost_block_at_the_head_loses_nothing(put, sealed):
+    """What says which trial it is stands there a second time."""
+    end = span_of(sealed, ATTACHMENT).start
+    recovery = recover_file(put(bytes(end) + sealed[end:], "T01.mcap"))
+    whole = TrialReader(put(sealed, "T02.mcap"))
+    reader = TrialReader(recovery.path)
+    for name in ("trial", "clock", "provenance", "channels"):
+        assert reader.metadata[name] == whole.metadata[name]
+    assert (recovery.verified.cycles, recovery.losses) == (300, ())
+    assert reader.attachments == ATTACHMENTS
+
+
 @pytest.mark.parametrize("reason", ["", "has a broken record"])
 def test_what_says_which_trial_it_is_cannot_be_done_without(put, sealed, reason):
-    head = [s for s in spans(sealed) if s.opcode == METADATA and s.end < len(sealed)]
-    trial = next(s for s in head if sealed[s.body + 4 : s.body + 9] == b"trial")
-    data = sealed[: trial.start] + sealed[trial.end :]
+    names = [sealed[s.body + 4 : s.body + 9] for s in spans(sealed)]
+    first, second = [
+        s for s, name in zip(spans(sealed), names, strict=True) if name == b"trial"
+    ]
+    data = sealed[: second.start] + sealed[second.end :]
+    data = data[: first.start] + data[first.end :]
     if reason:
-        data = flipped(sealed, trial.body + 3)
+        data = flipped(flipped(sealed, first.body + 3), second.body + 3)
     with pytest.raises(TrialFileError, match=r"nothing to save: it .+") as refused:
         recover_file(put(data, "T01.mcap"))
     told = "; what says which trial it is was there" in refused.value.message

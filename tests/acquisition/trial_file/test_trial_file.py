@@ -146,10 +146,10 @@ def test_facts_come_before_messages_and_the_result_after(trial):
     order = [span.opcode for span in spans(data)]
     first = min(i for i, opcode in enumerate(order) if opcode in MESSAGE_OPCODES)
     last = max(i for i, opcode in enumerate(order) if opcode in MESSAGE_OPCODES)
-    assert order[:first].count(METADATA) == 4
+    assert order[:first].count(METADATA) == 2 * 4  # before the attachments and after
     assert order[:first].count(ATTACHMENT) == len(ATTACHMENTS)
     assert order[last:].count(METADATA) == 1
-    assert b"result" in data[span_of(data, METADATA, 4).start :][:20]
+    assert b"result" in data[span_of(data, METADATA, 8).start :][:20]
 
 
 def test_attachments_come_back_with_their_digests(reader):
