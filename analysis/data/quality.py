@@ -26,9 +26,11 @@ _LOAD_WORDS = (
 _AIMS = ((1, 1), (1, 2), (2, 1), (2, 2), (0, 1), (0, 2))
 JOINT7_WARNING = 0.020  # motion of the locked joint that is reported [rad]
 ENOUGH = 0.02  # share of the samples a cell should hold
-# In slips the foot hops, and F_n is nothing but the error of a sound sensor. No ground
-# pulls: what is further below zero is the tare's or the plane's.
 SENSOR_ERROR = 0.4  # N, mean error of the paper's force sensor
+# In slips the foot hops, and F_n is nothing but the error of a sound sensor, which
+# drifts by about that much after a tare. No ground pulls: what is further below zero
+# is the tare's or the plane's.
+PULLED = 2.0 * SENSOR_ERROR  # N
 PULLED_WARNING = 0.03  # share of the kept samples below that
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
-from analysis.data.quality import PULLED_WARNING, SENSOR_ERROR
+from analysis.data.quality import PULLED, PULLED_WARNING
 from analysis.figures.sections import ReportSection
 from analysis.findings.findings import StudyResults
 from analysis.findings.paper_claims import PaperClaim
@@ -58,7 +58,7 @@ def summary(study: Study) -> ReportTable:
         "the fit, mean over trials ± its standard error. Constant: always the median "
         "F_t of the other trials. F_n ≤ 0: share of the kept samples with the foot off "
         "the ground, where it hops in a slip, or the tare wrong; a warning where it is "
-        f"below −{SENSOR_ERROR:g} N in more than {PULLED_WARNING:.0%}.",
+        f"below −{PULLED:g} N in more than {PULLED_WARNING:.0%}.",
         section=ReportSection.SUMMARY,
     )
 

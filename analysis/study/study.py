@@ -14,7 +14,7 @@ from analysis.data.prepare import (
     PrepareOptions,
     prepare_trial,
 )
-from analysis.data.quality import PULLED_WARNING, SENSOR_ERROR
+from analysis.data.quality import PULLED, PULLED_WARNING
 from analysis.data.samples import SampleTable
 from analysis.data.series import TractionSeries
 from analysis.data.terrain_kinds import terrain_kind
@@ -285,7 +285,7 @@ def _warnings(result: TerrainResult, has_container: bool) -> list[str]:
     warnings = []
     if result.pulled_share > PULLED_WARNING:
         warnings.append(
-            f"{result.terrain}: F_n <= -{SENSOR_ERROR:g} N, beyond the sensor's error, "
+            f"{result.terrain}: F_n <= -{PULLED:g} N, beyond the sensor's error, "
             f"in {result.pulled_share:.1%} of the kept samples (limit "
             f"{PULLED_WARNING:.0%}). Suspect the tare or the plane of the terrain."
         )

@@ -9,7 +9,7 @@ import numpy as np
 from acquisition.errors import TractionError
 from analysis.data.events import Slip
 from analysis.data.prepare import PreparedTrial
-from analysis.data.quality import SENSOR_ERROR, share_below
+from analysis.data.quality import PULLED, share_below
 from analysis.data.samples import SampleTable
 from analysis.data.terrain_kinds import kind_title
 from analysis.study.crossval import FoldResult, ModelFold
@@ -122,8 +122,8 @@ class TerrainResult:
 
     @property
     def pulled_share(self) -> float:
-        """Share of the kept samples with F_n below zero beyond the sensor's error."""
-        return share_below(self.trials, -SENSOR_ERROR)
+        """Share of the kept samples with F_n below what a sound sensor shows."""
+        return share_below(self.trials, -PULLED)
 
     def models(self, name: str) -> list[ModelFold]:
         """Return the folds of the model `name`."""
