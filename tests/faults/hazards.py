@@ -7,6 +7,7 @@ from bounds.json.
 from dataclasses import dataclass
 from enum import Enum
 
+from experiments.commissioning.steps import ProofStep
 from tests.faults.bounds import BOUND_PHASES, PrintedBound, read_bounds
 from tests.faults.expected import NOTHING
 from tests.faults.hazard_rows import ROWS
@@ -22,8 +23,29 @@ Made by `python -m tests.faults.hazards > docs/hazards.md`. Bounds are the worst
 recording of a trial and of a move by the arm itself, measured on the simulated arm
 (docs/faults.md): largest joint speed as a share of the joint's limit, travel of the
 sole within 0.5 s, force of the motors on the person who holds the sole. "As without it"
-stands where that is not more than what is measured when nothing happens at all.
+stands where that is not more than what is measured when nothing happens at all. Below
+a signal stand the steps of [the first day](first-day.md) that prove it on the arm
+itself.
 """
+_S = ProofStep
+# Steps of `traction commission` by the signal that they prove sound on the arm at hand.
+PROOFS: dict[str, tuple[ProofStep, ...]] = {
+    "joint position": (_S.IDENTITY, _S.TIMING, _S.BY_HAND),
+    "joint torque command": (_S.IDENTITY, _S.RAMPS, _S.LIFT, _S.GRAVITY_RAMP),
+    "safety mode": (_S.IDENTITY, _S.STOP_CIRCUIT),
+    "pendant and e-stop": (_S.STOP_CIRCUIT,),
+    "F/T wrench": (_S.OWN_WEIGHT, _S.HUNG_WEIGHT, _S.PLATE),
+    "host cycle": (_S.TIMING,),
+    "CAN bus": (_S.LISTEN, _S.TIMING),
+    "contact force": (_S.CONFIGURATION, _S.PLATE),
+    "second command": (_S.LISTEN,),
+    "serial line": (_S.OWN_WEIGHT,),
+    "zero": (_S.BY_HAND, _S.HUNG_WEIGHT, _S.LIFT),
+    "friction calibration": (_S.RAMPS,),
+    "tool model": (_S.CONFIGURATION, _S.OWN_WEIGHT, _S.LIFT, _S.CONTAINER),
+}
+# What no arm is needed for.
+OF_THE_COMPUTER = {"console heartbeat", "recorder", "disk", "wall clock"}
 
 
 class Mode(Enum):
@@ -111,7 +133,8 @@ def page() -> str:
     for row in hazards():
         if row.signal != signal:
             signal = row.signal
-            lines += ["", f"## {signal.capitalize()}", "", _TITLES, _RULE]
+            lines += ["", f"## {signal.capitalize()}", "", *_proofs(signal)]
+            lines += [_TITLES, _RULE]
         tests = "<br>".join(f"`{test}`" for test in row.tests)
         faults = ", ".join(f"`{fault}`" for fault in row.faults)
         cause = f"{row.cause} ({faults})" if faults else row.cause
@@ -120,6 +143,12 @@ def page() -> str:
     blind = sum(row.detection.startswith("not detected") for row in hazards())
     lines += ["", f"{len(hazards())} rows, {blind} of them not detected."]
     return "\n".join(lines) + "\n"
+
+
+def _proofs(signal: str) -> list[str]:
+    """Return what is to be said of the steps that prove a signal on the arm."""
+    steps = ", ".join(f"{step} {step.words}" for step in PROOFS.get(signal, ()))
+    return [f"Proved on the arm itself by {steps}.", ""] if steps else []
 
 
 _COLUMNS = ("how", "hazard", "cause", "detected by", "reaction", "bound", "test")

@@ -5,8 +5,16 @@ from pathlib import Path
 
 import pytest
 
+from experiments.proving.work import WORK
 from tests.faults.expected import TABLE
-from tests.faults.hazards import Mode, hazards, measured, page
+from tests.faults.hazards import (
+    OF_THE_COMPUTER,
+    PROOFS,
+    Mode,
+    hazards,
+    measured,
+    page,
+)
 
 ROOT = Path(__file__).parents[2]
 SIGNALS = {
@@ -33,6 +41,12 @@ SIGNALS = {
 def functions_of(path):
     tree = ast.parse((ROOT / path).read_text())
     return {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
+
+
+def test_every_signal_of_the_arm_is_proved_by_steps_that_are_done():
+    assert set(PROOFS) | OF_THE_COMPUTER == SIGNALS
+    assert not set(PROOFS) & OF_THE_COMPUTER
+    assert all(set(steps) <= set(WORK) and steps for steps in PROOFS.values())
 
 
 def test_the_printed_hazards_are_those_of_the_table():
