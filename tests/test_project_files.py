@@ -1,9 +1,12 @@
 """Files of the project that other programs read say the same as the project."""
 
+import re
 import tomllib
 from pathlib import Path
 
 import yaml
+
+from experiments.__main__ import COMMANDS
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
@@ -37,3 +40,18 @@ def test_a_problem_is_reported_with_the_page_of_the_rig():
     fields = parsed(".github/ISSUE_TEMPLATE/problem.yml")["body"]
     labels = [field["attributes"]["label"] for field in fields]
     assert "Output of `traction check --json`" in labels
+
+
+def test_commands_and_pages_named_for_programs_are_there():
+    text = (ROOT / "AGENTS.md").read_text()
+    names = re.findall(r"\]\(([^)]+)\)", text)
+    assert names
+    assert all((ROOT / name).is_file() for name in names)
+    modules = re.findall(r"tests\.([a-z.]+)", text)
+    for module in modules:
+        path = ROOT / "tests" / module.rstrip(".").replace(".", "/")
+        assert path.with_suffix(".py").is_file() or (path / "__main__.py").is_file()
+    never = text.partition("## Never")[2].partition("move or")[0]
+    moving = set(re.findall(r"`(\w+)`", never))
+    assert "commission" in moving
+    assert moving < set(COMMANDS)
