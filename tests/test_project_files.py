@@ -1,13 +1,16 @@
 """Files of the project that other programs read say the same as the project."""
 
 import re
+import subprocess
 import tomllib
 from pathlib import Path
 
+import pytest
 import yaml
 
 from experiments.__main__ import COMMANDS
 
+FATAL = 128  # of git
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 
@@ -55,3 +58,12 @@ def test_commands_and_pages_named_for_programs_are_there():
     moving = set(re.findall(r"`(\w+)`", never))
     assert "commission" in moving
     assert moving < set(COMMANDS)
+
+
+def test_no_file_holds_two_versions_of_a_line():
+    marks = r"^(<<<<<<< |>>>>>>> )"
+    words = ["git", "grep", "-nIE", marks]
+    found = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
+    if found.returncode == FATAL:
+        pytest.skip("no checkout of git")
+    assert found.stdout == ""
