@@ -1,4 +1,4 @@
-"""traction replay: a trial shown again, or a bus log in words."""
+"""traction replay: a trial shown again; a bus log, or a bundle, in words."""
 
 from __future__ import annotations
 
@@ -42,6 +42,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="a bus log of --can-log, or of candump -L",
     )
     parser.add_argument(
+        "--bundle", type=Path, metavar="FILE", help="a file of traction bundle"
+    )
+    parser.add_argument(
         "--foresight",
         type=Path,
         metavar="FILE",
@@ -61,6 +64,8 @@ def run(args: argparse.Namespace) -> int:
     """Show a trial or a bus log and return the exit code."""
     from acquisition.errors import SettingsError
 
+    if args.bundle is not None:
+        return _tell_bundle(args)
     is_trial = args.session is not None and args.trial is not None
     if args.foresight is not None and not is_trial:
         raise SettingsError(
@@ -78,6 +83,22 @@ def run(args: argparse.Namespace) -> int:
             hint="For example: traction replay S012 T04, or traction replay --can FILE",
         )
     return _show_trial(args) if is_trial else _show_log(args)
+
+
+def _tell_bundle(args: argparse.Namespace) -> int:
+    """Say what a bundle tells; return the exit code."""
+    from acquisition.errors import SettingsError
+    from experiments.operator.console import Console
+    from experiments.report.bundle_story import read_bundle, story
+
+    if args.session is not None or args.can is not None:
+        raise SettingsError(
+            "--bundle stands alone.", hint="For example: traction replay --bundle FILE"
+        )
+    console = Console(color=not args.no_color)
+    for line in story(read_bundle(args.bundle)):
+        console.say(line)
+    return 0
 
 
 def _show_trial(args: argparse.Namespace) -> int:
