@@ -90,10 +90,10 @@ def page(alarms: Alarms, seeds: int, friction: float, trials: int) -> str:
     return f"""# False alarms
 
 How often a trial with nothing wrong is doubted, of {alarms.trials} simulated ones:
-every terrain, {trials} trials each, seeds {FIRST_SEED} to {FIRST_SEED + seeds - 1},
-joint friction {friction:g} of what was identified on another arm. Made by
-`python -m studies.false_alarms --seeds {seeds} --write`; what each doubt is there to
-find stands in [disturbances](disturbances.md).
+every terrain at each of the seeds {FIRST_SEED} to {FIRST_SEED + seeds - 1}, joint
+friction {friction:g} of what was identified on another arm. What each doubt is there
+to find stands in [disturbances](disturbances.md). Made by
+`python -m studies.false_alarms --seeds {seeds} --trials {trials} --write`.
 
 | doubt | sound trials doubted, of {alarms.trials}{below} |
 |---|---|
