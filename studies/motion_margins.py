@@ -3,10 +3,10 @@
 python -m studies.motion_margins [--trials 6] [--stances 25] [--only TEXT]
 
 Sessions on four terrains with three shares of friction and three paces, stances on
-two terrains, and every calibration, through the whole program on a simulated arm that
-nothing is wrong with. Of each limit in `control_loop.motion` the largest share that was
-reached is kept. Exits with 1 where a sound arm was stopped, or came nearer than half of
-a limit.
+two terrains with two of them, and every calibration, through the whole program on a
+simulated arm that nothing is wrong with. Of each limit in `control_loop.motion` the
+largest share that was reached is kept. Exits with 1 where a sound arm was stopped, or
+came nearer than half of a limit.
 """
 
 import argparse
@@ -23,6 +23,8 @@ from tests.experiments.program import traction
 
 TERRAINS = ("S0", "TF", "S15", "B0")
 FRICTIONS = (0.02, 0.4, 1.0)
+# Beyond, friction alone holds a foot that is asked for 3 N: it never moves.
+STANCE_FRICTIONS = (0.02, 0.4)
 PACES = ("slow", "fast", "clumsy")
 STANCES = ("S0", "TF")
 CALIBRATIONS = ("gravity", "friction", "sensor", "foot")
@@ -84,7 +86,7 @@ def commands(trials: int, stances: int) -> Iterator[tuple[str, ...]]:
                 asked = ("--trials", str(trials), "--pace", pace)
                 yield "run", terrain, *asked, "--friction", str(friction)
     for terrain in STANCES:
-        for friction in FRICTIONS:
+        for friction in STANCE_FRICTIONS:
             asked = ("--policy", "constant-mu", "--stances", str(stances))
             asked = (*asked, "--trials", "2", "--friction", str(friction))
             yield "stance", terrain, *asked
