@@ -175,8 +175,9 @@ def joint_pd(kp: Array, kd: Array, error: Array, rate_error: Array) -> Array:
 
 
 # N m beyond the weight that move a joint for certain: one and a half times the dry
-# friction that was identified on another arm, and a quarter of the joint's weight.
-BREAKAWAY = np.array([4.0, 9.0, 4.5, 3.5, 0.7, 0.7, 0.16])
+# friction that was identified on another arm, and a quarter of the joint's weight;
+# joint 1, which bears none, a tenth for the joints that swing it as they start.
+BREAKAWAY = np.array([4.4, 9.0, 4.5, 3.5, 0.7, 0.7, 0.16])
 # rad at the joint that a move goes on meanwhile, a fifth of what dry friction holds.
 _IN_VAIN = np.array([1.0, 0.5, 0.5, 0.5, 2.0, 2.0, 3.0]) * 1e-3
 _TREMBLE = 1  # counts by which an encoder at rest flickers

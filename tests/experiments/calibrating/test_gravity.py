@@ -115,6 +115,17 @@ def test_the_whole_calibration_recovers_the_torques_at_its_own_pace(tmp_path):
     assert errors(out.read_text(), rig)[0] < 0.1
 
 
+def test_an_arm_with_all_the_friction_that_was_identified_is_not_taken_for_stuck(
+    tmp_path,
+):
+    """Its motors start at up to 1.4 of it while other joints swing theirs."""
+    arm = ("--friction", "1.0", "--seed", "1", "--fake", "--fast")
+    out = ("--out", tmp_path / "gravity.toml", "--data", tmp_path)
+    done = traction("calibrate", "gravity", "--force", *arm, *out)
+    assert done.code == 0, done.err
+    assert (tmp_path / "gravity.toml").is_file()
+
+
 def test_the_person_is_told_to_clear_the_space_and_sees_the_residuals(calibrated):
     done, _, _ = calibrated
     assert "clear the space" in done.out
