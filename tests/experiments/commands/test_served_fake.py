@@ -131,7 +131,7 @@ def test_a_served_arm_of_a_shell_goes_on_until_sigterm(tmp_path, how):
 
 def test_a_script_presses_and_quits_though_stdin_has_ended(tmp_path):
     script = tmp_path / "script"
-    script.write_text("idle\n0.01 quit\n")
+    script.write_text("idle\n0.5 quit\n")
     log = tmp_path / "bus.log"
     done = subprocess.run(
         [
