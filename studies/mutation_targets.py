@@ -155,7 +155,80 @@ _BODIES = (
 )
 _UNREAD = "overwritten before it is read"
 _EIGHTH = "there is no eighth motor that would read it"
+_TILTS = "_TILTS = ((5, -1.2), (4, 1.0), (4, -1.0), (5, -0.6))"
+_SINCE = (
+    "since_ns = ("
+    "_since(force, now_ns, is_beyond=seen.force > limits.contact_force), "
+    "_since(moment, now_ns, is_beyond=seen.moment > limits.contact_moment), "
+    "_since(force_hold, now_ns, is_beyond=seen.force {} limits.contact_force_hold), "
+    "_since(moment_hold, now_ns, "
+    "is_beyond=seen.moment > limits.contact_moment_hold), "
+    "_since(saturated, now_ns, is_beyond=seen.is_saturated), "
+    "_since(move, now_ns, is_beyond=seen.force > limits.contact_force_move))"
+)
 EQUIVALENT: dict[tuple[str, str], str] = {
+    (
+        f"{_LOOP}/guard.py",
+        "if are_within(values, limits): -> pass",
+    ): "a look that saves the loop; its rows say the same of every number",
+    (
+        f"{_LOOP}/contact.py",
+        f"{_SINCE.format('>')} -> {_SINCE.format('>=')}",
+    ): _AT_REST,
+    (
+        f"{_FILE}/salvage.py",
+        "latest = (self.last_ns if self.last_ns > 0 else start_ns) + _LONGEST_NS -> "
+        "latest = (self.last_ns if self.last_ns > 1 else start_ns) + _LONGEST_NS",
+    ): _BELOW,
+    (
+        f"{_FILE}/recover.py",
+        "before = (earliest or 0) - PERIOD_NS -> before = (earliest or 1) - PERIOD_NS",
+    ): _BELOW,
+    (
+        f"{_FILE}/recover.py",
+        "start_s = max(0, before + PERIOD_NS - first) / NS_PER_S -> "
+        "start_s = max(1, before + PERIOD_NS - first) / NS_PER_S",
+    ): _BELOW,
+    (
+        f"{_CONTROL}/position_control.py",
+        "_STIFFNESS = np.array([0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.0]) -> "
+        "_STIFFNESS = np.array([0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 1.0])",
+    ): "the limit of joint 7's spring is 0",
+    (
+        f"{_CONTROL}/position_control.py",
+        "elif abs(angles[i] - self._wanted[i]) > self._in_vain[i]: -> "
+        "elif abs(angles[i] - self._wanted[i]) >= self._in_vain[i]:",
+    ): _AT_REST,
+    (
+        f"{_CONTROL}/soft_walls.py",
+        "_ALL_ARMED = 127 -> _ALL_ARMED = 254",
+    ): "whether walls that are all armed are looked at once more",
+    (
+        f"{_DRIVER}/property_watch.py",
+        "known = nearest_documented(firmware[node - 1]) -> "
+        "known = nearest_documented(firmware[node - 2])",
+    ): "what is watched has the same number in every documented firmware",
+    (
+        f"{_DRIVER}/property_watch.py",
+        "self._next = 0 -> self._next = 1",
+    ): _UNREAD,
+    (
+        f"{_DRIVER}/status_poller.py",
+        "self._until_pendant = 0 -> self._until_pendant = 1",
+    ): "the mode is asked for in the first cycle either way",
+    (
+        f"{_DRIVER}/safety_module.py",
+        "_CONFIG_GAP_NS = 10000000 -> _CONFIG_GAP_NS = 20000000",
+    ): "a gap that is longer than promised keeps the promise",
+    (
+        "wam/model/clearance.py",
+        "if (distances < limits).any(): -> if (distances <= limits).any():",
+    ): _AT_REST,
+    (
+        "wam/calibration/free_space.py",
+        "if not ((pose >= low) & (pose <= high)).all(): -> "
+        "if not ((pose >= low) & (pose < high)).all():",
+    ): _AT_REST,
     (
         f"{_CONTROL}/friction_compensation.py",
         "if now == before: -> pass",
@@ -376,6 +449,14 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     ): "the last axis of two is the second",
     ("wam/calibration/poses.py", "_CANDIDATES = 1000 -> _CANDIDATES = 2000"): _TUNED,
     ("wam/calibration/poses.py", "_SEED = 7 -> _SEED = 8"): _TUNED,
+    **{
+        ("wam/calibration/poses.py", f"{_TILTS} -> {other}"): _TUNED
+        for other in (
+            _TILTS.replace("(5, -1.2)", "(6, -1.2)"),
+            _TILTS.replace("(4, -1.0)", "(5, -1.0)"),
+            _TILTS.replace("(5, -0.6)", "(5, +0.6)"),
+        )
+    },
     (
         "wam/calibration/poses.py",
         "information = 0.001 * np.eye(parameters) -> "

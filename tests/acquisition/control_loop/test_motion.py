@@ -129,3 +129,15 @@ def test_power_that_came_long_ago_is_no_activation():
     begin = motion(0, HOLD)
     again = motion(LATER, HOLD, foot_speed=0.5)
     assert judge(begin, again) is OK
+
+
+def test_joints_that_hold_are_as_slow_as_the_pages_say():
+    assert LIMITS.hold_speed == (1.2, 1.2, 1.2, 1.4, 2.0, 2.0, 2.5)
+
+
+def test_energy_that_filtered_speeds_show_late_is_what_the_arm_came_with():
+    before = motion(LATER, ArmState.HOLD)
+    early = [before, motion(LATER + 2, ArmState.DAMP, energy=0.10)]
+    late = motion(LATER + 100, ArmState.DAMP, energy=0.12)
+    assert judge(*early, motion(LATER + 10, ArmState.DAMP, energy=0.30), late) is OK
+    assert judge(*early, motion(LATER + 14, ArmState.DAMP, energy=0.30), late) is not OK

@@ -47,3 +47,8 @@ def test_what_is_no_number_stays_so_and_is_refused_by_the_driver():
 def test_the_largest_change_of_every_joint_is_its_share_of_the_limit():
     given = bounded_torque(np.full(7, 99.0), np.zeros(7), LIMITS)
     assert given == pytest.approx(STEP)
+
+
+def test_a_change_just_beyond_the_step_is_held_back():
+    wanted = 1.5 * STEP
+    assert bounded_torque(wanted, np.zeros(7), LIMITS) == pytest.approx(STEP)

@@ -202,3 +202,14 @@ def test_uneven_rows_are_averaged_over_seconds():
     assert smooth.v_t[row] == pytest.approx(t[near].mean())
     kept = np.diff(t[prepare_trial(series, PrepareOptions(fastest=100.0)).indices])
     assert np.median(kept) == pytest.approx(0.010, rel=0.05)
+
+
+def test_of_uneven_rows_the_first_of_every_hundredth_second_is_kept():
+    rng = np.random.default_rng(2)
+    t = 7.0 + np.cumsum(rng.exponential(0.004, 800))
+    v_t = np.full(800, 0.1)
+    series = TractionSeries("S0", "uneven", t, v_t, v_t, v_t)
+    kept = prepare_trial(series, PrepareOptions()).indices
+    numbers = np.floor((t - t[0]) / 0.01)
+    first = [int(np.flatnonzero(numbers == number)[0]) for number in np.unique(numbers)]
+    assert kept.tolist() == first

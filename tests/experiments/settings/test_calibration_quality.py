@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from pydantic import TypeAdapter, ValidationError
 
 from acquisition.errors import SettingsError
 from experiments.rig.build import build_tool
@@ -22,7 +23,7 @@ from ft_sensor.payload import TerrainFrame, payload_of
 from tests.experiments.program import write_config
 from tests.experiments.rig.test_friction_compensation import calibration as friction
 from tests.experiments.rig.test_gravity import calibration as gravity
-from wam.calibration.arm_identity import check_same_arm
+from wam.calibration.arm_identity import SerialNumbers, check_same_arm
 from wam.calibration.friction_file import friction_from_toml, friction_to_toml
 from wam.calibration.gravity_file import gravity_from_toml, gravity_to_toml
 from wam.model.constants import load_constants
@@ -177,3 +178,12 @@ def test_the_serial_numbers_of_the_arm_survive_a_file():
     assert stored.arm == ARM
     assert friction_from_toml(friction(arm=ARM), "friction.toml").arm == ARM
     assert gravity_from_toml(gravity(rig), "gravity.toml").arm is None
+
+
+def test_serial_numbers_are_those_that_a_puck_can_say():
+    numbers = TypeAdapter(SerialNumbers)
+    most = (2**31 - 1,) * 7
+    assert numbers.validate_python(most) == most
+    for wrong in (2**31, -1):
+        with pytest.raises(ValidationError):
+            numbers.validate_python((*most[:6], wrong))

@@ -186,3 +186,12 @@ def test_no_wall_is_armed_at_first(joint):
 def test_the_slightest_touch_of_a_wall_is_pushed_back(stop, sign):
     inside = stop + sign * (DEPTH - 0.002)
     assert pushed(armed(), at(inside))[3] == pytest.approx(sign * LIMIT / 0.2 * 0.002)
+
+
+def test_the_depth_has_the_sign_of_the_wall():
+    walls = SoftWalls(WALLS)
+    q = np.array([-0.95, 1.95, 0.0, 0.0, 0.0, -0.9, 1.9])
+    depth = walls.depth(q)
+    assert depth is not None
+    assert depth.tolist() == pytest.approx([0.05, -0.05, 0.0, 0.0, 0.0, 0.0, 0.0])
+    assert walls.depth(np.zeros(7)) is None

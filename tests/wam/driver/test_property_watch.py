@@ -8,7 +8,7 @@ from fakes.pucks.options import NetworkOptions
 from tests.fakes.stepped import Rig
 from wam.bus.frames import MOTOR_NODES
 from wam.driver.arm import WamArm
-from wam.driver.property_watch import WATCHED
+from wam.driver.property_watch import WATCHED, PropertyWatch
 from wam.driver.settings import ArmSettings
 
 CYCLE_NS = 2_000_000
@@ -66,3 +66,15 @@ def test_no_cycle_has_two_questions():
     nodes = (*MOTOR_NODES, 10)
     times = [t for t, i, d in bench.rig.sent if i in nodes and len(d) == 1]
     assert len({t // CYCLE_NS for t in times}) == len(times)
+
+
+def questions(watch, count):
+    return {watch.next_question() for _ in range(count)}
+
+
+def test_an_even_number_of_questions_is_asked_in_turn_too():
+    watch = PropertyWatch()
+    answers = [dict.fromkeys(WATCHED, 1)] * 6
+    watch.begin([*answers, dict.fromkeys(WATCHED[1:], 1)], (200,) * 7)
+    count = len(WATCHED) * 7 - 1
+    assert len(questions(watch, count)) == count

@@ -1,5 +1,6 @@
 """Start-up: who is late, who is missing, and what the encoders say."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
@@ -190,3 +191,19 @@ def test_motors_are_let_go_unless_the_arm_is_active(mode):
     assert info.safety_mode is mode
     told = [d for _, i, d in rig.sent if i == 0x404 and len(d) == 6 and d[0] == 0x88]
     assert told == ([] if mode is SafetyMode.ACTIVE else [b"\x88" + bytes(5)])
+
+
+def test_pucks_that_cannot_be_told_apart_are_warned_of():
+    rig = Rig(counts=HOME_COUNTS)
+    assert not any("same serial" in text for text in start(rig).warnings)
+    rig.network.set_property(3, "SN", 1005)
+    (told,) = [text for text in start(rig).warnings if "same serial" in text]
+    assert "1001 1002 1005 1004 1005 1006 1007" in told
+
+
+def test_a_serial_number_that_no_puck_told_is_unknown_in_a_recording():
+    info = start(Rig(counts=HOME_COUNTS))
+    assert info.metadata()["arm:serials"] == "1001 1002 1003 1004 1005 1006 1007"
+    unknown = (replace(info.pucks[0], serial=None), *info.pucks[1:])
+    serials = replace(info, pucks=unknown).metadata()["arm:serials"]
+    assert serials == "? 1002 1003 1004 1005 1006 1007"
