@@ -25,7 +25,7 @@ def commission(folder, *more):
 def day(tmp_path_factory):
     """Return the folder of a sound arm that was commissioned in one run."""
     folder = tmp_path_factory.mktemp("day")
-    write_config(folder)
+    write_config(folder, travel=0.45)  # whose corners can be told apart
     done = commission(folder, *NAMES)
     assert done.code == 0, (done.out, done.err)
     return folder, done
