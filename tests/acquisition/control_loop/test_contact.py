@@ -77,6 +77,11 @@ def test_a_load_at_its_limit_is_none(seen):
     assert follow([seen] * 500)[0] is OK
 
 
+def test_a_load_at_the_limit_of_hold_does_not_hold_the_arm():
+    at_both = load(force=150.0, moment=15.0)
+    assert follow([at_both] * 500, is_recording=False)[0] is OK
+
+
 def test_what_an_arm_meets_in_its_own_move_makes_it_hold_after_ten_milliseconds():
     moving = {"is_recording": False, "is_moving": True}
     verdict, cycle = follow([load(force=40.1)] * 20, **moving)

@@ -5,11 +5,14 @@ import hashlib
 import os
 import stat
 import struct
+import zlib
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
 from mcap.records import Message, Metadata
 
+from acquisition.clock import NS_PER_S
 from acquisition.errors import TrialFileError
 from acquisition.recording.recorder import seal
 from acquisition.sample import Flag
@@ -380,6 +383,16 @@ def test_an_impossible_time_in_a_torn_chunk_is_not_believed(put, left):
     assert recover_file(put(bytes(data))).seconds_dropped == 0.0
 
 
+@pytest.mark.parametrize(("minutes", "is_believed"), [(59, True), (61, False)])
+def test_a_torn_chunk_is_believed_for_an_hour(put, left, minutes, is_believed):
+    last = chunks(left)[-1]
+    before_ns = struct.unpack_from("<Q", left, chunks(left)[-2].body + 8)[0]
+    data = bytearray(left[: last.end - 5])
+    struct.pack_into("<Q", data, last.body + 8, before_ns + minutes * 60 * NS_PER_S)
+    dropped = recover_file(put(bytes(data))).seconds_dropped
+    assert dropped == pytest.approx(minutes * 60.0 * is_believed, abs=0.01)
+
+
 def test_a_bad_cadence_does_not_keep_a_trial_from_being_saved(tmp_path):
     slow = make_cycles(100)
     slow["host_ns"] = START_NS + np.arange(100) * 3_000_000
@@ -523,6 +536,58 @@ def test_a_record_that_refers_to_nothing_is_left_out(tmp_path, records, reason):
     assert kinds == ["Channel", "Message", "Gap", "Message"]
     assert reason in salvage.reason
     assert salvage.lost_bytes == len(records)
+
+
+def chunk_record(content, crc):
+    """Return a chunk that is not compressed; `crc` 0 = without a checksum."""
+    head = struct.pack("<QQQIIQ", 0, 0, len(content), crc, 0, len(content))
+    return record(CHUNK, head + content)
+
+
+def kinds_of(data, path):
+    return [type(one).__name__ for one in SoundRecords(data, path)]
+
+
+def test_behind_damage_a_chunk_without_a_checksum_proves_nothing(tmp_path):
+    content = channel_record(1, 0) + message_record(1)
+    path, damage = tmp_path / "T01.mcap", b"\xff" * 30
+    proved = chunk_record(content, zlib.crc32(content))
+    bare, whole = chunk_record(content, 0), ["Channel", "Message"]
+    assert kinds_of(MAGIC_BYTES + damage + proved, path) == ["Gap", *whole]
+    assert kinds_of(MAGIC_BYTES + damage + bare, path) == ["Gap"]
+    assert kinds_of(MAGIC_BYTES + bare, path) == whole
+
+
+def test_a_record_of_a_kind_that_there_is_not_ends_no_gap(put, left):
+    third, fourth = chunks(left)[2:4]
+    unknown = record(16, bytes(20))
+    data = flipped(left, third.end - 9)
+    data = data[: third.end] + unknown + data[third.end :]
+    salvage = salvaged_messages(data, put(data))[1]
+    gaps = [(gap.start, gap.end) for gap in salvage.gaps]
+    assert gaps == [(third.start, fourth.start + len(unknown))]
+
+
+def test_a_definition_that_an_attachment_quotes_defines_nothing(tmp_path):
+    quoted = channel_record(77, 0) * 2
+    fields = struct.pack("<QQI", 0, 0, 1) + b"a" + struct.pack("<IQ", 0, len(quoted))
+    body = fields + quoted
+    attachment = record(ATTACHMENT, body + struct.pack("<I", zlib.crc32(body)))
+    content = message_record(77)
+    data = MAGIC_BYTES + attachment + chunk_record(content, zlib.crc32(content))
+    salvage = SoundRecords(data, tmp_path / "T01.mcap")
+    assert [type(one).__name__ for one in salvage] == ["Attachment", "Gap"]
+    assert "messages without a channel" in salvage.reason
+
+
+def test_a_channel_without_a_schema_has_none_in_the_copy(put, left):
+    data = left + channel_record(99, 0) + message_record(99)
+    recovery = recover_file(put(data))
+    with recovery.path.open("rb") as file:
+        channels = make_reader(file).get_summary().channels.values()
+    schemas = {channel.topic: channel.schema_id for channel in channels}
+    assert schemas["/x"] == 0
+    assert schemas["/cycle"] > 0
 
 
 def test_nothing_of_a_chunk_is_given_that_breaks_in_its_middle(tmp_path):

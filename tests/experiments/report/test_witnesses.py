@@ -133,3 +133,11 @@ def test_a_journal_with_two_faults_is_named_once(crate):
     sum_again(crate)
     found = [text for text in texts(crate) if "events.jsonl" in text]
     assert len(found) == 1
+
+
+@pytest.mark.parametrize(("before", "is_named"), [(99_999, True), (100_000, False)])
+def test_a_description_is_read_for_a_hundred_thousand_files(crate, before, is_named):
+    (crate / "fits.csv").unlink()
+    describe(crate, [{}] * before + [{"@type": "File", "@id": "fits.csv"}])
+    sum_again(crate)
+    assert bool(texts(crate)) is is_named

@@ -40,6 +40,15 @@ def test_a_trial_begins_with_space_and_not_with_a_key_that_means_nothing(tmp_pat
     assert context.operator.keys == ["n"]
 
 
+@pytest.mark.parametrize(
+    ("keys", "ticked"), [("1", {1}), ("13", {1, 3}), ("131", {3}), ("1331", set())]
+)
+def test_a_digit_ticks_a_step_of_the_reset_or_takes_it_back(tmp_path, keys, ticked):
+    context = make_context(tmp_path, Keys(*keys, " "))
+    wait_ready(context, FIRST)
+    assert ready_view(context).ticked == ticked
+
+
 def test_quit_lets_the_next_trial_be_the_last(tmp_path):
     context = make_context(tmp_path, Keys("q", " "))
     wait_ready(context, FIRST)

@@ -311,7 +311,7 @@ def test_the_first_fault_of_a_tare_is_due_at_its_beginning(tmp_path):
 
 def test_the_journal_has_the_bias_to_a_tenth_of_a_millinewton(tmp_path):
     context = lifted(tmp_path)
-    context.loop_client.force = lambda s: 0.1 + 1.23456e-4 + 0.1 * (s > 0.8)
+    context.loop_client.force = lambda s: 0.1 + 1.23456e-4 + 0.1003456 * (s > 0.8)
     take_tare(context, TrialName(1, 1))
     (event,) = events(context, Event.TARED)
     assert event["bias"][0] == round(context.loop_client.bias[0], 4)

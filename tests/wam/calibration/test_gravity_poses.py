@@ -306,3 +306,14 @@ def test_a_wrist_that_cannot_turn_anywhere_is_refused(model):
 
     with pytest.raises(SettingsError, match="wrist"):
         tilted_pair(model, Closed(FLOOR))
+
+
+@pytest.mark.parametrize("way", [-1.0, 1.0])
+def test_a_pose_may_be_as_close_to_a_stop_as_its_approach_needs(model, way):
+    constants, pose = model.constants, np.array(UPRIGHT)
+    stop = constants.q_lower if way < 0.0 else constants.q_upper
+    pose[6] = stop[6] - way * OFFSET
+    check_poses(model, [pose], SPACE)
+    pose[6] += way * 1e-9
+    with pytest.raises(SettingsError, match="joint 7 is beyond its stop"):
+        check_poses(model, [pose], SPACE)

@@ -264,14 +264,17 @@ def test_a_hold_uses_its_share_of_the_limit_and_no_more_weight_included(
     assert tau[:6] == pytest.approx(np.full(6, way * 0.9 * 40.0))
 
 
-def test_a_hold_adds_nothing_to_a_weight_beyond_its_share(foot_model):
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_hold_adds_nothing_to_a_weight_beyond_its_share(foot_model, side):
+    leaning = np.array([0, side * 0.9, 0, 0.3, 0, 0, 0.2])
     law = with_walls(foot_model, torque=4.0)
-    law.enter(ArmState.HOLD, reading(0.0))
-    gravity = law.torque(reading(5.0))[1]
-    assert abs(gravity[1]) > 5.0
+    law.enter(ArmState.FLOAT, reading(0.0, q=leaning))  # held nowhere else
+    law.enter(ArmState.HOLD, reading(0.0, q=leaning))
+    gravity = law.torque(reading(5.0, q=leaning))[1]
+    assert -side * gravity[1] > 5.0
     falling = -np.sign(gravity) * 100.0
-    assert law.torque(reading(5.0, qd=falling))[0][1] == gravity[1]
-    rising = law.torque(reading(5.0, qd=-falling))[0][1]
+    assert law.torque(reading(5.0, q=leaning, qd=falling))[0][1] == gravity[1]
+    rising = law.torque(reading(5.0, q=leaning, qd=-falling))[0][1]
     assert abs(rising) == pytest.approx(0.9 * 4.0)
 
 
@@ -327,3 +330,11 @@ def test_a_hold_in_the_middle_of_a_move_begins_with_the_torque_of_the_move(law):
     law.enter(ArmState.HOLD, half)
     tau, gravity = law.torque(half)
     assert tau[3] - gravity[3] == pytest.approx(-0.5, abs=0.05)  # 500 N m/rad
+
+
+def test_the_lock_of_joint_7_fades_evenly_as_a_move_begins(law):
+    law.enter(ArmState.HOLD, reading(0.0))
+    law.move_to(DOWN, 0.5, reading(1.0))
+    times = (1.0, 1.25, 1.5, 2.0)
+    tau = np.array([law.torque(reading(t, q=moved(0.01)))[0][6] for t in times])
+    assert tau - tau[-1] == pytest.approx([-0.2, -0.1, 0.0, 0.0], abs=1e-9)

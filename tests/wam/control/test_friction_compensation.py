@@ -314,6 +314,22 @@ def test_twelve_turns_within_a_second_are_a_swing(turns, gap, is_over):
     assert compensation.metadata()["friction:swung_motor"] == str(3 * is_over)
 
 
+def test_what_a_swinging_motor_got_fades_evenly():
+    """Its twelfth turn ends the compensation; from there it rests."""
+    compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.7)
+    end = 3.0 * REACH[2] * motor_turns(CONSTANTS)[2]
+    angles = np.zeros((600, 7))
+    last = 1 + 11 * 45
+    for turn in range(0, 12, 2):
+        angles[1 + turn * 45 : 1 + (turn + 1) * 45, 2] = end
+    tau = after(compensation, angles)
+    assert compensation.swung_motor == 3
+    assert tau[last] == pytest.approx(-tau[last - 1])
+    assert np.abs(tau[last]).max() > 0.1
+    for cycles, share in ((0, 1.0), (10, 0.8), (25, 0.5), (50, 0.0), (90, 0.0)):
+        assert tau[last + cycles] == pytest.approx(share * tau[last])
+
+
 def test_what_is_left_fades_evenly_for_a_tenth_of_a_second():
     compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.7)
     whole = after(compensation, turning(1, 0.3))[-1]

@@ -39,6 +39,7 @@ def held():
 
 def test_the_springs_are_half_as_stiff_as_those_that_follow_moves(held):
     assert held.spring(seen(np.full(7, 1e-3))) == pytest.approx(-1e-3 * SOFT)
+    assert held.stiffness == pytest.approx(SOFT)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])

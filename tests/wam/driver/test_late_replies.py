@@ -194,3 +194,12 @@ def test_a_start_says_that_positions_come_too_late_and_not_that_they_are_missing
         rig.network.faults.delay(position_reply_id(node), 3_950_000, None)
     with pytest.raises(LinkTimeoutError, match=r"in time: \d+ replies came after"):
         arm.start()
+
+
+def test_a_cycle_that_does_not_ask_waits_little_longer_than_an_exchange():
+    """The last answer comes after 0.6 ms; replies are given up after 1.5 ms."""
+    bench = Bench(first_look_ns=100_000)
+    bench.run(EVERY - 1)
+    begun_ns = bench.rig.clock.t_ns
+    assert bench.arm.read(begun_ns).is_unasked
+    assert 700_000 < bench.rig.clock.t_ns - begun_ns < 1_000_000

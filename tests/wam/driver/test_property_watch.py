@@ -78,3 +78,17 @@ def test_an_even_number_of_questions_is_asked_in_turn_too():
     watch.begin([*answers, dict.fromkeys(WATCHED[1:], 1)], (200,) * 7)
     count = len(WATCHED) * 7 - 1
     assert len(questions(watch, count)) == count
+
+
+def test_every_start_asks_from_the_first_one_on():
+    watch = PropertyWatch()
+    for _ in range(2):
+        watch.begin([dict.fromkeys(WATCHED, 1)] * 7, (200,) * 7)
+        nodes = [watch.next_question()[0] for _ in range(9)]
+        assert nodes == [1, 2, 3, 4, 5, 6, 7, 1, 2]
+
+
+def test_the_only_question_is_asked_again_and_again():
+    watch = PropertyWatch()
+    watch.begin([{}] * 6 + [{"MT": 1370}], (200,) * 7)
+    assert len(questions(watch, 3)) == 1

@@ -166,3 +166,17 @@ def test_the_shipped_table_holds_the_constants_of_the_model():
         "MT": constants.mt,
     }
     assert compare(shipped_table(), found) == []
+
+
+def test_three_ways_to_set_a_puck_right_are_told_and_no_more():
+    three = ((3, "PIDX", 2), (6, "PIDX", 1), (3, "GRPB", 2))
+    assert "and so on" not in refusal(*three).hint
+    error = refusal(*three, (5, "GRPA", 1))
+    assert error.message.count("expected") == 4
+    assert ", and so on." in error.hint
+    assert error.hint.count("#9E") == 3  # each of them is kept by a frame
+
+
+def test_motors_of_one_differential_may_differ_by_two_percent():
+    assert start([(3, "IPNM", 2646)]).warnings == ()
+    assert "IPNM of puck 3 is 2645" in refusal((3, "IPNM", 2645)).message
