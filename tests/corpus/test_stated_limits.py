@@ -121,6 +121,20 @@ def test_chunks_that_unpack_to_too_much_end_what_is_read(tmp_path):
     assert salvage.gaps[0].start == chunk.start + 4 * (chunk.end - chunk.start)
 
 
+def test_chunks_may_unpack_to_all_that_is_allowed(tmp_path):
+    """Twelve of 16 MiB each; zeros behind them make the file large enough."""
+    content = b"\x99" + (16 * MIB - 9).to_bytes(8, "little") + bytes(16 * MIB - 9)
+    data = with_chunk(zstandard.compress(content), 16 * MIB)
+    chunk = span_of(data, CHUNK)
+    size = chunk.end - chunk.start
+    full = data[: chunk.start] + 13 * data[chunk.start : chunk.end] + bytes(2 * MIB)
+    assert unpacked_limit(len(full)) == 12 * 16 * MIB
+    salvage = SoundRecords(full, tmp_path / "T01.mcap")
+    list(salvage)
+    assert salvage.gaps[0].start == chunk.start + 12 * size
+    assert "unpack to too much" in salvage.reason
+
+
 def test_a_trial_has_no_more_cycles_than_are_allowed(tmp_path, monkeypatch):
     """Of 50 cycles, with the limit put beside them."""
     path = tmp_path / "T01.mcap"

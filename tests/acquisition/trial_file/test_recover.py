@@ -300,6 +300,16 @@ def test_a_chunk_that_is_gone_is_said_to_be_lost(put, sealed):
     assert recovery.losses == (LostSpan(0.204, 0.1),)
 
 
+def test_a_chunk_that_stands_there_twice_is_taken_once(put, left):
+    last = chunks(left)[-1]
+    again = left[last.start : last.end]
+    whole, _ = salvaged_messages(left, put(left))
+    found, salvage = salvaged_messages(left + again, put(left))
+    assert found == whole
+    assert "a chunk out of order" in salvage.reason
+    assert salvage.lost_bytes == len(again)
+
+
 def test_a_zeroed_first_chunk_is_known_from_the_summary(put, sealed):
     first = chunks(sealed)[0]
     zeroed = sealed[: first.body] + bytes(first.end - first.body) + sealed[first.end :]

@@ -92,3 +92,10 @@ def test_the_only_question_is_asked_again_and_again():
     watch = PropertyWatch()
     watch.begin([{}] * 6 + [{"MT": 1370}], (200,) * 7)
     assert len(questions(watch, 3)) == 1
+
+
+def test_nothing_is_asked_for_before_a_start_or_of_silent_pucks():
+    watch = PropertyWatch()
+    assert watch.next_question() is None
+    watch.begin([dict.fromkeys(WATCHED)] * 7, (200,) * 7)
+    assert watch.next_question() is None
