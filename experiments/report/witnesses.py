@@ -12,7 +12,7 @@ from experiments.session.kept_files import compare_kept
 from experiments.session.store import list_sessions
 
 _LARGEST = 64_000_000  # bytes of the description
-_MOST = 100_000  # files that it names
+_MOST = 100_000  # files and others that it names
 
 
 def changed_publication(folder: Path) -> list[ChangedFile]:
@@ -50,8 +50,10 @@ def _described(path: Path) -> list[str]:
     graph = None if content is None else content.get("@graph")
     if not isinstance(graph, list):
         raise TrialFileError(path, "describes no crate")
+    if len(cast("list[object]", graph)) > _MOST:
+        raise TrialFileError(path, f"describes more than {_MOST} things")
     names: list[str] = []
-    for entity in cast("list[object]", graph)[:_MOST]:
+    for entity in cast("list[object]", graph):
         known = cast("dict[str, object]", entity if isinstance(entity, dict) else {})
         name = known.get("@id") if known.get("@type") == "File" else None
         if isinstance(name, str) and _is_below(name):
