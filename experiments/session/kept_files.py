@@ -142,10 +142,14 @@ def _unknown_to_journal(
 
 
 def contradiction(folder: SessionFolder, events: Sequence[_Facts]) -> Deviation | None:
-    """Return what the journal says otherwise than the folder's name; None = nothing.
+    """Return what is said otherwise than by the folder's name; None = nothing.
 
-    A name decides where a session counts, and whether as a simulated one.
+    A name decides where a session counts, and whether as a simulated one. The journal
+    and session.json know it too.
     """
+    stated = read_json(folder.path / SUMMARY_FILE).get("simulated")
+    if isinstance(stated, bool) and stated is not folder.is_simulated:
+        return _of_the_other_kind(folder, SUMMARY_FILE, is_simulated=stated)
     if not events or events[0].get("event") != Event.STARTED:
         return None
     first = events[0]
@@ -154,11 +158,15 @@ def contradiction(folder: SessionFolder, events: Sequence[_Facts]) -> Deviation 
         return Deviation(folder.id, JOURNAL_FILE, f"is of {terrain}: a renamed session")
     is_simulated = first.get("fake", folder.is_simulated or None) is not None
     if is_simulated is not folder.is_simulated:
-        kind = "simulated" if is_simulated else "recorded"
-        return Deviation(
-            folder.id, JOURNAL_FILE, f"is of {kind} trials: a renamed session"
-        )
+        return _of_the_other_kind(folder, JOURNAL_FILE, is_simulated=is_simulated)
     return None
+
+
+def _of_the_other_kind(
+    folder: SessionFolder, file: str, *, is_simulated: bool
+) -> Deviation:
+    kind = "simulated" if is_simulated else "recorded"
+    return Deviation(folder.id, file, f"is of {kind} trials: a renamed session")
 
 
 def repeated_numbers(folders: Sequence[SessionFolder]) -> dict[Path, Deviation]:

@@ -266,6 +266,16 @@ def test_a_name_that_contradicts_the_journal_is_named(data, session, name):
     assert any("a renamed session" in problem for problem in problems)
 
 
+@pytest.mark.parametrize(("mark", "kind"), [("", "simulated"), (".fake", "recorded")])
+def test_a_summary_of_the_other_kind_is_named(session, mark, kind):
+    """A journal of which the first line does not say it leaves session.json."""
+    folder = session.path.rename(session.path.with_name(f"2027-01-15_S001_TF{mark}"))
+    change_json(folder / "session.json", simulated=kind == "simulated")
+    renamed = find_session(folder.parents[1], "S001")
+    wanted = ("session.json", f"is of {kind} trials: a renamed session")
+    assert wanted in deviations(renamed)
+
+
 def test_a_trial_whose_files_follow_the_journal_later_is_no_deviation(session):
     """A verdict is in the journal before the files are moved."""
     for suffix in (".json", ".mcap"):
