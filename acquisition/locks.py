@@ -1,31 +1,33 @@
 """Advisory locks of open files; the death of a process opens those it has.
 
-A file system or an operating system without them locks nothing: everything is free.
+An operating system without them locks nothing: everything is free.
 """
 
-from contextlib import suppress
 
-
-def try_lock(descriptor: int, *, is_shared: bool = False) -> bool:
+def try_lock(descriptor: int, *, is_shared: bool = False, without: bool = True) -> bool:
     """Take the lock of an open file; return False where another process has it.
 
     Args:
         descriptor: of the file or folder.
         is_shared: others may have it at the same time, if they share it too.
+        without: what is returned where a file system has no locks.
     """
     try:
         _lock(descriptor, is_shared=is_shared, is_awaited=False)
     except BlockingIOError:
         return False
     except OSError:  # a file system without locks
-        return True
+        return without
     return True
 
 
 def wait_for_lock(descriptor: int) -> None:
-    """Take the lock of an open file as soon as nobody else has it."""
-    with suppress(OSError):  # a file system without locks
-        _lock(descriptor, is_shared=False, is_awaited=True)
+    """Take the lock of an open file as soon as nobody else has it.
+
+    Raises:
+        OSError: the file system has no locks.
+    """
+    _lock(descriptor, is_shared=False, is_awaited=True)
 
 
 def _lock(descriptor: int, *, is_shared: bool, is_awaited: bool) -> None:

@@ -72,8 +72,10 @@ def _remove(path: Path) -> None:
     except OSError:
         return
     try:
-        # one that is locked is in use, e.g. by a process of another container
-        if os.fstat(descriptor).st_uid == os.getuid() and try_lock(descriptor):
+        is_own = os.fstat(descriptor).st_uid == os.getuid()
+        # What is locked is in use, e.g. by a process of another container; without
+        # locks nobody can tell.
+        if is_own and try_lock(descriptor, without=False):
             shutil.rmtree(path, ignore_errors=True)
     finally:
         os.close(descriptor)

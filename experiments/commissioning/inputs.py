@@ -51,7 +51,10 @@ def present_inputs(
         ],
         "[control]": section.control.model_dump(mode="json"),
         "[can]": [section.can.model_dump(mode="json"), platform.release()],
-        "terrain": rig.row.model_dump(mode="json"),
+        "terrain": [
+            rig.row.model_dump(mode="json"),
+            texts.get(f"{PREFIX}{rig.row.calibration}", ""),
+        ],
     }
     if answers:
         content["pucks"] = _properties(answers, _PUCK)

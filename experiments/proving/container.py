@@ -20,7 +20,7 @@ def collect(scene: Scene) -> Values:
     """Have the corners touched; return the points and what the matrix says of them.
 
     Raises:
-        PreflightError: not activated, or an earlier step does not count.
+        PreflightError: not activated.
         ArmFaultError, StopRequestedError: as `ConsoleLoop.tick`.
     """
     row, frame = scene.rig.row, scene.rig.frame

@@ -9,8 +9,9 @@ run or unpacked to be read.
 import hashlib
 import io
 import json
+import tomllib
 import zipfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -30,6 +31,7 @@ from experiments.session.data_files import (
     parse_object,
     write_new,
 )
+from experiments.session.states import Event
 from experiments.session.store import JOURNAL_FILE, SessionFolder, iso_utc
 
 MANIFEST = "bundle.json"
@@ -44,10 +46,12 @@ _PERSONAL = frozenset(
         *("config", "foresight"),
     }
 )
+_OF_VERDICTS = _PERSONAL | {"reason"}
+_PREFLIGHT = "preflight.json"  # its texts are the program's own, but for paths
 _OF_SESSION = (
     "session.json",
     JOURNAL_FILE,
-    "preflight.json",
+    _PREFLIGHT,
     "provenance.json",
     "conditions.json",
     "config.toml",
@@ -91,10 +95,8 @@ class BundleContents:
             return
         if not self.is_redacted:
             self.files[name] = content
-        elif name.endswith((".json", ".jsonl")):
-            self.files[name] = _redacted(name, content)
-        elif name.endswith(".toml"):
-            self.files[name] = content
+        elif (hidden := _redacted(name, content)) is not None:
+            self.files[name] = hidden
         else:
             self.left_out[name] = "may hold names"
 
@@ -129,8 +131,8 @@ def write_bundle(
             contents.add(f"{part}/{path.name}", path)
     for path in sorted((folder.path / "faults").glob("*.mcap")):
         contents.add_flight(f"faults/{path.name}", path)
-    for path in others:
-        contents.add(f"others/{path.name}", path)
+    for number, path in enumerate(others, 1):
+        contents.add(f"others/{number}_{path.name}", path.resolve())
     write_new(to, _archive(contents, _manifest(folder, contents)))
     return contents
 
@@ -178,29 +180,79 @@ def _plain(value: float) -> float | None:
     return round(value, 4) if np.isfinite(value) else None
 
 
-def _redacted(name: str, content: bytes) -> bytes:
-    """Return JSON, or a journal, in which what persons wrote is hidden."""
+def _redacted(name: str, content: bytes) -> bytes | None:
+    """Return a file of a session without what persons wrote; None = not known how."""
     if name == JOURNAL_FILE:
         events = enumerate(map(parse_line, content.splitlines()), 1)
         return b"".join(
-            journal_line(cast("dict[str, object]", _hidden(event)), number)
+            journal_line(_hidden_event(event), number)
             for number, event in events
             if event is not None
         )
-    found = parse_object(content)
-    return b"{}" if found is None else json.dumps(_hidden(found), indent=1).encode()
+    if name.startswith("others/"):
+        return None
+    if name.endswith(".toml"):
+        return _without_comments(content)
+    found = parse_object(content) if name.endswith(".json") else None
+    if found is None:
+        return None
+    is_preflight = name == _PREFLIGHT
+    shown = _hidden_paths(found) if is_preflight else _hidden(found, _OF_VERDICTS)
+    return json.dumps(shown, indent=1).encode()
 
 
-def _hidden(value: object) -> object:
-    """Return plain values in which what persons wrote, and paths, are hidden."""
+def _hidden_event(event: dict[str, object]) -> dict[str, object]:
+    """Return an event of the journal; the reason of a later verdict is typed."""
+    is_typed = event.get("event") == Event.VERDICT
+    shown = _hidden(event, _OF_VERDICTS if is_typed else _PERSONAL)
+    return cast("dict[str, object]", shown)
+
+
+def _hidden_paths(preflight: Mapping[str, object]) -> dict[str, object]:
+    """Return a preflight; the row that names rig.toml has the path of its folder."""
+    checks = preflight.get("checks")
+    rows = cast("list[object]", checks) if isinstance(checks, list) else []
+    shown = [
+        {**row, "text": HIDDEN} if row.get("name") == "config" else row
+        for row in (cast("Row", row) for row in rows if isinstance(row, dict))
+    ]
+    return {**preflight, "checks": shown}
+
+
+def _without_comments(content: bytes) -> bytes | None:
+    """Return TOML that says the same without comments, None where that is not sure."""
+    try:
+        text = content.decode()
+        shorter = "\n".join(map(_bare, text.splitlines())) + "\n"
+        is_same = tomllib.loads(shorter) == tomllib.loads(text)
+    except ValueError:
+        return None
+    return shorter.encode() if is_same else None
+
+
+def _bare(line: str) -> str:
+    """Return a line of TOML up to the first # that is in no quotes."""
+    quote = ""
+    for at, sign in enumerate(line):
+        if quote:
+            quote = "" if sign == quote else quote
+        elif sign in "\"'":
+            quote = sign
+        elif sign == "#":
+            return line[:at].rstrip()
+    return line
+
+
+def _hidden(value: object, names: Collection[str]) -> object:
+    """Return plain values in which the fields of these names are hidden."""
     if isinstance(value, dict):
         fields = cast("dict[str, object]", value)
         return {
-            key: HIDDEN if key in _PERSONAL and item else _hidden(item)
+            key: HIDDEN if key in names and item else _hidden(item, names)
             for key, item in fields.items()
         }
     if isinstance(value, list):
-        return [_hidden(item) for item in cast("list[object]", value)]
+        return [_hidden(item, names) for item in cast("list[object]", value)]
     return value
 
 

@@ -122,7 +122,11 @@ def _head(bundle: Bundle) -> Iterator[str]:
     if versions:
         yield f"Recorded with {', '.join(versions)}"
     for prefix, device in _DEVICES:
-        said = [f"{k.removeprefix(prefix)} {v}" for k, v in code.items() if prefix in k]
+        said = [
+            f"{key.removeprefix(prefix)} {value}"
+            for key, value in code.items()
+            if key.startswith(prefix)
+        ]
         if said:
             yield f"{device}: {', '.join(said)}"
 

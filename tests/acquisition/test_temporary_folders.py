@@ -1,5 +1,6 @@
 """Temporary folders of killed processes are removed, those of living ones stay."""
 
+import errno
 import fcntl
 import os
 import signal
@@ -76,6 +77,18 @@ def test_a_locked_folder_stays_though_its_number_is_unknown_here(tmp_path):
     os.close(descriptor)
     remove_abandoned("room", tmp_path)
     assert not path.exists()
+
+
+def test_without_locks_nobody_knows_whether_a_folder_is_in_use(tmp_path, monkeypatch):
+    def flock(*_):
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    path = tmp_path / f"room-{_dead_pid()}-abc"
+    path.mkdir()
+    monkeypatch.setattr(fcntl, "flock", flock)
+    with temporary_folder("room", tmp_path) as own:
+        assert own.is_dir()
+    assert path.exists()
 
 
 @pytest.mark.parametrize("name", ["room-x-abc", "room-1", "other-{pid}-abc"])

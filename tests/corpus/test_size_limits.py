@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.corpus.used_session import session_files
+from tests.corpus.used_session import lay_out
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(180)]
 ROOT = Path(__file__).parents[2]
@@ -79,11 +79,7 @@ def sparse(path, size):
 
 @pytest.fixture
 def data(tmp_path):
-    for path, content in session_files().items():
-        target = tmp_path / "data" / path
-        target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_bytes(content)
-    return tmp_path / "data"
+    return lay_out(tmp_path / "data")
 
 
 @pytest.mark.parametrize("name", SESSION_FILES)

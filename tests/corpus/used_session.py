@@ -73,6 +73,15 @@ def _record(journal: Journal, name: TrialName, verdict: Event) -> None:
     journal.append(verdict, **fields, reason="", who="mk")
 
 
+def lay_out(folder: Path) -> Path:
+    """Write the data with the session into `folder` and return that."""
+    for name, content in session_files().items():
+        target = folder / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_bytes(content)
+    return folder
+
+
 def use(name: str, data: bytes, folder: Path) -> None:
     """Run commands on the session, with `data` in place of its file `name`.
 

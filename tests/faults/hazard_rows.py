@@ -35,7 +35,7 @@ ROWS: dict[str, dict[str, Fields]] = {
         "stuck": (
             "the joint is pulled faster and faster while the arm moves by itself; in a trial speed and place are recorded wrongly",
             "encoder or its puck stands still and goes on answering",
-            "in a move: a motor that does not turn, while the move goes on and its torque would move it for certain (1.5 times the dry friction identified on another arm and a share of the weight). In a trial: motors 2 to 6 that stand while the sole goes 60 mm (a sound arm that sticks: 35 mm); motors 1 and 7 are not looked at, for both may stand in a sound trial. Not detected while the arm stands",
+            "in a move: a motor that does not turn, while the move goes on and its torque would move it for certain (1.5 times the dry friction identified on another arm, at joint 1 1.65, and a share of the weight). In a trial: motors 2 to 6 that stand while the sole goes 60 mm (a sound arm that sticks: 35 mm); motors 1 and 7 are not looked at, for both may stand in a sound trial. Not detected while the arm stands",
             "idle",
             _STUCK,
             "measured in a move and while the sole stands. On an arm almost without friction (0.02) a wrist joint reaches 1.7 of its limit in other moves, with 0.3 of it 1.1. An encoder that freezes within the last 17 mrad of joint 7's way is noticed in the next move only. In a trial motor 7, frozen, lets the ground turn the foot: 2.1 of the limit",

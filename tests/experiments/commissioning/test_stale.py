@@ -13,6 +13,7 @@ from experiments.commissioning.inputs import present_inputs
 from experiments.commissioning.steps import BASES, ORDER, TOLD
 from experiments.preflight.connecting import connect_rig
 from experiments.rig.rig import FakeOptions
+from experiments.settings.calibrations import PREFIX
 from experiments.settings.load import load_settings
 from lab.guest.commissioned import record_of
 from tests.experiments.commissioning.test_record import NOON
@@ -103,3 +104,18 @@ def test_a_module_with_another_firmware(sound):
 def test_every_basis_is_changed_by_a_test():
     # What only persons know stands in tests/experiments/commissioning/test_record.py.
     assert {*SETTINGS, *TOLD, "pucks", "motors", "module"} == set(BASES)
+
+
+def test_a_container_that_was_measured_again_under_the_same_name(sound):
+    rig, answers, info = sound
+    row = rig.row.model_copy(update={"calibration": "terrain_S0.toml"})
+
+    def measured(text):
+        texts = {**rig.settings.calibrations, f"{PREFIX}terrain_S0.toml": text}
+        settings = replace(rig.settings, calibrations=texts)
+        return replace(rig, row=row, settings=settings)
+
+    before = commissioned(present_inputs(measured("incline = 0.1"), answers, info))
+    again = present_inputs(measured("incline = 0.2"), answers, info)
+    found = [lack.step for lack in lacks(before, again, NOON)]
+    assert tuple(found) == BASES["terrain"].steps

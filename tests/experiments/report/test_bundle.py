@@ -13,20 +13,17 @@ from acquisition.trial_file.writer import FLIGHT_TOPICS
 from experiments.report import bundle_story
 from experiments.report.bundle import HIDDEN, MANIFEST, write_bundle
 from experiments.report.bundle_story import read_bundle, story
-from experiments.session.data_files import line_faults
+from experiments.session.data_files import journal_line, line_faults
 from experiments.session.store import find_session
 from tests.acquisition.trials import make_cycles, write_trial
-from tests.corpus.used_session import session_files
+from tests.corpus.used_session import lay_out
 from tests.experiments.program import traction
 
 
 @pytest.fixture
 def data(tmp_path):
     """Return data with a small session that has a flight recording."""
-    for name, content in session_files().items():
-        target = tmp_path / name
-        target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_bytes(content)
+    lay_out(tmp_path)
     folder = find_session(tmp_path, "S001").path
     (folder / "faults").mkdir(exist_ok=True)
     flight = folder / "faults" / "T03.flight.mcap"
@@ -57,7 +54,7 @@ def test_what_happened_can_be_read_from_it(data):
     log.write_text("(1.000000) can0 404#30\n")
     contents, bundle = bundled(data, log)
     assert contents.left_out == {}
-    assert "others/bus.log" in bundle.files
+    assert "others/1_bus.log" in bundle.files
     lines = list(story(bundle))
     assert lines[0] == "Session S001 on TF, SIMULATED"
     assert "Preflight: 1 of 2 good" in lines
@@ -93,6 +90,58 @@ def test_names_and_notes_are_hidden(data):
     assert HIDDEN in journal.decode()
     assert "names and notes hidden" in "\n".join(story(bundle))
     assert any("T03.flight" in line for line in story(bundle))  # its last seconds
+
+
+def test_what_a_redacted_bundle_is_for_stays_in_it(data):
+    """The preflight's own words, and settings without comments."""
+    folder = find_session(data, "S001").path
+    checks = [
+        {"mark": "▲", "name": "config", "text": "/home/ada/lab/rig.toml, TF"},
+        {"mark": "✘", "name": "bus", "text": "can0 is down"},
+    ]
+    (folder / "preflight.json").write_text(json.dumps({"checks": checks}))
+    text = '# of Ada\n[can]\nchannel = "a#b"  # Ada\'s "own"\n'
+    (folder / "config.toml").write_text(text)
+    (folder / "matrix.toml").write_text('a = """\n# not a comment\n"""  # Ada\n')
+    contents, bundle = bundled(data, is_redacted=True)
+    lines = list(story(bundle))
+    assert "  ✘ bus  can0 is down" in lines
+    assert f"  ▲ config  {HIDDEN}" in lines
+    assert bundle.files["config.toml"].split() == b'[can] channel = "a#b"'.split()
+    assert contents.left_out["matrix.toml"] == "may hold names"
+    assert not any(b"Ada" in content for content in bundle.files.values())
+
+
+def test_a_typed_reason_is_hidden_and_a_stop_is_not(data):
+    folder = find_session(data, "S001").path
+    journal = folder / "events.jsonl"
+    events = [
+        {"event": "trial-rejected", "trial": 1, "reason": "interrupted: estop"},
+        {"event": "verdict-changed", "trial": 1, "reason": "Ada leant on it"},
+    ]
+    journal.write_bytes(b"".join(journal_line(e, i) for i, e in enumerate(events, 1)))
+    sidecar = folder / "trials" / "T01.json"
+    fields = {"history": [{"reason": "Ada leant on it"}], "stop_reason": "travel"}
+    sidecar.write_text(json.dumps(fields))
+    _, bundle = bundled(data, is_redacted=True)
+    assert b"interrupted: estop" in bundle.files["events.jsonl"]
+    assert b"travel" in bundle.files["trials/T01.json"]
+    assert not any(b"Ada" in content for content in bundle.files.values())
+
+
+def test_files_of_one_name_and_links_that_a_person_names_are_taken(data):
+    for name in ("a", "b"):
+        (data / name).mkdir()
+        (data / name / "bus.log").write_text(name)
+    (data / "link.log").symlink_to(data / "a" / "bus.log")
+    named = [data / "a/bus.log", data / "b/bus.log", data / "link.log"]
+    _, bundle = bundled(data, *named)
+    found = {n: c for n, c in bundle.files.items() if n.startswith("others/")}
+    assert found == {
+        "others/1_bus.log": b"a",
+        "others/2_bus.log": b"b",
+        "others/3_link.log": b"a",
+    }
 
 
 def test_what_is_too_large_is_left_out_by_name(data, monkeypatch):

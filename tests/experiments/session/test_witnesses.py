@@ -18,7 +18,7 @@ from experiments.session.kept_files import (
     repeated_trials,
 )
 from experiments.session.store import find_session, list_sessions
-from tests.corpus.used_session import session_files
+from tests.corpus.used_session import lay_out, session_files
 
 SIZE = len(session_files()["sessions/2027-01-15_S001_TF.fake/trials/T01.mcap"])
 CHECKSUM = "is changed: its checksum is wrong"
@@ -26,11 +26,7 @@ CHECKSUM = "is changed: its checksum is wrong"
 
 @pytest.fixture
 def data(tmp_path):
-    for name, content in session_files().items():
-        target = tmp_path / name
-        target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_bytes(content)
-    return tmp_path
+    return lay_out(tmp_path)
 
 
 @pytest.fixture
