@@ -1,28 +1,42 @@
 """Which step of `traction commission` finds which wrong rig, by the command itself.
 
 python -m tests.wrong_rigs [NAME ...] [--seeds 1,2,3] [--friction 0.4,0.7,1.0]
+python -m tests.wrong_rigs sound --seeds 1-40 --until C7
 
 Each rig of the catalogue is commissioned by the scripted operator in stepped time, in
-a folder of its own. What it did before it was found is read from the recordings of C8
-to C11: energy of the arm, speed and travel of the sole, by the positions as believed.
+a folder of its own, beside a container of full length. It begins with the first step
+that can see what is wrong, after those that the sound rig of the same seed passed. What
+it did before it was found is read from the recordings of C8 to C11: energy of the arm,
+speed and travel of the sole, by the positions as believed.
+
+`--keep FILE` writes each ending into a table and passes over those that stand there, so
+that a catalogue that takes hours can be gone on with; `wrong_rigs_page` prints it.
 """
 
 import argparse
+import csv
+import shutil
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 
 from experiments.commands.commission import FAKE_FOLDER
-from experiments.commissioning.record import Commissioning, read_commissioning
-from experiments.commissioning.steps import ProofStep
+from experiments.commissioning.record import (
+    Commissioning,
+    read_commissioning,
+    write_commissioning,
+)
+from experiments.commissioning.steps import ORDER, ProofStep
 from experiments.proving.recording import Values, read_raw
 from experiments.proving.work import WORK
 from experiments.rig.build import build_tool
 from experiments.settings.load import load_settings
+from fakes.world.departure import Departure
 from fakes.world.wrong_rigs import catalogue, wrong_rig
 from tests.experiments.program import traction, write_config
 from wam.model.arm_model import ArmModel
@@ -32,6 +46,7 @@ HEAD = f"{'rig':24} {'class':12} {'seed':>4} {'fr.':>4} {'found':>6}  " + (
     f"{'mJ':>5} {'mm':>4} {'m/s':>5}  cause"
 )
 _SPEED_OVER = 10  # cycles, over which a speed is taken
+_TRAVEL = 0.45  # m, of a container whose corners can be told apart
 
 
 @dataclass(frozen=True)
@@ -75,22 +90,89 @@ def commissioned(
         name: of the catalogue; "" = a sound rig.
         seed: of the sound rig that it departs from.
         friction: share of another arm's.
-        first: step to begin with; "" = the first.
+        first: step to begin with; "" = the first that `name` can touch, after those of
+            the sound rig of `seed`.
         last: step to end with; "" = the last.
     """
+    with tempfile.TemporaryDirectory() as folder:
+        begin = first
+        if name and not first and _first_touched(name) is not ProofStep.CONFIGURATION:
+            begin = _begin_after_sound(name, seed, friction, Path(folder))
+        return _commission(Path(folder), name, seed, friction, begin, last)
+
+
+def _commission(
+    folder: Path, name: str, seed: int, friction: float, first: str, last: str
+) -> Ending:
+    """Commission a simulated rig in `folder`, as `commissioned`."""
     options: list[object] = ["--seed", seed, "--friction", friction]
     options += ["--from", first] if first else []
     options += ["--until", last] if last else []
     options += ["--wrong", name] if name else []
-    with tempfile.TemporaryDirectory() as folder:
-        config = write_config(Path(folder))
-        done = traction(
-            *("commission", "--fake", "--fast", "--operator-script", "auto"),
-            *("--config", config, *options),
-        )
-        kept = Path(folder) / FAKE_FOLDER
-        record = read_commissioning(kept) if kept.exists() else None
-        return _ending(kept, record, done.code, done.err, first)
+    config = write_config(folder, travel=_TRAVEL)
+    done = traction(
+        *("commission", "--fake", "--fast", "--operator-script", "auto"),
+        *("--config", config, *options),
+    )
+    files = folder / FAKE_FOLDER
+    record = read_commissioning(files) if files.exists() else None
+    return _ending(files, record, done.code, done.err, first)
+
+
+def _first_touched(name: str) -> ProofStep:
+    """Return the first step that what is wrong can change anything of.
+
+    C5, C8 and C13 begin on a rig of their own: nothing of what came before is missed.
+    What only the sensor tells begins at C6, with another draw of its noise.
+    """
+    rig, sound = wrong_rig(name).departure, Departure()
+    differs = {
+        field.name
+        for field in fields(Departure)
+        if not np.array_equal(getattr(rig, field.name), getattr(sound, field.name))
+    }
+    for step, of_step in reversed(_TOUCHED.items()):
+        if differs <= of_step:
+            return step
+    return ProofStep.CONFIGURATION
+
+
+_PLACES = frozenset({"place"})
+_TORQUES = _PLACES | {"torque"}
+_LOADS = _TORQUES | {
+    *("shown", "force_late", "cable"),
+    *("foot_mass", "foot_centre", "sole", "is_foot_turned"),
+}
+_POSES = _LOADS | {*("zeros", "stops", "ratios", "mount", "links"), "counts", "torn"}
+_TOUCHED = {  # fields of `Departure` that no step before can see
+    ProofStep.BY_HAND: _POSES | {"friction"},
+    ProofStep.OWN_WEIGHT: _LOADS,
+    ProofStep.REST_POSE: _TORQUES,
+    ProofStep.CONTAINER: _PLACES,
+}
+
+
+@cache
+def _sound_folder(seed: int, friction: float) -> tempfile.TemporaryDirectory[str]:
+    """Return the folder of a sound rig that passed C0 to C11."""
+    folder = tempfile.TemporaryDirectory()
+    ending = _commission(Path(folder.name), "", seed, friction, "", "C11")
+    assert not ending.step, ending
+    return folder
+
+
+def _begin_after_sound(name: str, seed: int, friction: float, folder: Path) -> str:
+    """Put what the sound rig of `seed` passed into `folder`; return what comes next."""
+    first = _first_touched(name)
+    sound = Path(_sound_folder(seed, friction).name) / FAKE_FOLDER
+    shutil.copytree(sound, folder / FAKE_FOLDER)
+    record = read_commissioning(sound)
+    assert record is not None
+    before = ORDER[: ORDER.index(first)]
+    steps = tuple(done for done in record.steps if done.step in before)
+    kept = record.model_copy(update={"steps": steps})
+    write_commissioning(folder / FAKE_FOLDER, kept)
+    return first
 
 
 def _ending(
@@ -139,44 +221,100 @@ def _moved(recordings: Sequence[Values]) -> tuple[float, float, float]:
     return energy, travel, speed
 
 
-def _rows(args: argparse.Namespace) -> Iterator[tuple[str, int, float, Ending]]:
-    seeds = [int(word) for word in args.seeds.split(",")]
+COLUMNS = ("name", "seed", "friction", "step", "is_refused", "mJ", "mm", "m/s", "cause")
+Run = tuple[str, int, float]  # name, "" = sound; seed; share of friction
+
+
+def read_kept(path: Path) -> dict[Run, Ending]:
+    """Return the endings that stand in a table of `--keep`; {} = there is none yet."""
+    if not path.exists():
+        return {}
+    with path.open(newline="") as file:
+        return {
+            (row["name"], int(row["seed"]), float(row["friction"])): Ending(
+                row["step"],
+                row["cause"],
+                row["is_refused"] == "True",
+                float(row["mJ"]) / 1e3,
+                float(row["mm"]) / 1e3,
+                float(row["m/s"]),
+            )
+            for row in csv.DictReader(file)
+        }
+
+
+def _keep(path: Path, run: Run, ending: Ending) -> None:
+    """Write an ending below the others."""
+    is_new = not path.exists()
+    with path.open("a", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        if is_new:
+            writer.writerow(COLUMNS)
+        moved = [f"{1e3 * ending.energy:.1f}", f"{1e3 * ending.travel:.1f}"]
+        cause = ending.cause.splitlines()[0] if ending.cause else ""
+        how = (ending.step, ending.is_refused)
+        writer.writerow([*run, *how, *moved, f"{ending.speed:.3f}", cause])
+
+
+def _numbers(text: str) -> list[int]:
+    """Return the seeds of "1,2,3" or "1-40"."""
+    numbers: list[int] = []
+    for word in text.split(","):
+        first, _, last = word.partition("-")
+        numbers += range(int(first), int(last or first) + 1)
+    return numbers
+
+
+def _runs(args: argparse.Namespace) -> list[Run]:
+    """Return what is asked for: all rigs of one seed, then those of the next."""
     shares = [float(word) for word in args.friction.split(",")]
     names = ["" if name == "sound" else name for name in args.names]
-    for name in names or list(catalogue()):
-        for number, seed in enumerate(seeds):
-            share = shares[number % len(shares)]
-            yield (
-                name,
-                seed,
-                share,
-                commissioned(name, seed, share, first=args.first, last=args.last),
-            )
+    return [
+        (name, seed, shares[number % len(shares)])
+        for number, seed in enumerate(_numbers(args.seeds))
+        for name in names or list(catalogue())
+    ]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Print a line for every rig and the sum; return the exit code."""
+    """Print a line for every rig and the sum; return the exit code.
+
+    1 = a sound rig was stopped.
+    """
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", help="of the catalogue, or sound (all)")
-    parser.add_argument("--seeds", default="1", help="of the sound rigs, with commas")
+    parser.add_argument("--seeds", default="1", help="of the sound rigs: 1,2,3 or 1-40")
     parser.add_argument("--friction", default="0.7", help="shares, one for each seed")
     parser.add_argument("--from", dest="first", default="", help="first step")
     parser.add_argument("--until", dest="last", default="", help="last step")
+    parser.add_argument("--keep", type=Path, help="table that is gone on with")
     args = parser.parse_args(arguments)
     for name in args.names:
         if name != "sound":
             wrong_rig(name)
     say = sys.stdout.write
     say(f"{HEAD}\n")
-    found = as_listed = total = 0
-    for name, seed, share, ending in _rows(args):
+    known = read_kept(args.keep) if args.keep else {}
+    found = as_listed = stopped = 0
+    runs = _runs(args)
+    for run in runs:
+        name, seed, share = run
+        ending = known.get(run)
+        if ending is None:
+            ending = commissioned(*run, first=args.first, last=args.last)
+            if args.keep:
+                _keep(args.keep, run, ending)
         say(f"{ending.row(name, seed, share)}\n")
         sys.stdout.flush()
-        total += 1
-        found += bool(ending.step)
+        stopped += not name and bool(ending.step)
+        found += bool(name) and bool(ending.step)
         as_listed += bool(name) and ending.step in wrong_rig(name).steps
-    say(f"{found} of {total} found, {as_listed} at a step that the catalogue names\n")
-    return 0
+    wrong = sum(bool(name) for name, _, _ in runs)
+    say(
+        f"{found} of {wrong} wrong rigs found, {as_listed} at a step of the catalogue\n"
+    )
+    say(f"{stopped} of {len(runs) - wrong} sound rigs stopped\n")
+    return 1 if stopped else 0
 
 
 if __name__ == "__main__":
