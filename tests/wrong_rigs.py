@@ -97,7 +97,12 @@ def commissioned(
     with tempfile.TemporaryDirectory() as folder:
         begin = first
         if name and not first and _first_touched(name) is not ProofStep.CONFIGURATION:
-            begin = _begin_after_sound(name, seed, friction, Path(folder))
+            begin = _first_touched(name)
+            before = ORDER[: ORDER.index(begin)]
+            _take_sound(seed, friction, before, Path(folder))
+        elif name and _is_of_other_pucks(name):
+            begin = ProofStep.IDENTITY  # of an arm that was commissioned
+            _take_sound(seed, friction, ORDER, Path(folder))
         return _commission(Path(folder), name, seed, friction, begin, last)
 
 
@@ -161,18 +166,22 @@ def _sound_folder(seed: int, friction: float) -> tempfile.TemporaryDirectory[str
     return folder
 
 
-def _begin_after_sound(name: str, seed: int, friction: float, folder: Path) -> str:
-    """Put what the sound rig of `seed` passed into `folder`; return what comes next."""
-    first = _first_touched(name)
+def _take_sound(
+    seed: int, friction: float, steps: Sequence[ProofStep], folder: Path
+) -> None:
+    """Put what the sound rig of `seed` passed of these steps into `folder`."""
     sound = Path(_sound_folder(seed, friction).name) / FAKE_FOLDER
     shutil.copytree(sound, folder / FAKE_FOLDER)
     record = read_commissioning(sound)
     assert record is not None
-    before = ORDER[: ORDER.index(first)]
-    steps = tuple(done for done in record.steps if done.step in before)
-    kept = record.model_copy(update={"steps": steps})
+    taken = tuple(done for done in record.steps if done.step in steps)
+    kept = record.model_copy(update={"steps": taken})
     write_commissioning(folder / FAKE_FOLDER, kept)
-    return first
+
+
+def _is_of_other_pucks(name: str) -> bool:
+    """Return whether only the record of a former day can tell what is wrong."""
+    return any(what == "SN" for _, what, _ in wrong_rig(name).departure.properties)
 
 
 def _ending(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -31,7 +30,6 @@ EXAMPLES = """\
   traction commission --fake --fast --until C3    the first steps, simulated devices"""
 
 FAKE_FOLDER = "commissioning.fake"
-_LONGEST_NAME = 100  # characters
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -72,6 +70,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="a drive cable was tensioned or replaced: C5 to C11 are stale",
     )
+    parser.add_argument(
+        "--accept",
+        metavar="STEP",
+        help="two persons accept what failed in this step, e.g. C6; nothing is started",
+    )
+    parser.add_argument(
+        "--reason", metavar="TEXT", help="why, with --accept (asked at a terminal)"
+    )
     parser.add_argument("--operator", metavar="NAME", help="who does it (login name)")
     parser.add_argument("--witness", metavar="NAME", help="who stands by")
     parser.add_argument("--fake", action="store_true", help="simulated devices")
@@ -88,6 +94,7 @@ def run(args: argparse.Namespace) -> int:
     from experiments.operator.console import WARNING, Console
     from experiments.operator.scripted import choose_operator
     from experiments.proving.guide import RecordFolder, recheck
+    from experiments.proving.signing import accept_failed, sign_end
     from experiments.rig.rig import FakeOptions
     from experiments.settings.load import load_settings
 
@@ -103,6 +110,13 @@ def run(args: argparse.Namespace) -> int:
         is_sound = recheck(files, console)
         _write_page(files, earlier, console, _offers(settings, files))
         return 0 if is_sound else 6
+    terrain = settings.row(args.terrain or settings.matrix.terrains[0].name).name
+    if args.accept:
+        persons = (args.operator or "", args.witness or "")
+        why = args.reason or ""
+        accept_failed(files, args.accept, terrain, persons, why, console)
+        _write_page(files, earlier, console, _offers(settings, files))
+        return 0
     operator = choose_operator(args.operator_script, is_fake=args.fake)
     fake: FakeOptions | None = None
     if args.fake:
@@ -126,7 +140,7 @@ def run(args: argparse.Namespace) -> int:
     for text in offers:
         console.say(f" {WARNING} {text}")
     if code == 0:
-        _end(files, console, persons, is_accepting=bool(offers))
+        sign_end(files, terrain, persons, offers, console)
     _write_page(files, earlier, console, offers)
     return code
 
@@ -244,54 +258,6 @@ def _sittings(
             finally:
                 scene.console_loop.make_safe()
     return 0
-
-
-def _end(
-    files: RecordFolder,
-    console: Console,
-    persons: tuple[str, str],
-    *,
-    is_accepting: bool,
-) -> None:
-    """Say what is left, or have the record signed by two persons."""
-    from experiments.commissioning.gate import lacks
-    from experiments.commissioning.steps import ORDER
-    from experiments.proving.work import WORK
-
-    last = max((done.ended for done in files.record.steps), default=None)
-    lacking = [lack.step for lack in lacks(files.record, {}, last)] if last else ORDER
-    missing = [step for step in WORK if step in lacking]
-    if missing:
-        console.say(f"Still to do: {', '.join(missing)}.")
-        return
-    later = ", ".join(step for step in lacking if step not in WORK)
-    if later:
-        console.say(f"Not done, and said in every recording: {later}.")
-    names = _two_names(persons, console, is_accepting=is_accepting)
-    if names is None:
-        console.say(
-            "Not signed: that takes two persons. Everything is kept; sign it with "
-            "traction commission, --operator NAME and --witness NAME."
-        )
-        return
-    files.sign(names)
-    console.say(f"Written and signed: {files.folder / 'commissioning.json'}.")
-
-
-def _two_names(
-    persons: tuple[str, str], console: Console, *, is_accepting: bool
-) -> tuple[str, str] | None:
-    """Return two different names, typed where there is a terminal; None = no two."""
-    typed = persons
-    if sys.stdin is not None and sys.stdin.isatty():
-        accepted = " and accepts rig.toml as it stands" if is_accepting else ""
-        console.say(f"Who signs has seen every step{accepted}.")
-        console.say("Name of the person who did it, then Enter:")
-        first = sys.stdin.readline().strip()
-        console.say("Name of the person who stood by, then Enter:")
-        typed = (first, sys.stdin.readline().strip())
-    one, two = (name[:_LONGEST_NAME] for name in typed)
-    return (one, two) if one and two and one != two else None
 
 
 def _steps(args: argparse.Namespace) -> list[ProofStep]:

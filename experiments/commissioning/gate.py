@@ -25,15 +25,18 @@ class Lack:
     Attributes:
         step: which.
         cause: why, in words.
+        subject: with what of several, e.g. a terrain; "" = there is one only.
     """
 
     step: ProofStep
     cause: str
+    subject: str = ""
 
     @property
     def text(self) -> str:
         """Return it in one line."""
-        return f"{self.step} {self.step.words}: {self.cause}"
+        of = f" of {self.subject}" if self.subject else ""
+        return f"{self.step} {self.step.words}{of}: {self.cause}"
 
 
 def bases_of(step: ProofStep) -> list[str]:
@@ -42,7 +45,10 @@ def bases_of(step: ProofStep) -> list[str]:
 
 
 def lacks(
-    record: Commissioning | None, inputs: Mapping[str, str], now: datetime
+    record: Commissioning | None,
+    inputs: Mapping[str, str],
+    now: datetime,
+    terrain: str = "",
 ) -> list[Lack]:
     """Return every step that does not count, in order; `()` = all of them do.
 
@@ -51,21 +57,44 @@ def lacks(
         inputs: digests of what steps stand on, as it is now; what is not known now is
             no contradiction.
         now: UTC.
+        terrain: whose container is meant; "" = the one that was looked at last.
     """
     return [
-        Lack(step, cause)
+        Lack(step, cause, subject)
         for step in ORDER
-        if (cause := _cause(record, step, inputs, now))
+        for subject in [terrain if step is ProofStep.CONTAINER else ""]
+        if (cause := _cause(record, step, subject, inputs, now))
+    ]
+
+
+def accepted(record: Commissioning, terrain: str) -> list[str]:
+    """Return what failed and was accepted, a phrase each.
+
+    Names and reason stay in the record: recordings are given away.
+
+    Args:
+        record: what was done.
+        terrain: whose container is meant.
+    """
+    steps = [
+        record.of(step, terrain if step is ProofStep.CONTAINER else "")
+        for step in ORDER
+    ]
+    return [
+        f"accepted by two persons: {done.name} ({done.cause})"
+        for done in steps
+        if done is not None and done.accepted is not None
     ]
 
 
 def _cause(
     record: Commissioning | None,
     step: ProofStep,
+    subject: str,
     inputs: Mapping[str, str],
     now: datetime,
 ) -> str:
-    done = record.of(step) if record is not None else None
+    done = record.of(step, subject) if record is not None else None
     if record is None or done is None:
         return "not done"
     if done.verdict == "wrong":
@@ -73,6 +102,8 @@ def _cause(
     inputs = {**inputs, **record.told_inputs()}
     for name in bases_of(step):
         then, current = done.inputs.get(name), inputs.get(name)
+        if then is None and BASES[name].may_be_untold:
+            continue
         if current is not None and then != current:
             when = record.told.get(name)
             told = "" if when is None else f" on {when:%Y-%m-%d}, as told"

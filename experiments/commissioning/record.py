@@ -25,6 +25,8 @@ _ANEW = "Put back the file as it was written, or do it again: traction commissio
 
 Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 Word = Annotated[str, Field(max_length=400)]
+Name = Annotated[str, Field(min_length=1, max_length=100)]
+Reason = Annotated[str, Field(min_length=1, max_length=300)]
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Moment = Annotated[datetime, Field(strict=False)]  # in a table it is read from a text
 Verdict = Literal["sound", "wrong", "accepted"]
@@ -83,11 +85,27 @@ class Raw(_Part):
     sha256: Digest
 
 
+class Acceptance(_Part):
+    """Two persons took the responsibility for a step that failed.
+
+    Attributes:
+        names: of the two.
+        reason: as it was typed.
+        when: UTC.
+    """
+
+    names: tuple[Name, Name]
+    reason: Reason
+    when: datetime
+
+
 class StepRecord(_Part):
     """One step that was done.
 
     Attributes:
         step: which.
+        subject: what of several it was done with, e.g. the terrain of a container; "" =
+            there is one only.
         started: UTC.
         ended: UTC.
         operator: who did it.
@@ -95,12 +113,14 @@ class StepRecord(_Part):
         inputs: digests of what it stands on, by the names of `steps.BASES`.
         raw: what was recorded.
         quantities: what came of it.
-        verdict: "accepted" = a person took the responsibility for `cause`.
+        verdict: "accepted" = two persons took the responsibility for `cause`.
         cause: the first contradiction, in words; "" = none.
+        accepted: by whom and why; None = it was not.
         digest: of all this and of the step before.
     """
 
     step: ProofStep
+    subject: Word = ""
     started: datetime
     ended: datetime
     operator: Word
@@ -110,18 +130,28 @@ class StepRecord(_Part):
     quantities: Many[Measured] = ()
     verdict: Verdict
     cause: Word = ""
+    accepted: Acceptance | None = None
     digest: Digest = _FIRST
+
+    @property
+    def name(self) -> str:
+        """What was done, in words."""
+        of = f" of {self.subject}" if self.subject else ""
+        return f"{self.step} {self.step.words}{of}"
 
     def chained(self, before: str) -> Self:
         """Return it with the digest that follows the digest `before`."""
         content = self.model_dump(mode="json", exclude={"digest"})
+        for later in ("subject", "accepted"):  # records without them keep their digests
+            if not content[later]:
+                del content[later]
         text = json.dumps(content, sort_keys=True, separators=(",", ":"))
         digest = hashlib.sha256(f"{before}{text}".encode()).hexdigest()
         return self.model_copy(update={"digest": digest})
 
 
 class Commissioning(_Part):
-    """All of it: every step once, in order, as it was done last.
+    """All of it: every step once, in order, as it was done last; C13 of each terrain.
 
     Attributes:
         version: of the file.
@@ -143,19 +173,45 @@ class Commissioning(_Part):
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
-        numbers = [ORDER.index(done.step) for done in self.steps]
-        if numbers != sorted(set(numbers)):
+        places = [_place(done) for done in self.steps]
+        if places != sorted(set(places)):
             raise ValueError("its steps are not in order, or one stands twice")
         return self
 
-    def of(self, step: ProofStep) -> StepRecord | None:
-        """Return what was done of a step; None = nothing."""
-        return next((done for done in self.steps if done.step is step), None)
+    @model_validator(mode="after")
+    def _accepted_by_persons(self) -> Self:
+        for done in self.steps:
+            if (done.accepted is not None) is not (done.verdict == "accepted"):
+                raise ValueError(f"{done.step} is {done.verdict}, by whom?")
+        return self
+
+    def of(self, step: ProofStep, subject: str = "") -> StepRecord | None:
+        """Return what was done of a step; None = nothing.
+
+        Args:
+            step: which.
+            subject: with what of several; "" = whatever was last. A record that names
+                none may be of any.
+        """
+        found = [
+            done
+            for done in self.steps
+            if done.step is step and (not subject or done.subject in ("", subject))
+        ]
+        return max(
+            found,
+            key=lambda done: (bool(subject) and done.subject == subject, done.ended),
+            default=None,
+        )
 
     def with_step(self, done: StepRecord) -> Self:
         """Return it with a step in its place; the chain is made anew, names go."""
-        steps = [old for old in self.steps if old.step is not done.step]
-        steps = sorted([*steps, done], key=lambda one: ORDER.index(one.step))
+        steps = [
+            old
+            for old in self.steps
+            if old.step is not done.step or old.subject not in ("", done.subject)
+        ]
+        steps = sorted([*steps, done], key=_place)
         chained = _chain(steps, self.told)
         return self.model_copy(update={"steps": chained, "signed": ()})
 
@@ -174,6 +230,11 @@ class Commissioning(_Part):
         """Return the first step whose digest is not that of what stands there."""
         pairs = zip(self.steps, _chain(self.steps, self.told), strict=True)
         return next((is_.step for is_, was in pairs if is_.digest != was.digest), None)
+
+
+def _place(done: StepRecord) -> tuple[int, str]:
+    """Return what the steps of a record are ordered by."""
+    return ORDER.index(done.step), done.subject
 
 
 def _chain(

@@ -49,10 +49,13 @@ class Basis:
     Attributes:
         words: what it is.
         steps: those that are stale when it has changed.
+        may_be_untold: a device tells it not every time: a step that was done without it
+            contradicts nothing.
     """
 
     words: str
     steps: tuple[ProofStep, ...]
+    may_be_untold: bool = False
 
 
 _S = ProofStep
@@ -83,8 +86,13 @@ BASES: dict[str, Basis] = {
         (_S.OWN_WEIGHT, _S.HUNG_WEIGHT, *_from(_S.RAMPS, _S.GRAVITY_RAMP)),
     ),
     "[ft_sensor]": Basis(
-        "[ft_sensor] of rig.toml, the sensor or its calibration",
+        "[ft_sensor] of rig.toml or its calibration",
         (_S.OWN_WEIGHT, _S.HUNG_WEIGHT, _S.LOCK_AND_CLOCK, _S.PLATE),
+    ),
+    "sensor": Basis(
+        "kind, serial number or firmware of the wrist sensor",
+        (_S.OWN_WEIGHT, _S.HUNG_WEIGHT, _S.LOCK_AND_CLOCK, _S.PLATE),
+        may_be_untold=True,
     ),
     "[gravity]": Basis(
         "[gravity] of rig.toml or its calibration", (_S.LIFT, _S.GRAVITY_RAMP)

@@ -84,16 +84,18 @@ def run_preflight(
     page = ChecksPage(console)
     _check_host(rig, data, page, probe)
     info = page.attempt(lambda: _check_arm(rig, page))
-    proofs: dict[str, str] = {}
-    if info is not None and made_anew is not None and not rig.is_simulated:
-        proofs = (
-            page.attempt(lambda: check_commissioned(rig, info, page.add, made_anew))
-            or {}
-        )
     sensor = None
     if info is not None or not rig.settings.rig.ft_sensor.is_on_bus:
         arm_state = "not touched" if info is None else IDLE_ARM
         sensor = page.attempt(lambda: _check_sensor(rig, arm_state, page.add))
+    proofs: dict[str, str] = {}
+    if info is not None and made_anew is not None and not rig.is_simulated:
+        proofs = (
+            page.attempt(
+                lambda: check_commissioned(rig, info, page.add, made_anew, sensor)
+            )
+            or {}
+        )
     if info is not None:
         page.attempt(lambda: _check_exchange(rig, page.add))
     grants = _check_rights(rig, page.add)

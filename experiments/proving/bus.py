@@ -1,6 +1,6 @@
 """C1 to C3: who is on the bus, what they say of themselves, and when."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 
 import numpy as np
@@ -56,8 +56,14 @@ def judge_silence(values: Values) -> Judgement:
     )
 
 
-def identify(rig: Rig) -> Values:
-    """Ask every device what it is, also one that the start refuses."""
+def identify(rig: Rig, commissioned: Sequence[int | None] = ()) -> Values:
+    """Ask every device what it is, also one that the start refuses.
+
+    Args:
+        rig: its bus is open.
+        commissioned: serial numbers of pucks 1 to 7 when it was last sound; () = it was
+            not.
+    """
     refusal, warnings, nodes = "", list[str](), list[int]()
     try:
         info = rig.backend.start_arm()
@@ -81,6 +87,9 @@ def identify(rig: Rig) -> Values:
         "warnings": texts(warnings),
         "refusal": texts([refusal] if refusal else []),
         "expected": texts([_expected(rig)]),
+        "commissioned": np.array(
+            [_SILENT if each is None else each for each in commissioned], dtype=np.int64
+        ),
     }
 
 
@@ -98,6 +107,29 @@ def told(values: Values) -> dict[str, list[int | None]]:
     }
 
 
+def serials_of(values: Values) -> list[int | None]:
+    """Return the serial numbers of pucks 1 to 7; [] = they were not asked."""
+    return told(values).get("SN", [])
+
+
+def commissioned_with(values: Values) -> list[int | None]:
+    """Return the serial numbers that the arm had when it was last sound; [] = never."""
+    if "commissioned" not in values:  # an earlier recording
+        return []
+    stored = values["commissioned"].tolist()
+    return [None if each == _SILENT else int(each) for each in stored]
+
+
+def _replaced(values: Values) -> list[str]:
+    """Return in words which pucks are not those that were commissioned."""
+    pairs = zip(serials_of(values), commissioned_with(values), strict=False)
+    return [
+        f"SN of puck {node} is {is_}, it was {was}"
+        for node, (is_, was) in enumerate(pairs, 1)
+        if None not in (is_, was) and is_ != was
+    ]
+
+
 def judge_identity(values: Values) -> Judgement:
     """Judge what `identify` was told."""
     counts = dict(
@@ -111,13 +143,14 @@ def judge_identity(values: Values) -> Judgement:
     differences = compare(table, properties) if complete else []
     severe = [each.text for each in differences if not each.is_warning]
     unkept = [each for each in words(values, "warnings") if "safety module" in each]
-    refusal = words(values, "refusal")
+    refusal, replaced = words(values, "refusal"), _replaced(values)
     serials = [each for each in properties.get("SN", []) if each is not None]
     rows = [
         found("module", int(counts.get(SAFETY_NODE, 0) > 0)),
         found("nodes", sum(count > 0 for count in motors)),
         found("twice", max(*counts.values(), 0)),
         found("properties", len(severe), text="; ".join(severe)),
+        found("replaced", len(replaced), text="; ".join(replaced)),
         found("module_limits", len(unkept), text=" ".join(unkept)),
         found("refused", len(refusal), text=" ".join(refusal)),
     ]

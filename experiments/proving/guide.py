@@ -5,10 +5,12 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
+from acquisition.errors import SettingsError
 from experiments import provenance
 from experiments.commissioning.gate import lacks, require
-from experiments.commissioning.inputs import inputs_of, present_inputs
+from experiments.commissioning.inputs import inputs_of
 from experiments.commissioning.record import (
+    Acceptance,
     Commissioning,
     Measured,
     StepRecord,
@@ -19,7 +21,7 @@ from experiments.commissioning.record import (
 from experiments.commissioning.steps import ProofStep
 from experiments.messages import preflight_error
 from experiments.operator.console import BAD, GOOD, Console
-from experiments.proving import by_hand
+from experiments.proving import bus, by_hand
 from experiments.proving.limits import Judgement
 from experiments.proving.recording import Values, read_raw, write_raw
 from experiments.proving.scene import Scene
@@ -111,8 +113,8 @@ def do_step(
     if work.needs_zero and scene.info is not None and not scene.info.is_zeroed:
         raise preflight_error("not-zeroed")
     if work.needs_proof and scene.simulation is None:
-        present = present_inputs(scene.rig, scene.answers, scene.info)
-        require(lacks(files.record, present, _now(scene.rig)))
+        require(lacks(files.record, scene.inputs(), _now(scene.rig)))
+    scene.serials = _commissioned_with(files)
     by_hand_before = files.record.of(ProofStep.BY_HAND)
     if by_hand_before is not None and by_hand_before.raw:
         stops = read_raw(files.folder, by_hand_before.raw[0])
@@ -123,11 +125,12 @@ def do_step(
     ended = _now(scene.rig)
     name = f"commissioning_{step}_{ended:%Y%m%dT%H%M%S}.npz"
     raw = write_raw(files.folder, name, values)
-    present = present_inputs(scene.rig, scene.answers, scene.info)
+    present = scene.inputs()
     present |= files.record.told_inputs()
     files.keep(
         StepRecord(
             step=step,
+            subject=scene.rig.row.name if step is ProofStep.CONTAINER else "",
             started=started,
             ended=ended,
             operator=persons[0],
@@ -143,14 +146,49 @@ def do_step(
     return judgement
 
 
+def _commissioned_with(files: RecordFolder) -> list[int | None]:
+    """Return the serial numbers of the arm when C2 was last sound; [] = it was not."""
+    identity = files.record.of(ProofStep.IDENTITY)
+    if identity is None or not identity.raw:
+        return []
+    values = read_raw(files.folder, identity.raw[0])
+    is_wrong = identity.verdict == "wrong"
+    return bus.commissioned_with(values) if is_wrong else bus.serials_of(values)
+
+
+def accept(files: RecordFolder, done: StepRecord, acceptance: Acceptance) -> None:
+    """Write that two persons accept a step that failed.
+
+    Raises:
+        SettingsError: it did not fail, its recording is not there, or what failed is
+            nothing that a person may accept.
+    """
+    if not done.cause:
+        raise SettingsError(
+            f"{done.name} is sound: there is nothing to accept.", hint=_NOTHING
+        )
+    judgement = WORK[done.step].judge(read_raw(files.folder, done.raw[0]))
+    if judgement.barred:
+        raise SettingsError(
+            f"Nobody may accept this of {done.name}: {'; '.join(judgement.barred)}.",
+            hint=f"{WORK[done.step].way_back} {_NOTHING}",
+        )
+    changes = {"verdict": "accepted", "accepted": acceptance}
+    files.keep(done.model_copy(update=changes))
+
+
+_NOTHING = "Nothing was written."
+
+
 def wanted(
     scene: Scene, steps: Sequence[ProofStep], files: RecordFolder, *, is_anew: bool
 ) -> list[ProofStep]:
     """Return those of `steps` that have to be done; all of them where `is_anew`."""
     if is_anew:
         return list(steps)
-    present = present_inputs(scene.rig, scene.answers, scene.info)
-    lacking = {lack.step for lack in lacks(files.record, present, _now(scene.rig))}
+    now, terrain = _now(scene.rig), scene.rig.row.name
+    found = lacks(files.record, scene.inputs(), now, terrain)
+    lacking = {lack.step for lack in found}
     return [step for step in steps if step in lacking]
 
 
@@ -161,6 +199,11 @@ def say_judgement(console: Console, step: ProofStep, judgement: Judgement) -> No
     if judgement.cause:
         console.check(BAD, name, judgement.cause)
         console.say(f"   {WORK[step].way_back}")
+        if not judgement.barred:
+            console.say(
+                "   If it is right as it is, two persons may accept it: traction "
+                f"commission --accept {step}"
+            )
         return
     most = sorted(judgement.quantities, key=_nearness, reverse=True)[:SHOWN]
     text = ", ".join(each.text for each in judgement.quantities if each in most)
@@ -185,14 +228,19 @@ def recheck(files: RecordFolder, console: Console) -> bool:
         (raw,) = done.raw
         judgement = WORK[done.step].judge(read_raw(files.folder, raw))
         say_judgement(console, done.step, judgement)
-        is_sound = is_sound and not judgement.cause
+        is_sound = is_sound and not (judgement.cause and done.accepted is None)
+        if done.accepted is not None:
+            console.say("   it was accepted by two persons")
+        is_kept = done.accepted is not None and bool(judgement.cause)
         verdict = "wrong" if judgement.cause else "sound"
+        verdict = done.verdict if is_kept else verdict
         if (judgement.quantities, verdict) != (done.quantities, done.verdict):
             console.say(f"   it was {done.verdict}; the record says so now")
             changed = {
                 "quantities": judgement.quantities,
                 "verdict": verdict,
                 "cause": judgement.cause,
+                "accepted": done.accepted if is_kept else None,
             }
             files.keep(done.model_copy(update=changed))
     return is_sound

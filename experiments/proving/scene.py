@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from acquisition.control_loop.proof import ProofGoal
 from acquisition.ipc.loop_client import LoopClient
 from acquisition.simulation import SimulationControl
+from experiments.commissioning.inputs import present_inputs
 from experiments.messages import FaultContext, fault_text
 from experiments.operator.console import Console
 from experiments.operator.prompts import Prompt
@@ -33,6 +34,8 @@ class Scene:
         console_loop: rig, terminal and operator together.
         info: of the arm that was started; None = it was not.
         answers: what its pucks said of themselves.
+        sensor: what the wrist sensor said of itself; None = it was not opened.
+        serials: of its pucks when C2 was last sound; () = it was not.
         is_proving: the arm is active in a proof.
         stops: by how much each joint's zero is off by its stops [rad], shape (7,);
             None = not measured.
@@ -42,6 +45,8 @@ class Scene:
     console_loop: ConsoleLoop
     info: ArmInfo | None = None
     answers: Sequence[Mapping[str, int | None]] = ()
+    sensor: Mapping[str, str] | None = None
+    serials: Sequence[int | None] = ()
     is_proving: bool = False
     stops: Array | None = None
 
@@ -70,8 +75,12 @@ class Scene:
             return
         self.info = self.rig.backend.start_arm()
         self.answers = self.rig.backend.arm.answers()
-        self.rig.backend.open_sensor()
+        self.sensor = self.rig.backend.open_sensor()
         self.rig.backend.begin()
+
+    def inputs(self) -> dict[str, str]:
+        """Return digests of what steps stand on, as far as it is known now."""
+        return present_inputs(self.rig, self.answers, self.info, self.sensor)
 
     def say(self, text: str) -> None:
         """Print a line, below which the bar goes on."""

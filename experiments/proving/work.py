@@ -57,7 +57,7 @@ def _shown(
 
 
 def _identify(scene: Scene) -> Values:
-    values = bus.identify(scene.rig)
+    values = bus.identify(scene.rig, scene.serials)
     scene.answers = scene.rig.backend.arm.answers()
     return values
 

@@ -71,13 +71,16 @@ def _page(
 
 
 def _step(done: StepRecord, earlier: Commissioning | None) -> LimitedStep:
-    old = earlier.of(done.step) if earlier is not None else None
+    old = earlier.of(done.step, done.subject) if earlier is not None else None
     before = {each.name: each.value for each in old.quantities} if old else {}
     persons = " with ".join(name for name in (done.operator, done.witness) if name)
     words = f"{done.verdict}, {done.ended:%Y-%m-%d %H:%M} UTC, by {persons}."
+    if done.accepted is not None:
+        names, when = " and ".join(done.accepted.names), done.accepted.when
+        words += f" Accepted by {names}, {when:%Y-%m-%d}: {done.accepted.reason}"
     return LimitedStep(
-        f"{done.step} {done.step.words}",
-        done.step,
+        done.name,
+        f"{done.step}{done.subject}",
         [_value(each, before.get(each.name)) for each in done.quantities],
         f"{words} {done.cause}" if done.cause else words,
     )

@@ -60,9 +60,15 @@ def decode_mode(value: int) -> SafetyMode:
 
 
 class SafetyModule:
-    """Client of the safety module, for use outside the loop."""
+    """Client of the safety module, for use outside the loop.
+
+    Attributes:
+        defaults: its own limits before `set_limits` set others, in the order of
+            `SafetyLimits.words`; None = it did not answer, () = it was not asked.
+    """
 
     def __init__(self, properties: PropertyClient, clock: Clock, vers: int) -> None:
+        self.defaults: tuple[int | None, ...] = ()
         self._properties = properties
         self._clock = clock
         self._vers = nearest_documented(vers)
@@ -82,6 +88,10 @@ class SafetyModule:
                 hint="Switch the arm off and on, then look at the pendant.",
             )
         return mode
+
+    def serial(self) -> int | None:
+        """Return its serial number; None = it does not tell."""
+        return self._try_get("SN")
 
     def lower_to_idle(self, within_ns: int) -> SafetyMode:
         """Ask for IDLE until the module confirms IDLE or E-STOP; return the last mode.
@@ -157,6 +167,7 @@ class SafetyModule:
             number = property_number(Device.SAFETY, name, self._vers)
             self._set("DEF", number)
             self._set("LOAD", number)
+        self.defaults = tuple(self._try_get(name) for name in wanted)
         for name, value in wanted.items():
             self._set(name, value)
         kept = {name: self._try_get(name) for name in wanted}

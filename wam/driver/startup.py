@@ -75,6 +75,9 @@ class ArmInfo:
         late_replies: replies that came after their question was given up.
         transport: how the bus was reached, for people.
         warnings: what is not as documented and does not keep the arm from being driven.
+        safety_serial: serial number of the safety module; None = it does not tell.
+        safety_defaults: limits that it has of itself, in the order of
+            `SafetyLimits.words`; None = it did not answer.
     """
 
     pucks: tuple[PuckInfo, ...]
@@ -86,6 +89,13 @@ class ArmInfo:
     late_replies: int
     transport: str = ""
     warnings: tuple[str, ...] = ()
+    safety_serial: int | None = None
+    safety_defaults: tuple[int | None, ...] = ()
+
+    def module_identity(self) -> tuple[int | None, ...]:
+        """Return what tells one safety module from another; () = not all is known."""
+        told = (self.safety_vers, self.safety_serial, *self.safety_defaults)
+        return () if None in told else told
 
     def metadata(self) -> dict[str, str]:
         """Return firmware, serial numbers and warnings as text for a recording."""
@@ -156,6 +166,8 @@ class StartUp:
             is_zeroed=safety.is_zeroed(),
             late_replies=self._properties.late_replies,
             warnings=tuple(self._warnings),
+            safety_serial=safety.serial(),
+            safety_defaults=safety.defaults,
         )
 
     def _wake(self, asleep: list[int]) -> None:

@@ -88,6 +88,23 @@ def test_nothing_is_begun_beside_a_file_that_is_not_there(tmp_path):
     assert read_commissioning(tmp_path / FAKE_FOLDER) is None
 
 
+def test_a_puck_that_was_replaced_is_noticed_until_two_persons_accept_it(tmp_path):
+    config, kept = write_config(tmp_path), tmp_path / FAKE_FOLDER
+    options = ("commission", *FIRST[:-1], "C2", "--config", config)
+    assert traction(*options).code == 0
+    other = (*options, "--wrong", "one-puck-replaced", "--from", "C2")
+    for _ in range(2):  # doing it again makes it no better
+        done = traction(*other)
+        assert done.code == 3
+        assert "SN of puck 3 is 2003, it was 1003" in done.out
+        assert "two persons may accept it" in done.out
+    options = ("--fake", "--config", config, "--accept", "C2", "--operator", "Ada")
+    options += ("--witness", "Grace", "--reason", "a spare puck")
+    assert traction("commission", *options).code == 0
+    assert read_commissioning(kept).of("C2").accepted.reason == "a spare puck"
+    assert traction(*other).code == 0  # this is its arm from now on
+
+
 # Name of the catalogue, the step that finds it, words of its cause.
 WRONG = [
     ("foot-typed-4.5kg", "C0", "feet.tread.mass = 4.5"),

@@ -6,9 +6,10 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from acquisition.errors import PreflightError, SettingsError
-from experiments.commissioning.gate import bases_of, lacks, require
+from experiments.commissioning.gate import accepted, bases_of, lacks, require
 from experiments.commissioning.record import (
     NAME,
+    Acceptance,
     Commissioning,
     Measured,
     StepRecord,
@@ -210,3 +211,86 @@ def test_steps_beyond_the_gate_keep_nobody_from_driving():
 def test_a_quantity_stands_beside_its_limits(value, low, high, passes, text):
     quantity = Measured(name="travel", value=value, unit="%", low=low, high=high)
     assert (quantity.is_within, quantity.text) == (passes, text)
+
+
+# --- one of several, and accepted ----------------------------------------------------
+
+
+def test_every_terrain_keeps_its_own_container():
+    first = done(ProofStep.CONTAINER, subject="S0")
+    other = {**INPUTS, "terrain": "e" * 64}
+    second = done(
+        ProofStep.CONTAINER,
+        subject="S10",
+        inputs={name: other[name] for name in bases_of(ProofStep.CONTAINER)},
+    )
+    record = whole(*ORDER[:-2]).with_step(second).with_step(first)
+    record = record.with_step(done(ProofStep.PLATE))
+    assert [one.subject for one in record.steps if one.subject] == ["S0", "S10"]
+    assert lacks(record, INPUTS, NOON, "S0") == []
+    assert lacks(record, other, NOON, "S10") == []
+    (stale,) = lacks(record, other, NOON, "S0")
+    assert stale.text.startswith("C13 container of S0: stale: row of the terrain")
+    (missing,) = lacks(record, INPUTS, NOON, "TF")
+    assert missing.text == "C13 container of TF: not done"
+    again = record.with_step(done(ProofStep.CONTAINER, subject="S0", cause="moved"))
+    assert again.of(ProofStep.CONTAINER, "S0").cause == "moved"
+    assert again.of(ProofStep.CONTAINER, "S10") is not None
+
+
+def test_a_container_of_an_earlier_record_is_of_any_terrain_until_it_is_done_again():
+    record = whole()
+    assert lacks(record, INPUTS, NOON, "S0") == []
+    again = record.with_step(done(ProofStep.CONTAINER, subject="S0"))
+    assert [one.subject for one in again.steps if one.subject] == ["S0"]
+    assert len(again.steps) == len(ORDER)
+
+
+ACCEPTANCE = Acceptance(names=("Ada", "Grace"), reason="a new cable", when=NOON)
+
+
+def test_what_was_accepted_counts_and_is_said_without_the_names(tmp_path):
+    record = whole().with_step(
+        done(
+            ProofStep.OWN_WEIGHT,
+            verdict="accepted",
+            cause="the cable pulls",
+            accepted=ACCEPTANCE,
+        )
+    )
+    write_commissioning(tmp_path, record)
+    read = read_commissioning(tmp_path)
+    assert read == record
+    assert lacks(read, INPUTS, NOON) == []
+    assert accepted(read, "S0") == [
+        "accepted by two persons: C6 own weight (the cable pulls)"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("old", "new"), [("Ada", "Eve"), ("a new cable", "nothing"), ("Grace", "Ada")]
+)
+def test_persons_and_reasons_are_not_changed_unseen(tmp_path, old, new):
+    failed = done(ProofStep.OWN_WEIGHT, verdict="accepted", accepted=ACCEPTANCE)
+    write_commissioning(tmp_path, whole().with_step(failed))
+    path = tmp_path / NAME
+    path.write_text(path.read_text().replace(old, new))
+    with pytest.raises(SettingsError, match="was changed at or before C6 "):
+        read_commissioning(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("verdict", "who"), [("accepted", None), ("sound", ACCEPTANCE)]
+)
+def test_a_step_is_accepted_by_somebody_or_not_at_all(verdict, who):
+    failed = done(ProofStep.OWN_WEIGHT, verdict=verdict, accepted=who)
+    with pytest.raises(ValueError, match="by whom"):
+        Commissioning(program="x", steps=(failed,))
+
+
+def test_a_record_of_a_former_version_keeps_its_digests():
+    # Made before a step could be of one of several, or accepted.
+    step = done(ProofStep.TIMING, inputs={}, quantities=())
+    assert step.chained("0" * 64).digest == (
+        "e0684ca75e3849d966a89df1c9ad439c729b2d06ce1d0b13f6c3f2c84f708217"
+    )

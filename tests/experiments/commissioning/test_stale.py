@@ -37,14 +37,15 @@ MOTOR = ("IPNM", "POLES", "MT")
 
 
 def connected(folder):
-    """Return the rig of rig.toml, what it answers, and its start."""
+    """Return the rig of rig.toml, what it answers, its start, what its sensor says."""
     settings = load_settings(folder / "rig.toml")
     rig = connect_rig(
         settings, settings.matrix.terrains[0], FakeOptions("fast", 1, 0.7)
     )
     try:
         info = rig.backend.start_arm()
-        return rig, rig.backend.arm.answers(), info
+        answers = rig.backend.arm.answers()
+        return rig, answers, info, rig.backend.open_sensor()
     finally:
         rig.backend.close()
 
@@ -87,27 +88,73 @@ def test_a_section_that_was_changed(sound, tmp_path, name):
 @pytest.mark.parametrize("joint", [1, 7])
 @pytest.mark.parametrize("name", [*PUCK, *MOTOR])
 def test_a_puck_that_says_something_else(sound, joint, name):
-    rig, answers, info = sound
+    rig, answers, info, sensor = sound
     other = [dict(answer) for answer in answers]
     assert other[joint - 1][name] is not None
     other[joint - 1][name] += 1
     basis = "pucks" if name in PUCK else "motors"
-    assert stale(sound, present_inputs(rig, other, info)) == BASES[basis].steps
+    assert stale(sound, present_inputs(rig, other, info, sensor)) == BASES[basis].steps
 
 
-def test_a_module_with_another_firmware(sound):
-    rig, answers, info = sound
-    other = replace(info, safety_vers=info.safety_vers + 1)
-    assert stale(sound, present_inputs(rig, answers, other)) == BASES["module"].steps
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda info: {"safety_vers": info.safety_vers + 1},
+        lambda info: {"safety_serial": info.safety_serial + 1},
+        *(
+            lambda info, i=i: {
+                "safety_defaults": tuple(
+                    value + (k == i) for k, value in enumerate(info.safety_defaults)
+                )
+            }
+            for i in range(4)
+        ),
+    ],
+    ids=["firmware", "serial", "VL1", "VL2", "TL1", "TL2"],
+)
+def test_another_module_or_one_with_other_limits_of_its_own(sound, change):
+    rig, answers, info, sensor = sound
+    assert info.safety_defaults == (2048, 4096, 4731, 5204)
+    other = replace(info, **change(info))
+    present = present_inputs(rig, answers, other, sensor)
+    assert stale(sound, present) == BASES["module"].steps
+
+
+def test_a_module_that_does_not_tell_contradicts_nothing(sound):
+    rig, answers, info, sensor = sound
+    silent = replace(info, safety_serial=None)
+    assert stale(sound, present_inputs(rig, answers, silent, sensor)) == ()
+
+
+TOLD_BY_SENSOR = {"serial_number": "BFT-1", "firmware": "3.2"}  # once it has booted
+
+
+@pytest.mark.parametrize("name", ["model", *TOLD_BY_SENSOR])
+def test_another_wrist_sensor(sound, name):
+    rig, answers, info, sensor = sound
+    told = {**sensor, **TOLD_BY_SENSOR}
+    before = commissioned(present_inputs(rig, answers, info, told))
+    other = present_inputs(rig, answers, info, {**told, name: f"{told[name]}1"})
+    found = [lack.step for lack in lacks(before, other, NOON)]
+    assert tuple(found) == BASES["sensor"].steps
+
+
+def test_a_sensor_that_does_not_tell_contradicts_nothing(sound):
+    rig, answers, info, sensor = sound
+    assert sensor["serial_number"].startswith("unknown")
+    silent = present_inputs(rig, answers, info, sensor)
+    told = present_inputs(rig, answers, info, {**sensor, **TOLD_BY_SENSOR})
+    assert lacks(commissioned(told), silent, NOON) == []
+    assert lacks(commissioned(silent), told, NOON) == []
 
 
 def test_every_basis_is_changed_by_a_test():
     # What only persons know stands in tests/experiments/commissioning/test_record.py.
-    assert {*SETTINGS, *TOLD, "pucks", "motors", "module"} == set(BASES)
+    assert {*SETTINGS, *TOLD, "pucks", "motors", "module", "sensor"} == set(BASES)
 
 
 def test_a_container_that_was_measured_again_under_the_same_name(sound):
-    rig, answers, info = sound
+    rig, answers, info, _ = sound
     row = rig.row.model_copy(update={"calibration": "terrain_S0.toml"})
 
     def measured(text):
