@@ -15,18 +15,21 @@ from experiments.arguments import (
 from experiments.rig.truth_options import add_truth, check_truth, mount_of
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from experiments.commissioning.record import Commissioning
     from experiments.commissioning.steps import ProofStep
     from experiments.operator.console import Console
     from experiments.operator.prompts import OperatorInput
     from experiments.proving.guide import RecordFolder
+    from experiments.proving.scene import Scene
     from experiments.rig.rig import FakeOptions
     from experiments.settings.load import Settings
+    from experiments.settings.matrix import TerrainRow
 
 EXAMPLES = """\
   traction commission --config lab/rig.toml what is not done or stale, step by step
+  traction commission --daily --config lab/rig.toml   the check of every day
   traction commission --fake --fast --until C3    the first steps, simulated devices"""
 
 FAKE_FOLDER = "commissioning.fake"
@@ -47,6 +50,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--terrain",
         metavar="NAME",
         help="whose container C13 looks at (the first of matrix.toml)",
+    )
+    parser.add_argument(
+        "--daily",
+        action="store_true",
+        help="2 min before a session: is the arm still as it was commissioned?",
     )
     parser.add_argument(
         "--recheck",
@@ -134,6 +142,8 @@ def run(args: argparse.Namespace) -> int:
     console.say(f"traction commission        {kind} · {files.folder}")
     if args.fake:
         console.say("Simulated hands and pendant do what is asked, at [space].")
+    if args.daily:
+        return _daily(args, settings, fake, files, persons, console, operator)
     _note_changes(args, files)
     code = _sittings(args, settings, fake, steps, files, persons, console, operator)
     offers = _offers(settings, files)
@@ -215,11 +225,69 @@ def _sittings(
     operator: OperatorInput,
 ) -> int:
     """Do the steps, as many on one connection as can be; return the exit code."""
+    from experiments.proving.guide import do_step, wanted
+    from experiments.proving.work import SITTINGS
+    from experiments.run.stop import StopRequestedError
+
+    row = settings.row(args.terrain or settings.matrix.terrains[0].name)
+    is_anew = args.first is not None
+    for sitting in SITTINGS:
+        due = [step for step in sitting if step in steps]
+
+        def work(scene: Scene, due: Sequence[ProofStep] = due) -> int:
+            for step in wanted(scene, due, files, is_anew=is_anew):
+                if do_step(scene, step, files, persons).cause:
+                    return 3
+                if scene.console_loop.stop.count:
+                    raise StopRequestedError
+            return 0
+
+        if due and (code := _on_rig(settings, row, fake, console, operator, work)):
+            return code
+    return 0
+
+
+def _daily(
+    args: argparse.Namespace,
+    settings: Settings,
+    fake: FakeOptions | None,
+    files: RecordFolder,
+    persons: tuple[str, str],
+    console: Console,
+    operator: OperatorInput,
+) -> int:
+    """Do the daily check, draw its history and return the exit code."""
+    from experiments.commissioning.daily import read_history
+    from experiments.proving.daily import do_daily, reference_of
+    from experiments.report.daily import write_history_page
+
+    reference_of(files)  # before anything is touched
+    row = settings.row(args.terrain or settings.matrix.terrains[0].name)
+
+    def work(scene: Scene) -> int:
+        check = do_daily(scene, files, persons, is_simulated=args.fake)
+        return 3 if check.cause else 0
+
+    before = len(read_history(files.folder, is_simulated=args.fake).checks)
+    code = _on_rig(settings, row, fake, console, operator, work)
+    history = read_history(files.folder, is_simulated=args.fake)
+    if len(history.checks) > before:
+        console.say(f"Page: {write_history_page(files.folder, history)}")
+    return code
+
+
+def _on_rig(
+    settings: Settings,
+    row: TerrainRow,
+    fake: FakeOptions | None,
+    console: Console,
+    operator: OperatorInput,
+    work: Callable[[Scene], int],
+) -> int:
+    """Do `work` on one connection and return its exit code, or that of its end."""
     from experiments.operator.terminal import keyboard
     from experiments.preflight.connecting import connect_rig
-    from experiments.proving.guide import do_step, wanted
     from experiments.proving.scene import Scene
-    from experiments.proving.work import SITTINGS
     from experiments.rig.bus_log import logging_bus
     from experiments.run.console_loop import ConsoleLoop
     from experiments.run.pose_walk import INTERRUPTED
@@ -231,33 +299,22 @@ def _sittings(
     )
 
     stop = StopFlag()
-    row = settings.row(args.terrain or settings.matrix.terrains[0].name)
-    is_anew = args.first is not None
-    for sitting in SITTINGS:
-        due = [step for step in sitting if step in steps]
-        if not due:
-            continue
-        rig = connect_rig(settings, row, fake)
-        with logging_bus(rig, None, console), handle_signals(stop), keyboard(operator):
-            scene = Scene(rig, ConsoleLoop(rig, console, operator, stop))
-            try:
-                for step in wanted(scene, due, files, is_anew=is_anew):
-                    if do_step(scene, step, files, persons).cause:
-                        return 3
-                    if stop.count:
-                        raise StopRequestedError
-            except StopRequestedError:
-                console.say(
-                    "Stopped as asked. The steps that were done are kept; "
-                    "traction commission goes on with the next."
-                )
-                return INTERRUPTED
-            except ArmFaultError as fault:
-                console.problem(scene.fault_words(fault))
-                return 4
-            finally:
-                scene.console_loop.make_safe()
-    return 0
+    rig = connect_rig(settings, row, fake)
+    with logging_bus(rig, None, console), handle_signals(stop), keyboard(operator):
+        scene = Scene(rig, ConsoleLoop(rig, console, operator, stop))
+        try:
+            return work(scene)
+        except StopRequestedError:
+            console.say(
+                "Stopped as asked. The steps that were done are kept; "
+                "traction commission goes on with the next."
+            )
+            return INTERRUPTED
+        except ArmFaultError as fault:
+            console.problem(scene.fault_words(fault))
+            return 4
+        finally:
+            scene.console_loop.make_safe()
 
 
 def _steps(args: argparse.Namespace) -> list[ProofStep]:

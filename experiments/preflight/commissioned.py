@@ -4,6 +4,7 @@ from collections.abc import Collection, Mapping
 from datetime import UTC, datetime
 
 from acquisition.errors import IDLE_ARM, PreflightError, TractionError
+from experiments.commissioning import daily
 from experiments.commissioning.gate import (
     COMPLETE,
     FIELD,
@@ -12,8 +13,8 @@ from experiments.commissioning.gate import (
     require,
 )
 from experiments.commissioning.inputs import present_inputs
-from experiments.commissioning.record import read_commissioning
-from experiments.commissioning.steps import GATED
+from experiments.commissioning.record import Commissioning, read_commissioning
+from experiments.commissioning.steps import GATED, ProofStep
 from experiments.operator.console import BAD, GOOD, WARNING
 from experiments.preflight.page import Add
 from experiments.rig.rig import Rig
@@ -54,12 +55,52 @@ def check_commissioned(
         raise PreflightError(
             error.message, hint=error.hint, arm_state=IDLE_ARM
         ) from error
+    said_daily = _check_daily(rig, record, now, add)
     further = [lack.text for lack in found if lack.step not in GATED]
     said = [f"uncommissioned: {'; '.join(further)}"] if further else []
     said += accepted(record, rig.row.name) if record is not None else []
     if said:
         text = ". ".join(said)
         add(WARNING, FIELD, text)
-        return {FIELD: text}
+        return {FIELD: text, daily.FIELD: said_daily}
     add(GOOD, FIELD, "all steps, sound and not stale")
-    return {FIELD: COMPLETE}
+    return {FIELD: COMPLETE, daily.FIELD: said_daily}
+
+
+def _check_daily(
+    rig: Rig, record: Commissioning | None, now: datetime, add: Add
+) -> str:
+    """Refuse an arm whose last daily check failed; return words for recordings.
+
+    Where there was none today, that is said. The day of the commissioning needs none.
+
+    Raises:
+        PreflightError: the last daily check failed.
+    """
+    try:
+        history = daily.read_history(rig.settings.folder, is_simulated=False)
+    except TractionError as error:
+        add(BAD, "daily check", error.message)
+        raise PreflightError(
+            error.message, hint=error.hint, arm_state=IDLE_ARM
+        ) from error
+    ramps = record.of(ProofStep.RAMPS) if record is not None else None
+    proved = ramps.ended if ramps is not None else None
+    last = history.checks[-1] if history.checks else None
+    if last is not None and (proved is None or last.ended > proved):
+        if last.cause:
+            add(BAD, "daily check", last.words)
+            raise PreflightError(
+                f"The daily check of this arm failed: {last.words}",
+                hint="Look at what it names, then traction commission --daily.",
+                arm_state=IDLE_ARM,
+            )
+        if history.counts_at(now):
+            add(GOOD, "daily check", last.words)
+            return last.words
+    elif proved is not None and now - proved <= daily.COUNTS_FOR:
+        add(GOOD, "daily check", "commissioned today")
+        return "commissioned today"
+    text = "none today" if last is None else f"none today, the last one {last.words}"
+    add(WARNING, "daily check", f"{text}: traction commission --daily")
+    return text

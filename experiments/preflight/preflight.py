@@ -30,11 +30,12 @@ from experiments.preflight.host_checks import (
 )
 from experiments.preflight.identity import check_identity, serial_numbers
 from experiments.preflight.page import Add, CheckResult, ChecksPage
+from experiments.preflight.zero import zero_errors
 from experiments.rig.arm_operations import EXCHANGE_CYCLES
 from experiments.rig.law_calibrations import forced_calibrations, law_words
 from experiments.rig.rig import Rig
 from wam.driver.health import complaints, temperature_range
-from wam.driver.home import HOME_LIMIT, check_zero, zero_error
+from wam.driver.home import HOME_LIMIT, check_zero
 from wam.driver.startup import ArmInfo
 
 STEPPED_TEST = 0.3  # s
@@ -174,13 +175,9 @@ def _check_zero(rig: Rig, info: ArmInfo, add: Add) -> None:
     Raises:
         PreflightError: the arm is zeroed elsewhere.
     """
-    noted = rig.settings.rig.arm.mech_at_home
-    mech = [puck.mech for puck in info.pucks if puck.mech is not None]
-    if noted is None or len(mech) < len(info.pucks) or rig.is_simulated:
+    error = zero_errors(rig, info)
+    if error is None:
         return
-    cts = [puck.cts for puck in info.pucks]
-    counts = rig.backend.loop_client.latest()["counts"][0].tolist()
-    error = zero_error(rig.model.constants, cts, counts, mech, noted)
     worst = float(np.abs(error).max())
     add(BAD if worst > HOME_LIMIT else GOOD, "zero", f"{worst:.4f} rad off at most")
     check_zero(error)

@@ -18,22 +18,22 @@ from wam.driver.puck_properties import (
     shipped_table,
 )
 
-LISTENED = 10  # s
+LISTENED = 10.0  # s
 _PORTION = 0.5  # s, between two looks at the screen
 ASKED = 3  # times that each device is asked for the same
 LOOPED = 60  # s
 _SILENT = -(2**31)  # in the place of a property that was not told
 
 
-def listen(rig: Rig) -> Iterator[tuple[float, Values]]:
-    """Ask for nothing; yield the share that is done and what was heard so far."""
+def listen(rig: Rig, most: float = LISTENED) -> Iterator[tuple[float, Values]]:
+    """Ask for nothing for `most` [s]; yield the share done and what was heard."""
     frames, seconds = 0, 0.0
-    while seconds < LISTENED:
+    while seconds < most:
         heard = rig.backend.arm.listen(_PORTION)
         seconds += _PORTION
         frames += heard.frames
         yield (
-            seconds / LISTENED,
+            seconds / most,
             {
                 "seconds": np.array(seconds),
                 "frames": np.array(frames),

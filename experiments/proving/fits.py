@@ -38,6 +38,7 @@ class FootFit:
 
     Attributes:
         mass: of it [kg].
+        weight: of it in the base frame [N], shape (3,).
         centre: of it in the sensor frame [m], shape (3,).
         way: angle between its weight and down [degrees].
         force_left: what no weight explains, rms of an axis [N].
@@ -46,6 +47,7 @@ class FootFit:
     """
 
     mass: float
+    weight: Array
     centre: Array
     way: float
     force_left: float
@@ -97,8 +99,9 @@ def fit_foot(values: Values) -> FootFit:
     twisted = loads[:, 3:].ravel() - arms @ centred
     return FootFit(
         mass=float(np.linalg.norm(w)) / GRAVITY,
+        weight=w,
         centre=centred[3:].astype(np.float64),
-        way=_angle(w, _DOWN),
+        way=angle(w, _DOWN),
         force_left=_rms(left),
         moment_left=_rms(twisted),
         lever=_lever(loads),
@@ -112,7 +115,7 @@ def fit_hung(values: Values) -> HungFit:
     both = (values["before"] + values["after"]) / 2
     loads = number(values, "sign") * (values["loaded"] - both)
     forces = loads[:, :3]
-    ways = [_angle(each @ force, _DOWN) for each, force in zip(R, forces, strict=True)]
+    ways = [angle(each @ force, _DOWN) for each, force in zip(R, forces, strict=True)]
     arms = np.concatenate([cross_matrix(force).T for force in forces])
     sole, *_ = np.linalg.lstsq(arms, loads[:, 3:].ravel())
     priors = np.full(len(FITTED), _PRIOR)
@@ -188,7 +191,7 @@ def _turn(v: Array) -> Array:
     return np.eye(3) + np.sin(angle) * X + (1.0 - np.cos(angle)) * X @ X
 
 
-def _angle(a: Array, b: Array) -> float:
+def angle(a: Array, b: Array) -> float:
     """Return the angle between two vectors [degrees]."""
     share = float(a @ b) / float(np.linalg.norm(a) * np.linalg.norm(b) + 1e-12)
     return float(np.degrees(np.arccos(np.clip(share, -1.0, 1.0))))

@@ -380,6 +380,46 @@ LIMITS: Mapping[str, Limit] = {
         "N",
         "Scale of the sensor across its axis, or the balance was not held level",
     ),
+    # the check of every day, beside the commissioning
+    "changed": Limit(
+        "devices that say something else of themselves",
+        "",
+        "Changed since the commissioning: {text}",
+        high=0,
+    ),
+    "exchange": Limit(
+        "seven positions after their question, median",
+        "ms",
+        "The adapter is slow, or the bus is busy",
+        low=0.01,
+        high=1.5,
+    ),
+    "zero": Limit(
+        "zero beside mech_at_home, worst joint",
+        "degrees",
+        "The arm is zeroed elsewhere: lay it home and zero again",
+        high=1.7,
+    ),
+    "hang_force": Limit(
+        "weight of the foot beside the commissioning",
+        "N",
+        "Another foot, something touches it, the sensor's scale or its cable",
+        high=0.35,
+    ),
+    "hang_way": Limit(
+        "weight of the foot turned beside it",
+        "degrees",
+        "A zero position, the sensor or the base was turned",
+        high=6.0,
+    ),
+    "drift": Limit(
+        "lift-off of joint {joint} over that of the commissioning",
+        "",
+        "Motor {joint}, its drive cable, or friction: less lifts it where a cable is "
+        "off or the zero is wrong, more where something rubs or a phase is open",
+        low=0.85,
+        high=1.15,
+    ),
     "ended": Limit("stops by the guard", "", "{text}", high=0),
 }
 

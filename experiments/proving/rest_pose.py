@@ -102,21 +102,26 @@ def rest(scene: Scene) -> Values:
 
 def judge_rest(values: Values) -> Judgement:
     """Judge an arm without torque from its first active cycle."""
+    return judged(rest_rows(values))
+
+
+def rest_rows(values: Values) -> list[Found]:
+    """Return the quantities of an arm without torque."""
     seconds = _seconds(values["t_ns"])
     rows = [
         found("rest", 1e3 * way, high=1e3 * PROOF_LIMITS.rest[i], joint=i + 1)
         for i, way in enumerate(_ways(values["q"]))
     ]
-    return judged([*rows, *_ended(values), found("active", seconds)])
+    return [*rows, *_ended(values), found("active", seconds)]
 
 
-def ramps(scene: Scene) -> Values:
-    """Push one joint after the other, each until it moves."""
+def ramps(scene: Scene, joints: Sequence[int] = RAMPS) -> Values:
+    """Push one joint after the other, each until it moves; the sign is the sense."""
     lay_down(scene)
     constants, q = scene.rig.model.constants, scene.position()
     weights = scene.rig.law_model.gravity(q)
     goals: list[ProofGoal] = []
-    for signed in RAMPS:
+    for signed in joints:
         i = abs(signed) - 1
         torque = 2.0 * float(constants.coulomb[i])
         if signed in LIFTED:
@@ -130,6 +135,28 @@ def ramps(scene: Scene) -> Values:
 
 def judge_ramps(values: Values) -> Judgement:
     """Judge whether each joint moved as it was pushed, and at which torque."""
+    return judged(ramp_rows(values))
+
+
+def liftoffs(values: Values) -> dict[int, float]:
+    """Return what lifted each joint off its stop [N m], by joint with its sense.
+
+    Args:
+        values: of `ramps`; joints that it did not come to are left out.
+    """
+    torques: dict[int, float] = {}
+    for k, (joint, torque) in enumerate(
+        zip(values["joints"].tolist(), values["torques"].tolist(), strict=True)
+    ):
+        part, signed = values["proof"] == k, int(np.copysign(joint, torque))
+        if signed in LIFTED and part.any():  # a ramp ends where the joint moves
+            torques[signed] = float(np.abs(values["tau"][part][:, joint - 1]).max())
+    return torques
+
+
+def ramp_rows(values: Values) -> list[Found]:
+    """Return the quantities of joints that were pushed."""
+    lifted = liftoffs(values)
     rows: list[Found] = []
     for number, (joint, torque) in enumerate(
         zip(values["joints"].tolist(), values["torques"].tolist(), strict=True)
@@ -138,7 +165,7 @@ def judge_ramps(values: Values) -> Judgement:
         if not part.any():
             break
         i, sense = int(joint) - 1, 1.0 if torque > 0 else -1.0
-        q, tau = values["q"][part], values["tau"][part]
+        q = values["q"][part]
         ways = np.abs(q - q[0]).max(axis=0)
         ways[i] = 0.0
         most = np.array([PROOF_LIMITS.aside_of(i + 1, j) for j in range(1, 8)])
@@ -158,11 +185,10 @@ def judge_ramps(values: Values) -> Judgement:
         rows.append(
             found("moved", 1e3 * way.max(), low=1e3 * reach, joint=_signed(i, sense))
         )
-        if int(sense) * (i + 1) in LIFTED:
-            needed = float(np.abs(tau[:, i]).max())  # it ends where the joint moves
+        if (needed := lifted.get(int(sense) * (i + 1))) is not None:
             weight = abs(float(values["weights"][i]))
             rows.append(found("liftoff", needed / weight, joint=i + 1))
-    return judged([*rows, *_ended(values)])
+    return [*rows, *_ended(values)]
 
 
 def lift(scene: Scene) -> Values:

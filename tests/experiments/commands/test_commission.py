@@ -6,6 +6,7 @@ import pytest
 
 from experiments.commands.commission import FAKE_FOLDER
 from experiments.commissioning.record import NAME, read_commissioning
+from experiments.commissioning.steps import ProofStep
 from experiments.report import commissioning as page
 from tests.experiments.program import traction, write_config
 from tests.wrong_rigs import commissioned
@@ -101,7 +102,10 @@ def test_a_puck_that_was_replaced_is_noticed_until_two_persons_accept_it(tmp_pat
     options = ("--fake", "--config", config, "--accept", "C2", "--operator", "Ada")
     options += ("--witness", "Grace", "--reason", "a spare puck")
     assert traction("commission", *options).code == 0
-    assert read_commissioning(kept).of("C2").accepted.reason == "a spare puck"
+    assert (
+        read_commissioning(kept).of(ProofStep.IDENTITY).accepted.reason
+        == "a spare puck"
+    )
     assert traction(*other).code == 0  # this is its arm from now on
 
 

@@ -1,14 +1,20 @@
 """May torque be sent? The record beside rig.toml and the arm that answers tell."""
 
 import json
+from datetime import UTC, datetime, timedelta
 
 import pytest
 
 from acquisition.errors import PreflightError
+from experiments.commissioning.daily import (
+    DailyCheck,
+    read_history,
+    write_history,
+)
 from experiments.commissioning.inputs import inputs_of, present_inputs
-from experiments.commissioning.record import NAME, write_commissioning
+from experiments.commissioning.record import NAME, Raw, write_commissioning
 from experiments.commissioning.steps import GATED, ORDER
-from experiments.operator.console import BAD, WARNING
+from experiments.operator.console import BAD, GOOD, WARNING
 from experiments.preflight.commissioned import check_commissioned
 from experiments.preflight.connecting import connect_rig
 from experiments.rig.rig import FakeOptions
@@ -101,7 +107,7 @@ def test_a_record_of_a_simulated_arm_is_none_of_a_real_one(config):
 def test_a_sound_record_lets_through_and_recordings_say_what_is_open(config):
     arm = Arm(config)
     said = arm.check()["commissioning"]
-    assert arm.lines[-1][0] == WARNING
+    assert [mark for mark, *_ in arm.lines] == [GOOD, WARNING]
     assert said.startswith("uncommissioned: C12 lock and clock: not done")
 
 
@@ -113,9 +119,89 @@ def test_a_record_of_every_step_is_complete(config):
         changes = {"step": step, "inputs": inputs_of(step, present)}
         record = record.with_step(record.steps[0].model_copy(update=changes))
     write_commissioning(config.parent, record)
-    assert arm.check() == {"commissioning": "complete"}
+    said = {"commissioning": "complete", "daily_check": "commissioned today"}
+    assert arm.check() == said
 
 
 def test_what_a_command_measures_anew_is_not_stale_for_it(config):
     config.write_text(changed(config.read_text(), *FRICTION))
     assert Arm(config).check(("[friction]",))
+
+
+def as_of(config, hours):
+    """Let the record be of so long ago, and nothing stale by that."""
+    arm = Arm(config)
+    record = sound_record(arm.rig, arm.info)
+    for done in record.steps:
+        ended = done.ended - timedelta(hours=hours)
+        record = record.with_step(done.model_copy(update={"ended": ended}))
+    write_commissioning(config.parent, record)
+    arm.rig.backend.close()
+
+
+def checked(config, hours, cause="", *, is_simulated=False):
+    """Write a daily check of so long ago."""
+    arm = Arm(config)
+    now = datetime.fromtimestamp(arm.rig.clock.utc_ns() // 10**9, UTC)
+    arm.rig.backend.close()
+    ended = now - timedelta(hours=hours)
+    done = DailyCheck(
+        started=ended,
+        ended=ended,
+        operator="one",
+        witness="",
+        raw=Raw(file="daily.npz", sha256="0" * 64),
+        quantities=(),
+        cause=cause,
+    )
+    history = read_history(config.parent, is_simulated=is_simulated)
+    write_history(config.parent, history.with_check(done))
+
+
+def said_of_today(config):
+    arm = Arm(config)
+    said = arm.check()["daily_check"]
+    (line,) = [line for line in arm.lines if line[1] == "daily check"]
+    return line[0], said
+
+
+def test_a_day_without_a_check_is_said_in_recordings(config):
+    as_of(config, 30)
+    assert said_of_today(config) == (WARNING, "none today")
+    checked(config, 17)
+    mark, said = said_of_today(config)
+    assert (mark, said[:27]) == (WARNING, "none today, the last one 20")
+
+
+def test_a_check_of_today_is_said_in_recordings(config):
+    as_of(config, 30)
+    checked(config, 15)
+    mark, said = said_of_today(config)
+    assert (mark, said[-5:]) == (GOOD, "sound")
+
+
+def test_an_arm_whose_check_failed_is_refused_until_one_passes(config):
+    as_of(config, 30)
+    checked(config, 20, "lift-off of joint 2 over that of the commissioning 0.2.")
+    refusal = Arm(config).refusal()
+    assert "The daily check of this arm failed: " in refusal.message
+    assert "lift-off of joint 2" in refusal.message
+    checked(config, 1)
+    assert said_of_today(config)[0] == GOOD
+
+
+def test_what_failed_before_the_arm_was_commissioned_again_does_not_count(config):
+    as_of(config, 2)
+    checked(config, 3, "lift-off of joint 2.")
+    assert said_of_today(config) == (GOOD, "commissioned today")
+
+
+def test_checks_of_a_simulated_arm_say_nothing_of_a_real_one(config):
+    as_of(config, 30)
+    checked(config, 1, "lift-off of joint 2.", is_simulated=True)
+    assert said_of_today(config) == (WARNING, "none today")
+
+
+def test_a_history_that_is_none_is_refused(config):
+    (config.parent / "daily.json").write_text("[]")
+    assert "daily.json cannot be read" in Arm(config).refusal().message

@@ -32,8 +32,18 @@ _SLOP = np.radians(0.1)  # of a joint pressed onto its stop by hand
 class HeldArm:
     """An arm that differs from its drawings, in the hands of a person."""
 
-    def __init__(self, tool: Tool, seed: int, wrong: str = "") -> None:
-        """Draw the sound arm of `seed`; `wrong` = a name of the catalogue."""
+    def __init__(
+        self, tool: Tool, seed: int, wrong: str = "", another_day: int = 0
+    ) -> None:
+        """Draw the sound arm of `seed`.
+
+        Args:
+            tool: what hangs on its plate, as believed.
+            seed: of what is drawn once for an arm.
+            wrong: a name of the catalogue; "" = nothing is.
+            another_day: draws anew what is another one every day: poses, the sensor's
+                bias, drift and noise.
+        """
         sound = draw_sound(seed)
         self.departure: Departure = (
             wrong_rig(wrong).departure.on(sound) if wrong else sound
@@ -51,7 +61,7 @@ class HeldArm:
         self._gauges = WristGauges(true, -self._down, 0.002)
         if self.departure.cable.any():
             self._gauges.cable = self.departure.cable
-        random = trial_generator(seed, "held", 0)
+        random = trial_generator(seed, "held", another_day)
         self._errors = SensorErrors(random.spawn(1)[0])
         self._random = random
         self._t_ns = 0
@@ -82,9 +92,9 @@ class HeldArm:
         ends = {"q_lower": drawn.q_lower, "q_upper": drawn.q_upper}
         return {"low": np.array(lows), "high": np.array(highs), **ends}
 
-    def own_weight(self) -> Values:
-        """Return what C6 records."""
-        measured = [self._bring(pose) for pose in POSES]
+    def own_weight(self, poses: Sequence[Sequence[float]] = POSES) -> Values:
+        """Return what C6 records, or the daily check in fewer poses."""
+        measured = [self._bring(pose) for pose in poses]
         q, readings = zip(*measured, strict=True)
         return {"q": np.array(q), "readings": np.array(readings), **self._believes()}
 

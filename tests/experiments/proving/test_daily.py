@@ -1,0 +1,190 @@
+"""The check of every day: what it makes of an arm that is, and is not, as it was."""
+
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+import pytest
+
+from acquisition.errors import SettingsError
+from experiments.commissioning.daily import (
+    DailyCheck,
+    DailyHistory,
+    read_history,
+    write_history,
+)
+from experiments.commissioning.record import Measured, Raw
+from experiments.proving import daily
+from experiments.proving.fits import fit_foot
+from experiments.proving.guide import RecordFolder
+from experiments.proving.recording import texts
+from experiments.proving.weights import POSES
+from experiments.report.daily import write_history_page
+from experiments.rig.build import build_tool
+from experiments.settings.load import load_settings
+from tests.experiments.proving.held_arm import HeldArm
+from wam.model.constants import load_constants
+
+SOUND = 40
+NOON = datetime(2026, 11, 26, 12, tzinfo=UTC)
+HOME = load_constants().home
+BEFORE = (18.0, 7.0)  # N m, of joints 2 and 4
+
+
+@pytest.fixture(scope="module")
+def tool():
+    return build_tool(load_settings(None).rig, "tread")
+
+
+def lain(seconds=1.0):
+    """Return what an arm records that lies still."""
+    t_ns = np.arange(round(seconds / 0.002)) * 2_000_000
+    return {"t_ns": t_ns, "q": np.tile(HOME, (len(t_ns), 1)), "ended": texts([])}
+
+
+def lifted(torques):
+    """Return what is recorded while joints 2 and 4 are lifted off at these [N m]."""
+    parts = []
+    for joint, sense, torque in ((2, 1.0, torques[0]), (4, -1.0, torques[1])):
+        part = lain()
+        tau = np.zeros((len(part["t_ns"]), 7))
+        tau[:, joint - 1] = sense * np.linspace(0.0, torque, len(tau))
+        q = part["q"].copy()
+        q[-5:, joint - 1] += 0.01 * sense
+        parts.append((q, tau))
+    return {
+        "proof": np.repeat([0, 1], len(parts[0][0])),
+        "joints": np.array([2, 4]),
+        "torques": np.array([30.0, -12.0]),
+        "q": np.concatenate([q for q, _ in parts]),
+        "tau": np.concatenate([tau for _, tau in parts]),
+        "weights": np.array([0.0, 18.7, 0.0, 5.65, 0.0, 0.72, 0.0]),
+        "ended": texts([]),
+    }
+
+
+def day(tool, seed, wrong="", torques=BEFORE, **changed):
+    """Return what is recorded on another day of the arm of `seed`."""
+    weight = fit_foot(HeldArm(tool, seed).own_weight()).weight
+    poses = [POSES[at] for at in daily.HANGING] * 2  # held again where it did not fit
+    held = HeldArm(tool, seed, wrong, another_day=1).own_weight(poses)
+    values = {
+        "heard_master": np.array(-1),
+        "heard_frames": np.array(0),
+        "heard_error_frames": np.array(0),
+        "replies_ns": np.full(100, 700_000),
+        "unasked": np.array(5),
+        "late": np.array(0),
+        "answer_ns": np.array(290_000),
+        "changed": texts([]),
+        "zero": np.zeros(0),
+        **held,
+        "reference_weight": weight,
+        "reference_lifted": np.array(BEFORE),
+        **{f"rest_{name}": each for name, each in lain().items()},
+        **{f"ramp_{name}": each for name, each in lifted(torques).items()},
+    }
+    return values | changed
+
+
+def test_no_sound_arm_of_many_is_stopped_on_another_day(tool):
+    causes = [daily.judge(day(tool, seed)).cause for seed in range(SOUND)]
+    assert causes == [""] * SOUND
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ("foot-heavier", "weight of the foot beside"),
+        ("foot-half", "weight of the foot beside"),
+        ("sensor-turned-20deg", "weight of the foot"),
+        ("sensor-cable-pulls", "weight of the foot"),
+        ("zero-7-off-90deg", "weight of the foot"),
+    ],
+)
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_an_arm_that_changed_is_named(tool, seed, wrong, words):
+    assert daily.judge(day(tool, seed, wrong)).cause.startswith(words)
+
+
+@pytest.mark.parametrize(
+    ("torques", "joint"), [((2.8, 7.0), 2), ((22.0, 7.0), 2), ((18.0, 5.5), 4)]
+)
+def test_a_lift_off_that_drifted_is_named(tool, torques, joint):
+    cause = daily.judge(day(tool, 1, torques=torques)).cause
+    assert cause.startswith(f"lift-off of joint {joint} over that of the commissioning")
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"heard_master": np.array(20)}, "other masters"),
+        ({"changed": texts(["a puck"])}, "Changed since the commissioning: a puck"),
+        ({"late": np.array(4)}, "answered all the same"),
+        ({"replies_ns": np.full(100, 1_600_000)}, "seven positions"),
+        ({"replies_ns": np.zeros(0)}, "seven positions"),
+        ({"answer_ns": np.array(2_300_000)}, "from a question"),
+        ({"zero": np.radians([0.0, 1.8, 0, 0, 0, 0, 0])}, "zeroed elsewhere"),
+    ],
+)
+def test_a_bus_or_a_zero_that_is_another_one_is_named(tool, changed, words):
+    assert words in daily.judge(day(tool, 1, **changed)).cause
+
+
+def test_an_arm_that_moves_without_torque_is_named_and_not_lifted(tool):
+    values = {k: v for k, v in day(tool, 1).items() if not k.startswith("ramp_")}
+    values["rest_q"] = values["rest_q"].copy()
+    values["rest_q"][-1, 1] += 0.016
+    assert daily.judge(values).cause.startswith("way of joint 2 without torque")
+
+
+def test_an_arm_that_was_not_commissioned_has_nothing_to_be_compared_with(tmp_path):
+    files = RecordFolder.open(tmp_path, is_simulated=True)
+    with pytest.raises(SettingsError, match="C6 own weight was not passed"):
+        daily.reference_of(files)
+
+
+# --- its history ----------------------------------------------------------------------
+
+
+def check(days, lifted_at=1.0, cause=""):
+    ended = NOON + timedelta(days=days)
+    name = "lift-off of joint 2 over that of the commissioning"
+    return DailyCheck(
+        started=ended - timedelta(minutes=2),
+        ended=ended,
+        operator="Ada <A>",
+        witness="",
+        raw=Raw(file="daily.npz", sha256="0" * 64),
+        quantities=(
+            Measured(name=name, value=lifted_at, unit="", low=0.85, high=1.15),
+            Measured(name="other masters", value=0.0, unit="", high=0.0),
+        ),
+        cause=cause,
+    )
+
+
+def test_a_history_is_read_as_it_was_written_and_counts_for_a_day(tmp_path):
+    history = DailyHistory().with_check(check(0)).with_check(check(1))
+    write_history(tmp_path, history)
+    assert read_history(tmp_path, is_simulated=False) == history
+    assert not read_history(tmp_path, is_simulated=True).checks
+    assert history.counts_at(NOON + timedelta(days=1, hours=16))
+    assert not history.counts_at(NOON + timedelta(days=1, hours=17))
+
+
+def test_its_page_draws_the_drift_beside_the_limits(tmp_path):
+    history = DailyHistory(is_simulated=True)
+    for days, value in enumerate((1.0, 0.95, 0.8)):
+        cause = "it drifts" if days > 1 else ""
+        history = history.with_check(check(days, value, cause))
+    text = write_history_page(tmp_path, history).read_text()
+    for words in (
+        "0.8",
+        "\u22120.2",
+        "it drifts",
+        "Ada &lt;A&gt;",
+        "2026-11-28",
+        "<svg",
+    ):
+        assert words in text
+    assert text.count("<svg") == 1  # masters are not drawn
