@@ -46,6 +46,10 @@ class Hands(Protocol):
         """Push the sole with `force` [N] in the base frame, shape (3,), so long [s]."""
         ...
 
+    def twist(self, torque: float, seconds: float) -> None:
+        """Twist the foot about joint 7 with `torque` [N m] so long [s]."""
+        ...
+
 
 class SimulationControl(Hands, Protocol):
     """Hand, pendant, ground and faults of a simulated rig."""

@@ -55,7 +55,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="lines that press the pendant and order the hands at the arm, as on "
         "stdin: [SECONDS] activate|idle|estop|quit, pose q1..q7 SECONDS, "
-        "stop JOINT low|high, hang KG, unhang, push FX FY FZ SECONDS, release",
+        "stop JOINT low|high, hang KG, unhang, push FX FY FZ SECONDS, "
+        "twist N_M SECONDS, release",
     )
     parser.add_argument(
         "--can-log", type=Path, metavar="FILE", help="write every frame there"

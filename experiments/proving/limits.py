@@ -331,6 +331,38 @@ LIMITS: Mapping[str, Limit] = {
         "Compensation moves the arm: masses, mounting, zeros or torque constants",
     ),
     "share": Limit("share of the compensation reached", "", "{text}", low=1.0),
+    # C12
+    "rocked": Limit(
+        "swing of the foot's weight, rms",
+        "N",
+        "The foot was not rocked enough, or positions and forces are of two things",
+        low=0.4,
+    ),
+    "lag": Limit(
+        "forces behind positions",
+        "ms",
+        "Forces and motion are not of one time: a buffer of the sensor or its driver, "
+        "or late positions",
+        low=-5.0,
+        high=5.0,
+    ),
+    "turned": Limit(
+        "moment that turned the foot", "N m", "Too little to tell", low=0.2
+    ),
+    "stiffness": Limit(
+        "stiffness of joint 7's lock",
+        "N m/rad",
+        "Motor 7 makes another torque than it is told, its counts per turn, or "
+        "lock_kp of rig.toml",
+        low=16.0,
+        high=28.0,
+    ),
+    "ringing": Limit(
+        "swing beyond its rest once let go, over the way it was turned",
+        "",
+        "The lock rings: positions are late, or lock_kd of rig.toml",
+        high=0.5,
+    ),
     # C13
     "corners": Limit("corners make a container", "", "{text}", low=1.0),
     "flat": Limit(
@@ -434,6 +466,7 @@ ACCEPTABLE = frozenset(
         *("unusual", "drawings", "replaced", "travel", "stop_angle"),
         *("force_left", "foot_mass", "weight_way", "foot_centre", "moment_left"),
         *("hung_scale", "hung_spread", "fitted", "sole", "hung_way", "weight"),
+        *("stiffness", "lag"),
         *("flat", "incline", "heading", "far_end", "short", "scale", "balance"),
     }
 )

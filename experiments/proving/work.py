@@ -9,6 +9,7 @@ from experiments.proving import (
     by_hand,
     configuration,
     container,
+    lock_clock,
     rest_pose,
     scales,
     stop_circuit,
@@ -158,6 +159,15 @@ WORK: Mapping[ProofStep, StepWork] = {
         needs_loop=True,
         needs_zero=True,
     ),
+    ProofStep.LOCK_AND_CLOCK: StepWork(
+        lock_clock.collect,
+        lock_clock.judge,
+        4,
+        "Look at the sensor's buffer and filter, at motor 7, and at lock_kp, lock_kd.",
+        needs_loop=True,
+        needs_zero=True,
+        needs_proof=True,
+    ),
     ProofStep.CONTAINER: StepWork(
         container.collect,
         container.judge,
@@ -182,6 +192,7 @@ SITTINGS: tuple[tuple[ProofStep, ...], ...] = (
     (ProofStep.STOP_CIRCUIT,),
     (ProofStep.BY_HAND, ProofStep.OWN_WEIGHT, ProofStep.HUNG_WEIGHT),
     (ProofStep.REST_POSE, ProofStep.RAMPS, ProofStep.LIFT, ProofStep.GRAVITY_RAMP),
+    (ProofStep.LOCK_AND_CLOCK,),
     (ProofStep.CONTAINER,),
     (ProofStep.PLATE,),
 )

@@ -1,4 +1,4 @@
-"""Lines that tell the hands at a served arm what to do: pose, stop, hang, push."""
+"""Lines that tell the hands at a served arm what to do, e.g. pose, hang, push."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Literal
 
 from acquisition.simulation import Hands
 
+_HARDEST = 4.0  # N m, of a hand that twists
 _LONGEST, _HEAVIEST, _STRONGEST, _FARTHEST = 600.0, 20.0, 200.0, 7.0  # s, kg, N, rad
 
 
@@ -60,6 +61,18 @@ class PushOrder:
 
 
 @dataclass(frozen=True, slots=True)
+class TwistOrder:
+    """Twist the foot about joint 7 with `torque` [N m] for `seconds`."""
+
+    torque: float
+    seconds: float
+
+    def give(self, hands: Hands) -> None:
+        """Let the hands do it."""
+        hands.twist(self.torque, self.seconds)
+
+
+@dataclass(frozen=True, slots=True)
 class ReleaseOrder:
     """Let go of the arm."""
 
@@ -68,7 +81,7 @@ class ReleaseOrder:
         hands.let_go()
 
 
-HandOrder = PoseOrder | StopOrder | HangOrder | PushOrder | ReleaseOrder
+HandOrder = PoseOrder | StopOrder | HangOrder | PushOrder | TwistOrder | ReleaseOrder
 
 
 class HandOrderError(ValueError):
@@ -121,6 +134,14 @@ def _push(words: list[str]) -> HandOrder:
     )
 
 
+def _twist(words: list[str]) -> HandOrder:
+    torque, seconds = _numbers(words, 2, "twist N_M SECONDS")
+    return TwistOrder(
+        _within(torque, -_HARDEST, _HARDEST, "N m"),
+        _within(seconds, 0.0, _LONGEST, "s"),
+    )
+
+
 def _release(words: list[str]) -> HandOrder:
     _numbers(words, 0, "release")
     return ReleaseOrder()
@@ -132,6 +153,7 @@ _READERS: dict[str, Callable[[list[str]], HandOrder]] = {
     "hang": _hang,
     "unhang": _unhang,
     "push": _push,
+    "twist": _twist,
     "release": _release,
 }
 HAND_WORDS = tuple(_READERS)

@@ -37,6 +37,7 @@ from wam.model.constants import GRAVITY, ArmConstants, Array
 from wam.model.tool import Tool
 
 _NO_TORQUE = (0.0,) * 7
+_JOINT_7, _TWIST_RATE = 6, 2.0  # N m/s, of a person
 _ON_STAND = 0.02  # rad, of each joint: the foot has not left the stand
 # A person notices that the arm grows heavy, and then bears it [s].
 _NOTICED, _BORNE = 0.2, 0.5
@@ -87,6 +88,8 @@ class ArmPlant:
         self.finger = (0.0, 0.0, 0.0)
         self._hung = 0.0  # on a string from the sole [kg]
         self._pushed: tuple[Array, int] = (np.zeros(3), 0)  # at the sole [N], until
+        self._twist, self._twisted_until_ns = 0.0, 0  # about joint 7 [N m]
+        self._twisted = 0.0  # of that, in this cycle
         self._pull: Vector3 | None = None  # at the sole beside the ground's [N]
         self._ends = Ends(constants.q_lower, constants.q_upper)
         self._has_links = False
@@ -252,6 +255,11 @@ class ArmPlant:
         until_ns = self.t_ns + round(1e9 * seconds)
         self._pushed = self._axes.dot(np.array(force, dtype=np.float64)), until_ns
 
+    def twist(self, torque: float, seconds: float) -> None:
+        """Let a person twist the foot about joint 7, `torque` [N m], for `seconds`."""
+        self._twist = torque
+        self._twisted_until_ns = self.t_ns + round(1e9 * seconds)
+
     def start_truth(self) -> None:
         """Begin to write down what really happens."""
         self.truth = Truth()
@@ -291,6 +299,14 @@ class ArmPlant:
             body.keep_turn()
         self._has_links = links is not None
         force, self._pull = self._lift(), self._pull_at_sole()
+        twisted = 0.0
+        if self.t_ns < self._twisted_until_ns:  # begun gently, let go at once
+            step = _TWIST_RATE * PERIOD_NS * 1e-9
+            most = self._twist - self._twisted
+            twisted = self._twisted + min(max(most, -step), step)
+        if twisted != self._twisted:
+            self.disturbance[_JOINT_7] += twisted - self._twisted
+            self._twisted = twisted
         grip = GRIP if self.hand.is_holding and links is None else NO_GRIP
         torques = None
         if links is not None:
@@ -333,6 +349,9 @@ class ArmPlant:
         if self._pull is not None:
             px, py, pz = self._pull
             fx, fy, fz = fx + px, fy + py, fz + pz
+        if self._twisted:
+            ux, uy, uz = (self._twisted * self._body.rotation[:, 2]).tolist()
+            tx, ty, tz = tx + ux, ty + uy, tz + uz
         felt = (x + fx, y + fy, z + fz, tx, ty, tz)
         self._wrist.end_cycle(self._body.rotation, felt, motion[3:])
         if self.truth is not None:

@@ -278,6 +278,10 @@ class LocalSimulation:
         """Push the sole with `force` [N], base frame, for `seconds`."""
         self.rig.plant.push_with(force, seconds)
 
+    def twist(self, torque: float, seconds: float) -> None:
+        """Twist the foot about joint 7 with `torque` [N m] for `seconds`."""
+        self.rig.plant.twist(torque, seconds)
+
     def lift(self) -> None:
         """Let the hand carry the foot above the far end and hold it still."""
         self._roll_in()

@@ -14,6 +14,7 @@ from experiments.tools.hand_orders import (
     PushOrder,
     ReleaseOrder,
     StopOrder,
+    TwistOrder,
     parse_hand_order,
 )
 from experiments.tools.pendant import Lines, Pendant, TimedPress, parse_script
@@ -31,6 +32,7 @@ ZEROS = (0.0,) * 6
         ("hang 2", HangOrder(2.0)),
         ("unhang", HangOrder(0.0)),
         ("push 5 0 -1.5 0.6", PushOrder((5.0, 0.0, -1.5), 0.6)),
+        ("twist -0.6 2", TwistOrder(-0.6, 2.0)),
         ("release", ReleaseOrder()),
     ],
 )
@@ -59,6 +61,8 @@ def test_other_lines_are_none_of_the_hands(line):
         ("unhang 2", "expected unhang"),
         ("push 1 2 3", "expected push FX FY FZ SECONDS"),
         ("push 1 2 900 1", "900 is not within -200..200 N"),
+        ("twist 1", "expected twist N_M SECONDS"),
+        ("twist 9 1", "9 is not within -4..4 N m"),
         ("release it", "expected release"),
     ],
 )

@@ -185,3 +185,22 @@ def test_a_push_moves_an_arm_that_nobody_holds():
     # 30 N for 0.2 s against some kg: centimetres, less what sinks either way.
     aside = moved([0.0, 30.0, 0.0]) - moved([0.0, 0.0, 0.0])
     assert aside[1] > 0.01
+
+
+def test_a_twist_shows_in_the_sensor_turns_joint_7_and_ends():
+    plant = make_plant(friction=0.4, seed=1, has_hand=False, support=Support.NONE)
+    pass_time(plant, 0.1)
+    free, before = np.array(plant.sensor_load(plant.t_ns)), plant.q[6]
+    plant.twist(0.6, 0.5)
+    pass_time(plant, 0.1)
+    early = np.array(plant.sensor_load(plant.t_ns)) - free
+    pass_time(plant, 0.35)
+    late = np.array(plant.sensor_load(plant.t_ns)) - free
+    # It is begun at 2 N m/s, and the foot's inertia takes a little of it.
+    assert early[5] == pytest.approx(0.2, abs=0.03)
+    assert late[5] == pytest.approx(0.6, abs=0.03)
+    assert plant.q[6] - before > 0.01
+    pass_time(plant, 0.3)
+    assert (np.array(plant.sensor_load(plant.t_ns)) - free)[5] == pytest.approx(
+        0.0, abs=0.05
+    )

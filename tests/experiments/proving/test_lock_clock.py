@@ -1,0 +1,100 @@
+"""C12: lag, stiffness and ringing are recovered from signals of known ones."""
+
+import numpy as np
+import pytest
+
+from experiments.proving import lock_clock
+from experiments.proving.recording import texts
+from experiments.proving.weights import POSES
+from fakes.plant.gauges import WristGauges
+from tests.fakes.scenes import TOOL
+from wam.model.arm_model import ArmModel
+from wam.model.constants import load_constants
+
+MODEL = ArmModel(load_constants(), TOOL)
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def rocked(lag=0.0, way=0.3, seconds=10.0):
+    """Return what is recorded of a foot that is rocked about joint 6 at 1 Hz."""
+    gauges, t = WristGauges(TOOL, UP, 0.002), np.arange(0.0, seconds, 0.002)
+    q = np.tile(np.array(POSES[1], dtype=np.float64), (len(t), 1))
+    q[:, 5] += way * np.sin(2.0 * np.pi * t)
+    qd = np.gradient(q, 0.002, axis=0)
+    loads = []
+    for place, speed in zip(q, qd, strict=True):
+        rates = MODEL.sole_jacobian(place) @ speed
+        gauges.end_cycle(MODEL.plate_pose(place)[1], [0.0] * 6, rates.tolist())
+        loads.append(gauges.load())
+    t_ns = np.round(1e9 * (t + 1.0)).astype(np.int64)
+    rng = np.random.default_rng(1)
+    return {
+        "t_ns": t_ns,
+        "q": q,
+        "wrench_ns": t_ns + round(1e9 * lag),
+        "wrench": np.array(loads) + 0.05 * rng.standard_normal((len(t), 6)) + 3.0,
+    }
+
+
+def turned(stiffness=20.0, moment=0.6, back=0.0):
+    """Return what is recorded of a foot that is turned and let go."""
+    way = moment / stiffness
+    rest = np.zeros(900)
+    swing = way * np.exp(-np.arange(100) / 20.0)
+    swing[50] = -back * way
+    return {
+        "turned": np.array([0.1, 0.1 + way, 0.1]),
+        "moments": np.array([[0, 0, 0.02], [0, 0, 0.02 + moment], [0, 0, 0.02]]),
+        "swing_q7": np.concatenate([swing, rest]) + 0.1,
+        "ended": texts([]),
+        "sign": np.array(1.0),
+        "mounting": np.eye(3),
+    }
+
+
+def cause(**changed):
+    return lock_clock.judge({**rocked(), **turned(), **changed}).cause
+
+
+@pytest.mark.parametrize("lag", [-0.004, 0.0, 0.002, 0.02])
+def test_the_lag_of_the_sensor_is_recovered(lag):
+    seen, _ = lock_clock.force_lag({**rocked(lag), **turned()})
+    # The model is linear in the lag: a large one comes out 7 % too large.
+    assert seen == pytest.approx(lag, abs=5e-4, rel=0.08)
+
+
+def test_a_sound_arm_passes():
+    assert cause() == ""
+
+
+@pytest.mark.parametrize("lag", [-0.006, 0.006, 0.02])
+def test_forces_of_another_time_are_named(lag):
+    assert cause(**rocked(lag)).startswith("forces behind positions")
+
+
+def test_a_foot_that_was_hardly_rocked_tells_nothing():
+    assert cause(**rocked(way=0.05)).startswith("swing of the foot's weight")
+
+
+def test_a_recording_without_readings_is_no_sound_one():
+    nothing = {"wrench_ns": np.zeros(0), "wrench": np.zeros((0, 6))}
+    assert cause(**nothing).startswith("swing of the foot's weight")
+
+
+@pytest.mark.parametrize("stiffness", [9.5, 15.0, 29.0])
+def test_a_lock_of_another_stiffness_is_named(stiffness):
+    assert cause(**turned(stiffness)).startswith("stiffness of joint 7's lock")
+
+
+def test_a_lock_that_rings_is_named():
+    assert cause(**turned(back=0.6)).startswith("swing beyond its rest")
+    assert cause(**turned(back=0.3)) == ""
+
+
+def test_a_moment_of_nothing_tells_nothing():
+    assert cause(**turned(moment=0.1)).startswith("moment that turned the foot")
+
+
+def test_an_arm_that_the_guard_stopped_is_named_by_its_words():
+    stopped = {"ended": texts(["The speed of joint 7 was 2.6 rad/s."])}
+    assert "The speed of joint 7" in cause(**stopped)
