@@ -156,7 +156,7 @@ def judge_identity(values: Values) -> Judgement:
     ]
     if complete and len(serials) == len(MOTOR_NODES):
         rows.append(found("serials", len(set(serials))))
-    return judged(rows)
+    return judged(rows, [each.text for each in differences if each.is_warning])
 
 
 def time_replies(rig: Rig) -> Iterator[tuple[float, Values]]:

@@ -20,7 +20,7 @@ from experiments.commissioning.record import (
 )
 from experiments.commissioning.steps import ProofStep
 from experiments.messages import preflight_error
-from experiments.operator.console import BAD, GOOD, Console
+from experiments.operator.console import BAD, GOOD, WARNING, Console
 from experiments.proving import bus, by_hand
 from experiments.proving.limits import Judgement
 from experiments.proving.recording import Values, read_raw, write_raw
@@ -196,6 +196,8 @@ def say_judgement(console: Console, step: ProofStep, judgement: Judgement) -> No
     """Say what came of a step in a line, and what to do where it failed."""
     console.end_panel()
     name = f"{step} {step.words}"
+    for note in judgement.notes:
+        console.check(WARNING, name, note)
     if judgement.cause:
         console.check(BAD, name, judgement.cause)
         console.say(f"   {WORK[step].way_back}")

@@ -53,11 +53,13 @@ class Judgement:
         quantities: in the order in which they were judged.
         cause: the first contradiction, in words; "" = none.
         barred: what failed that nobody may accept, in words.
+        notes: what is not as expected and keeps nobody from going on, in words.
     """
 
     quantities: tuple[Measured, ...]
     cause: str
     barred: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 _MOTION = "Something moves the arm that is not gravity on its stops"
@@ -518,7 +520,7 @@ def _share(measured: Measured) -> float:
     return 0.0
 
 
-def judged(rows: Sequence[Found]) -> Judgement:
+def judged(rows: Sequence[Found], notes: Sequence[str] = ()) -> Judgement:
     """Return what a step's quantities say together; the first that fails is named."""
     first = next((row for row in rows if not row.measured.is_within), None)
     cause = "" if first is None else f"{first.measured.text}. {first.wrong}"
@@ -527,4 +529,5 @@ def judged(rows: Sequence[Found]) -> Judgement:
         for row in rows
         if not (row.measured.is_within or row.may_be_accepted)
     )
-    return Judgement(tuple(row.measured for row in rows), cause[:400], barred)
+    quantities = tuple(row.measured for row in rows)
+    return Judgement(quantities, cause[:400], barred, tuple(notes))

@@ -100,7 +100,7 @@ def judge(values: Values) -> Judgement:
     t_ns, mode, fresh = values["t_ns"], values["mode"], values["fresh"]
     stop = mode == SafetyMode.E_STOP
     first = int(stop.argmax()) if stop.any() else len(stop)
-    early = _longest(mode[:first] == SafetyMode.ACTIVE) * _MS
+    early = _longest(t_ns, mode[:first] == SafetyMode.ACTIVE) / 1e6
     silent = _silent_since(fresh, first)
     stopped = 1e9 if silent is None else max(0.0, float(silent - first) * _MS)
     kept = (t_ns > int(values["released_ns"])) & (t_ns < int(values["idled_ns"]))
@@ -117,13 +117,22 @@ def judge(values: Values) -> Judgement:
     )
 
 
-def _longest(is_so: NDArray[np.bool_]) -> int:
-    """Return the length of the longest run of True."""
-    best = run = 0
-    for each in is_so.tolist():
-        run = run + 1 if each else 0
-        best = max(best, run)
-    return best
+def _longest(t_ns: NDArray[np.int64], is_so: NDArray[np.bool_]) -> int:
+    """Return the longest time from a cycle that is so to the next that is not [ns].
+
+    While the module is being put to idle there are no cycles: what it takes lies
+    between two of them.
+    """
+    times = t_ns.tolist()
+    longest, since = 0, None
+    for i, each in enumerate(is_so.tolist()):
+        if each and since is None:
+            since = i
+        elif since is not None and not each:
+            longest, since = max(longest, times[i] - times[since]), None
+    if since is not None:
+        longest = max(longest, times[len(is_so) - 1] - times[since])
+    return longest
 
 
 def _silent_since(fresh: NDArray[np.int64], stop: int) -> int | None:

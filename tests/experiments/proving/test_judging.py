@@ -87,6 +87,20 @@ def test_a_sound_stop_passes_and_one_that_leaves_the_power_does_not():
     assert "stop button" in stop_circuit.judge(pressed(silent_after=200)).cause
 
 
+def test_a_module_that_does_not_go_to_idle_is_named_by_the_time_that_passes():
+    sound = pressed()
+    mode, t_ns = sound["mode"].copy(), sound["t_ns"].copy()
+    mode[20] = SafetyMode.ACTIVE
+    assert stop_circuit.judge({**sound, "mode": mode}).cause == ""
+    # Nothing is recorded while it is asked to; its own heartbeat brakes it at last.
+    t_ns[21:] += 98_000_000
+    late = {**sound, "mode": mode, "t_ns": t_ns}
+    late |= {name: sound[name] + 98_000_000 for name in ("released_ns", "idled_ns")}
+    assert "does not go back to idle" in stop_circuit.judge(late).cause
+    mode[20:26] = SafetyMode.ACTIVE
+    assert "does not go back" in stop_circuit.judge({**sound, "mode": mode}).cause
+
+
 def test_an_arm_that_moves_without_torque_is_named():
     q = np.tile(CONSTANTS.home, (500, 1))
     values = {"t_ns": np.arange(500) * 2_000_000, "q": q, "ended": texts([])}
