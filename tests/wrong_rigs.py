@@ -73,6 +73,14 @@ class Ending:
     travel: float = 0.0
     speed: float = 0.0
 
+    @property
+    def words(self) -> str:
+        """Where and how it ended, in a word or two."""
+        if not self.step:
+            return "passed"
+        kind = "warned" if self.is_warned else "refused" if self.is_refused else ""
+        return f"{self.step} {kind}".strip()
+
     def row(self, name: str, seed: int, friction: float) -> str:
         """Return it as a line below `HEAD`; "sound" is the name of a sound rig."""
         kind = wrong_rig(name).kind.value if name else "sound"

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
 EXAMPLES = """\
   traction commission --config lab/rig.toml what is not done or stale, step by step
-  traction commission --daily --config lab/rig.toml   the check of every day
   traction commission --fake --fast --until C3    the first steps, simulated devices"""
 
 FAKE_FOLDER = "commissioning.fake"

@@ -9,12 +9,10 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Literal, Self
 
-from pydantic import BaseModel, ConfigDict
-
 from acquisition.errors import SettingsError
 from acquisition.files import open_directory, read_regular, replace_file
 from acquisition.validation import Many, first_problem
-from experiments.commissioning.record import Measured, Raw, Word
+from experiments.commissioning.record import Measured, Raw, RecordPart, Word
 
 NAME = "daily.json"
 FIELD = "daily_check"  # of the metadata of a recording
@@ -24,11 +22,7 @@ COUNTS_FOR = timedelta(hours=16)  # a day in the laboratory
 _HINT = "Put back the file as it was written, or move it away: its history begins anew."
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
-
-
-class DailyCheck(_Part):
+class DailyCheck(RecordPart):
     """One check.
 
     Attributes:
@@ -56,7 +50,7 @@ class DailyCheck(_Part):
         return f"{when}, {self.cause or 'sound'}"
 
 
-class DailyHistory(_Part):
+class DailyHistory(RecordPart):
     """All checks of an arm, the oldest first.
 
     Attributes:

@@ -32,11 +32,13 @@ Moment = Annotated[datetime, Field(strict=False)]  # in a table it is read from 
 Verdict = Literal["sound", "wrong", "accepted"]
 
 
-class _Part(BaseModel):
+class RecordPart(BaseModel):
+    """A part of a record: nothing else may stand in it, and it does not change."""
+
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
-class Measured(_Part):
+class Measured(RecordPart):
     """One quantity of a step beside its limits.
 
     Attributes:
@@ -73,7 +75,7 @@ class Measured(_Part):
         return f"{self.name} {self.value:.4g}{unit}{bounds}"
 
 
-class Raw(_Part):
+class Raw(RecordPart):
     """A recording that a step was judged by.
 
     Attributes:
@@ -85,7 +87,7 @@ class Raw(_Part):
     sha256: Digest
 
 
-class Acceptance(_Part):
+class Acceptance(RecordPart):
     """Two persons took the responsibility for a step that failed.
 
     Attributes:
@@ -99,7 +101,7 @@ class Acceptance(_Part):
     when: datetime
 
 
-class StepRecord(_Part):
+class StepRecord(RecordPart):
     """One step that was done.
 
     Attributes:
@@ -150,7 +152,7 @@ class StepRecord(_Part):
         return self.model_copy(update={"digest": digest})
 
 
-class Commissioning(_Part):
+class Commissioning(RecordPart):
     """All of it: every step once, in order, as it was done last; C13 of each terrain.
 
     Attributes:

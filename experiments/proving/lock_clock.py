@@ -26,7 +26,8 @@ from wam.model.constants import GRAVITY, Array, load_constants
 
 ROCKED = 10.0  # s
 _POSE = 1  # of `POSES`: the foot ahead
-_WAY, _HALF = 0.3, 0.5  # rad to both sides, s from side to side
+# At 1 Hz the hysteresis of a sound sensor looks like a lag of up to 4 ms.
+_WAY, _HALF = 0.3, 1.0 / 3.0  # rad to both sides, s from side to side
 TURNED = 0.6  # N m, 6 N at 100 mm
 _TURN_SECONDS = 60.0  # that simulated hands turn
 _SETTLED, _MEANT = 0.8, 0.3  # s
@@ -64,8 +65,9 @@ def collect(scene: Scene) -> Values:
 def _rock(scene: Scene) -> Values:
     bring(scene, POSES[_POSE], "the pose where the foot points ahead")
     scene.ask(
-        f"Rock the foot about joint 6, {_WAY:g} rad to both sides, once a second, with "
-        f"a hand on the wrist and none on the foot. [space], then {ROCKED:g} s."
+        f"Rock the foot about joint 6, {_WAY:g} rad to both sides, three times in "
+        "two seconds, with a hand on the wrist and none on the foot. [space], then "
+        f"{ROCKED:g} s."
     )
     cycles = scene.rig.shared.cycles.reader()
     wrenches = scene.loop_client.wrenches()

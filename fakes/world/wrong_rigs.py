@@ -279,8 +279,8 @@ _OTHERS = (
     WrongRig("sensor-x-dead", 73, _S, "the sensor shows no force along x", "bridge open", ("C6", "C7"), _senses(np.diag([0.0, 1.0, 1.0, 1.0, 1.0, 1.0]))),
     WrongRig("idle-button-dead", 74, _E, "Shift-idle of the pendant does nothing", "contact", ("C4",), Departure(module=ModuleTrouble(dead_button="idle"))),
     WrongRig("supply-40v", 75, _E, "the power bus has 40 V", "another supply", ("C2",), Departure(module=ModuleTrouble(voltage=40.0))),
-    WrongRig("motor-7-half", 77, _W, "motor 7 makes half its torque", "a phase with little contact", ("C9", "C12"), Departure(torque=scaled(m7=0.5))),
     WrongRig("puck-6-hot", 76, _M, "puck 6 is 58 degrees warm, idle", "motor that was stalled", ("C2",), _said((6, "TEMP", 58), (6, "THERM", 57))),
+    WrongRig("motor-7-half", 77, _W, "motor 7 makes half its torque", "a phase with little contact", ("C9", "C12"), Departure(torque=scaled(m7=0.5))),
 )
 # fmt: on
 

@@ -34,7 +34,7 @@ PROOFS: dict[str, tuple[ProofStep, ...]] = {
     "joint torque command": (_S.IDENTITY, _S.RAMPS, _S.LIFT, _S.GRAVITY_RAMP),
     "safety mode": (_S.IDENTITY, _S.STOP_CIRCUIT),
     "pendant and e-stop": (_S.STOP_CIRCUIT,),
-    "F/T wrench": (_S.OWN_WEIGHT, _S.HUNG_WEIGHT, _S.PLATE),
+    "F/T wrench": (_S.OWN_WEIGHT, _S.HUNG_WEIGHT, _S.LOCK_AND_CLOCK, _S.PLATE),
     "host cycle": (_S.TIMING,),
     "CAN bus": (_S.LISTEN, _S.TIMING),
     "contact force": (_S.CONFIGURATION, _S.PLATE),
