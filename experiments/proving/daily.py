@@ -223,11 +223,16 @@ def _lying(values: Values) -> list[Found]:
     rows = rest_pose.rest_rows(rest)
     if not ramp:
         return rows
+    rows += rest_pose.ramp_rows(ramp)
+    if not all(row.measured.is_within for row in rows):
+        return rows  # nothing was lifted off
     lifted = rest_pose.liftoffs(ramp)
-    for joint, before in zip(LIFTED, values["reference_lifted"].tolist(), strict=True):
-        ratio = lifted.get(joint, 0.0) / before
-        rows.append(found("drift", ratio, joint=abs(joint)))
-    return [*rows, *rest_pose.ramp_rows(ramp)]
+    pairs = zip(LIFTED, values["reference_lifted"].tolist(), strict=True)
+    drifts = [
+        found("drift", lifted.get(joint, 0.0) / before, joint=abs(joint))
+        for joint, before in pairs
+    ]
+    return [*rows, *drifts]
 
 
 def _part(values: Values, prefix: str) -> Values:

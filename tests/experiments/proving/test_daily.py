@@ -107,11 +107,16 @@ def test_an_arm_that_changed_is_named(tool, seed, wrong, words):
 
 
 @pytest.mark.parametrize(
-    ("torques", "joint"), [((2.8, 7.0), 2), ((22.0, 7.0), 2), ((18.0, 5.5), 4)]
+    ("torques", "joint"), [((15.2, 7.0), 2), ((22.0, 7.0), 2), ((18.0, 5.5), 4)]
 )
 def test_a_lift_off_that_drifted_is_named(tool, torques, joint):
     cause = daily.judge(day(tool, 1, torques=torques)).cause
     assert cause.startswith(f"lift-off of joint {joint} over that of the commissioning")
+
+
+def test_a_joint_that_is_lifted_by_less_than_its_weight_is_named(tool):
+    cause = daily.judge(day(tool, 1, torques=(2.8, 7.0))).cause
+    assert cause.startswith("lift-off of joint 2 over its weight")
 
 
 @pytest.mark.parametrize(
