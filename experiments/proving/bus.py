@@ -22,6 +22,7 @@ LISTENED = 10.0  # s
 _PORTION = 0.5  # s, between two looks at the screen
 ASKED = 3  # times that each device is asked for the same
 LOOPED = 60  # s
+IDLE_DEGREES = (10.0, 50.0)  # °C
 _SILENT = -(2**31)  # in the place of a property that was not told
 
 
@@ -65,9 +66,13 @@ def identify(rig: Rig, commissioned: Sequence[int | None] = ()) -> Values:
             not.
     """
     refusal, warnings, nodes = "", list[str](), list[int]()
+    degrees = np.full((2, len(MOTOR_NODES)), np.nan)  # of pucks, of motors
     try:
         info = rig.backend.start_arm()
         warnings, nodes = list(info.warnings), list(info.nodes)
+        for i, puck in enumerate(info.pucks):
+            told_of = (puck.health.puck_degc, puck.health.motor_degc)
+            degrees[:, i] = [np.nan if each is None else each for each in told_of]
     except TractionError as error:
         refusal = error.message
         if not isinstance(error, UnfitDeviceError):
@@ -86,6 +91,7 @@ def identify(rig: Rig, commissioned: Sequence[int | None] = ()) -> Values:
         "differing": np.array(counted["differing"], dtype=np.int64),
         "warnings": texts(warnings),
         "refusal": texts([refusal] if refusal else []),
+        "degrees": degrees,
         "expected": texts([_expected(rig)]),
         "commissioned": np.array(
             [_SILENT if each is None else each for each in commissioned], dtype=np.int64
@@ -130,6 +136,19 @@ def _replaced(values: Values) -> list[str]:
     ]
 
 
+def _temperatures(values: Values) -> list[str]:
+    """Return in words which pucks and motors are not as warm as idle ones are."""
+    if "degrees" not in values:  # an earlier recording
+        return []
+    low, high = IDLE_DEGREES
+    return [
+        f"{what} {node} has {degrees:.0f} °C, an idle one has {low:g} to {high:g}"
+        for what, row in zip(("puck", "motor"), values["degrees"].tolist(), strict=True)
+        for node, degrees in enumerate(row, 1)
+        if degrees < low or degrees > high
+    ]
+
+
 def judge_identity(values: Values) -> Judgement:
     """Judge what `identify` was told."""
     counts = dict(
@@ -156,7 +175,8 @@ def judge_identity(values: Values) -> Judgement:
     ]
     if complete and len(serials) == len(MOTOR_NODES):
         rows.append(found("serials", len(set(serials))))
-    return judged(rows, [each.text for each in differences if each.is_warning])
+    advice = [each.text for each in differences if each.is_warning]
+    return judged(rows, [*advice, *_temperatures(values)])
 
 
 def time_replies(rig: Rig) -> Iterator[tuple[float, Values]]:

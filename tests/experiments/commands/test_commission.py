@@ -109,6 +109,22 @@ def test_a_puck_that_was_replaced_is_noticed_until_two_persons_accept_it(tmp_pat
     assert traction(*other).code == 0  # this is its arm from now on
 
 
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ("puck-6-hot", "puck 6 has 58 °C, an idle one has 10 to 50"),
+        ("otemp-120", "OTEMP of puck 2 is 120"),
+        ("", ""),
+    ],
+)
+def test_what_is_unusual_is_said_and_passes(tmp_path, wrong, words):
+    options = ("commission", *FIRST[:-1], "C2", "--config", write_config(tmp_path))
+    done = traction(*options, *(("--wrong", wrong) if wrong else ()))
+    assert done.code == 0, done.err
+    assert ("▲ C2 identity" in done.out) is bool(wrong)
+    assert words in " ".join(done.out.split())
+
+
 # Name of the catalogue, the step that finds it, words of its cause.
 WRONG = [
     ("foot-typed-4.5kg", "C0", "feet.tread.mass = 4.5"),
