@@ -99,6 +99,8 @@ def _cause(
         return "not done"
     if done.verdict == "wrong":
         return done.cause or "failed"
+    if (done.accepted is not None) is not (done.verdict == "accepted"):
+        return f"{done.verdict}, by whom?"
     inputs = {**inputs, **record.told_inputs()}
     for name in bases_of(step):
         then, current = done.inputs.get(name), inputs.get(name)

@@ -180,13 +180,6 @@ class Commissioning(RecordPart):
             raise ValueError("its steps are not in order, or one stands twice")
         return self
 
-    @model_validator(mode="after")
-    def _accepted_by_persons(self) -> Self:
-        for done in self.steps:
-            if (done.accepted is not None) is not (done.verdict == "accepted"):
-                raise ValueError(f"{done.step} is {done.verdict}, by whom?")
-        return self
-
     def of(self, step: ProofStep, subject: str = "") -> StepRecord | None:
         """Return what was done of a step; None = nothing.
 

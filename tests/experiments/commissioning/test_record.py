@@ -282,10 +282,10 @@ def test_persons_and_reasons_are_not_changed_unseen(tmp_path, old, new):
 @pytest.mark.parametrize(
     ("verdict", "who"), [("accepted", None), ("sound", ACCEPTANCE)]
 )
-def test_a_step_is_accepted_by_somebody_or_not_at_all(verdict, who):
+def test_a_step_is_accepted_by_somebody_or_does_not_count(verdict, who):
     failed = done(ProofStep.OWN_WEIGHT, verdict=verdict, accepted=who)
-    with pytest.raises(ValueError, match="by whom"):
-        Commissioning(program="x", steps=(failed,))
+    (lack,) = lacks(whole().with_step(failed), INPUTS, NOON)
+    assert lack.text == f"C6 own weight: {verdict}, by whom?"
 
 
 def test_a_record_of_a_former_version_keeps_its_digests():
