@@ -109,6 +109,34 @@ def test_an_arm_that_moves_without_torque_is_named():
     assert "way of joint 3" in rest_pose.judge_rest(values).cause
 
 
+def lifted(share):
+    """Return what is recorded of joint 2 that weighs `share` of what is predicted."""
+    way = np.concatenate([np.linspace(0.0, 0.08, 400), np.linspace(0.08, 0.0, 400)])
+    q, tau, predicted = np.tile(CONSTANTS.home, (800, 1)), *np.zeros((2, 800, 7))
+    q[:, 1] += way
+    predicted[:, 1] = 18.7
+    tau[:, 1] = 18.7 * share + np.where(np.arange(800) < 400, 1.0, -1.0)  # friction
+    return {
+        "proof": np.zeros(800),
+        "joints": np.array([2]),
+        "torques": np.array([25.0]),
+        "q": q,
+        "tau": tau,
+        "predicted": predicted,
+        "ended": texts([]),
+    }
+
+
+@pytest.mark.parametrize(
+    ("share", "is_sound"),
+    [(1.0, True), (0.9, True), (1.1, True), (0.88, False), (1.17, False)],
+)
+def test_a_joint_weighs_what_is_predicted_to_two_newton_metres(share, is_sound):
+    cause = rest_pose.judge_lift(lifted(share)).cause
+    assert (cause == "") is is_sound
+    assert is_sound or cause.startswith("weight on joint 2")
+
+
 def test_a_recording_is_read_as_written_or_refused(tmp_path):
     raw = write_raw(tmp_path, "one.npz", {"q": np.arange(3.0), "t": texts(["a"])})
     found = read_raw(tmp_path, raw)
