@@ -39,8 +39,8 @@ are refused at every start already, by what the pucks say or by who is on the bu
 "found at" is what was designed. "commissioned" is what `traction commission` made of
 them, kept by `python -m tests.wrong_rigs --seeds 1,2,3 --friction 0.4,0.7,1.0 --keep
 tests/fakes/world/wrong_rigs.csv`, which goes on where it was left: the step at which it
-stopped, how many of the arms (an empty cell: not run yet), and the largest energy of the arm, way and speed of the
-sole until then, where it was active.
+stopped, how many of the arms (an empty cell: not run yet), and the largest energy of
+the arm, way and speed of the sole until then, where it was active.
 
 ## Sound rigs
 
