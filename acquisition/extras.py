@@ -7,7 +7,7 @@ from acquisition.errors import MissingLibraryError
 
 # Module to import and name in the package index, by extra of the distribution.
 EXTRAS: Mapping[str, Mapping[str, str]] = {
-    "report": {"jinja2": "Jinja2", "matplotlib": "matplotlib"},
+    "report": {"jinja2": "Jinja2", "matplotlib": "matplotlib", "PIL": "pillow"},
     "cluster": {"dask": "dask", "distributed": "distributed"},
     "live": {"foxglove": "foxglove-sdk"},
     "pandas": {"pandas": "pandas"},

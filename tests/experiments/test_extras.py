@@ -3,9 +3,12 @@
 import subprocess
 import sys
 import tomllib
+from importlib import metadata
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 from acquisition.errors import MissingLibraryError
 from acquisition.extras import EXTRAS, require_extra
@@ -22,7 +25,34 @@ sys.modules.update(dict.fromkeys({names!r}))
 from experiments.__main__ import main
 sys.exit(main({arguments!r}))
 """
-LIBRARIES = tuple(name for extra in EXTRAS.values() for name in extra)
+
+
+def closure(names):
+    """Return the distributions that `names` install, with all that these need."""
+    found, left = set(), [canonicalize_name(name) for name in names]
+    while left:
+        name = left.pop()
+        if name in found:
+            continue
+        found.add(name)
+        for line in metadata.requires(name) or ():
+            need = Requirement(line)
+            if need.marker is None or need.marker.evaluate({"extra": ""}):
+                left.append(canonicalize_name(need.name))
+    return found
+
+
+def foreign_modules():
+    """Return what can be imported here, and not where no extra is installed."""
+    core = closure(Requirement(line).name for line in PROJECT["dependencies"])
+    here = metadata.packages_distributions()
+    return sorted(
+        module
+        for module, owners in here.items()
+        if module.isidentifier()
+        and "traction" not in owners
+        and not core & {canonicalize_name(owner) for owner in owners}
+    )
 
 
 def without(names, *arguments):
@@ -84,6 +114,8 @@ def test_a_command_names_its_missing_extra_first(
 @pytest.mark.timeout(300)
 def test_without_any_extra_trials_are_recorded_verified_and_exported(tmp_path):
     data = ("--data", tmp_path)
+    hidden = foreign_modules()
+    assert {name for extra in EXTRAS.values() for name in extra} <= set(hidden)
     for arguments in (
         ("run", "TF", *FAKE, "--trials", 2),
         ("verify", "--all"),
@@ -94,7 +126,7 @@ def test_without_any_extra_trials_are_recorded_verified_and_exported(tmp_path):
         ("identify", tmp_path / "tables", "--terrain-db", tmp_path / "terrains.json"),
         ("bundle", "S001", "--to", tmp_path / "bundle.zip"),
     ):
-        done = without(LIBRARIES, *arguments, *data)
+        done = without(hidden, *arguments, *data)
         assert done.returncode == 0, (arguments, done.stdout, done.stderr)
     tables = {path.name for path in (tmp_path / "tables").rglob("T*.csv")}
     assert {"T01.csv", "T02.csv"} <= tables
@@ -103,7 +135,7 @@ def test_without_any_extra_trials_are_recorded_verified_and_exported(tmp_path):
 def test_a_notebook_fits_without_any_extra_and_names_that_of_a_picture():
     code = f"""
 import sys
-sys.modules.update(dict.fromkeys({LIBRARIES!r}))
+sys.modules.update(dict.fromkeys({foreign_modules()!r}))
 import traction as tr
 tables = tr.load_tables({str(SLICE)!r}).on("TF")
 print(tr.fit(tables, "tustin"))
