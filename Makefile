@@ -7,13 +7,14 @@ STAMP := $(VENV)/.installed
 DOCS := $(VENV)/.docs
 WHEEL := build/wheel
 
-.PHONY: demo test docs wheel lab lab-page lint types contracts crate-validator sbom clean
+.PHONY: demo test docs wheel lock lab lab-page lint types contracts crate-validator sbom clean
 
 $(STAMP): pyproject.toml constraints.txt
 	@echo "Setting up $(VENV) (a few minutes the first time) ..."
 	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade 'pip>=25.1'
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check \
-	    --constraint constraints.txt --editable '.[test,dev]'
+	    --constraint constraints.txt --editable '.[all]' --group test --group dev
 	@touch $@
 
 test: $(STAMP)  ## set up, then run every test of the default suite
@@ -21,7 +22,7 @@ test: $(STAMP)  ## set up, then run every test of the default suite
 
 $(DOCS): $(STAMP) docs/constraints.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check \
-	    --constraint constraints.txt --constraint docs/constraints.txt --editable '.[docs]'
+	    --constraint constraints.txt --constraint docs/constraints.txt --group docs
 	@touch $@
 
 docs: $(DOCS)  ## the documentation: docs/_build/html/index.html
@@ -39,7 +40,7 @@ demo: $(STAMP)  ## two simulated sessions of ten trials, then the report of both
 	$(BIN)/traction report --all --data demo
 
 wheel: $(STAMP)  ## built, installed in an environment of its own, a session run there
-	rm -rf build
+	rm -rf $(WHEEL) build/lib build/bdist.*
 	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps \
 	    --wheel-dir $(WHEEL) .
 	$(PYTHON) -m venv $(WHEEL)/venv
@@ -71,6 +72,9 @@ crate-validator: .venv-crate/.installed  ## roc-validator, which needs an older 
 	.venv-crate/bin/python -m pip install --quiet --disable-pip-version-check \
 	    roc-validator==0.13.0
 	@touch $@
+
+lock: $(STAMP)  ## pylock.toml and constraints.lock, of wheels for every Python that is declared
+	$(BIN)/python -m tests.pylock
 
 sbom: $(STAMP)  ## what is installed, as CycloneDX JSON: sbom.json
 	$(BIN)/python -m tests.sbom > sbom.json

@@ -12,7 +12,10 @@ import re
 from importlib import metadata
 from pathlib import Path
 
-from tests.licences import licence_of, pins
+from packaging.requirements import Requirement
+
+from tests.licences import licence_of
+from tests.pylock import pinned
 
 ROOT = Path(__file__).parents[1]
 _HASH = re.compile(r"--hash=sha256:([0-9a-f]{64})")
@@ -38,9 +41,9 @@ def bill(constraints: str, lock: str) -> dict[str, object]:
         lock: text of constraints.lock.
     """
     sums = hashes(lock)
+    wanted = [pin.name for pin in pinned(constraints) if _is_here(pin)]
     components = [
-        _component(name, sums.get(name, []))
-        for name in sorted(pins(constraints), key=str.lower)
+        _component(name, sums.get(name, [])) for name in sorted(wanted, key=str.lower)
     ]
     main = {
         "type": "application",
@@ -55,6 +58,11 @@ def bill(constraints: str, lock: str) -> dict[str, object]:
         "metadata": {"component": main},
         "components": components,
     }
+
+
+def _is_here(pin: Requirement) -> bool:
+    """Return whether this version of Python needs the pin."""
+    return pin.marker is None or pin.marker.evaluate()
 
 
 def _component(name: str, sums: list[str]) -> dict[str, object]:

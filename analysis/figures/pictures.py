@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from PIL import Image
 
 Pixels = np.ndarray[Any, np.dtype[np.uint8]]
 
@@ -48,6 +47,8 @@ def png_of_few_colours(pixels: Pixels, dpi: int) -> bytes:
         pixels: red, green, blue and opacity, shape (rows, columns, 4).
         dpi: pixels per inch, for the file.
     """
+    from PIL import Image
+
     packed = np.ascontiguousarray(pixels).view("<u4")[..., 0] & _WHITE
     flat = packed.ravel()
     begins = np.flatnonzero(flat[1:] != flat[:-1]) + 1
@@ -81,6 +82,8 @@ def _palette(shades: Pixels, counts: np.ndarray) -> tuple[Pixels, Pixels]:
     if len(shades) <= _COLOURS:
         return shades, np.arange(len(shades), dtype=np.uint8)
     order = np.argsort(-counts, kind="stable")
+    from PIL import Image
+
     exact, others = order[:_EXACT], order[_EXACT:]
     weights = np.minimum(counts[others], _MOST_WEIGHT)
     row = Image.fromarray(np.repeat(shades[others], weights, axis=0)[None])

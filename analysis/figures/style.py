@@ -14,16 +14,21 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.backends.backend_svg import FigureCanvasSVG
-from matplotlib.colors import LogNorm
-from matplotlib.figure import Figure
 
+from acquisition.errors import MissingLibraryError
 from analysis.data.terrain_kinds import BIG, FLAT, SMALL
 from analysis.figures.pictures import Picture, png_of_few_colours
+
+try:
+    import matplotlib as mpl
+    from matplotlib.axes import Axes
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+    from matplotlib.colors import LogNorm
+    from matplotlib.figure import Figure
+except ModuleNotFoundError as error:
+    raise MissingLibraryError("matplotlib", "report") from error
 
 __all__ = [
     "ONE_COLUMN",

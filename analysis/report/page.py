@@ -10,8 +10,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-
+from acquisition.errors import MissingLibraryError
 from analysis.figures.sections import PAGE_ORDER, ReportSection
 from analysis.findings.findings import (
     StudyResults,
@@ -46,6 +45,11 @@ from analysis.study.models import GP_SE, GP_SE_TRIAL
 from analysis.study.store import write_atomic
 from analysis.study.study import Study
 from analysis.terrains.export import database_of
+
+try:
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+except ModuleNotFoundError as error:
+    raise MissingLibraryError("Jinja2", "report") from error
 
 __all__ = ["ReportContext", "ReportTable", "write_report"]
 

@@ -69,6 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Lead through one calibration and write its file; return the exit code."""
+    from acquisition.extras import require_extra
     from experiments.operator.console import Console
     from experiments.operator.scripted import choose_operator
     from experiments.operator.terminal import keyboard
@@ -83,6 +84,8 @@ def run(args: argparse.Namespace) -> int:
     from experiments.settings.load import load_settings
 
     _check_arguments(args)
+    if args.what == "friction":
+        require_extra("report")  # its page
     friction = friction_share(args)
     settings = load_settings(args.config)
     row = settings.row(args.terrain or settings.matrix.terrains[0].name)

@@ -98,6 +98,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Do the steps that are due and return the exit code."""
+    from acquisition.extras import require_extra
     from experiments.operator.console import WARNING, Console
     from experiments.operator.scripted import choose_operator
     from experiments.proving.guide import RecordFolder, recheck
@@ -105,6 +106,7 @@ def run(args: argparse.Namespace) -> int:
     from experiments.rig.rig import FakeOptions
     from experiments.settings.load import load_settings
 
+    require_extra("report")  # the page of what was measured
     check_truth(args)
     steps = _steps(args)
     friction = friction_share(args)

@@ -55,6 +55,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Fit tables and write the report."""
     from acquisition.clock import SystemClock
+    from acquisition.extras import require_extra
+
+    require_extra("report")  # before its page is imported
+    if args.scheduler:
+        require_extra("cluster")
     from analysis.report.page import ReportContext, write_report
     from analysis.report.what_if_tables import plain_choice, side_by_side
     from analysis.study.models import FitOptions

@@ -54,6 +54,11 @@ def run(args: argparse.Namespace) -> int:
     """Write the report of one session or of a study."""
     import json
 
+    from acquisition.extras import require_extra
+
+    require_extra("report")
+    if args.scheduler:
+        require_extra("cluster")
     if not args.scheduler and not _is_kept(Path(args.data)):
         from acquisition.worker_processes import available_cores, prepare_workers
 

@@ -14,7 +14,6 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from acquisition.errors import MissingLibraryError
 from experiments.report.checksums import SUMS, digest_of
 
 if TYPE_CHECKING:
@@ -111,18 +110,6 @@ class PublishedPhoto:
 def is_publication(path: Path) -> bool:
     """Return whether `path` is a folder that `traction publish` wrote."""
     return (path / METADATA).is_file() or (path / SUMS).is_file()
-
-
-def require_rocrate() -> None:
-    """Find out before anything is written whether rocrate is installed.
-
-    Raises:
-        MissingLibraryError: it is not.
-    """
-    try:
-        import rocrate.rocrate as _  # noqa: F401
-    except ImportError as error:
-        raise MissingLibraryError("rocrate", "publish") from error
 
 
 def crate_text(

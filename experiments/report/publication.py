@@ -12,6 +12,7 @@ from pathlib import Path
 
 from acquisition.clock import SystemClock
 from acquisition.errors import TrialFileError
+from acquisition.extras import require_extra
 from acquisition.trial_file.data_files import list_folder, open_data
 from analysis.data.load import RecordedTrial, load_trial
 from experiments import provenance
@@ -23,7 +24,6 @@ from experiments.report.crate import (
     RecordingAction,
     StudyAction,
     crate_text,
-    require_rocrate,
 )
 from experiments.report.credits import (
     Author,
@@ -90,7 +90,8 @@ def publish_sessions(
         SessionError: `to` holds something, or there is no kept trial.
         TrialFileError: a file cannot be read or written.
     """
-    require_rocrate()
+    require_extra("report")
+    require_extra("publish")
     make_empty(to)
     copies = [_copy_session(session, to / SESSIONS) for session in sessions]
     photos = _copy_photos(sessions, copies, to, console)

@@ -19,8 +19,7 @@ from analysis.findings.rig_health import with_tares
 from analysis.foresight.judged import JUDGED_TYPES
 from analysis.foresight.training import fit_foresight
 from analysis.report.drawing import DRAWN_TYPES
-from analysis.report.page import ReportContext, write_report
-from analysis.report.page_model import BedPhoto
+from analysis.report.page_model import BedPhoto, ReportContext
 from analysis.report.what_if import StudyVariant
 from analysis.report.what_if_tables import plain_choice, side_by_side
 from analysis.study.crossval import Prepared
@@ -259,7 +258,10 @@ def report_sessions(
 
     Raises:
         SessionError: no session has a kept trial.
+        MissingLibraryError: the extra `report` is not installed.
     """
+    from analysis.report.page import write_report  # exporting needs no page
+
     choices = order.choices
     fit = FitOptions(choices.bounds, seed=order.seed, models=choices.models)
     analysed = study_sessions(sessions, data, order, console, fit)

@@ -1,0 +1,37 @@
+"""Libraries that only some commands need, by the extra that installs them."""
+
+from collections.abc import Mapping
+from importlib.util import find_spec
+
+from acquisition.errors import MissingLibraryError
+
+# Module to import and name in the package index, by extra of the distribution.
+EXTRAS: Mapping[str, Mapping[str, str]] = {
+    "report": {"jinja2": "Jinja2", "matplotlib": "matplotlib", "PIL": "pillow"},
+    "cluster": {"dask": "dask", "distributed": "distributed"},
+    "live": {"foxglove": "foxglove-sdk"},
+    "pandas": {"pandas": "pandas"},
+    "parquet": {"pyarrow": "pyarrow"},
+    "publish": {"rocrate": "rocrate"},
+}
+
+
+def require_extra(extra: str) -> None:
+    """Refuse before anything is done what would fail at its end; imports nothing.
+
+    Args:
+        extra: one of `EXTRAS`.
+
+    Raises:
+        MissingLibraryError: a library of it is not installed.
+    """
+    for module, library in EXTRAS[extra].items():
+        if not _is_installed(module):
+            raise MissingLibraryError(library, extra)
+
+
+def _is_installed(module: str) -> bool:
+    try:
+        return find_spec(module) is not None
+    except (ImportError, ValueError):  # hidden, or a module without a specification
+        return False

@@ -1,0 +1,150 @@
+"""What works without extras; a command names the one that it misses."""
+
+import subprocess
+import sys
+import tomllib
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+from acquisition.errors import MissingLibraryError
+from acquisition.extras import EXTRAS, require_extra
+from tests.experiments.program import traction
+
+ROOT = Path(__file__).parents[2]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+SLICE = ROOT / "tests" / "data" / "rehearsal_slice.npz"
+AUTHOR = ("--author", "Family, Given", "--licence", "CC0-1.0")
+FAKE = ("--fake", "--fast", "--operator-script", "auto")
+HIDDEN = """
+import sys
+sys.modules.update(dict.fromkeys({names!r}))
+from experiments.__main__ import main
+sys.exit(main({arguments!r}))
+"""
+
+
+def closure(names):
+    """Return the distributions that `names` install, with all that these need."""
+    found, left = set(), [canonicalize_name(name) for name in names]
+    while left:
+        name = left.pop()
+        if name in found:
+            continue
+        found.add(name)
+        for line in metadata.requires(name) or ():
+            need = Requirement(line)
+            if need.marker is None or need.marker.evaluate({"extra": ""}):
+                left.append(canonicalize_name(need.name))
+    return found
+
+
+def foreign_modules():
+    """Return what can be imported here, and not where no extra is installed."""
+    core = closure(Requirement(line).name for line in PROJECT["dependencies"])
+    here = metadata.packages_distributions()
+    return sorted(
+        module
+        for module, owners in here.items()
+        if module.isidentifier()
+        and "traction" not in owners
+        and not core & {canonicalize_name(owner) for owner in owners}
+    )
+
+
+def without(names, *arguments):
+    """Run a command where `names` cannot be imported; return how it ended."""
+    code = HIDDEN.format(names=names, arguments=[str(word) for word in arguments])
+    words = [sys.executable, "-c", code]
+    return subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
+
+
+def test_extras_are_those_of_the_distribution():
+    declared = {
+        name: {word.partition(">")[0] for word in words}
+        for name, words in PROJECT["optional-dependencies"].items()
+    }
+    everything = declared.pop("all")
+    assert declared == {name: set(each.values()) for name, each in EXTRAS.items()}
+    assert everything == {f"traction[{','.join(sorted(EXTRAS))}]"}
+
+
+@pytest.mark.parametrize("extra", EXTRAS)
+def test_an_extra_whose_library_is_hidden_is_named(extra, monkeypatch):
+    require_extra(extra)
+    hidden = next(iter(EXTRAS[extra]))
+    monkeypatch.setitem(sys.modules, hidden, None)
+    with pytest.raises(MissingLibraryError, match=EXTRAS[extra][hidden]) as refused:
+        require_extra(extra)
+    assert f"traction[{extra}]" in refused.value.hint
+
+
+@pytest.mark.parametrize(
+    ("extra", "arguments"),
+    [
+        ("report", ("report", "--all")),
+        ("report", ("fit", SLICE, "--to", "fit")),
+        ("report", ("publish", "--all", "--to", "crate", *AUTHOR)),
+        ("report", ("commission", *FAKE)),
+        ("report", ("calibrate", "friction", *FAKE)),
+        ("cluster", ("report", "--all", "--scheduler", "tcp://127.0.0.1:9")),
+        ("cluster", ("fit", SLICE, "--to", "f", "--scheduler", "tcp://127.0.0.1:9")),
+        ("publish", ("publish", "--all", "--to", "crate", *AUTHOR)),
+        ("parquet", ("export", "S001", "--to", "tables", "--format", "parquet")),
+        ("live", ("watch",)),
+    ],
+)
+@pytest.mark.parametrize("nth", [0, -1])
+def test_a_command_names_its_missing_extra_first(
+    extra, arguments, nth, recorded, monkeypatch, tmp_path
+):
+    """Also of the last library of the extra, and nothing has been written then."""
+    monkeypatch.setitem(sys.modules, list(EXTRAS[extra])[nth], None)
+    monkeypatch.chdir(tmp_path)
+    done = traction(*arguments, "--data", recorded.data)
+    assert done.code == 2, done
+    assert f"traction[{extra}]" in done.err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_without_any_extra_trials_are_recorded_verified_and_exported(tmp_path):
+    data = ("--data", tmp_path)
+    hidden = foreign_modules()
+    assert {name for extra in EXTRAS.values() for name in extra} <= set(hidden)
+    for arguments in (
+        ("run", "TF", *FAKE, "--trials", 2),
+        ("verify", "--all"),
+        ("status",),
+        ("check", "--fake"),
+        ("export", "S001", "--to", tmp_path / "tables"),
+        ("export", "--terrain-db", tmp_path / "terrains.json"),
+        ("identify", tmp_path / "tables", "--terrain-db", tmp_path / "terrains.json"),
+        ("bundle", "S001", "--to", tmp_path / "bundle.zip"),
+    ):
+        done = without(hidden, *arguments, *data)
+        assert done.returncode == 0, (arguments, done.stdout, done.stderr)
+    tables = {path.name for path in (tmp_path / "tables").rglob("T*.csv")}
+    assert {"T01.csv", "T02.csv"} <= tables
+
+
+def test_a_notebook_fits_without_any_extra_and_names_that_of_a_picture():
+    code = f"""
+import sys
+sys.modules.update(dict.fromkeys({foreign_modules()!r}))
+import traction as tr
+tables = tr.load_tables({str(SLICE)!r}).on("TF")
+print(tr.fit(tables, "tustin"))
+try:
+    tables[0].plot()
+except Exception as error:
+    print(error)
+"""
+    words = [sys.executable, "-c", code]
+    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "traction[report]" in done.stdout
