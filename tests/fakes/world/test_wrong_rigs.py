@@ -11,6 +11,7 @@ from acquisition.errors import SettingsError
 from experiments.rig.fake import typed_wrongly, wrong_rigs
 from experiments.settings.load import load_settings
 from fakes.clock import SteppedClock
+from fakes.ground.terrain import GroundChoice
 from fakes.plant.plant import ArmPlant
 from fakes.world.departure import Departure
 from fakes.world.rig import FakeRig, SimulatedScene
@@ -43,7 +44,7 @@ def build():
     built = []
 
     def start(name):
-        scene = SimulatedScene("S0", "small", "tread", FRAME, START_Q, 1)
+        scene = SimulatedScene("S0", GroundChoice("small", "tread"), FRAME, START_Q, 1)
         departure = wrong_rig(name).departure if name else Departure()
         clock = SteppedClock()
         rig = FakeRig(replace(scene, departure=departure), CONSTANTS, TOOL, clock)
@@ -444,7 +445,7 @@ def test_places_are_what_they_are_named_for(build):
     assert frame("heading-off-20deg").heading == pytest.approx(np.radians(20.0))
     assert frame("far-end-off-100mm").far_end == pytest.approx((0.70, 0.0, 0.02))
     assert frame("travel-too-long").travel == pytest.approx(FRAME.travel - 0.1)
-    assert build("label-swapped").scene.stones == "none"
+    assert build("label-swapped").scene.ground.stones == "none"
 
 
 def test_every_rig_of_the_catalogue_can_be_built(build):
