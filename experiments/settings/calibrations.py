@@ -149,7 +149,7 @@ class _Reader:
         if row.taught is not None:
             instead = f"remove [places.{row.place}]"
             text = read_calibration(self._folder / row.taught, "terrain", instead)
-            taught = TaughtPlace.model_validate(parse_toml(text))
+            taught = TaughtPlace.parse(text)
             self._check_kind(row.taught, is_of_simulation=taught.simulated)
             self.texts[f"{PREFIX}{row.taught}"] = text
         name = row.calibration

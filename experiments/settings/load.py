@@ -143,9 +143,7 @@ def load_settings(config: Path | None) -> Settings:
     Raises:
         SettingsError: a file is missing, no TOML, or holds a wrong key or value.
     """
-    shipped = resources.files("experiments.data")
-    rig_text = (shipped / "rig.toml").read_text()
-    matrix_text = (shipped / "matrix.toml").read_text()
+    rig_text, matrix_text = map(_shipped, ("rig.toml", "matrix.toml"))
     origin = SHIPPED
     if config is not None:
         rig_text = _read(config)
@@ -158,6 +156,49 @@ def load_settings(config: Path | None) -> Settings:
     rig = load_rig(rig_text, name, folder)
     matrix = load_matrix(matrix_text, rig)
     return Settings(rig, matrix, rig_text, matrix_text, origin, folder)
+
+
+def load_unplaced(
+    config: Path | None, place: str, foot: str | None
+) -> tuple[Settings, TerrainRow]:
+    """Return settings with one terrain at a place that nobody has measured yet.
+
+    Where the container of a simulation stands follows from the numbers that rig.toml
+    has of the place, or is that of the shipped matrix; a real arm needs none.
+
+    Args:
+        config: rig.toml; None = the shipped defaults. No matrix.toml is read.
+        place: its name.
+        foot: that is mounted; None = the first of rig.toml.
+
+    Raises:
+        SettingsError: rig.toml has a wrong key or value, or no such foot.
+    """
+    text = _shipped("rig.toml") if config is None else _read(config)
+    folder = Path() if config is None else config.parent
+    name = "rig.toml" if config is None else config.name
+    rig = _parse(RigSettings, text, name)
+    build_device(rig.ft_sensor)
+    if foot is not None and foot not in rig.feet:
+        raise SettingsError(
+            f"There is no foot {foot!r} in {name}.",
+            hint=f"Feet: {', '.join(rig.feet)}. Nothing was started.",
+        )
+    known = rig.places.get(place, StatedPlace())
+    row = TerrainRow(
+        name=f"place-{place.replace('_', '-')}"[:24],
+        foot=foot or next(iter(rig.feet)),
+        far_end=known.far_end or (0.70, 0.0, 0.12),
+        heading_deg=known.heading_deg or 0.0,
+        incline_deg=known.incline_deg or 0.0,
+        travel=known.travel or 0.45,
+        trials=1,
+        stones="small",
+    )
+    rig = rig.model_copy(update={"places": {}})
+    matrix = MatrixSettings(terrains=(row,))
+    origin = SHIPPED if config is None else str(config)
+    return Settings(rig, matrix, text, "", origin, folder), row
 
 
 def load_rig(text: str, name: str, folder: Path) -> RigSettings:
@@ -187,7 +228,13 @@ def _taught(name: str, place: StatedPlace, folder: Path) -> StatedPlace:
             hint="Remove the numbers, or the line taught. Nothing was started.",
         )
     text = _read(folder / place.taught, f"Run traction teach {name}.")
-    taught = _parse(TaughtPlace, text, place.taught)
+    try:
+        taught = TaughtPlace.parse(text)
+    except ValueError as error:
+        raise SettingsError(
+            f"{place.taught} is no place: {error}.",
+            hint=f"Run traction teach {name} again. Nothing was started.",
+        ) from error
     if taught.place != name:
         raise SettingsError(
             f"{place.taught} is of place {taught.place}, not of {name}.",
@@ -234,6 +281,10 @@ def read_foot(path: Path) -> FootSection:
     """
     text = _read(path, "Name a foot of rig.toml, or a file with mass, com, inertia.")
     return _parse(FootSection, text, path.name)
+
+
+def _shipped(name: str) -> str:
+    return (resources.files("experiments.data") / name).read_text()
 
 
 def _read(path: Path, hint: str = "Name a rig.toml with --config.") -> str:

@@ -3,6 +3,7 @@
 from pydantic import Field
 
 from acquisition.settings import File, SettingsSection
+from acquisition.toml_files import TomlFile
 from experiments.settings.matrix import Angles, FarEnd, Heading, Incline, Travel
 
 
@@ -36,7 +37,7 @@ class StatedPlace(SettingsSection):
         return any(each is not None for each in stated)
 
 
-class TaughtPlace(SettingsSection):
+class TaughtPlace(TomlFile):
     """A file of `traction teach`.
 
     Attributes:
