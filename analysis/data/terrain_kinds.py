@@ -31,6 +31,7 @@ PAPER_INCLINES: Mapping[str, float] = {
     **dict.fromkeys(("S15", "B15"), 15.0),
 }
 LEVELS = ("terrain", "stones", "surface")
+_OTHER_INCLINE = 2.5  # degrees; half of what the paper's differ by
 _TITLES = {
     SMALL: "small stones",
     BIG: "big stones",
@@ -104,6 +105,21 @@ def terrain_incline(
     """
     stated = [angle for angle in inclines if angle is not None]
     return median(stated) if stated else PAPER_INCLINES.get(terrain)
+
+
+def is_papers(terrain: str, kind: str, incline_deg: float | None) -> bool:
+    """Whether a terrain is one of the paper's: its name, stones and incline.
+
+    Args:
+        terrain: its name.
+        kind: its kind.
+        incline_deg: its incline [degrees]; None = unknown.
+    """
+    if PAPER_KINDS.get(terrain) != kind:
+        return False
+    return incline_deg is None or (
+        abs(incline_deg - PAPER_INCLINES[terrain]) < _OTHER_INCLINE
+    )
 
 
 def kind_title(kind: str) -> str:

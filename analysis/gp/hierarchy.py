@@ -207,6 +207,22 @@ class PredictiveProcess:
             mean, np.maximum(latent, 0.0), float(sn2[0]), float(sc2[0])
         )
 
+    def covariance(self, grounds: Sequence[Ground], point: Array) -> Array:
+        """Return the covariance of f_0 + d_g on k grounds at one input, shape (k, k).
+
+        Args:
+            grounds: known or not.
+            point: the input, shape (1, 2).
+        """
+        process, theta = self._process, self._process.theta
+        z = (point - process.centre) / process.scale
+        related = Resemblance(self._rows.grounds, grounds, process.terms)
+        B = related.at(theta)[0][self._rows.ground]
+        cross = _covariance(theta, self._X, np.repeat(z, len(grounds), axis=0), B)
+        half = self._factor.half(cross)
+        own = Resemblance(grounds, grounds, process.terms).at(theta)[0]
+        return np.exp(2.0 * theta[0]) + own - half.T @ half
+
 
 class GroundPosterior:
     """Log likelihood plus log prior of theta, given rows: what a search climbs.

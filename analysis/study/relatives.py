@@ -145,7 +145,7 @@ def grounds_of(trials: Mapping[str, Sequence[TractionSeries]]) -> dict[str, Grou
         incline = terrain_incline(name, [series.incline_deg for series in recorded])
         if incline is None:
             continue
-        factors = factors_of(recorded)
+        factors = logarithms(factors_of(recorded), recorded)
         if kind == FINE and isinstance(size := dict(factors).get("d50"), float):
             kind = f"{size:g} mm"
         if kind == FLAT or grain_size(kind) is not None:
@@ -154,20 +154,32 @@ def grounds_of(trials: Mapping[str, Sequence[TractionSeries]]) -> dict[str, Grou
     return grounds
 
 
-def factors_of(recorded: Sequence[TractionSeries]) -> tuple[tuple[str, Value], ...]:
+def factors_of(recorded: Sequence[TractionSeries]) -> dict[str, Value]:
     """Return the factors that the recordings of a terrain state alike.
 
-    One that they contradict each other in does not apply. Numbers that are compared by
-    their logarithm are logarithms, but for the grain size, d50 [mm].
+    One that they contradict each other in does not apply.
     """
     found: dict[str, Value] = {}
     for series in recorded:
         for name, value in series.factors.items():
-            own = value
-            if name in series.logs and name != "d50" and isinstance(value, float):
-                own = math.log(value) if value > 0.0 else None
-            found[name] = own if found.get(name, own) == own else None
-    return tuple(found.items())
+            found[name] = value if found.get(name, value) == value else None
+    return found
+
+
+def logarithms(
+    factors: Mapping[str, Value], recorded: Sequence[TractionSeries]
+) -> tuple[tuple[str, Value], ...]:
+    """Return factors with the logarithm of those that are compared by it.
+
+    The grain size, d50 [mm], stays what it is: its term takes the logarithm itself.
+    """
+    logs = {name for series in recorded for name in series.logs} - {"d50"}
+    values: dict[str, Value] = dict(factors)
+    for name in logs & set(values):
+        value = values[name]
+        if isinstance(value, float):
+            values[name] = math.log(value) if value > 0.0 else None
+    return tuple(values.items())
 
 
 def plan_relatives(
