@@ -9,10 +9,8 @@ if TYPE_CHECKING:
     from experiments.operator.console import Console
 
 EXAMPLES = """\
-  traction init                             into this folder
   traction init lab                         into lab/, made where it is missing
-  traction init lab --ask                   a matrix of your own, by a few questions
-  traction init new --from lab/rig.toml     the same cells, in the newer form"""
+  traction init lab --ask                   a matrix of your own, by a few questions"""
 
 _FILES = ("rig.toml", "matrix.toml")
 

@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 
 EXAMPLES = """\
   traction status                           the table, and what comes next
-  traction status --where kind=live,stones=big --follow   watch a part of it
-  traction status --where 'moisture=wet,d50>=19'   cells by their factors"""
+  traction status --where 'kind=live,incline_deg>5' --follow   watch a part of it"""
 
 _HEADER = ("terrain", "kind", "kept", "trials", "rejected", "sessions")
 _LOOK_NS = 1_000_000_000

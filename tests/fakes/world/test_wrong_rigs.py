@@ -344,7 +344,7 @@ def test_feet_are_what_they_are_named_for():
 def test_a_foot_that_is_mistyped_is_in_the_settings_or_refused_there():
     settings = load_settings(None)
     light = typed_wrongly(settings, "foot-forgotten")
-    assert {light.rig.feet.tread.mass, light.rig.feet.bare.mass} == {0.05}
+    assert {foot.mass for foot in light.rig.feet.values()} == {0.05}
     assert typed_wrongly(settings, "foot-half") is settings
     with pytest.raises(SettingsError, match=r"mass = 4\.5"):
         typed_wrongly(settings, "foot-typed-4.5kg")
