@@ -6,6 +6,8 @@ from typing import Literal, Protocol
 
 from acquisition.sample import Record
 
+ENDS = 100  # numbers of touches above it: the near end, the far end, and again
+
 
 class Hands(Protocol):
     """A person who brings a simulated arm to poses and loads its foot."""

@@ -20,7 +20,7 @@ import pinocchio as pin
 
 from acquisition.clock import PERIOD_NS
 from fakes.ground.contact import Contact, Motion
-from fakes.ground.terrain import Terrain, make_terrain
+from fakes.ground.terrain import GroundChoice, Terrain, make_terrain
 from fakes.plant.plant import ArmPlant
 from fakes.plant.push import HandView, Pace, Push, Vector3
 from fakes.randomness import TrialGenerators, trial_generators
@@ -247,7 +247,9 @@ def _random() -> TrialGenerators:
 
 
 def _ground() -> Terrain:
-    return make_terrain("small", "tread", _FRAME.incline, _random().ground)
+    return make_terrain(
+        GroundChoice("small", "tread"), _FRAME.incline, _random().ground
+    )
 
 
 def _part(name: str, took: list[float], whole: float) -> PageSection:

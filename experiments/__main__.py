@@ -36,6 +36,7 @@ COMMANDS = {
     "zero": "set the home position after confirmation",
     "bench": "measures the control loop on this machine",
     "calibrate": "guided calibrations of the rig",
+    "teach": "teach by hand where a container stands",
     "fake": "serve the simulated arm to other programs over CAN",
     "replay": "replay a trial, or decode a bus log",
     "watch": "serve the running session to a second screen, read only",

@@ -109,7 +109,7 @@ class TerrainFrame:
     """Frame of a terrain: x_T down the slope toward the base, z_T the normal.
 
     Attributes:
-        incline: angle of the plane [rad], the far end is the high end.
+        incline: angle of the plane [rad]; positive: the far end is the high end.
         heading: direction from the base to the container about z [rad].
         far_end: point of the plane where trials start [m], shape (3,), base frame.
         travel: length of a trial along x_T [m].
@@ -127,6 +127,12 @@ class TerrainFrame:
         yaw = np.array([[ch, -sh, 0.0], [sh, ch, 0.0], [0.0, 0.0, 1.0]])
         rows = np.array([[-ca, 0.0, -sa], [0.0, -1.0, 0.0], [-sa, 0.0, ca]])
         return rows @ yaw.T
+
+    def from_other_end(self) -> "TerrainFrame":
+        """Return the same plane crossed the other way, from its near end."""
+        near = np.array(self.far_end) + self.travel * self.axes()[0]
+        x, y, z = near.tolist()
+        return TerrainFrame(-self.incline, self.heading + np.pi, (x, y, z), self.travel)
 
     def displacement(self, position: Floats) -> Floats:
         """Return the distance from the far end along x_T [m], shape (...)."""

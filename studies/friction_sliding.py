@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from acquisition.control_loop.states import ArmState
-from fakes.ground.terrain import make_terrain
+from fakes.ground.terrain import GroundChoice, make_terrain
 from fakes.plant.push import HandView, Vector3
 from studies.friction_page import with_sliding
 from tests.fakes.scenes import CONSTANTS
@@ -86,7 +86,9 @@ def loads(found: str, true: str, share: float) -> SlidLoad:
 def put_down_and_slide(bench: HoldBench, speed: float) -> tuple[float, float]:
     """Return how far F_n is from its weight at rest and while it slides [N]."""
     plant = bench.plant
-    plant.terrain = make_terrain("none", "tread", 0.0, np.random.default_rng(1))
+    plant.terrain = make_terrain(
+        GroundChoice("none", "tread"), 0.0, np.random.default_rng(1)
+    )
     bench.enter(ArmState.FLOAT)
     plant.hand.put_down(plant.terrain.surface(0.0))
     forces(bench, _RESTS)

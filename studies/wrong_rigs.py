@@ -20,6 +20,7 @@ from acquisition.control_loop.law import FootObserver
 from acquisition.control_loop.loop import Loop
 from acquisition.control_loop.states import ArmState
 from fakes.clock import SteppedClock
+from fakes.ground.terrain import GroundChoice
 from fakes.plant.model import PlantOptions, Support
 from fakes.plant.wiring import Wiring
 from fakes.world.rig import FakeRig, SimulatedScene
@@ -204,7 +205,7 @@ def _wiring(rig: FakeRig, wrong: GuardRig) -> Wiring:
 def run(wrong: GuardRig, friction: float, state: ArmState = ArmState.HOLD) -> RunAway:
     """Return what a wrong rig does when it is activated and nobody holds it."""
     clock = SteppedClock()
-    scene = SimulatedScene("S0", "small", "tread", FRAME, START_Q, 1)
+    scene = SimulatedScene("S0", GroundChoice("small", "tread"), FRAME, START_Q, 1)
     options = PlantOptions(friction, has_hand=False, down=wrong.down)
     rig = FakeRig(scene, CONSTANTS, TOOL, clock, options)
     clock.attach(rig)

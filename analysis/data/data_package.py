@@ -11,13 +11,15 @@ import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import Literal
+from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from acquisition.errors import SettingsError
 from acquisition.files import UnfitFileError, open_regular, read_regular
 from acquisition.validation import Many, first_problem
+from analysis.data.recorded_factors import MOST, checked_factors
+from analysis.data.terrain_kinds import Value
 
 DESCRIPTOR = "datapackage.json"
 _LARGEST = 16_000_000  # bytes of a descriptor; a study of 80 trials has 2 million
@@ -37,6 +39,9 @@ class TableOrigin(BaseModel):
         terrain: name of the terrain.
         stones: size of the stones; empty where it is not known.
         incline_deg: of the plane [degrees].
+        factors: what else is known of terrain and foot, by name; None = does not
+            apply.
+        logs: numbers among the factors that are compared by their logarithm.
         force_age: how much older than the joints the forces are [s].
         simulated: the devices were simulated.
         recording: SHA-256 of the recorded trial.
@@ -50,9 +55,16 @@ class TableOrigin(BaseModel):
     terrain: str = ""
     stones: str = Field(default="", max_length=60)
     incline_deg: float | None = Field(default=None, ge=-90, le=90)
+    factors: dict[str, Any] = Field(default_factory=dict[str, Any], max_length=MOST)
+    logs: tuple[str, ...] = Field(default=(), max_length=MOST)
     force_age: float = Field(default=0.0, ge=-1, le=1)
     simulated: bool = False
     recording: str = Field(default="", max_length=64)
+
+    @field_validator("factors")
+    @classmethod
+    def _are_factors(cls, values: dict[str, Any]) -> dict[str, Value]:
+        return checked_factors(values)
 
     @property
     def name(self) -> str:

@@ -18,6 +18,7 @@ from acquisition.settings import parse_toml
 from acquisition.trial_file.reader import TrialReader
 from analysis.data.inertia import InertialForce, inertial_force
 from analysis.data.prepare import foot_velocity
+from analysis.data.recorded_factors import StatedFactors, stated_factors
 from analysis.data.series import TractionSeries
 from analysis.data.tare_bracket import TareBracket, read_bracket
 from ft_sensor.calibration.files import payload_from_toml, terrain_from_toml
@@ -90,6 +91,11 @@ class RecordedTrial:
         return self.metadata["trial"].get("stone_size", "")
 
     @property
+    def factors(self) -> StatedFactors:
+        """What the recording states of its terrain and foot."""
+        return stated_factors(self.metadata["trial"])
+
+    @property
     def is_simulated(self) -> bool:
         """Whether the trial came from simulated devices."""
         return self.metadata["trial"].get("simulated") == "true"
@@ -122,6 +128,8 @@ class RecordedTrial:
             F_t=F_t,
             stones=self.stones,
             incline_deg=float(np.degrees(self.frame.incline)),
+            factors=self.factors.values,
+            logs=self.factors.logs,
             stamped_lag=self.stamped_lag,
             is_simulated=self.is_simulated,
         )

@@ -1,11 +1,13 @@
 """The record of one trial as the analysis takes it: velocity and forces over time."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.errors import SettingsError
+from analysis.data.terrain_kinds import Value
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -32,7 +34,10 @@ class TractionSeries:
         F_t: traction force [N], > 0 in slip.
         stones: size of the stones as recorded or given: "small", "big" or "none";
             empty where it is not known.
-        incline_deg: of the plane [degrees]; None where it is not known.
+        incline_deg: of the plane along the push [degrees]; None where it is not known.
+        factors: what else is known of the terrain and the foot, by name; None = does
+            not apply.
+        logs: numbers among the factors that are compared by their logarithm.
         stamped_lag: how much older than the velocity the forces are by their own time
             stamps [s]; 0 where they have none.
         is_prepared: the rows are samples kept by an earlier preparation: smoothed,
@@ -56,6 +61,8 @@ class TractionSeries:
     F_t: Array
     stones: str = ""
     incline_deg: float | None = None
+    factors: Mapping[str, Value] = field(default_factory=dict[str, Value])
+    logs: frozenset[str] = frozenset()
     stamped_lag: float = 0.0
     is_prepared: bool = False
     is_simulated: bool = False

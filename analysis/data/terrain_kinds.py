@@ -1,18 +1,25 @@
-"""The kind of a terrain: small stones, big stones, a flat plate, or its own.
+"""The kind of a terrain: its grain size, a flat plate, or its own.
 
-The size of the stones is a fact of the recording (`stones` in matrix.toml, `stone_size`
-in a trial's metadata) or is given with a table; it never follows from a terrain's name.
-Only where nothing is recorded do the eight names of the paper stand for their stones.
-Any other terrain of unknown stones is a kind of its own, under its own name.
+The size of the stones is a fact of the recording (`stones` or d50 in matrix.toml,
+`stone_size` in a trial's metadata) or is given with a table; it never follows from a
+terrain's name. Only where nothing is recorded do the eight names of the paper stand for
+their stones. Any other terrain of unknown stones is a kind of its own, under its own
+name.
 """
 
+import re
 from collections.abc import Iterable, Mapping
 from statistics import median
 
 from acquisition.errors import SettingsError
 
+Value = float | str | None  # of a factor; None = does not apply
 SMALL, BIG, FLAT = "small", "big", "flat"
+FINE, STONES = "fine", "stones"  # below 2 mm; stones of unknown size
 STONE_SIZES: Mapping[str, str] = {"small": SMALL, "big": BIG, "none": FLAT}
+SIZE_BY_WORD: Mapping[str, float] = {"small": 19.0, "big": 37.0}  # d50 [mm]
+FINEST_STONES = 2.0  # mm
+_MILLIMETRES = re.compile(r"(\d{1,4}(?:\.\d{1,6})?) mm")
 PAPER_KINDS: Mapping[str, str] = {
     **dict.fromkeys(("S0", "S10", "S15"), SMALL),
     **dict.fromkeys(("B0", "B10", "B15"), BIG),
@@ -24,19 +31,63 @@ PAPER_INCLINES: Mapping[str, float] = {
     **dict.fromkeys(("S15", "B15"), 15.0),
 }
 LEVELS = ("terrain", "stones", "surface")
-_TITLES = {SMALL: "small stones", BIG: "big stones", FLAT: "flat plate"}
+_OTHER_INCLINE = 2.5  # degrees; half of what the paper's differ by
+_TITLES = {
+    SMALL: "small stones",
+    BIG: "big stones",
+    FLAT: "flat plate",
+    FINE: "fine ground",
+    STONES: "stones",
+}
+
+
+def stones_of(ground: str, d50: float | None) -> str:
+    """Return the word for stones that a recording states.
+
+    Args:
+        ground: "stones", "plate" or "fine".
+        d50: grain size [mm]; None = not stated.
+    """
+    if ground == "plate":
+        return "none"
+    if ground == FINE or d50 is None:
+        return FINE if ground == FINE else STONES
+    words = {size: word for word, size in SIZE_BY_WORD.items()}
+    return words.get(d50, f"{round(d50, 6):g} mm")
+
+
+def ground_of(d50: float | None) -> str:
+    """Return "plate", "fine" or "stones" for a grain size [mm]; None = has none."""
+    if d50 is None:
+        return "plate"
+    return FINE if d50 < FINEST_STONES else STONES
+
+
+def grain_size(kind: str) -> float | None:
+    """Return the grain size of a kind [mm], None where it has none or none is known."""
+    found = _MILLIMETRES.fullmatch(kind)
+    return float(found[1]) if found else SIZE_BY_WORD.get(kind)
+
+
+def _stated(word: str) -> str:
+    """Return the kind that a recorded size of stones stands for, "" for none."""
+    if word in (FINE, STONES) or _MILLIMETRES.fullmatch(word):
+        return word
+    return STONE_SIZES.get(word, "")
 
 
 def terrain_kind(terrain: str, stones: Iterable[str] = ()) -> str:
-    """Return "small", "big" or "flat"; the terrain's own name where it is unknown.
+    """Return "small", "big", "flat", e.g. "12 mm", "fine" or "stones".
+
+    The terrain's own name where it is unknown.
 
     Args:
         terrain: its name.
-        stones: sizes that its recordings state: "small", "big" or "none"; any other
-            text states nothing. Recordings that contradict each other make the
-            terrain a kind of its own.
+        stones: sizes that its recordings state: "small", "big", "none", e.g. "12 mm",
+            "fine" or "stones"; any other text states nothing. Recordings that
+            contradict each other make the terrain a kind of its own.
     """
-    stated = {STONE_SIZES[size] for size in stones if size in STONE_SIZES}
+    stated = {kind for kind in map(_stated, stones) if kind}
     if not stated:
         return PAPER_KINDS.get(terrain, terrain)
     return stated.pop() if len(stated) == 1 else terrain
@@ -56,16 +107,36 @@ def terrain_incline(
     return median(stated) if stated else PAPER_INCLINES.get(terrain)
 
 
+def is_papers(terrain: str, kind: str, incline_deg: float | None) -> bool:
+    """Whether a terrain is one of the paper's: its name, stones and incline.
+
+    Args:
+        terrain: its name.
+        kind: its kind.
+        incline_deg: its incline [degrees]; None = unknown.
+    """
+    if PAPER_KINDS.get(terrain) != kind:
+        return False
+    return incline_deg is None or (
+        abs(incline_deg - PAPER_INCLINES[terrain]) < _OTHER_INCLINE
+    )
+
+
 def kind_title(kind: str) -> str:
     """Return a kind in words, e.g. "small stones"; a terrain's own kind is its name."""
-    return _TITLES.get(kind, kind)
+    return (
+        f"stones of {kind}" if _MILLIMETRES.fullmatch(kind) else _TITLES.get(kind, kind)
+    )
+
+
+def is_stony(kind: str) -> bool:
+    """Whether the ground is of stones, of whatever size."""
+    return kind == STONES or grain_size(kind) is not None
 
 
 def surface_of(kind: str) -> str:
-    """Return "flat" or "rocky"; a terrain's own kind stays what it is."""
-    if kind in (SMALL, BIG):
-        return "rocky"
-    return kind
+    """Return "flat" or "rocky"; fine ground and an own kind stay what they are."""
+    return "rocky" if is_stony(kind) else kind
 
 
 def groups_of(kinds: Mapping[str, str]) -> dict[str, dict[str, str]]:
@@ -90,11 +161,11 @@ def parse_stones(text: str) -> dict[str, str]:
     stones: dict[str, str] = {}
     for part in filter(None, text.split(",")):
         terrain, equals, size = (piece.strip() for piece in part.rpartition("="))
-        if not (equals and terrain) or size not in STONE_SIZES:
+        if not (equals and terrain and _stated(size)):
             raise SettingsError(
                 f"--stones {text}: {part!r} does not give the stones of a terrain.",
-                hint=f"The sizes are {', '.join(STONE_SIZES)}; write e.g. "
-                "--stones Sand=none,Beach=small",
+                hint=f"The sizes are {', '.join(STONE_SIZES)}, fine, stones, or e.g. "
+                '"12 mm"; write e.g. --stones Sand=none,Beach=small',
             )
         stones[terrain] = size
     return stones

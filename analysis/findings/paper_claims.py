@@ -56,8 +56,13 @@ class _Statement(NamedTuple):
 
 
 def paper_claims(evidence: PaperEvidence) -> list[PaperClaim]:
-    """Return every statement; none for one terrain, which makes no comparison."""
-    if len(evidence.study.terrains) < 2:
+    """Return every statement.
+
+    None for one terrain, which makes no comparison, nor for terrains that are not the
+    paper's.
+    """
+    terrains = evidence.study.terrains.values()
+    if len(terrains) < 2 or not all(terrain.is_papers for terrain in terrains):
         return []
     return [_held(evidence, statement) for statement in _STATEMENTS]
 

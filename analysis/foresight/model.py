@@ -15,6 +15,7 @@ from pydantic import (
 
 from acquisition.schema import MOST_TERRAINS
 from acquisition.validation import Entries, Many
+from analysis.data.recorded_factors import foot_of
 from analysis.foresight.ground import GroundLaw, GroundModel
 from analysis.foresight.ground_window import GROUND_FEATURES, WINDOWS
 from analysis.foresight.logistic import RidgeLogistic
@@ -31,13 +32,21 @@ def _is_for(features: Sequence[str]) -> AfterValidator:
     return AfterValidator(methodcaller("checked", len(features)))
 
 
+_TREADS = {"tread": "true", "bare": "false"}  # as the first recordings state a foot
+
+
+def tread_of(foot: str) -> str:
+    """Return what recordings state as `tread` of a foot."""
+    return _TREADS.get(foot, foot)
+
+
 @dataclass(frozen=True, slots=True)
 class RigIdentity:
     """What a trial states of foot and rig, as text.
 
     Attributes:
         simulated: "true" or "false".
-        tread: whether the foot has its tread on, "true" or "false".
+        tread: which foot: "true" with its tread, "false" bare, or its name.
         effective_mass_kg: of the arm at the sole.
         foot_mass_kg: of the foot.
     """
@@ -59,7 +68,7 @@ class RigIdentity:
     @property
     def text(self) -> str:
         """The identity in words."""
-        foot = {"true": "tread", "false": "bare"}.get(self.tread, "?")
+        foot = foot_of(self.tread) or "?"
         kind = "simulated" if self.simulated == "true" else "live"
         return (
             f"{kind} rig, {foot} foot of {self.foot_mass_kg or '?'} kg, effective mass "

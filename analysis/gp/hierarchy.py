@@ -4,19 +4,20 @@ The force on ground g, in trial q, at standardised inputs x:
 
     f = f_0(x) + d_g(x) + u_q,    f_0 ~ GP(0, s0^2 SE_l),    u_q ~ N(0, sc^2)
     cov(d_g(x), d_h(x')) = A^2 T(g, h) SE_m(x, x')
-    T = (1 - own) exp(-(a_g - a_h)^2 / 2 la^2) rho^[sizes differ] + own [g = h]
+    T = (1 - own) exp(-(a_g - a_h)^2 / 2 la^2) rho^e F + own [g = h]
 
 f_0 is shared by all grounds, d_g is what stones or plates add. Among stones T falls
-with the difference of the inclines a and, by rho, between sizes; `own` is what a ground
-has to itself. A plate is like itself only: there T = [g = h], and 0 from stones to
-plates. A, sc and the noise sn are one value for stones and one for plates.
+with the difference of the inclines a and, by rho, between grain sizes; F does the same
+for further factors (`ground`); `own` is what a ground has to itself. A plate is like
+itself only: there T = [g = h], and 0 from stones to plates. A, sc and the noise sn are
+one value for stones and one for plates.
 
 theta holds logarithms (logits of rho and own). Every one has a normal prior: two plates
 alone do not fix a spread between plates. (Rasmussen and Williams 2006, section 2.7 and
 eq. 5.9; Gelman et al. 2013, section 5, for hierarchies.)
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,7 +25,14 @@ import numpy as np
 from acquisition.errors import SettingsError
 from analysis.data.series import Array
 from analysis.gp.climb import climb
-from analysis.gp.ground import Ground, GroundRows, Resemblance
+from analysis.gp.ground import (
+    BASE,
+    FactorTerm,
+    Ground,
+    GroundRows,
+    Resemblance,
+    terms_of,
+)
 from analysis.gp.kernels import SquaredExponential
 from analysis.gp.likelihood import Factor, factorise
 
@@ -42,6 +50,8 @@ _PRIOR = np.array(
         (np.log(0.4), 1.0),
     ]
 )
+# of every further factor: a length over the spread of a number, a share of a word
+_LENGTH_PRIOR, _SHARE_PRIOR = (0.7, 1.0), (1.0, 1.5)
 _IS_SIZE = np.array([n[4:].partition("_")[0] in {"s0", "A", "sc", "sn"} for n in NAMES])
 _SEARCHED_SD = 4.0  # prior standard deviations that the search goes
 _TOLERANCE = 1e-7  # share of the value that the last step of a climb gains less than
@@ -54,14 +64,17 @@ class GroundLikelihood:
     Args:
         rows: the rows; outputs are taken as they are.
         X: their standardised inputs, shape (n, 2).
+        terms: the factors that the model takes.
     """
 
-    def __init__(self, rows: GroundRows, X: Array) -> None:
+    def __init__(
+        self, rows: GroundRows, X: Array, terms: Sequence[FactorTerm] = ()
+    ) -> None:
         self._y, self._is_plate = rows.y, rows.is_plate
         self._ground = rows.ground
         self._present = sorted(set(rows.ground.tolist()))
         grounds = [rows.grounds[g] for g in self._present]
-        self._resemblance = Resemblance(grounds, grounds)
+        self._resemblance = Resemblance(grounds, grounds, terms)
         self._starts = np.flatnonzero(np.diff(rows.ground, prepend=-1))
         self._ground_index = np.searchsorted(self._present, rows.ground)
         self._trials = rows.blocks()
@@ -69,7 +82,7 @@ class GroundLikelihood:
         self._added = SquaredExponential().over(X, X)
 
     def __call__(self, theta: Array) -> tuple[float, Array]:
-        """Return the log likelihood and its gradient in theta, shape (14,).
+        """Return the log likelihood and its gradient in theta, shape (14 + k,).
 
         Raises:
             SettingsError: the covariance cannot be factorised.
@@ -86,17 +99,17 @@ class GroundLikelihood:
         by_ground = np.add.reduceat(
             np.add.reduceat(W * unit, self._starts, axis=0), self._starts, axis=1
         )
-        slope = np.zeros(len(NAMES))
+        slope = np.zeros(theta.size)
         for k, derivative in slopes.items():
             slope[k] = (by_ground * derivative).sum()
         slope[5:7] = of_added(W * wide)[1:]
-        slope[10:] = self._noise_slopes(W, theta)
+        slope[10:BASE] = self._noise_slopes(W, theta)
         slope[:3] = of_shared(W)
         return lml, slope
 
     def _noise_slopes(self, W: Array, theta: Array) -> Array:
         """Return the slopes of log sc and log sn, each of stones and plates."""
-        slopes, variances = np.zeros(4), np.exp(2.0 * theta[10:])
+        slopes, variances = np.zeros(4), np.exp(2.0 * theta[10:BASE])
         diagonal = np.diagonal(W)
         for rows in self._trials:
             is_plate = int(self._is_plate[rows.start])
@@ -127,7 +140,8 @@ class GroundProcess:
     """The process with its hyperparameters, given rows.
 
     Attributes:
-        theta: hyperparameters, in the order of `NAMES`.
+        theta: hyperparameters, in the order of `names_of`.
+        terms: the factors that it takes.
         rows: what it is given; outputs around `offset`.
         centre: of the inputs, shape (2,).
         scale: standard deviation of the inputs, shape (2,).
@@ -136,6 +150,7 @@ class GroundProcess:
     """
 
     theta: Array
+    terms: tuple[FactorTerm, ...]
     rows: GroundRows
     centre: Array
     scale: Array
@@ -152,7 +167,7 @@ class GroundProcess:
 
     def describe(self) -> dict[str, float]:
         """Return the hyperparameters by name."""
-        return dict(zip(NAMES, self.theta.tolist(), strict=True))
+        return dict(zip(names_of(self.terms), self.theta.tolist(), strict=True))
 
 
 class PredictiveProcess:
@@ -167,7 +182,7 @@ class PredictiveProcess:
         self._process, self._rows = process, rows
         self._X = (rows.inputs - process.centre) / process.scale
         theta = process.theta
-        B = Resemblance(rows.grounds, rows.grounds).at(theta)[0]
+        B = Resemblance(rows.grounds, rows.grounds, process.terms).at(theta)[0]
         K = _covariance(theta, self._X, self._X, B[np.ix_(rows.ground, rows.ground)])
         self._factor = _factor(K, theta, rows.is_plate, rows.blocks())
         self._alpha = self._factor.solve(rows.y - process.offset)
@@ -176,8 +191,9 @@ class PredictiveProcess:
         """Return the force of a new trial on a ground, known or not, at m inputs."""
         process, theta = self._process, self._process.theta
         Z = (inputs - process.centre) / process.scale
-        B = Resemblance(self._rows.grounds, [ground]).at(theta)[0][self._rows.ground]
-        own = Resemblance([ground], [ground]).at(theta)[0][0, 0]
+        related = Resemblance(self._rows.grounds, [ground], process.terms)
+        B = related.at(theta)[0][self._rows.ground]
+        own = Resemblance([ground], [ground], process.terms).at(theta)[0][0, 0]
         prior = np.exp(2.0 * theta[0]) + own
         mean, latent = np.empty(len(Z)), np.full(len(Z), prior)
         for i in range(0, len(Z), _BLOCK):
@@ -190,6 +206,22 @@ class PredictiveProcess:
         return GroundPrediction(
             mean, np.maximum(latent, 0.0), float(sn2[0]), float(sc2[0])
         )
+
+    def covariance(self, grounds: Sequence[Ground], point: Array) -> Array:
+        """Return the covariance of f_0 + d_g on k grounds at one input, shape (k, k).
+
+        Args:
+            grounds: known or not.
+            point: the input, shape (1, 2).
+        """
+        process, theta = self._process, self._process.theta
+        z = (point - process.centre) / process.scale
+        related = Resemblance(self._rows.grounds, grounds, process.terms)
+        B = related.at(theta)[0][self._rows.ground]
+        cross = _covariance(theta, self._X, np.repeat(z, len(grounds), axis=0), B)
+        half = self._factor.half(cross)
+        own = Resemblance(grounds, grounds, process.terms).at(theta)[0]
+        return np.exp(2.0 * theta[0]) + own - half.T @ half
 
 
 class GroundPosterior:
@@ -214,13 +246,14 @@ class GroundPosterior:
         levels = [rows.y[rows.ground == g].mean() for g in np.unique(rows.ground)]
         self.offset = float(np.mean(levels))
         centred = replace(rows, y=rows.y - self.offset)
+        self.terms = terms_of(rows.grounds)
         self._likelihood = GroundLikelihood(
-            centred, (rows.inputs - self.centre) / self.scale
+            centred, (rows.inputs - self.centre) / self.scale, self.terms
         )
-        self._mean, self._sd = prior_of(unit)
+        self._mean, self._sd = prior_of(unit, self.terms)
 
     def __call__(self, theta: Array) -> tuple[float, Array]:
-        """Return the value and its gradient in theta, shape (14,).
+        """Return the value and its gradient in theta, shape (14 + k,).
 
         Raises:
             SettingsError: the covariance cannot be factorised.
@@ -229,20 +262,25 @@ class GroundPosterior:
         far = (theta - self._mean) / self._sd
         return lml - 0.5 * float(far @ far), slope - far / self._sd
 
-    def climbed(self, start: Array | None = None) -> GroundProcess:
+    def climbed(self, start: Mapping[str, float] | None = None) -> GroundProcess:
         """Return the process at the top that a start leads to.
 
         Args:
-            start: theta to begin with; the priors' centre by default.
+            start: hyperparameters to begin with by name; of those that it lacks, and
+                by default, the priors' centre.
         """
+        begin = self._mean.copy()
+        for index, name in enumerate(names_of(self.terms)):
+            begin[index] = (start or {}).get(name, begin[index])
         best = climb(
             self,
-            self._mean if start is None else start,
+            begin,
             self._mean[:, None] + self._sd[:, None] * [-_SEARCHED_SD, _SEARCHED_SD],
             tolerance=_TOLERANCE,
         )
         return GroundProcess(
             theta=best.theta,
+            terms=self.terms,
             rows=self.rows,
             centre=self.centre,
             scale=self.scale,
@@ -253,23 +291,33 @@ class GroundPosterior:
 
 def in_unit(theta: Array, ratio: float) -> Array:
     """Return theta for outputs in a unit that is 1 / `ratio` times the old one."""
-    return theta + np.log(ratio) * _IS_SIZE
+    changed = theta.copy()
+    changed[:BASE] += np.log(ratio) * _IS_SIZE
+    return changed
 
 
-def prior_of(unit: float) -> tuple[Array, Array]:
-    """Return means and standard deviations of the priors of theta, each (14,).
+def names_of(terms: Sequence[FactorTerm]) -> tuple[str, ...]:
+    """Return the names of the hyperparameters, those of further factors last."""
+    return (*NAMES, *(term.parameter for term in terms))
+
+
+def prior_of(unit: float, terms: Sequence[FactorTerm] = ()) -> tuple[Array, Array]:
+    """Return means and standard deviations of the priors of theta, each (14 + k,).
 
     Args:
         unit: of the outputs, over N at the median force.
+        terms: the factors that the model takes.
     """
-    mean, sd = _PRIOR.T
-    return mean + np.log(unit) * _IS_SIZE, sd.copy()
+    further = [_SHARE_PRIOR if term.is_word else _LENGTH_PRIOR for term in terms]
+    mean, sd = np.array([*_PRIOR.tolist(), *further]).T
+    mean[:BASE] += np.log(unit) * _IS_SIZE
+    return mean, sd
 
 
 def _by_surface(theta: Array, is_plate: Array) -> tuple[Array, Array]:
     """Return sc^2 and sn^2 of rows on stones and plates, each of shape (n,)."""
     surface = is_plate.astype(int)
-    variances = np.exp(2.0 * theta[10:])
+    variances = np.exp(2.0 * theta[10:BASE])
     return variances[:2][surface], variances[2:][surface]
 
 

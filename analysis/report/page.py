@@ -178,7 +178,7 @@ def sections(
     tables = [
         summary(study),
         parameters(study),
-        *([statements(results)] if results.claims else []),
+        *statements(results),
         table_one(study),
         *beyond_tables(results),
         velocity_shares(study),

@@ -116,7 +116,7 @@ def table_one(study: Study) -> ReportTable:
                 "; ".join(flag_counts(result, TUSTIN)) or "none",
             ]
         )
-        if name in PAPER:
+        if name in PAPER and result.is_papers:
             printed = [f"{getattr(PAPER[name], key):g}" for key in UNITS]
             rows.append([name, "paper, Table I", *printed, ""])
     units = [f"{SYMBOLS[key]} [{unit}]" for key, unit in UNITS.items()]
@@ -131,16 +131,41 @@ def table_one(study: Study) -> ReportTable:
     )
 
 
-def statements(results: StudyResults) -> ReportTable:
-    """Return the paper's statements beside what the study shows."""
-    return ReportTable(
-        name="Findings of the paper",
-        header=("in", "paper", "this study", "agrees?"),
-        rows=[_statement_row(claim) for claim in results.claims],
-        note="Errors: mean absolute errors on trials left out. Beyond chance: paired "
-        "over the trials, p below 0.05 for all comparisons of the row together (Holm).",
-        section=ReportSection.PAPER,
+def statements(results: StudyResults) -> list[ReportTable]:
+    """Return the paper's statements beside what the study shows.
+
+    None for one terrain; for terrains that are not the paper's a line that says so.
+    """
+    terrains = results.study.terrains
+    others = [name for name, result in terrains.items() if not result.is_papers]
+    note = (
+        "Errors: mean absolute errors on trials left out. Beyond chance: paired "
+        "over the trials, p below 0.05 for all comparisons of the row together (Holm)."
     )
+    if others:
+        note = (
+            "Not compared: the paper's statements are about its own eight terrains. "
+            f"These are others: {_few_names(others)}."
+        )
+    if len(terrains) < 2:
+        return []
+    return [
+        ReportTable(
+            name="Findings of the paper",
+            header=("in", "paper", "this study", "agrees?"),
+            rows=[_statement_row(claim) for claim in results.claims],
+            note=note,
+            section=ReportSection.PAPER,
+        )
+    ]
+
+
+_SHOWN = 6  # names in a sentence
+
+
+def _few_names(names: Sequence[str]) -> str:
+    more = f" and {len(names) - _SHOWN} more" if names[_SHOWN:] else ""
+    return ", ".join(names[:_SHOWN]) + more
 
 
 def velocity_shares(study: Study) -> ReportTable:

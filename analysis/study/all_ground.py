@@ -184,13 +184,14 @@ def fit_all_ground(
         rated = {bend: _rated(few, F_t, process, unit, bend, c) for bend in bends}
         likeliest = max(bends, key=rated.__getitem__)
         if likeliest != c:
-            begin = in_unit(process.theta, unit[likeliest] / unit[c])
+            theta = in_unit(process.theta, unit[likeliest] / unit[c])
+            begin = replace(process, theta=theta).describe()
             c = likeliest
             process = GroundPosterior(rows_of(few, c), unit[c]).climbed(begin)
     else:
         c = start.c
         posterior = GroundPosterior(rows_of(few, c), unit[c])
-        process = posterior.climbed(start.process.theta)
+        process = posterior.climbed(start.process.describe())
     given = [rows.thinned(GIVEN) for rows in known]
     return AllGroundModel.of(process, c, given).shaped(given)
 

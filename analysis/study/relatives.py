@@ -7,6 +7,7 @@ prior's. Its three trials, each left out in turn, decide; where there are more r
 they need a clear gain, as three trials are a noisy judge.
 """
 
+import math
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -18,7 +19,14 @@ from acquisition.errors import TractionError
 from analysis.data.prepare import PreparedTrial
 from analysis.data.samples import SampleTable, TrainingSet
 from analysis.data.series import TractionSeries
-from analysis.data.terrain_kinds import BIG, FLAT, SMALL, terrain_incline, terrain_kind
+from analysis.data.terrain_kinds import (
+    FINE,
+    FLAT,
+    Value,
+    grain_size,
+    terrain_incline,
+    terrain_kind,
+)
 from analysis.gp.ground import Ground
 from analysis.gp.kernels import SquaredExponential
 from analysis.study.all_ground import (
@@ -135,9 +143,43 @@ def grounds_of(trials: Mapping[str, Sequence[TractionSeries]]) -> dict[str, Grou
     for name, recorded in trials.items():
         kind = terrain_kind(name, [series.stones for series in recorded])
         incline = terrain_incline(name, [series.incline_deg for series in recorded])
-        if kind in (SMALL, BIG, FLAT) and incline is not None:
-            grounds[name] = Ground(name, kind, incline)
+        if incline is None:
+            continue
+        factors = logarithms(factors_of(recorded), recorded)
+        if kind == FINE and isinstance(size := dict(factors).get("d50"), float):
+            kind = f"{size:g} mm"
+        if kind == FLAT or grain_size(kind) is not None:
+            others = tuple(pair for pair in factors if pair[0] != "d50")
+            grounds[name] = Ground(name, kind, incline, others)
     return grounds
+
+
+def factors_of(recorded: Sequence[TractionSeries]) -> dict[str, Value]:
+    """Return the factors that the recordings of a terrain state alike.
+
+    One that they contradict each other in does not apply.
+    """
+    found: dict[str, Value] = {}
+    for series in recorded:
+        for name, value in series.factors.items():
+            found[name] = value if found.get(name, value) == value else None
+    return found
+
+
+def logarithms(
+    factors: Mapping[str, Value], recorded: Sequence[TractionSeries]
+) -> tuple[tuple[str, Value], ...]:
+    """Return factors with the logarithm of those that are compared by it.
+
+    The grain size, d50 [mm], stays what it is: its term takes the logarithm itself.
+    """
+    logs = {name for series in recorded for name in series.logs} - {"d50"}
+    values: dict[str, Value] = dict(factors)
+    for name in logs & set(values):
+        value = values[name]
+        if isinstance(value, float):
+            values[name] = math.log(value) if value > 0.0 else None
+    return tuple(values.items())
 
 
 def plan_relatives(

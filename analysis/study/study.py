@@ -17,13 +17,14 @@ from analysis.data.prepare import (
 from analysis.data.quality import PULLED, PULLED_WARNING
 from analysis.data.samples import SampleTable
 from analysis.data.series import TractionSeries
-from analysis.data.terrain_kinds import terrain_kind
+from analysis.data.terrain_kinds import terrain_incline, terrain_kind
 from analysis.study.crossval import FoldResult, Prepared, plan_folds, run_fold
 from analysis.study.jobs import Batch, Progress, Store, Workers, run_batches
 from analysis.study.metrics import standard_error
 from analysis.study.models import NEW_TRIAL, FitOptions
 from analysis.study.relatives import (
     RelativesOutcome,
+    factors_of,
     grounds_of,
     plan_relatives,
     run_relatives,
@@ -187,6 +188,8 @@ def _result(
         folds=tuple(fold for fold in folds if fold.terrain == terrain),
         whole=whole,
         components=components,
+        incline_deg=terrain_incline(terrain, [s.incline_deg for s in recorded]),
+        factors=factors_of(recorded),
     )
 
 

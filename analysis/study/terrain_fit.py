@@ -2,7 +2,7 @@
 
 import zlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from analysis.data.events import Slip
 from analysis.data.prepare import PreparedTrial
 from analysis.data.quality import PULLED, share_below
 from analysis.data.samples import SampleTable
-from analysis.data.terrain_kinds import kind_title
+from analysis.data.terrain_kinds import Value, is_papers, kind_title
 from analysis.study.crossval import FoldResult, ModelFold
 from analysis.study.models import FitOptions
 from analysis.study.trial_components import TrialComponents
@@ -66,6 +66,8 @@ class TerrainResult:
         whole: the Tustin fit of all its trials, with intervals.
         components: how its trials differ; None where they were not asked for, or for
             fewer than three of them.
+        incline_deg: along the push, positive downhill [degrees]; None where unknown.
+        factors: what else its recordings state alike, by name.
     """
 
     terrain: str
@@ -75,6 +77,13 @@ class TerrainResult:
     folds: tuple[FoldResult, ...]
     whole: PooledTustinFit
     components: TrialComponents | None = None
+    incline_deg: float | None = None
+    factors: Mapping[str, Value] = field(default_factory=dict[str, Value])
+
+    @property
+    def is_papers(self) -> bool:
+        """Whether it is one of the paper's eight terrains: name, stones and incline."""
+        return is_papers(self.terrain, self.kind, self.incline_deg)
 
     @property
     def title(self) -> str:

@@ -5,7 +5,7 @@ stands in `terrain_db.schema.json` beside this module, its JSON Schema.
 
 Between the points of a table values are linear; outside of it they are those of its
 edge. Version 1 had one mean and sd [N] for the quantiles of a model: it is still read,
-as normal distributions.
+as normal distributions. Version 2 had neither inclines nor factors.
 """
 
 import json
@@ -18,13 +18,14 @@ from pydantic import AfterValidator, BaseModel, Field, model_validator
 from acquisition.errors import SettingsError
 from acquisition.files import UnfitFileError, read_regular
 from acquisition.validation import Entries, Many, first_problem
+from analysis.data.recorded_factors import checked_factors
 from analysis.data.series import Array
 from analysis.study.distribution import SHARES
 from analysis.terrains.known import KnownTerrain, TerrainDatabase
 from analysis.terrains.parts import Parts, checked_parts
 from analysis.terrains.table import Rows, Table
 
-FORMAT, VERSION = "traction-terrain-db", 2
+FORMAT, VERSION = "traction-terrain-db", 3
 _OLD = 1  # mean and sd instead of quantiles
 _LARGEST = 6_000_000  # bytes; in memory it takes thirty times as much
 _MOST = 1_000_000_000  # trials or samples
@@ -52,6 +53,7 @@ _Shares = Annotated[
 ]
 _Rows = Many[Many[_Finite]]
 _Count = Annotated[int, Field(ge=0, le=_MOST)]
+_Factors = Annotated[dict[str, Any], AfterValidator(checked_factors)]
 _Parts = Annotated[Parts, AfterValidator(checked_parts)]
 
 
@@ -67,6 +69,8 @@ class _Model(BaseModel):
 
 class _Terrain(BaseModel):
     kind: str
+    incline_deg: float | None = Field(default=None, ge=-90, le=90)
+    factors: _Factors = Field(default_factory=dict[str, Any])
     trials: _Count
     samples: _Count
     rho: float = Field(ge=0.0, lt=1.0)
@@ -84,7 +88,7 @@ class _File(BaseModel):
     """A database in the order of its file; units are for people."""
 
     format: Literal["traction-terrain-db"]
-    version: Literal[1, 2]
+    version: Literal[1, 2, 3]
     made_utc: str
     simulated: bool
     default: str
@@ -153,6 +157,8 @@ def _terrain(name: str, terrain: _Terrain, file: _File) -> KnownTerrain:
     return KnownTerrain(
         name=name,
         kind=terrain.kind,
+        incline_deg=terrain.incline_deg,
+        factors=terrain.factors,
         trials=terrain.trials,
         samples=terrain.samples,
         rho=terrain.rho,
@@ -229,6 +235,8 @@ def to_text(database: TerrainDatabase) -> str:
 def _stored(terrain: KnownTerrain) -> _Terrain:
     return _Terrain.model_construct(
         kind=terrain.kind,
+        incline_deg=terrain.incline_deg,
+        factors=dict(terrain.factors),
         trials=terrain.trials,
         samples=terrain.samples,
         rho=terrain.rho,

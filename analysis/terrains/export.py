@@ -115,6 +115,8 @@ def database_of(
         task.terrain: KnownTerrain(
             name=task.terrain,
             kind=study.kinds[task.terrain],
+            incline_deg=study.terrains[task.terrain].incline_deg,
+            factors=study.terrains[task.terrain].factors,
             trials=len(task.trials),
             samples=sum(rows.count for rows in task.trials),
             rho=_rho(identification, task.terrain),

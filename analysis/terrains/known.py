@@ -16,6 +16,7 @@ from acquisition.errors import SettingsError
 from analysis.breakaway.answers import BreakAwayRisk
 from analysis.breakaway.model import BreakAwayModel
 from analysis.data.series import Array
+from analysis.data.terrain_kinds import Value
 from analysis.study.metrics import Prediction
 from analysis.terrains.parts import BREAK_AWAY_PART, Parts, break_away_in
 from analysis.terrains.points import points_of
@@ -40,6 +41,8 @@ class KnownTerrain:
         recogniser: name of the model that `rho` and `limits` belong to, which says how
             well a trial fits the terrain; "" = the default.
         parts: what else is known of it, by name; see `analysis.terrains.parts`.
+        incline_deg: along the push, positive downhill [degrees]; None where unknown.
+        factors: of its recordings, the foot among them, by name; None = does not apply.
     """
 
     name: str
@@ -54,6 +57,8 @@ class KnownTerrain:
     titles: Mapping[str, str] = field(default_factory=dict)
     recogniser: str = ""
     parts: Parts = field(default_factory=dict[str, Any])
+    incline_deg: float | None = None
+    factors: Mapping[str, Value] = field(default_factory=dict[str, Value])
 
     @overload
     def predict(self, F_n: float, v_t: float, model: str = "") -> TractionEstimate: ...

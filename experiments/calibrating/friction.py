@@ -10,6 +10,7 @@ import numpy as np
 from acquisition.errors import SettingsError
 from acquisition.settings import read_text
 from analysis.report.friction_page import FRICTION_HEADER, FrictionPage, friction_rows
+from experiments.rig.build import start_of
 from experiments.run.console_loop import ConsoleLoop
 from experiments.run.pose_walk import PoseWalk
 from experiments.run.ready import activate
@@ -99,7 +100,7 @@ class FrictionGuide:
             earlier=_earlier(calibration, out),
             terrain=rig.row.name,
             frame=rig.frame,
-            start_q=np.array(rig.row.start_q),
+            start_q=start_of(rig.row, rig.model),
             truth=truth,
         )
 

@@ -6,13 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from experiments.arguments import (
-    add_simulated_arm,
-    add_time,
-    asked_time,
-    friction_share,
-)
-from experiments.rig.truth_options import add_truth, check_truth, mount_of
+from experiments.arguments import friction_share
+from experiments.calibrating.opening import add_arm
 
 if TYPE_CHECKING:
     from experiments.run.console_loop import ConsoleLoop
@@ -40,13 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="row of the matrix: its foot, its container (the first row)",
     )
-    parser.add_argument("--fake", action="store_true", help="simulated devices")
-    add_time(parser)
-    add_simulated_arm(parser)
-    add_truth(parser)
-    parser.add_argument(
-        "--operator-script", metavar="auto", help="simulated operator, only with --fake"
-    )
+    add_arm(parser)
     parser.add_argument(
         "--to",
         type=Path,
@@ -70,55 +59,29 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Lead through one calibration and write its file; return the exit code."""
     from acquisition.extras import require_extra
-    from experiments.operator.console import Console
-    from experiments.operator.scripted import choose_operator
-    from experiments.operator.terminal import keyboard
-    from experiments.preflight.connecting import connect_rig
-    from experiments.preflight.preflight import run_preflight
-    from experiments.rig.bus_log import logging_bus
-    from experiments.rig.rig import FakeOptions
-    from experiments.rig.simulation import SimulatedHand
-    from experiments.run.console_loop import ConsoleLoop
-    from experiments.run.pose_walk import guided
-    from experiments.run.stop import StopFlag, handle_signals
+    from experiments.calibrating.opening import check_arm, check_new, guide_person
     from experiments.settings.load import load_settings
 
-    _check_arguments(args)
+    check_arm(args)
+    _check_poses(args)
     if args.what == "friction":
         require_extra("report")  # its page
-    friction = friction_share(args)
+    friction_share(args)
     settings = load_settings(args.config)
     row = settings.row(args.terrain or settings.matrix.terrains[0].name)
     settings, row = _without_old(args.what, settings, row)
     out = args.to or _output_path(args.what, settings, row, is_fake=args.fake)
     for path in _written(args, out):
-        _check_out(path)
+        check_new(path)
     args.chosen = _chosen_poses(args, settings, row)
-    console = Console(color=not args.no_color, goes_on=True)
-    operator = choose_operator(args.operator_script, is_fake=args.fake)
-    fake: FakeOptions | None = None
-    if args.fake:
-        fake = FakeOptions(
-            asked_time(args) or "paced",
-            args.seed,
-            friction,
-            cables=args.cables,
-            mount=mount_of(args),
-            wrong=args.wrong,
-        )
-    rig = connect_rig(settings, row, fake)
-    kind = "SIMULATED" if rig.is_simulated else "LIVE RIG"
-    console.say(f"traction calibrate {args.what}        {kind} · foot {row.foot}")
-    stop = StopFlag()
-    with logging_bus(rig, None, console), handle_signals(stop), keyboard(operator):
-        made_anew = _MADE_ANEW.get(args.what)
-        run_preflight(rig, Path(args.data), console, made_anew=made_anew)
-        hand = SimulatedHand(rig.simulation) if rig.simulation else None
-        console_loop = ConsoleLoop(rig, console, operator, stop, hand)
-        command = f"traction calibrate {args.what}"
-        return guided(
-            console_loop, lambda: _WORK[args.what](console_loop, args, out), command
-        )
+
+    def work(console_loop: ConsoleLoop) -> None:
+        _WORK[args.what](console_loop, args, out)
+
+    command = f"traction calibrate {args.what}"
+    return guide_person(
+        args, settings, row, work, command, made_anew=_MADE_ANEW.get(args.what)
+    )
 
 
 def _gravity(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> None:
@@ -249,7 +212,7 @@ def _without_old(
     if what == "friction":
         return settings.without_friction(), row
     if what == "terrain":
-        bare = row.model_copy(update={"calibration": None})
+        bare = row.model_copy(update={"calibration": None, "push_deg": 0})
         return settings.with_row(bare), bare
     return settings.without_sensor(row.foot, is_mounted=what == "foot"), row
 
@@ -273,22 +236,15 @@ def _output_path(
     return path.with_name(f"{path.stem}.fake{path.suffix}")
 
 
-def _check_arguments(args: argparse.Namespace) -> None:
+def _check_poses(args: argparse.Namespace) -> None:
     from acquisition.errors import SettingsError
 
-    nothing = "Nothing was started."
-    if not args.fake and (asked_time(args) or args.operator_script):
-        raise SettingsError(
-            "--fast, --processes and --operator-script work only with --fake.",
-            hint=nothing,
-        )
-    check_truth(args)
     fewest = _FEWEST.get(args.what, 0)
     if not fewest <= args.poses <= _MOST:
         raise SettingsError(
             f"--poses {args.poses} - expected a whole number {fewest}..{_MOST}, "
             "e.g. 12.",
-            hint=nothing,
+            hint="Nothing was started.",
         )
 
 
@@ -303,19 +259,3 @@ def _chosen_poses(
     fewest = _FEWEST.get(args.what)
     counts = range(0) if fewest is None else range(fewest, _MOST + 1)
     return read_poses(args.pose_file, settings, row, counts)
-
-
-def _check_out(out: Path) -> None:
-    """Refuse before the arm moves what could not be written afterwards."""
-    from acquisition.errors import SettingsError
-
-    if out.exists():
-        raise SettingsError(
-            f"{out} exists and is never overwritten.",
-            hint="Move it away or choose another name with --to. Nothing was started.",
-        )
-    if not out.parent.is_dir():
-        raise SettingsError(
-            f"There is no folder {out.parent} for the calibration.",
-            hint="Make it, or choose another name with --to. Nothing was started.",
-        )

@@ -79,7 +79,7 @@ def _add_arm(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--tool",
-        metavar="tread|bare|none|FILE",
+        metavar="FOOT|none|FILE",
         help="what is mounted on the tool plate: a foot of rig.toml below the wrist "
         "sensor (default: that of the first terrain), nothing and no sensor, or the "
         "foot of a TOML file with mass [kg], com [m], inertia [kg m2], sole [m]",

@@ -84,10 +84,17 @@ def run(args: argparse.Namespace) -> int:
         Console(color=False).say(shown)
         return 0
     sessions = choose_sessions(data, args.sessions, every=args.all)
-    order = [row.name for row in load_settings(args.config).matrix.terrains]
+    matrix = load_settings(args.config).matrix
+    order = [row.name for row in matrix.terrains]
     missing = tell_missing(sessions, console, allow_missing=args.allow_missing)
     wanted = ReportRequest(
-        order, args.seed, args.scheduler, choices, missing, with_pdf=args.pdf
+        order,
+        args.seed,
+        args.scheduler,
+        choices,
+        missing,
+        with_pdf=args.pdf,
+        matrix=matrix,
     )
     page = report_sessions(sessions, data, wanted, console)
     if args.json:

@@ -9,17 +9,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Mapping, Sequence
+    from collections.abc import Callable, Collection, Sequence
 
     from experiments.operator.console import Console
     from experiments.session.kept_files import Deviation
     from experiments.session.store import SessionFolder
-    from experiments.settings.matrix import TerrainRow
+    from experiments.settings.matrix import MatrixSettings
+    from experiments.status_table.summary_cache import StatusMatrix
     from experiments.status_table.table import MatrixRow
+    from experiments.status_table.where import Where
 
 EXAMPLES = """\
   traction status                           the table, and what comes next
-  traction status --where kind=live,stones=big --follow   watch a part of it"""
+  traction status --where 'kind=live,incline_deg>5' --follow   watch a part of it"""
 
 _HEADER = ("terrain", "kind", "kept", "trials", "rejected", "sessions")
 _LOOK_NS = 1_000_000_000
@@ -41,7 +43,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--where",
         default="",
         metavar="K=V,...",
-        help="only these: terrain, stones, incline_deg, foot, kind, session, operator",
+        help="only these: terrain, stones, incline_deg, push_deg, foot, place, kind, "
+        "session, operator or a factor, with = != < <= > >=",
     )
     parser.add_argument(
         "--follow",
@@ -57,14 +60,15 @@ def run(args: argparse.Namespace) -> int:
     from experiments.status_table.table import (
         count_rows,
         find_deviations,
-        parse_where,
         see_sessions,
     )
     from experiments.status_table.upcoming import enough_lines, next_steps
+    from experiments.status_table.where import parse_where
 
     cache = SummaryCache(None if args.fresh else cache_path(args.data))
-    rows = cache.rows(_settings_texts(args.config), lambda: _terrains(args.config))
-    where = parse_where(args.where)
+    matrix = cache.matrix(_settings_texts(args.config), lambda: _matrix(args.config))
+    rows = matrix.rows
+    where = parse_where(args.where, _factors(args, matrix))
     console = Console(color=not args.no_color)
 
     def look() -> StatusTable:
@@ -75,7 +79,7 @@ def run(args: argparse.Namespace) -> int:
         kinds = {line.is_simulated for line in lines if line.sessions} or {False}
         steps = enough_lines(seen, rows, where)
         for kind in sorted(kinds):
-            steps += next_steps(args.data, seen, rows, is_simulated=kind)
+            steps += next_steps(args.data, seen, matrix, is_simulated=kind)
         notes = table_notes(args.data, known, terrains, where, lines)
         return StatusTable(lines, notes, steps, find_deviations(seen, where))
 
@@ -112,7 +116,7 @@ def table_notes(
     data: Path,
     known: Sequence[SessionFolder],
     terrains: Collection[str],
-    where: Mapping[str, str],
+    where: Where,
     lines: Sequence[object],
 ) -> list[str]:
     """Return why the table shows less than somebody may expect, a line for each reason.
@@ -147,8 +151,7 @@ def table_notes(
         if session.terrain not in terrains
     ]
     if where and not lines:
-        asked = ",".join(f"{key}={value}" for key, value in where.items())
-        notes.append(f"Nothing matches --where {asked}.")
+        notes.append(f"Nothing matches --where {where}.")
     return notes
 
 
@@ -185,10 +188,22 @@ def _settings_texts(config: Path | None) -> list[bytes] | None:
     return texts
 
 
-def _terrains(config: Path | None) -> Sequence[TerrainRow]:
+def _matrix(config: Path | None) -> MatrixSettings:
     from experiments.settings.load import load_settings
 
-    return load_settings(config).matrix.terrains
+    return load_settings(config).matrix
+
+
+def _factors(args: argparse.Namespace, matrix: StatusMatrix) -> list[str]:
+    """Return the factors of the matrix, and of recorded sessions where one is asked."""
+    from experiments.session.store import list_sessions
+    from experiments.status_table.session_summaries import recorded_factors
+
+    names = dict.fromkeys(name for row in matrix.rows for name in row.factors)
+    if args.where:
+        for folder in list_sessions(args.data):
+            names |= dict.fromkeys(recorded_factors(folder))
+    return list(names)
 
 
 def _row(line: MatrixRow) -> tuple[str, ...]:

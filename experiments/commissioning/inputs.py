@@ -35,7 +35,7 @@ def present_inputs(
     arm = section.arm.model_dump(mode="json")
     zero = arm.pop("mech_at_home")
     texts, feet = rig.settings.calibrations, section.feet
-    names = (section.ft_sensor, feet.tread, feet.bare)
+    names = (section.ft_sensor, *feet.values())
     of_sensor, *of_feet = (
         texts.get(f"{PREFIX}{each.calibration}", "") for each in names
     )
@@ -44,7 +44,7 @@ def present_inputs(
         "[safety]": section.safety.model_dump(mode="json"),
         "[limits]": section.limits.model_dump(mode="json"),
         "[arm]": arm,
-        "[feet]": [feet.model_dump(mode="json"), of_feet],
+        "[feet]": [{name: foot.plain() for name, foot in feet.items()}, of_feet],
         "[ft_sensor]": [section.ft_sensor.model_dump(mode="json"), of_sensor],
         "[gravity]": [
             section.gravity.model_dump(mode="json"),
@@ -57,7 +57,7 @@ def present_inputs(
         "[control]": section.control.model_dump(mode="json"),
         "[can]": [section.can.model_dump(mode="json"), platform.release()],
         "terrain": [
-            rig.row.model_dump(mode="json"),
+            rig.row.plain(),
             texts.get(f"{PREFIX}{rig.row.calibration}", ""),
         ],
     }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from acquisition.simulation import ENDS
 from experiments.operator.prompts import Prompt, PromptState
 
 DAMPED_SECONDS = 0.5  # after a fault of motion, until it lets the arm hold again [s]
@@ -53,7 +54,7 @@ def _touch_key(state: PromptState) -> str:
     """Touch a dozen points, each until the foot is at rest."""
     if state.since < TOUCH_SECONDS:
         return ""
-    return " " if state.trial <= TOUCHES else "d"
+    return "d" if TOUCHES < state.trial <= ENDS else " "
 
 
 _AUTOMATIC: dict[Prompt, Callable[[PromptState], str]] = {

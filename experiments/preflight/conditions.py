@@ -16,17 +16,14 @@ from experiments.operator.prompts import OperatorInput, Prompt
 from experiments.operator.terminal import wait_for_key
 from experiments.preflight.page import CheckResult
 from experiments.rig.rig import Rig
-from experiments.session.data_files import read_json, write_json
+from experiments.session.recorded_conditions import FILE, VERSION, read_conditions
 from experiments.session.store import SessionFolder, list_sessions
 from experiments.settings.matrix import TerrainRow
 from experiments.settings.origins import flatten
 from experiments.settings.rig import RigSettings
 from ft_sensor.vendors.registry import SECTIONS
 
-FILE = "conditions.json"
-VERSION = 2  # of the file; 1 had no number
 FOOT = "terrain.foot"  # name of a condition
-_VERSION_KEY = "version"
 _GRAVITY, _FRICTION = "gravity calibration", "friction calibration"
 _NO_CALIBRATION = "none"
 _SENSOR = ("model", "serial_number", "firmware", "filter")
@@ -39,23 +36,12 @@ _EXEMPT = (
     "rig.arm.",
     "rig.ft_sensor.port",
     "rig.limits.free_disk_gb",
+    "rig.places.",
     "terrain.trials",
+    "terrain.simulate.",
     "terrain.reset",
 )
 _SHOWN = 8  # differences that are listed
-
-
-@dataclass(frozen=True, slots=True)
-class Conditions:
-    """What conditions.json of a session says.
-
-    Attributes:
-        version: of the file.
-        values: of the conditions by name.
-    """
-
-    version: int
-    values: Mapping[str, str]
 
 
 def rig_conditions(rig: Rig) -> dict[str, str]:
@@ -98,23 +84,6 @@ def default_conditions(sensor_kind: str = "") -> dict[str, str]:
     defaults = {"rig": rig, "terrain": _defaults(TerrainRow)}
     none = dict.fromkeys((_GRAVITY, _FRICTION), _NO_CALIBRATION)
     return {**_texts(defaults), **none}
-
-
-def write_conditions(folder: SessionFolder, values: Mapping[str, str]) -> None:
-    """Write the conditions of a new session.
-
-    Raises:
-        TrialFileError: the disk is full or gone.
-    """
-    write_json(folder.path / FILE, {_VERSION_KEY: VERSION, **values})
-
-
-def read_conditions(folder: SessionFolder) -> Conditions:
-    """Return the conditions of a session, none where the file is damaged."""
-    entries = read_json(folder.path / FILE)
-    version = entries.pop(_VERSION_KEY, 1)
-    values = {name: str(value) for name, value in entries.items()}
-    return Conditions(version if isinstance(version, int) else 1, values)
 
 
 def differences(then: Mapping[str, str], now: Mapping[str, str]) -> list[str]:

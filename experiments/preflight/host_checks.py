@@ -11,6 +11,7 @@ from acquisition.sample import Record
 from experiments.messages import preflight_error
 from experiments.operator.console import BAD, GOOD, WARNING
 from experiments.preflight.page import Add, CheckResult
+from experiments.rig.build import start_of
 from experiments.rig.rig import Rig
 from experiments.settings.load import SHIPPED
 from experiments.settings.rig import CONTACT_LIMITS, WITHIN_RANGE, RigSettings
@@ -92,7 +93,7 @@ def check_masses(rig: Rig) -> CheckResult | None:
         return None
     reaches = reaches_along(
         rig.model,
-        np.array(rig.row.start_q),
+        start_of(rig.row, rig.model),
         rig.frame.axes(),
         rig.frame.travel,
         remaining_friction(stored.fit, section.share),

@@ -17,6 +17,8 @@ from analysis.data.data_package import (
 from analysis.data.load import RecordedTrial, load_trial
 from analysis.data.parquet_tables import to_parquet
 from analysis.data.prepare import PrepareOptions, prepare_trial
+from analysis.data.recorded_factors import FOOT, StatedFactors
+from analysis.data.terrain_kinds import Value
 from experiments.operator.console import WARNING, Console
 from experiments.report.checksums import SUMS, digest_of, write_sums
 from experiments.report.quantities import KEPT, QUANTITIES, kept_rule
@@ -57,8 +59,8 @@ _INDEX_MEANINGS = {
     "operator": "who pushed",
     "started_utc": "when the recording began, UTC",
     "incline_deg": "incline of the plane",
-    "stone_size": "of the stones: small, big or none",
-    "tread": "of the foot",
+    "stone_size": "of the stones: small, big, none, e.g. 12 mm, fine or stones",
+    "tread": "of the foot: true, false (bare), or the foot's name",
     "simulated": "true where the devices were simulated",
     "sha256 of the recording": "SHA-256 of the trial file",
 }
@@ -180,13 +182,19 @@ def export_sessions(
     make_empty(to)
     writer = TableWriter(to, form)
     rows: list[list[str]] = []
+    stated: list[StatedFactors] = []
     for session, path in paths:
         trial = load_trial(path)
         name = f"{session.path.name}/{path.stem}"
         (to / session.path.name).mkdir(exist_ok=True)
         rows.append(_write_trial(writer, name, session, trial))
+        stated.append(trial.factors)
         console.say(f"{name}: {len(trial.t)} rows")
-    writer.add_texts(INDEX, rows, _INDEX_MEANINGS, "The trials.")
+    columns = _factor_columns(stated)
+    for row, factors in zip(rows, stated, strict=True):
+        row += [_cell(factors.values, column) for column in columns]
+    index = {**_INDEX_MEANINGS, **columns}
+    writer.add_texts(INDEX, rows, index, "The trials.")
     meanings = dictionary_rows(form)
     writer.add_texts(DICTIONARY, meanings, _DICTIONARY_MEANINGS, "Every column.")
     what = f"Kept trials of {', '.join(s.id for s in sessions)}"
@@ -195,6 +203,28 @@ def export_sessions(
     if is_simulated:
         console.say(f"{WARNING} SIMULATED: trials.csv says so in every row.")
     console.say(f"{len(rows)} trials in {to}. To check: cd {to} && sha256sum -c {SUMS}")
+
+
+def _factor_columns(stated: Sequence[StatedFactors]) -> dict[str, str]:
+    """Return the factors of trials by name with what each is; {} where none has any."""
+    units = {name: unit for each in stated for name, unit in each.units.items()}
+    names = dict.fromkeys(name for each in stated for name in each.values)
+    if not set(names) - {FOOT}:  # the column `tread` tells it
+        return {}
+    about = {
+        name: f"factor [{unit}]" if unit else "factor" for name, unit in units.items()
+    }
+    return {name: about.get(name, "factor") for name in names}
+
+
+def _cell(values: Mapping[str, Value], name: str) -> str:
+    """Return a factor of a trial as text: "-" = does not apply, "" = not stated."""
+    if name not in values:
+        return ""
+    value = values[name]
+    if value is None:
+        return "-"
+    return value if isinstance(value, str) else f"{value:.12g}"
 
 
 def _write_trial(
@@ -211,6 +241,8 @@ def _write_trial(
         terrain=trial.terrain,
         stones=trial.stones,
         incline_deg=series.incline_deg,
+        factors=dict(series.factors),
+        logs=tuple(sorted(series.logs)),
         force_age=series.stamped_lag,
         simulated=trial.is_simulated,
         recording=recording,

@@ -12,6 +12,7 @@ from acquisition.clock import SystemClock
 from acquisition.errors import SessionError, SettingsError, TrialFileError
 from analysis.data.load import load_trial
 from analysis.data.plausibility import summed_up
+from analysis.data.recorded_factors import stated_factors
 from analysis.data.terrain_kinds import terrain_kind
 from analysis.findings.findings import compute_results
 from analysis.findings.held_trial import HeldTrial, TrialFiles
@@ -35,6 +36,12 @@ from analysis.study.study import Study, StudyOptions, run_study
 from analysis.terrains.export import break_away_batch, break_away_of, database_of
 from analysis.terrains.identify import identify_study
 from experiments.operator.console import Console
+from experiments.report.cells import (
+    cells_table,
+    forecast_of,
+    forecast_table,
+    plain_forecast,
+)
 from experiments.report.choices import AnalysisChoices, repeat_study
 from experiments.report.commissioned import uncommissioned
 from experiments.report.foresight import StudyForesight, study_foresight, watched_trials
@@ -48,6 +55,7 @@ from experiments.report.truth_errors import (
 from experiments.session.data_files import write_new_text
 from experiments.session.photos import photos_of
 from experiments.session.store import FOLDS, SessionFolder, iso_utc
+from experiments.settings.matrix import MatrixSettings
 
 EXPORTED = (*PAPER_MODELS, GP_SE_TRIAL)
 
@@ -64,6 +72,7 @@ class ReportRequest:
         missing: kept trials that are missing or changed, in words.
         out: folder of the report; None = that of the session, or `data`/study.
         with_pdf: figures are wanted as PDF, too.
+        matrix: whose cells are forecast; None = none.
     """
 
     terrains: Sequence[str]
@@ -73,6 +82,7 @@ class ReportRequest:
     missing: Sequence[str] = ()
     out: Path | None = None
     with_pdf: bool = False
+    matrix: MatrixSettings | None = None
 
     def sorted(self, names: Iterable[str]) -> list[str]:
         """Return `names` in the matrix's order, others last by name."""
@@ -290,6 +300,18 @@ def _context(
 ) -> ReportContext:
     """Return what the report shows beyond the study."""
     study, trials = analysed.study, analysed.trials
+    series = {name: [t.series for t in group] for name, group in trials.items()}
+    forecast = (
+        forecast_of(study, series, order.matrix)
+        if order.matrix is not None and len(sessions) > 1
+        else None
+    )
+    units = {
+        name: unit
+        for group in trials.values()
+        for trial in group
+        for name, unit in stated_factors(trial.metadata["trial"]).units.items()
+    }
     photos, unsound = photos_of(sessions)
     count = sum(len(group) for group in trials.values())
     return ReportContext(
@@ -299,6 +321,8 @@ def _context(
         is_foreign=False,
         generated_utc=iso_utc(SystemClock().utc_ns()),
         tables=[
+            *cells_table(study, units),
+            *([] if forecast is None else [forecast_table(forecast)]),
             *(side_by_side(choice, study, other) for choice, other in others),
             *truth_tables(study, trials, analysed.truths),
             *foresight.tables,
@@ -308,6 +332,7 @@ def _context(
             "what_if": [plain_choice(c, study, other) for c, other in others],
             "foresight": foresight.numbers,
             "left_out": analysed.left_out,
+            "matrix": None if forecast is None else plain_forecast(forecast),
         },
         warnings=[
             *uncommissioned(

@@ -38,23 +38,54 @@ from wam.driver.puck_properties import known_table
 from wam.driver.safety_module import WARNING_SHARE, SafetyLimits
 from wam.driver.settings import ArmSettings
 from wam.model.arm_model import ArmModel
-from wam.model.constants import ArmConstants, Body
+from wam.model.constants import ArmConstants, Array, Body
+from wam.model.start_pose import elbow_up, lowered_to
 from wam.model.tool import Tool, sensor_body
 
 
 def terrain_frame(row: TerrainRow) -> TerrainFrame:
-    """Return the frame of a row of the matrix."""
-    return TerrainFrame(
+    """Return the frame of the push across a row of the matrix.
+
+    That of its container; of a push away from the base, the same seen from its other
+    end: trials start at the near end, and what was downhill is uphill.
+    """
+    frame = TerrainFrame(
         incline=float(np.radians(row.incline_deg)),
         heading=float(np.radians(row.heading_deg)),
         far_end=row.far_end,
         travel=row.travel,
     )
+    return frame if row.push_deg == 0 else frame.from_other_end()
+
+
+def start_of(row: TerrainRow, model: ArmModel) -> Array:
+    """Return joints with the foot where trials start: as stated, or computed [rad].
+
+    Args:
+        row: of the matrix.
+        model: the arm with its tool.
+
+    Raises:
+        SettingsError: the arm does not reach it.
+    """
+    frame = terrain_frame(row)
+    start, axes = np.array(frame.far_end), frame.axes()
+    if row.start_q is None:
+        try:
+            return elbow_up(model, axes, start)
+        except SettingsError as error:
+            raise SettingsError(
+                f"{row.name}: {error.message}", hint=error.hint
+            ) from error
+    stated = np.array(row.start_q)
+    if row.push_deg == 0:
+        return stated
+    return lowered_to(model, axes, start, stated, 0.0)
 
 
 def build_tool(rig: RigSettings, foot: str) -> Tool:
     """Return sensor and foot as rig.toml describes them."""
-    return tool_with(rig, rig.feet.tread if foot == "tread" else rig.feet.bare)
+    return tool_with(rig, rig.feet[foot])
 
 
 def tool_with(rig: RigSettings, section: FootSection) -> Tool:

@@ -22,6 +22,7 @@ from experiments.rig.build import (
     build_sensor,
     build_tool,
     open_bus_sensor,
+    start_of,
     terrain_frame,
     tool_with,
 )
@@ -34,6 +35,7 @@ from ft_sensor.serial_line.sensor import SerialSensor
 from ft_sensor.vendors.registry import AnySensor
 from wam.calibration.friction_file import FrictionCalibration, friction_from_toml
 from wam.calibration.gravity_file import gravity_from_toml
+from wam.model.arm_model import ArmModel
 from wam.model.constants import ArmConstants, load_constants
 from wam.model.gravity import weighed_arm
 from wam.model.moments import moments_of_links
@@ -86,25 +88,29 @@ class SimulatedRig:
 
     def metadata(self) -> dict[str, Any]:
         """Return the world in plain values, for a process of its own."""
-        frame = terrain_frame(self.row)
+        row, tool = self.row, build_tool(self.rig, self.row.foot)
+        frame, sole = terrain_frame(row), self.rig.feet[row.foot].simulate
+        start = start_of(row, ArmModel(load_constants(), tool))
         scene = {
-            "terrain": self.row.name,
-            "stones": self.row.stones,
-            "foot": self.row.foot,
+            "terrain": row.name,
+            "stones": row.stones,
+            "foot": row.foot,
+            "effects": dict(row.simulate),
+            "sole": None if sole is None else sole.model_dump(),
             "frame": {
                 "incline": frame.incline,
                 "heading": frame.heading,
                 "far_end": list(frame.far_end),
                 "travel": frame.travel,
             },
-            "start_q": list(self.row.start_q),
+            "start_q": start.tolist(),
             "seed": self.seed,
             "sensor": sensor_metadata(self.rig.ft_sensor),
             "truth": None if self.truth is None else asdict(self.truth),
         }
         return {
             "scene": scene,
-            "tool": tool_metadata(build_tool(self.rig, self.row.foot)),
+            "tool": tool_metadata(tool),
             "friction": self.friction,
             "pace": self.pace,
             "cables": self.cables,
@@ -232,8 +238,8 @@ class ServedArm:
         bus: "traction-fake" or an interface of python-can, and its channel.
         line: path and kind of a serial sensor; None = the sensor is on the bus.
         is_idle_first: the arm begins powered, idle, pucks asleep; otherwise in E-STOP.
-        tool: "tread" or "bare" of rig.toml, "none", or the path of a foot's file; empty
-            for the foot of the first terrain.
+        tool: a foot of rig.toml, "none", or the path of a foot's file; empty for the
+            foot of the first terrain.
         has_hand: a person carries the arm.
         firmware: of the motor pucks, and of the safety module.
         is_at_rest: the arm is at home with joint 6 on its upper stop, not just at home.
@@ -262,7 +268,7 @@ def _served_tool(settings: Settings, tool: str) -> Tool | None:
     """
     if tool == NO_TOOL:
         return None
-    if tool in ("", "tread", "bare"):
+    if not tool or tool in settings.rig.feet:
         foot = tool or settings.matrix.terrains[0].foot
         return build_tool(settings.rig, foot)
     return tool_with(settings.rig, read_foot(Path(tool)))

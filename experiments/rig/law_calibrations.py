@@ -304,7 +304,7 @@ def gravity_words(rig: RigSettings, gravity_text: str, foot: str) -> str:
 
 
 def _check_tool(rig: RigSettings, stored: GravityCalibration) -> None:
-    is_known = stored.foot in type(rig.feet).model_fields
+    is_known = stored.foot in rig.feet
     if is_known and fits_tool(stored, build_tool(rig, stored.foot)):
         return
     sensor, body = stored.tool.sensor, stored.tool.foot

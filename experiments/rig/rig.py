@@ -9,7 +9,7 @@ from typing import Any
 from acquisition.clock import Clock, SystemClock
 from acquisition.ipc.layout import SharedLayout
 from acquisition.simulation import SimulationControl
-from analysis.foresight.model import RigIdentity
+from analysis.foresight.model import RigIdentity, tread_of
 from experiments.arguments import FRICTION, TimeMode
 from experiments.rig.arm_lock import ArmLock
 from experiments.rig.backend import RigBackend
@@ -131,7 +131,7 @@ class Rig:
         assert self.model.tool is not None
         return RigIdentity(
             simulated="true" if self.is_simulated else "false",
-            tread="true" if self.row.foot == "tread" else "false",
+            tread=tread_of(self.row.foot),
             effective_mass_kg=repr(self.settings.rig.control.virtual_mass),
             foot_mass_kg=repr(self.model.tool.foot.mass),
         )

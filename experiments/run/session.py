@@ -19,7 +19,6 @@ from experiments.preflight.conditions import (
     last_foot,
     rig_conditions,
     sensor_conditions,
-    write_conditions,
 )
 from experiments.preflight.connecting import connect_rig
 from experiments.preflight.preflight import Preflight, run_preflight
@@ -39,6 +38,7 @@ from experiments.run.stop import StopFlag, handle_signals
 from experiments.session.data_files import write_json, write_text
 from experiments.session.journal import Journal
 from experiments.session.lock import session_lock
+from experiments.session.recorded_conditions import write_conditions
 from experiments.session.stance_task import StanceTask
 from experiments.session.states import Event
 from experiments.session.store import create_session, session_utc_ns
@@ -46,7 +46,7 @@ from experiments.session.unbegun import clear_unbegun
 from experiments.settings.load import Settings
 from experiments.settings.matrix import TerrainRow
 from experiments.status_table.session_summaries import glance_sessions
-from experiments.status_table.summary_cache import row_of
+from experiments.status_table.summary_cache import matrix_of
 from experiments.status_table.upcoming import next_steps
 from experiments.trial.files import SessionMetadata, collect_metadata
 
@@ -288,10 +288,10 @@ def _print_next(request: SessionRequest, journal: Journal, code: int) -> None:
     request.console.say(f"Complete. Next: traction report {name}{data}")
     request.console.say(f"It writes {journal.folder.path / 'report' / 'index.html'}")
     is_simulated = journal.folder.is_simulated
-    rows = [row_of(row) for row in request.settings.matrix.terrains]
+    matrix = matrix_of(request.settings.matrix)
     try:
         seen = glance_sessions(request.data)
-        steps = next_steps(request.data, seen, rows, is_simulated=is_simulated)
+        steps = next_steps(request.data, seen, matrix, is_simulated=is_simulated)
     except TractionError as error:  # of another session; this one is complete
         steps = [f"▲ The next terrain is unknown: {error.message}"]
     for step in steps:

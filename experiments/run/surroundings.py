@@ -26,7 +26,7 @@ _BESIDE, _BEYOND = 0.25, 0.10  # half a container's width, and past a trial's en
 def container_box(frame: TerrainFrame) -> ObstacleBox:
     """Return the container as a box that stands on the floor."""
     axes = frame.axes()
-    deep = frame.far_end[2] + BASE_HEIGHT
+    deep = _highest(frame) + BASE_HEIGHT
     size = np.array([frame.travel + 2.0 * _BEYOND, 2.0 * _BESIDE, deep + RIM])
     middle = np.array([0.5 * frame.travel, 0.0, 0.5 * (RIM - deep)])
     center = np.array(frame.far_end) + middle @ axes
@@ -35,10 +35,16 @@ def container_box(frame: TerrainFrame) -> ObstacleBox:
 
 def free_space(settings: Settings, row: TerrainRow) -> FreeSpace:
     """Return where the arm may move with the foot and beside the container of `row`."""
-    floor = max(row.far_end[2] for row in settings.matrix.terrains) + ABOVE
+    frames = map(terrain_frame, settings.matrix.terrains)
+    floor = max(map(_highest, frames)) + ABOVE
     tool = build_tool(settings.rig, row.foot)
     box = container_box(terrain_frame(row))
     return FreeSpace(floor, ArmClearance(load_constants(), tool, (box,)))
+
+
+def _highest(frame: TerrainFrame) -> float:
+    """Return how high the higher end of a container is [m]."""
+    return max(frame.far_end[2], frame.from_other_end().far_end[2])
 
 
 class PoseFile(SettingsSection):

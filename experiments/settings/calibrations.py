@@ -1,6 +1,6 @@
 """The settings with the calibrations that they name: sensor, feet, containers."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
@@ -9,9 +9,10 @@ import numpy as np
 from pydantic import ValidationError
 
 from acquisition.errors import SettingsError
-from acquisition.settings import read_text
+from acquisition.settings import parse_toml, read_text
 from experiments.settings.load import Settings
 from experiments.settings.matrix import TerrainRow
+from experiments.settings.places import TaughtPlace
 from experiments.settings.rig import RigSettings
 from ft_sensor.calibration.files import terrain_from_toml, terrain_metadata
 from ft_sensor.calibration.fit import ContainerFit, check_residual, check_terrain
@@ -103,7 +104,13 @@ def with_calibrations(settings: Settings, *, is_simulated: bool | None) -> Setti
     """
     reader = _Reader(settings, is_simulated=is_simulated)
     rig = reader.rig(settings.rig)
-    rows = tuple(reader.row(row) for row in settings.matrix.terrains)
+    sharing: dict[str, set[str]] = {}
+    for row in settings.matrix.terrains:
+        sharing.setdefault(row.place or row.name, set()).add(row.name)
+    rows = tuple(
+        reader.row(row, sharing[row.place or row.name])
+        for row in settings.matrix.terrains
+    )
     matrix = settings.matrix.model_copy(update={"terrains": rows})
     return replace(settings, rig=rig, matrix=matrix, calibrations=reader.texts)
 
@@ -126,20 +133,31 @@ class _Reader:
             mount["sign"] = int(stored.fit.sign)
             if stored.foot in feet:
                 feet[stored.foot].update(_body(stored, rig.ft_sensor.height))
-        for name, section in (("tread", rig.feet.tread), ("bare", rig.feet.bare)):
+        for name, section in rig.feet.items():
             if section.calibration is not None:
                 stored = self._sensor(section.calibration, "foot", name)
                 feet[name].update(_body(stored, rig.ft_sensor.height))
         return _checked(RigSettings, values)
 
-    def row(self, row: TerrainRow) -> TerrainRow:
-        """Return a row of the matrix with the container where it was touched."""
+    def row(self, row: TerrainRow, sharing: Collection[str]) -> TerrainRow:
+        """Return a row of the matrix with the container where it was touched.
+
+        Args:
+            row: the row.
+            sharing: names of the terrains that stand at its place, itself among them.
+        """
+        if row.taught is not None:
+            instead = f"remove [places.{row.place}]"
+            text = read_calibration(self._folder / row.taught, "terrain", instead)
+            taught = TaughtPlace.parse(text)
+            self._check_kind(row.taught, is_of_simulation=taught.simulated)
+            self.texts[f"{PREFIX}{row.taught}"] = text
         name = row.calibration
         if name is None:
             return row
         text = self._read(name, f"terrain --terrain {row.name}")
         terrain, frame = terrain_from_toml(text)
-        if terrain != row.name:
+        if terrain not in sharing:
             raise _mismatch(name, f"terrain {terrain}", f"terrain {row.name}")
         facts = terrain_metadata(text)
         self._check_kind(name, is_of_simulation=facts.get("simulated") == "true")
@@ -184,12 +202,18 @@ def forced_words(settings: Settings) -> list[str]:
     words: list[str] = []
     for key, text in settings.calibrations.items():
         name = key.removeprefix(PREFIX)
+        if _is_of_place(text):
+            continue
         if "readings" not in text:  # a container
             if terrain_metadata(text).get(FORCED) == "true":
                 words.append(f"{name} was forced: its incline is not the matrix's.")
         elif fault := _sensor_fault(sensor_from_toml(text, name)):
             words.append(f"{name} was forced. {fault}")
     return words
+
+
+def _is_of_place(text: str) -> bool:
+    return "place" in parse_toml(text)
 
 
 def _sensor_fault(stored: SensorCalibration) -> str:

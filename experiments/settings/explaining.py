@@ -3,7 +3,7 @@
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, cast, get_args
+from typing import Any, cast, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
@@ -45,7 +45,11 @@ def line_of(text: str, name: str) -> int | None:
 
 
 def explain(
-    model: type[BaseModel], name: str, text: str, error: ValidationError
+    model: type[BaseModel],
+    name: str,
+    text: str,
+    error: ValidationError,
+    inside: str = "",
 ) -> str:
     """Return what is wrong with a file that should have been a `model`.
 
@@ -57,6 +61,8 @@ def explain(
         name: of the file.
         text: its content.
         error: what pydantic says of it.
+        inside: the table of the file that should be one, e.g. "cells[3]"; empty = the
+            whole file.
     """
     errors = sorted(error.errors(), key=lambda e: e["type"] == "missing")
     parts: list[str] = []
@@ -73,14 +79,16 @@ def explain(
             if key is not None:
                 meant.add(missing[key])
         if where not in meant:
-            parts.append(_sentence(model, text, each))
+            parts.append(_sentence(model, text, each, inside))
     more = [f"and {len(parts) - _MOST} more"] if parts[_MOST:] else []
     return f"{name}: {'; '.join([*parts[:_MOST], *more])}."
 
 
-def _sentence(model: type[BaseModel], text: str, error: ErrorDetails) -> str:
+def _sentence(
+    model: type[BaseModel], text: str, error: ErrorDetails, inside: str
+) -> str:
     """Return one error without its full stop, its line at the end."""
-    location = _locate(model, error["loc"])
+    location = _locate(model, error["loc"], inside)
     line = line_of(text, location.name)
     return _reason(location, error) + (f" (line {line})" if line else "")
 
@@ -140,15 +148,21 @@ class _Location:
         return f", e.g. {examples[0]}" if examples else ""
 
 
-def _locate(model: type[BaseModel], location: tuple[int | str, ...]) -> _Location:
+def _locate(
+    model: type[BaseModel], location: tuple[int | str, ...], inside: str
+) -> _Location:
     """Follow the `location` of an error; a kind stands in it like a table."""
     current: type[BaseModel] | None = model
     field: FieldInfo | None = None
     kinds: Mapping[str, type[BaseModel]] = {}
-    name = kind = ""
+    name, kind = inside, ""
     siblings: Sequence[str] = ()
     item: int | None = None
+    is_named = False  # of several tables, each under a name of its own
     for part in location:
+        if is_named and isinstance(part, str):
+            name, is_named = f"{name}.{part}", False
+            continue
         siblings = tuple(current.model_fields) if current else siblings
         if isinstance(part, int):
             name += f"[{part}]"
@@ -160,6 +174,7 @@ def _locate(model: type[BaseModel], location: tuple[int | str, ...]) -> _Locatio
             item = None
             field = current.model_fields.get(part) if current else None
             sections = _sections_of(field.annotation) if field else []
+            is_named = field is not None and get_origin(field.annotation) is dict
             current = sections[0] if len(sections) == 1 else None
             if len(sections) > 1:
                 kinds = {_kind_of(section): section for section in sections}

@@ -4,16 +4,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
 from acquisition.errors import SettingsError
 from acquisition.settings import parse_toml, read_text
 from experiments.arguments import did_you_mean
-from experiments.settings.explaining import explain
-from experiments.settings.matrix import MatrixSettings, TerrainRow
+from experiments.settings.design import DesignFile, resolve_design
+from experiments.settings.explaining import explain, line_of
+from experiments.settings.matrix import MatrixSettings, TerrainRow, Version1Matrix
 from experiments.settings.numbers import beyond_real, unusual_numbers
+from experiments.settings.places import StatedPlace, TaughtPlace
 from experiments.settings.rig import FootSection, RigSettings
 from experiments.settings.sensor import build_device
 
@@ -105,8 +107,8 @@ class Settings:
         The mounting of the sensor goes too, unless it `is_mounted` as it was.
         """
         nothing = {"calibration": None}
-        old = self.rig.feet.tread if foot == "tread" else self.rig.feet.bare
-        feet = self.rig.feet.model_copy(update={foot: old.model_copy(update=nothing)})
+        old = self.rig.feet[foot]
+        feet = {**self.rig.feet, foot: old.model_copy(update=nothing)}
         changed: dict[str, object] = {"feet": feet}
         if not is_mounted:
             changed["ft_sensor"] = self.rig.ft_sensor.model_copy(update=nothing)
@@ -141,9 +143,7 @@ def load_settings(config: Path | None) -> Settings:
     Raises:
         SettingsError: a file is missing, no TOML, or holds a wrong key or value.
     """
-    shipped = resources.files("experiments.data")
-    rig_text = (shipped / "rig.toml").read_text()
-    matrix_text = (shipped / "matrix.toml").read_text()
+    rig_text, matrix_text = map(_shipped, ("rig.toml", "matrix.toml"))
     origin = SHIPPED
     if config is not None:
         rig_text = _read(config)
@@ -151,18 +151,126 @@ def load_settings(config: Path | None) -> Settings:
         beside = config.with_name("matrix.toml")
         if beside.exists():
             matrix_text = _read(beside)
-    rig = _parse(RigSettings, rig_text, "rig.toml" if config is None else config.name)
+    name = "rig.toml" if config is None else config.name
+    folder = config.parent if config is not None else Path()
+    rig = load_rig(rig_text, name, folder)
+    matrix = load_matrix(matrix_text, rig)
+    return Settings(rig, matrix, rig_text, matrix_text, origin, folder)
+
+
+def load_unplaced(
+    config: Path | None, place: str, foot: str | None
+) -> tuple[Settings, TerrainRow]:
+    """Return settings with one terrain at a place that nobody has measured yet.
+
+    Where the container of a simulation stands follows from the numbers that rig.toml
+    has of the place, or is that of the shipped matrix; a real arm needs none.
+
+    Args:
+        config: rig.toml; None = the shipped defaults. No matrix.toml is read.
+        place: its name.
+        foot: that is mounted; None = the first of rig.toml.
+
+    Raises:
+        SettingsError: rig.toml has a wrong key or value, or no such foot.
+    """
+    text = _shipped("rig.toml") if config is None else _read(config)
+    folder = Path() if config is None else config.parent
+    name = "rig.toml" if config is None else config.name
+    rig = _parse(RigSettings, text, name)
     build_device(rig.ft_sensor)
-    matrix = _parse(MatrixSettings, matrix_text, "matrix.toml")
-    names = [row.name for row in matrix.terrains]
+    if foot is not None and foot not in rig.feet:
+        raise SettingsError(
+            f"There is no foot {foot!r} in {name}.",
+            hint=f"Feet: {', '.join(rig.feet)}. Nothing was started.",
+        )
+    known = rig.places.get(place, StatedPlace())
+    row = TerrainRow(
+        name=f"place-{place.replace('_', '-')}"[:24],
+        foot=foot or next(iter(rig.feet)),
+        far_end=known.far_end or (0.70, 0.0, 0.12),
+        heading_deg=known.heading_deg or 0.0,
+        incline_deg=known.incline_deg or 0.0,
+        travel=known.travel or 0.45,
+        trials=1,
+        stones="small",
+    )
+    rig = rig.model_copy(update={"places": {}})
+    matrix = MatrixSettings(terrains=(row,))
+    origin = SHIPPED if config is None else str(config)
+    return Settings(rig, matrix, text, "", origin, folder), row
+
+
+def load_rig(text: str, name: str, folder: Path) -> RigSettings:
+    """Return a rig.toml with the places that were taught.
+
+    Args:
+        text: its text.
+        name: of the file, in messages.
+        folder: where the files are that it names.
+
+    Raises:
+        SettingsError: no TOML, or it or a taught place has a wrong key or value.
+    """
+    rig = _parse(RigSettings, text, name)
+    build_device(rig.ft_sensor)
+    places = {key: _taught(key, each, folder) for key, each in rig.places.items()}
+    return rig.model_copy(update={"places": places})
+
+
+def _taught(name: str, place: StatedPlace, folder: Path) -> StatedPlace:
+    """Return a place with what its file states."""
+    if place.taught is None:
+        return place
+    if place.has_numbers:
+        raise SettingsError(
+            f"rig.toml: places.{name} was taught and has numbers of its own.",
+            hint="Remove the numbers, or the line taught. Nothing was started.",
+        )
+    text = _read(folder / place.taught, f"Run traction teach {name}.")
+    try:
+        taught = TaughtPlace.parse(text)
+    except ValueError as error:
+        raise SettingsError(
+            f"{place.taught} is no place: {error}.",
+            hint=f"Run traction teach {name} again. Nothing was started.",
+        ) from error
+    if taught.place != name:
+        raise SettingsError(
+            f"{place.taught} is of place {taught.place}, not of {name}.",
+            hint=f"Run traction teach {name}, or name its file. Nothing was started.",
+        )
+    calibration = {"calibration": place.calibration}
+    return taught.as_place(place.taught).model_copy(update=calibration)
+
+
+def load_matrix(text: str, rig: RigSettings) -> MatrixSettings:
+    """Return the rows of a matrix.toml of either version.
+
+    Raises:
+        SettingsError: no TOML, or a wrong key or value, or one that the rig has not.
+    """
+    if "version" in _toml(text, "matrix.toml"):
+        file = _parse(DesignFile, text, "matrix.toml")
+        return resolve_design(file, text, rig.places, tuple(rig.feet))
+    old = _parse(Version1Matrix, text, "matrix.toml")
+    names = [row.name for row in old.terrains]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise SettingsError(
             f"matrix.toml: terrain {twice[0]!r} occurs twice.",
             hint="Every row needs a name of its own. Nothing was started.",
         )
-    folder = config.parent if config is not None else Path()
-    return Settings(rig, matrix, rig_text, matrix_text, origin, folder)
+    for number, row in enumerate(old.terrains):
+        if row.foot not in rig.feet:
+            line = line_of(text, f"terrains[{number}].foot")
+            raise SettingsError(
+                f'matrix.toml: terrains[{number}].foot = "{row.foot}" - expected '
+                f"a foot of rig.toml: {', '.join(rig.feet)} (line {line}).",
+                hint="Nothing was started.",
+            )
+    rows = tuple(TerrainRow.model_validate(row.model_dump()) for row in old.terrains)
+    return MatrixSettings(terrains=rows)
 
 
 def read_foot(path: Path) -> FootSection:
@@ -173,6 +281,10 @@ def read_foot(path: Path) -> FootSection:
     """
     text = _read(path, "Name a foot of rig.toml, or a file with mass, com, inertia.")
     return _parse(FootSection, text, path.name)
+
+
+def _shipped(name: str) -> str:
+    return (resources.files("experiments.data") / name).read_text()
 
 
 def _read(path: Path, hint: str = "Name a rig.toml with --config.") -> str:
@@ -186,11 +298,14 @@ def _read(path: Path, hint: str = "Name a rig.toml with --config.") -> str:
 
 
 def _parse(model: type[_M], text: str, name: str) -> _M:
+    return _validated(model, _toml(text, name), text, name)
+
+
+def _toml(text: str, name: str) -> dict[str, Any]:
     try:
-        data = parse_toml(text)
+        return parse_toml(text)
     except ValueError as error:
         raise SettingsError(f"{name}: {error}.", hint="Nothing was started.") from error
-    return _validated(model, data, text, name)
 
 
 def _validated(model: type[_M], data: object, text: str, name: str) -> _M:

@@ -1,17 +1,25 @@
-"""What may stand in matrix.toml: the terrains and how they are pushed across."""
+"""The matrix: what stands in matrix.toml once it is read, a row per terrain.
 
-from typing import Annotated, Literal
+A file of version 1 has one table per terrain. One of version 2 names factors and cells
+(`design`); both end here.
+"""
 
-from pydantic import Field
+import math
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, StringConstraints, model_validator
 
 from acquisition.settings import File, Number, SettingsSection, Usual, Whole
-from analysis.data.terrain_kinds import FLAT
+from analysis.data.terrain_kinds import FLAT, SIZE_BY_WORD, Value, terrain_kind
 
+MOST_FACTORS = 12
+LONGEST_WORD = 40
 _Across = Annotated[Number, Field(ge=-1.2, le=1.2), Usual(-1.0, 1.0, "m")]
 _Up = Annotated[Number, Field(ge=-0.5, le=1.0), Usual(-0.4, 0.6, "m")]
-_Place = tuple[_Across, _Across, _Up]  # what the arm reaches
+FarEnd = tuple[_Across, _Across, _Up]  # what the arm reaches
 # The stops of the joints, as in wam7.toml.
-_Angles = tuple[
+Angles = tuple[
     Annotated[Number, Field(ge=-2.6, le=2.6), Usual(-2.5, 2.5, "rad")],
     Annotated[Number, Field(ge=-2.0, le=2.0), Usual(-1.9, 1.9, "rad")],
     Annotated[Number, Field(ge=-2.8, le=2.8), Usual(-2.7, 2.7, "rad")],
@@ -20,49 +28,201 @@ _Angles = tuple[
     Annotated[Number, Field(ge=-1.6, le=1.6), Usual(-1.5, 1.5, "rad")],
     Annotated[Number, Field(ge=-3.0, le=3.0), Usual(-2.9, 2.9, "rad")],
 ]
-_Task = Annotated[str, Field(min_length=1, max_length=60, pattern=r"^[^\x00-\x1f]+$")]
+Heading = Annotated[Number, Field(ge=-180, le=180), Usual(-180.0, 180.0, "degrees")]
+Travel = Annotated[Number, Field(gt=0.05, le=1.0), Usual(0.05, 0.7, "m")]
+Incline = Annotated[Number, Field(ge=-30, le=30), Usual(-20.0, 20.0, "degrees")]
+Trials = Annotated[Whole, Field(ge=1, le=99), Usual(1, 30)]
+PlaceName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]{0,23}$")]
+FootName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,15}$")]
+CellName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9+-]{0,23}$")]
+GroundWord = Literal["stones", "plate", "fine"]
+Push = Literal[0, 180]
+Target = Literal["grid", "corner", "break-away"]
+_Text = Annotated[str, Field(min_length=1, max_length=60, pattern=r"^[^\x00-\x1f]+$")]
+Tasks = Annotated[tuple[_Text, ...], Field(min_length=1, max_length=9)]
+RESET = ("rake", "level", "foot at the far end")
+Word = Annotated[
+    str,
+    StringConstraints(
+        pattern=r"^[A-Za-z0-9][A-Za-z0-9 ._+/-]*$", max_length=LONGEST_WORD
+    ),
+]
 
 
-class TerrainRow(SettingsSection):
-    """One row of the matrix.
+class DesignFactor(SettingsSection):
+    """Something that varies between the cells.
+
+    Attributes:
+        name: the key of the cells that states it.
+        unit: of a number; "" = none.
+        kind: a number, or one of `levels`.
+        scale: on which numbers are compared by the joint model.
+        levels: the words that a cell may state.
+        words: what a word means, for people.
+    """
+
+    name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,23}$")] = Field(
+        examples=["moisture"]
+    )
+    unit: Annotated[str, Field(max_length=16, pattern=r"^[^\x00-\x1f]*$")] = ""
+    kind: Literal["number", "word"] = Field(examples=["word"])
+    scale: Literal["linear", "log"] = "linear"
+    levels: tuple[Word, ...] = Field(default=(), max_length=60)
+    words: dict[Word, _Text] = Field(default_factory=dict[str, str])
+
+    @model_validator(mode="after")
+    def _fits_its_kind(self) -> Self:
+        if self.kind == "word":
+            if not self.levels or len(set(self.levels)) < len(self.levels):
+                raise ValueError(
+                    'a word needs levels, each once, e.g. levels = ["dry", "wet"]'
+                )
+            if self.unit or self.scale != "linear":
+                raise ValueError("a word has no unit and no scale")
+        elif self.levels or self.words:
+            raise ValueError("a number has no levels and no words")
+        if strange := sorted(set(self.words) - set(self.levels)):
+            raise ValueError(f"words explains {strange[0]!r}, which is no level")
+        if self.name == "d50" and (self.kind, self.unit) != ("number", "mm"):
+            raise ValueError('d50 is the grain size: kind = "number", unit = "mm"')
+        return self
+
+    def check(self, value: Value) -> str:
+        """Return what is wrong with a value of this factor, "" for nothing."""
+        if value is None:
+            return ""
+        if self.kind == "word":
+            if value in self.levels:
+                return ""
+            return f"one of {', '.join(self.levels)}" + ' or "-"'
+        if isinstance(value, str) or not math.isfinite(value):
+            return 'a finite number or "-"'
+        if (self.scale == "log" or self.name == "d50") and value <= 0.0:
+            return "a number above 0"
+        return ""
+
+
+class Design(SettingsSection):
+    """In which order the cells are recorded.
+
+    Attributes:
+        order: by chance against drift, as the rows stand, or by chance within blocks.
+        block_by: keys of the cells that are hard to change: those alike are done in
+            one go.
+        repeat_blocks: how often all cells are recorded again, on another day.
+        seed: of the draws.
+    """
+
+    order: Literal["randomised", "rows", "blocked"] = "randomised"
+    block_by: tuple[Annotated[str, Field(max_length=24)], ...] = Field(
+        default=(), max_length=4
+    )
+    repeat_blocks: Annotated[Whole, Field(ge=0, le=9)] = 0
+    seed: Annotated[Whole, Field(ge=0, le=2**31)] = 1
+
+
+class _Row(SettingsSection):
+    """What rows of either version have.
 
     `reset`: what a person does to the terrain before every trial. `target`: what the
     trials are to tell most about.
     """
 
-    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9-]{0,15}$", examples=["S10"])
+    name: CellName = Field(examples=["S10"])
+    foot: FootName = Field(examples=["tread"])
+    far_end: FarEnd = Field(examples=[[0.70, 0.0, 0.12]])
+    heading_deg: Heading = Field(examples=[0.0])
+    travel: Travel = Field(examples=[0.45])
+    trials: Trials = Field(examples=[10])
+    reset: Tasks = Field(
+        default=RESET, examples=[["rake", "level", "foot at the far end"]]
+    )
+    target: Target = Field(default="grid", examples=["corner"])
+    calibration: File | None = Field(default=None, examples=["terrain_S10.toml"])
+
+
+class Version1Row(_Row):
+    """One table of a matrix.toml without a version."""
+
     stones: Literal["small", "big", "none"] = Field(examples=["small"])
     incline_deg: Annotated[Number, Usual(0.0, 20.0, "degrees")] = Field(
         ge=0, le=30, examples=[10.0]
     )
-    foot: Literal["tread", "bare"] = Field(examples=["tread"])
-    far_end: _Place = Field(examples=[[0.70, 0.0, 0.12]])
-    heading_deg: Annotated[Number, Usual(-180.0, 180.0, "degrees")] = Field(
-        ge=-180, le=180, examples=[0.0]
+    start_q: Angles = Field(examples=[[0, 0.77, 0, 1.19, 0, 1.19, 0]])
+
+
+class Version1Matrix(SettingsSection):
+    """A matrix.toml without a version."""
+
+    terrains: tuple[Version1Row, ...] = Field(min_length=1)
+
+
+class TerrainRow(_Row):
+    """One row of the matrix: a terrain, the foot, the way across, the factors.
+
+    Attributes:
+        stones: size of the stones as recordings state it: small, big, none, e.g.
+            "12 mm", "fine", or "stones" of unknown size.
+        incline_deg: of the container, positive where its far end is high [degrees].
+        push_deg: direction of the push against x_T [degrees]: 0 = toward the base, 180
+            = away from it, from the near end.
+        start_q: joints with the foot at the far end [rad]; None = computed.
+        place: of rig.toml, where the container stands; None = its own.
+        taught: file of `place` as taught by hand; None = it was not.
+        factors: values by name of the factor; None = does not apply.
+        simulate: by parameter of the simulated ground, what its words multiply it by.
+    """
+
+    stones: Annotated[str, Field(max_length=24)]
+    incline_deg: Incline
+    push_deg: Push = 0
+    start_q: Angles | None = None
+    place: str | None = None
+    taught: File | None = None
+    factors: dict[str, float | str | None] = Field(
+        default_factory=dict[str, "float | str | None"]
     )
-    travel: Annotated[Number, Usual(0.05, 0.7, "m")] = Field(
-        gt=0.05, le=1.0, examples=[0.45]
-    )
-    trials: Annotated[Whole, Usual(1, 30)] = Field(ge=1, le=99, examples=[10])
-    reset: tuple[_Task, ...] = Field(
-        default=("rake", "level", "foot at the far end"),
-        min_length=1,
-        max_length=9,
-        examples=[["rake", "level", "foot at the far end"]],
-    )
-    target: Literal["grid", "corner", "break-away"] = Field(
-        default="grid", examples=["corner"]
-    )
-    start_q: _Angles = Field(examples=[[0, 0.77, 0, 1.19, 0, 1.19, 0]])
-    calibration: File | None = Field(default=None, examples=["terrain_S10.toml"])
+    simulate: dict[str, float] = Field(default_factory=dict[str, float])
 
     @property
     def kind(self) -> str:
         """Kind of terrain: the size of its stones, or "flat" for a plate."""
-        return FLAT if self.stones == "none" else self.stones
+        return terrain_kind(self.name, [self.stones])
+
+    @property
+    def is_plate(self) -> bool:
+        """Whether there are no stones."""
+        return self.kind == FLAT
+
+    @property
+    def d50(self) -> float | None:
+        """Grain size [mm]; None where there is none, or it is not stated."""
+        stated = self.factors.get("d50")
+        if isinstance(stated, float | int):
+            return float(stated)
+        return SIZE_BY_WORD.get(self.stones)
+
+    @property
+    def slope_deg(self) -> float:
+        """Incline along the push, positive downhill [degrees]."""
+        return -self.incline_deg if self.push_deg == 180 else self.incline_deg
+
+    def plain(self) -> dict[str, Any]:
+        """Return it in plain values, without what only few rows state."""
+        values = self.model_dump(mode="json")
+        few = ("push_deg", "place", "taught", "factors", "simulate")
+        return {k: v for k, v in values.items() if k not in few or v}
+
+    @property
+    def facts(self) -> Mapping[str, Value]:
+        """What tells it apart from others: factors, foot, incline and push."""
+        fixed = {"foot": self.foot, "incline_deg": self.incline_deg}
+        return {**self.factors, **fixed, "push_deg": float(self.push_deg)}
 
 
 class MatrixSettings(SettingsSection):
-    """Everything in matrix.toml."""
+    """The whole matrix."""
 
     terrains: tuple[TerrainRow, ...] = Field(min_length=1)
+    factors: tuple[DesignFactor, ...] = ()
+    design: Design = Design()

@@ -106,6 +106,11 @@ def _usual_numbers(
     for name, field in type(section).model_fields.items():
         here = f"{place}.{name}".lstrip(".")
         value: Any = getattr(section, name)
+        if isinstance(value, dict):  # sections by name
+            for key, each in cast("dict[str, Any]", value).items():
+                if isinstance(each, BaseModel):
+                    yield from _usual_numbers(each, f"{here}.{key}")
+            continue
         items = cast("tuple[Any, ...]", value) if isinstance(value, tuple) else (value,)
         for index, each in enumerate(items):
             item = index if isinstance(value, tuple) else None

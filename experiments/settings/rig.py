@@ -14,6 +14,8 @@ from acquisition.settings import (
     Usual,
     Whole,
 )
+from experiments.settings.matrix import FootName, PlaceName
+from experiments.settings.places import StatedPlace
 from ft_sensor.reading import largest_load
 from ft_sensor.vendors.registry import AnySensor
 from wam.calibration.arm_identity import SerialNumbers
@@ -96,8 +98,37 @@ class ArmSection(SettingsSection):
     properties: File | None = Field(default=None, examples=["pucks.toml"])
 
 
+class SimulatedSole(SettingsSection):
+    """Friction of a sole on a plate, for the simulation; its equation: `fakes.ground`.
+
+    Attributes:
+        mu_s: share of the normal force that holds it at rest.
+        mu_k: the same while it slides.
+        v_S: velocity at which one turns into the other [m/s].
+        b: viscous friction [N s/m].
+    """
+
+    mu_s: Annotated[Number, Field(gt=0, le=2)]
+    mu_k: Annotated[Number, Field(gt=0, le=2)]
+    v_S: Annotated[Number, Field(gt=0, le=1)]
+    b: Annotated[Number, Field(ge=0, le=100)]
+
+    @model_validator(mode="after")
+    def _holds_at_rest(self) -> Self:
+        if self.mu_k > self.mu_s:
+            raise ValueError("mu_k is above mu_s, which no sole has")
+        return self
+
+
 class FootSection(SettingsSection):
-    """A foot with its adapter, in frame 7."""
+    """A foot with its adapter, in frame 7.
+
+    Attributes:
+        shape: of the sole; recorded with its trials.
+        area: of the sole [m^2]; recorded with its trials.
+        simulate: its friction on a plate, where it is simulated; left out: that of the
+            foot with tread.
+    """
 
     mass: Annotated[Number, Usual(0.1, 1.5, "kg")] = Field(
         ge=0.05, le=2.0, examples=[0.45]
@@ -108,13 +139,15 @@ class FootSection(SettingsSection):
     )
     sole: _OnPlate = Field(examples=[[0.01, 0.0, 0.112]])
     calibration: File | None = Field(default=None, examples=["foot_tread.toml"])
+    shape: Literal["flat", "round", "point"] | None = None
+    area: Annotated[Number, Field(gt=0, le=0.1), Usual(1e-4, 0.02, "m^2")] | None = None
+    simulate: SimulatedSole | None = None
 
-
-class Feet(SettingsSection):
-    """The two feet of the experiment."""
-
-    tread: FootSection
-    bare: FootSection
+    def plain(self) -> dict[str, Any]:
+        """Return it in plain values, without what it does not state of its sole."""
+        values = self.model_dump(mode="json")
+        new = ("shape", "area", "simulate")
+        return {k: v for k, v in values.items() if k not in new or v is not None}
 
 
 class ControlSection(SettingsSection):
@@ -336,7 +369,10 @@ class RigSettings(SettingsSection):
     can: CanSettings
     arm: ArmSection = ArmSection()
     ft_sensor: Annotated[AnySensor, Field(discriminator="kind")]
-    feet: Feet
+    feet: dict[FootName, FootSection] = Field(min_length=1, max_length=16)
+    places: dict[PlaceName, StatedPlace] = Field(
+        default_factory=dict[str, StatedPlace], max_length=100
+    )
     control: ControlSection
     limits: LimitSection
     gravity: GravitySection = GravitySection(model="cad")

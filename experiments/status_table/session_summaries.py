@@ -16,10 +16,13 @@ from experiments.session.store import SUMMARY_FILE, list_sessions
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from analysis.data.terrain_kinds import Value
     from experiments.session.kept_files import Deviation
     from experiments.session.store import SessionFolder
+    from experiments.status_table.where import Where
 
 _FOLDERS = ("", "trials", "rejected", "faults")
+_FACTORS = "terrain.factors."  # before the name of a condition
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +72,7 @@ class SeenSession:
     summary: SessionSummary
 
     @property
-    def facts(self) -> dict[str, str]:
+    def facts(self) -> dict[str, Value]:
         """What conditions can ask of it."""
         return {**facts_of(self.folder), "operator": self.summary.operator}
 
@@ -127,10 +130,37 @@ def glance_sessions(data: Path) -> list[SeenSession]:
     return [SeenSession(folder, glance(folder)) for folder in list_sessions(data)]
 
 
-def facts_of(folder: SessionFolder) -> dict[str, str]:
+def facts_of(folder: SessionFolder) -> dict[str, Value]:
     """Return what conditions can ask of a session that was not read."""
     kind = "simulated" if folder.is_simulated else "live"
     return {"kind": kind, "session": folder.id}
+
+
+def recorded_factors(folder: SessionFolder) -> list[str]:
+    """Return the names of the factors that a session's conditions.json states."""
+    from experiments.session.recorded_conditions import read_conditions
+
+    names = read_conditions(folder).values
+    return [n.removeprefix(_FACTORS) for n in names if n.startswith(_FACTORS)]
+
+
+def recorded_facts(folder: SessionFolder, where: Where) -> dict[str, Value]:
+    """Return what a session's conditions.json states of the keys that are asked for.
+
+    The matrix may have changed since; a session without the file states nothing.
+    """
+    from experiments.session.recorded_conditions import read_conditions
+
+    if not where.keys - {"terrain", "kind", "session", "operator"}:
+        return {}
+    stated = read_conditions(folder).values
+    prefixes = ("terrain.", _FACTORS)
+    return {
+        key: None if stated[name] == "None" else stated[name]
+        for key in where.keys
+        for name in (prefix + key for prefix in prefixes)
+        if name in stated
+    }
 
 
 def signature_of(folder: Path) -> tuple[str, int]:

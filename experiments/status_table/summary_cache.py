@@ -14,7 +14,7 @@ import json
 import os
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -33,10 +33,11 @@ from experiments.status_table.session_summaries import (
 )
 
 if TYPE_CHECKING:
+    from analysis.data.terrain_kinds import Value
     from experiments.session.store import SessionFolder
-    from experiments.settings.matrix import TerrainRow
+    from experiments.settings.matrix import MatrixSettings, TerrainRow
 
-_FORMAT = 1
+_FORMAT = 2
 _LARGEST = 16 * 2**20  # bytes; a thousand sessions take 0.3 MB
 _SETTLED_NS = 2_000_000_000  # a change within one tick of the clock has no other time
 _TRIAL = re.compile(r"T\d\d[a-z]*")
@@ -53,11 +54,52 @@ class StatusRow:
     trials: int
     kind: str
     target: str
+    push_deg: int = 0
+    place: str | None = None
+    factors: Mapping[str, Value] = field(default_factory=dict[str, "Value"])
+    blocks: int = 1
 
 
-def row_of(row: TerrainRow) -> StatusRow:
-    """Return what the table needs of a row of the matrix."""
-    return StatusRow(*(getattr(row, field.name) for field in fields(StatusRow)))
+@dataclass(frozen=True, slots=True)
+class StatusMatrix:
+    """The matrix as the table needs it.
+
+    Attributes:
+        rows: its terrains.
+        order: randomised, rows or blocked.
+        block_by: keys of the rows that are done in one go.
+        logs: factors that are compared by their logarithm.
+        seed: of the draws.
+    """
+
+    rows: tuple[StatusRow, ...]
+    order: str = "randomised"
+    block_by: tuple[str, ...] = ()
+    logs: tuple[str, ...] = ()
+    seed: int = 1
+
+
+def row_of(row: TerrainRow, blocks: int = 1) -> StatusRow:
+    """Return what the table needs of a row of the matrix.
+
+    Args:
+        row: the row.
+        blocks: how often its trials are recorded.
+    """
+    names = [each.name for each in fields(StatusRow) if each.name != "blocks"]
+    return StatusRow(**{name: getattr(row, name) for name in names}, blocks=blocks)
+
+
+def matrix_of(matrix: MatrixSettings) -> StatusMatrix:
+    """Return what the table needs of the matrix."""
+    design = matrix.design
+    return StatusMatrix(
+        rows=tuple(row_of(row, 1 + design.repeat_blocks) for row in matrix.terrains),
+        order=design.order,
+        block_by=design.block_by,
+        logs=tuple(f.name for f in matrix.factors if f.scale == "log"),
+        seed=design.seed,
+    )
 
 
 def cache_path(data: Path) -> Path:
@@ -117,25 +159,25 @@ class SummaryCache:
             self._sessions[folder.path.name] = self._seen[folder.path.name] = entry
             self._is_changed = True
 
-    def rows(
-        self, texts: Sequence[bytes] | None, read: Callable[[], Sequence[TerrainRow]]
-    ) -> tuple[StatusRow, ...]:
-        """Return the rows of a matrix, read only if the texts of the settings changed.
+    def matrix(
+        self, texts: Sequence[bytes] | None, read: Callable[[], MatrixSettings]
+    ) -> StatusMatrix:
+        """Return the matrix, read only if the texts of the settings changed.
 
         Args:
             texts: the contents of the settings files; None where they are not known.
             read: what reads and checks the settings; what it raises is passed on.
         """
         if texts is None:
-            return tuple(map(row_of, read()))
+            return matrix_of(read())
         digests = [hashlib.sha256(text).hexdigest() for text in texts]
         key = hashlib.sha256(" ".join(digests).encode()).hexdigest()
-        rows = _rows_of(self._matrices.get(key))
-        if rows is None:
-            rows = tuple(map(row_of, read()))
-            self._matrices = {key: [asdict(row) for row in rows]}
+        known = _matrix_of(self._matrices.get(key))
+        if known is None:
+            known = matrix_of(read())
+            self._matrices = {key: asdict(known)}
             self._is_changed = True
-        return rows
+        return known
 
     def save(self) -> None:
         """Write what is new to the file; one that cannot be written costs only time."""
@@ -218,13 +260,48 @@ def _summary_of(entry: object, signature: str) -> SessionSummary | None:
     return SessionSummary(**values)
 
 
-def _rows_of(value: object) -> tuple[StatusRow, ...] | None:
-    """Return the rows in an entry, None where it holds anything else."""
-    if not isinstance(value, list) or not value:
+_ROW: Mapping[str, tuple[type, ...]] = {
+    "name": (str,),
+    "stones": (str,),
+    "incline_deg": (float,),
+    "foot": (str,),
+    "trials": (int,),
+    "kind": (str,),
+    "target": (str,),
+    "push_deg": (int,),
+    "place": (str, type(None)),
+    "factors": (dict,),
+    "blocks": (int,),
+}
+
+
+def _matrix_of(value: object) -> StatusMatrix | None:
+    """Return the matrix in an entry, None where it holds anything else."""
+    entry = _mapping(value)
+    rows = tuple(map(_row_of, _list(entry.get("rows"))))
+    block_by, logs = (_list(entry.get(name)) for name in ("block_by", "logs"))
+    order, seed = entry.get("order"), entry.get("seed")
+    words = [order, *block_by, *logs]
+    if type(seed) is not int or not all(isinstance(word, str) for word in words):
         return None
-    rows = [_mapping(row) for row in cast("list[object]", value)]
-    kinds = dict.fromkeys((field.name for field in fields(StatusRow)), str)
-    kinds |= {"incline_deg": float, "trials": int}
-    if any({k: type(v) for k, v in row.items()} != kinds for row in rows):
+    known = tuple(row for row in rows if row is not None)
+    if not known or len(known) < len(rows):
         return None
-    return tuple(StatusRow(**row) for row in rows)
+    texts = tuple(map(str, block_by)), tuple(map(str, logs))
+    return StatusMatrix(known, str(order), *texts, seed)
+
+
+def _row_of(value: object) -> StatusRow | None:
+    row = _mapping(value)
+    if set(row) != set(_ROW):
+        return None
+    if any(type(row[name]) not in kinds for name, kinds in _ROW.items()):
+        return None
+    plain = (str, float, type(None))
+    if any(type(each) not in plain for each in row["factors"].values()):
+        return None
+    return StatusRow(**row)
+
+
+def _list(value: object) -> list[object]:
+    return cast("list[object]", value) if isinstance(value, list) else []

@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING
 
-from acquisition.errors import SettingsError
 from experiments.session.store import list_sessions
-from experiments.status_table.session_summaries import SeenSession, facts_of
+from experiments.status_table.session_summaries import (
+    SeenSession,
+    facts_of,
+    recorded_facts,
+)
+from experiments.status_table.where import Where
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from analysis.data.terrain_kinds import Value
     from experiments.session.kept_files import Deviation
     from experiments.status_table.summary_cache import StatusRow, SummaryCache
 
-KEYS = ("terrain", "stones", "incline_deg", "foot", "kind", "session", "operator")
+EVERYTHING = Where()
 
 
-def see_sessions(
-    data: Path, where: Mapping[str, str], cache: SummaryCache
-) -> list[SeenSession]:
+def see_sessions(data: Path, where: Where, cache: SummaryCache) -> list[SeenSession]:
     """Return all sessions below `data`, each read once, oldest number first.
 
     Args:
@@ -31,7 +34,7 @@ def see_sessions(
     """
     seen: list[SeenSession] = []
     for folder in list_sessions(data):
-        is_asked = matches(facts_of(folder), where)
+        is_asked = where.matches(facts_of(folder))
         look = cache.summary if is_asked else cache.glance
         seen.append(SeenSession(folder, look(folder)))
     return _counted_once(seen)
@@ -98,38 +101,35 @@ class MatrixRow:
 def count_rows(
     seen: Sequence[SeenSession],
     rows: Sequence[StatusRow],
-    where: Mapping[str, str] | None = None,
+    where: Where = EVERYTHING,
 ) -> list[MatrixRow]:
     """Return a line per terrain of the matrix, live first, simulated where there is.
 
     Args:
         seen: the sessions.
         rows: the terrains.
-        where: only terrains and sessions with these values, by a name of `KEYS`.
+        where: only terrains and sessions of which these hold.
     """
-    where = where or {}
     sessions = counted_of(seen, where)
     lines: list[MatrixRow] = []
     for row in rows:
-        if not matches(facts_of_row(row), where):
+        if not where.matches(facts_of_row(row)):
             continue
         for is_simulated in (False, True):
             own = [s for s in sessions if is_of(s, row, is_simulated=is_simulated)]
-            is_wanted = not is_simulated and where.get("kind") != "simulated"
-            if own or (is_wanted and not {"session", "operator"} & set(where)):
+            is_wanted = not is_simulated and where.matches({"kind": "live"})
+            if own or (is_wanted and not {"session", "operator"} & where.keys):
                 lines.append(_line(row, own, is_simulated=is_simulated))
     return lines
 
 
-def counted_of(
-    seen: Sequence[SeenSession], where: Mapping[str, str]
-) -> list[SeenSession]:
+def counted_of(seen: Sequence[SeenSession], where: Where) -> list[SeenSession]:
     """Return the sessions of pushes with these values that can be read."""
     return [
         s
         for s in seen
         if s.summary.problem is None and not s.summary.is_of_stances
-        if matches(s.facts, where)
+        if where.matches(s.facts) and where.matches(recorded_facts(s.folder, where))
     ]
 
 
@@ -139,9 +139,7 @@ def is_of(session: SeenSession, row: StatusRow, *, is_simulated: bool) -> bool:
     return folder.terrain == row.name and folder.is_simulated is is_simulated
 
 
-def find_deviations(
-    seen: Sequence[SeenSession], where: Mapping[str, str]
-) -> list[Deviation]:
+def find_deviations(seen: Sequence[SeenSession], where: Where) -> list[Deviation]:
     """Return what is missing or changed of the kept trials in the table.
 
     Args:
@@ -149,44 +147,17 @@ def find_deviations(
         where: only sessions with these values, as in `count_rows`; what cannot be
             read is named of every session.
     """
-    asked = [s for s in seen if s.summary.problem or matches(s.facts, where)]
+    asked = [s for s in seen if s.summary.problem or where.matches(s.facts)]
     found = [d for s in asked for d in s.summary.deviations]
     found += [s.summary.problem for s in seen if s.summary.problem is not None]
     return list(dict.fromkeys(found))
 
 
-def parse_where(text: str) -> dict[str, str]:
-    """Return the conditions in `K=V,K=V`.
-
-    Raises:
-        SettingsError: it is not of that form, or a key is unknown.
-    """
-    conditions: dict[str, str] = {}
-    for part in filter(None, text.split(",")):
-        key, sign, value = part.partition("=")
-        if key not in KEYS or not sign or not value:
-            raise SettingsError(
-                f"--where {part!r} - expected KEY=VALUE, e.g. kind=live.",
-                hint=f"Keys: {', '.join(KEYS)}.",
-            )
-        conditions[key] = value
-    return conditions
-
-
-def facts_of_row(row: StatusRow) -> dict[str, str]:
+def facts_of_row(row: StatusRow) -> dict[str, Value]:
     """Return what conditions can ask of a row of the matrix."""
-    incline = f"{row.incline_deg:g}"
-    return {
-        "terrain": row.name,
-        "stones": row.stones,
-        "incline_deg": incline,
-        "foot": row.foot,
-    }
-
-
-def matches(fields: Mapping[str, str], where: Mapping[str, str]) -> bool:
-    """Return whether every fact that is asked for has the value."""
-    return all(fields[key] == value for key, value in where.items() if key in fields)
+    fixed = {"terrain": row.name, "stones": row.stones, "incline_deg": row.incline_deg}
+    more = {"foot": row.foot, "push_deg": float(row.push_deg), "place": row.place}
+    return {**row.factors, **fixed, **more}
 
 
 def _line(
@@ -198,7 +169,7 @@ def _line(
         terrain=row.name,
         is_simulated=is_simulated,
         kept=len(kept),
-        wanted=row.trials,
+        wanted=row.trials * row.blocks,
         rejected=sum(s.summary.rejected for s in sessions),
         sessions=tuple(s.folder.id for s in sessions),
         trials=tuple(kept.count(name) for name in names),

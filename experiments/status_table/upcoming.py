@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import random
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -13,22 +14,23 @@ from typing import TYPE_CHECKING
 from acquisition.errors import TrialFileError
 from experiments.arguments import data_option
 from experiments.session.lock import owner_of
-from experiments.status_table.table import counted_of, facts_of_row, is_of, matches
+from experiments.status_table.table import counted_of, facts_of_row, is_of
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from analysis.data.terrain_kinds import Value
     from experiments.status_table.session_summaries import SeenSession
-    from experiments.status_table.summary_cache import StatusRow
+    from experiments.status_table.summary_cache import StatusMatrix, StatusRow
+    from experiments.status_table.where import Where
 
 _DRAWS = 400  # orders
-_SEED = 1  # the same data give the same advice
 
 
 def next_steps(
     data: Path,
     seen: Sequence[SeenSession],
-    rows: Sequence[StatusRow],
+    matrix: StatusMatrix,
     *,
     is_simulated: bool,
 ) -> list[str]:
@@ -43,10 +45,23 @@ def next_steps(
             number = session.folder.id
             steps.append(f"{text} To go on: traction resume {number}{option}")
     done = [s.folder.terrain for s in own if not s.summary.is_of_stances]
-    order = suggest_order(rows, done)
+    order = suggest_order(matrix, done)
     if order:
-        steps.append(f"Suggested order, randomised against drift: {' '.join(order)}")
+        steps.append(f"{_ORDERS[matrix.order]}: {_listed(order)}")
     return steps
+
+
+_ORDERS = {
+    "randomised": "Suggested order, randomised against drift",
+    "blocked": "Suggested order, in blocks, randomised against drift",
+    "rows": "Next, as the rows stand",
+}
+_SHOWN = 12  # terrains of an order
+
+
+def _listed(order: Sequence[str]) -> str:
+    more = f" and {len(order) - _SHOWN} more" if order[_SHOWN:] else ""
+    return " ".join(order[:_SHOWN]) + more
 
 
 def _opened(session: SeenSession) -> str:
@@ -71,7 +86,7 @@ def _left(session: SeenSession) -> str:
 
 
 def enough_lines(
-    seen: Sequence[SeenSession], rows: Sequence[StatusRow], where: Mapping[str, str]
+    seen: Sequence[SeenSession], rows: Sequence[StatusRow], where: Where
 ) -> list[str]:
     """Return the terrains whose kept trials are enough for their target.
 
@@ -85,7 +100,7 @@ def enough_lines(
     lines: list[str] = []
     sessions = counted_of(seen, where)
     for row in rows:
-        if not matches(facts_of_row(row), where):
+        if not where.matches(facts_of_row(row)):
             continue
         for is_simulated in (False, True):
             own = [s for s in sessions if is_of(s, row, is_simulated=is_simulated)]
@@ -100,30 +115,68 @@ def _enough(own: Sequence[SeenSession], row: StatusRow) -> str:
     return enough_of([s.folder for s in own], row)
 
 
-def suggest_order(rows: Sequence[StatusRow], done: Sequence[str]) -> list[str]:
+def suggest_order(matrix: StatusMatrix, done: Sequence[str]) -> list[str]:
     """Return the terrains still to be recorded in a good order.
 
     A foot that wears, a sensor that drifts and a person who learns change with time.
     If the inclines came in rising order, these could not be told from the incline. So
-    of many random orders that one is taken in which inclination, size of the stones
-    and tread go least with the position in the whole sequence.
+    of many random orders that one is taken in which the factors go least with the
+    position in the whole sequence. What is hard to change is done in one go; cells that
+    are recorded again come when all have been recorded as often.
 
     Args:
-        rows: the matrix.
+        matrix: the matrix.
         done: names of the terrains recorded so far, oldest first.
     """
-    factors = {row.name: _factors(row) for row in rows}
-    begun = [name for name in done if name in factors]
-    rest = [row.name for row in rows if row.name not in begun]
-    if not rest:
-        return []
-    columns = _columns([*begun, *rest], factors, len(begun))
-    dice = random.Random(_SEED)
-    orders = [dice.sample(rest, len(rest)) for _ in range(_DRAWS)]
+    rows = {row.name: row for row in matrix.rows}
+    begun = [name for name in done if name in rows]
+    times = Counter(begun)
+    least = min((times[name] for name in rows), default=0)
+    rest = [
+        name
+        for name, row in rows.items()
+        if times[name] == least and least < row.blocks
+    ]
+    if not rest or matrix.order == "rows":
+        return rest
+    columns = _columns([*begun, *rest], factor_columns(matrix), len(begun))
+    dice = random.Random(matrix.seed)
+    blocks = _blocks(matrix, rest, begun)
+    orders = [_drawn(dice, blocks) for _ in range(_DRAWS)]
     return min(
         orders,
         key=lambda order: max((c.correlation(order) for c in columns), default=0),
     )
+
+
+def _blocks(
+    matrix: StatusMatrix, rest: Sequence[str], begun: Sequence[str]
+) -> list[list[str]]:
+    """Return the terrains by what is hard to change; that of the last one first."""
+    if matrix.order != "blocked":
+        return [list(rest)]
+    facts = {row.name: facts_of_row(row) for row in matrix.rows}
+
+    def hard(name: str) -> tuple[Value, ...]:
+        return tuple(facts[name].get(key) for key in matrix.block_by)
+
+    blocks: dict[tuple[Value, ...], list[str]] = {}
+    if begun and any(hard(name) == hard(begun[-1]) for name in rest):
+        blocks[hard(begun[-1])] = []
+    for name in rest:
+        blocks.setdefault(hard(name), []).append(name)
+    is_open = bool(begun) and hard(begun[-1]) in blocks
+    first = blocks.pop(hard(begun[-1])) if is_open else []
+    return [first, *blocks.values()]
+
+
+def _drawn(dice: random.Random, blocks: Sequence[Sequence[str]]) -> list[str]:
+    """Return a random order; the first block stays the first."""
+    first, *others = blocks
+    shuffled = dice.sample(others, len(others))
+    return [
+        name for block in (first, *shuffled) for name in dice.sample(block, len(block))
+    ]
 
 
 def confounding(order: Sequence[str], factors: Mapping[str, Sequence[float]]) -> float:
@@ -174,7 +227,30 @@ def _columns(
     return columns
 
 
-def _factors(row: StatusRow) -> tuple[float, ...]:
-    """Return inclination and, as 0 or 1: big stones, a plate, a bare foot."""
-    signs = (row.stones == "big", row.stones == "none", row.foot == "bare")
-    return (row.incline_deg, *map(float, signs))
+def factor_columns(matrix: StatusMatrix) -> dict[str, tuple[float, ...]]:
+    """Return what tells the terrains apart as numbers, by name; all equally long.
+
+    A number is itself, or its logarithm; a word is 0 or 1 for every level but the
+    first, and so is whether a number applies.
+    """
+    facts = [
+        {**facts_of_row(row), "terrain": None, "place": None} for row in matrix.rows
+    ]
+    if "d50" in facts[0]:  # says the same as the size of the stones
+        facts = [{**each, "stones": None} for each in facts]
+    columns: list[list[float]] = []
+    for key in facts[0]:
+        values = [each[key] for each in facts]
+        words = list(dict.fromkeys(v for v in values if not isinstance(v, float)))
+        is_mixed = len(words) < len(set(values))
+        columns += [
+            [float(value == word) for value in values]
+            for word in (words if is_mixed else words[1:])
+        ]
+        numbers = [v for v in values if isinstance(v, float)]
+        if numbers:
+            scale = math.log if key in matrix.logs else float
+            mean = math.fsum(map(scale, numbers)) / len(numbers)
+            columns.append([scale(v) if isinstance(v, float) else mean for v in values])
+    names = [row.name for row in matrix.rows]
+    return dict(zip(names, zip(*columns, strict=True), strict=True))

@@ -1,5 +1,6 @@
 """One trial on its way to the disk: header, end conditions, sidecar, flight record."""
 
+import json
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -71,6 +72,7 @@ def trial_header(rig: Rig, details: SessionMetadata, name: TrialName) -> TrialHe
         "seed": "" if details.seed is None else str(details.seed),
         "started_utc": iso_utc(rig.clock.utc_ns()),
         "tared_ns": str(rig.tared_ns),
+        **_stated_factors(rig),
     }
     terrain = {"stones": row.stones, "foot": row.foot}
     attachments = {
@@ -95,6 +97,29 @@ def trial_header(rig: Rig, details: SessionMetadata, name: TrialName) -> TrialHe
             {} if rig.foresight is None else rig.foresight.metadata(rig.identity)
         ),
     )
+
+
+def _stated_factors(rig: Rig) -> dict[str, str]:
+    """Return what a matrix of version 2 states of a cell; {} where it has no factors.
+
+    `factors` is JSON: values by name, null = does not apply; `factor_units` and
+    `factor_scales` their units, and on which scale numbers are compared.
+    """
+    row, matrix = rig.row, rig.settings.matrix
+    if not matrix.factors and row.push_deg == 0 and row.foot in ("tread", "bare"):
+        return {}
+    foot = rig.settings.rig.feet[row.foot]
+    sole = {"foot_shape": foot.shape, "foot_area_m2": foot.area}
+    units = {factor.name: factor.unit for factor in matrix.factors}
+    scales = {f.name: f.scale for f in matrix.factors if f.kind == "number"}
+    return {
+        "foot": row.foot,
+        "push_deg": str(row.push_deg),
+        "factors": json.dumps(row.factors, sort_keys=True),
+        "factor_units": json.dumps(units, sort_keys=True),
+        "factor_scales": json.dumps(scales, sort_keys=True),
+        **{name: str(value) for name, value in sole.items() if value is not None},
+    }
 
 
 @dataclass(slots=True)

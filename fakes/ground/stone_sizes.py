@@ -1,7 +1,9 @@
 """The two sizes of stones, and what a slope does to a bed of them."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+
+from acquisition.errors import SettingsError
 
 _REPOSE = math.radians(40.0)  # angle of repose of dumped crushed stone
 
@@ -53,6 +55,43 @@ STONES = {
         0.037, 4, 12.5, 4.5, 3000.0, 0.50, 1.6, 0.04, 0.08, 0.10, 2.0, 0.45, 0.015
     ),
 }
+
+
+_FINEST, _COARSEST = 0.010, 0.060  # d50 that is simulated [m]
+_FEWEST = 2  # contacts
+
+
+def stones_of_size(d50: float) -> StoneParameters:
+    """Return a bed of stones of any size between 10 and 60 mm.
+
+    Every parameter is a straight line in ln d50 through those of the two sizes.
+
+    Args:
+        d50: grain size [m].
+
+    Raises:
+        SettingsError: stones of this size are not simulated.
+    """
+    if not _FINEST <= d50 <= _COARSEST:
+        raise not_simulated(f"stones of {1e3 * d50:g} mm")
+    small, big = STONES["small"], STONES["big"]
+    share = math.log(d50 / small.d50) / math.log(big.d50 / small.d50)
+    values = {
+        name: getattr(small, name) + share * (getattr(big, name) - getattr(small, name))
+        for name in (field.name for field in fields(StoneParameters))
+    }
+    contacts = max(round(values.pop("N")), _FEWEST)
+    return StoneParameters(**{**values, "d50": d50}, N=contacts)
+
+
+def not_simulated(what: str) -> SettingsError:
+    """Return the refusal of a ground that is not simulated."""
+    return SettingsError(
+        f"{what} are not simulated, only plates and stones of "
+        f"{1e3 * _FINEST:g} to {1e3 * _COARSEST:g} mm.",
+        hint="Record this cell on the arm, or give it another d50. Nothing was "
+        "started.",
+    )
 
 
 def slope_factor(incline: float) -> float:

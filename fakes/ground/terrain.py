@@ -1,15 +1,21 @@
 """The ground of one trial: a plate or a bed of stones, and the planks around it."""
 
 import math
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import Protocol, TypeVar
 
 import numpy as np
 
 from fakes.ground.contact import DAMPING_MASS, NO_CONTACT, Contact, Motion
 from fakes.ground.footing import Footing
 from fakes.ground.profile import smooth_profile, value_at
-from fakes.ground.stone_sizes import STONES
+from fakes.ground.stone_sizes import (
+    STONES,
+    StoneParameters,
+    not_simulated,
+    stones_of_size,
+)
 from fakes.ground.stones import StoneBed
 
 
@@ -124,20 +130,73 @@ class Terrain(Protocol):
         ...
 
 
+@dataclass(frozen=True, slots=True)
+class GroundChoice:
+    """What the ground of a container is.
+
+    Attributes:
+        stones: "small", "big", "none" (a plate), or e.g. "12 mm".
+        foot: its name; matters on plates.
+        sole: friction of the foot on plates; None = that of its name, or with tread.
+        effects: what parameters of the ground are multiplied by; those that it does
+            not have are left out.
+    """
+
+    stones: str
+    foot: str
+    sole: PlateParameters | None = None
+    effects: Mapping[str, float] = field(default_factory=dict[str, float])
+
+    def plate(self) -> PlateParameters:
+        """Return the friction of the foot on a plate."""
+        known = self.sole or PLATES.get(self.foot, PLATES["tread"])
+        return _multiplied(known, self.effects)
+
+    def bed(self) -> StoneParameters:
+        """Return the parameters of the stones.
+
+        Raises:
+            SettingsError: these are not simulated.
+        """
+        return _multiplied(_stones(self.stones), self.effects)
+
+
+def _stones(word: str) -> StoneParameters:
+    if word in STONES:
+        return STONES[word]
+    size, _, unit = word.partition(" ")
+    if unit != "mm":
+        raise not_simulated(f"{word!r} without a grain size")
+    return stones_of_size(1e-3 * float(size))
+
+
+_P = TypeVar("_P", PlateParameters, StoneParameters)
+
+
+def _multiplied(parameters: _P, effects: Mapping[str, float]) -> _P:
+    """Return parameters with those of them that effects name multiplied."""
+    own = {f.name for f in fields(parameters)} & set(effects)
+    return replace(
+        parameters, **{name: effects[name] * getattr(parameters, name) for name in own}
+    )
+
+
 def make_terrain(
-    stones: str, foot: str, incline: float, rng: np.random.Generator
+    choice: GroundChoice, incline: float, rng: np.random.Generator
 ) -> Plate | StoneBed:
     """Return the ground of one trial.
 
     Args:
-        stones: "small", "big" or "none" (a plate).
-        foot: "tread" or "bare"; matters on plates.
-        incline: of the container [rad].
+        choice: what it is.
+        incline: along the push, positive downhill [rad].
         rng: generator of this trial.
+
+    Raises:
+        SettingsError: this ground is not simulated.
     """
-    if stones == "none":
-        return Plate(PLATES[foot], rng)
-    return StoneBed(STONES[stones], incline, rng)
+    if choice.stones == "none":
+        return Plate(choice.plate(), rng)
+    return StoneBed(choice.bed(), incline, rng)
 
 
 FREE = 0.045  # from the centre line until the sole's edge meets a plank [m]

@@ -8,6 +8,7 @@ from enum import Enum, auto
 
 import numpy as np
 
+from acquisition.simulation import ENDS
 from fakes.plant.grip import JointGrip
 from fakes.plant.push import (
     LATERAL_B,
@@ -31,7 +32,12 @@ _ASIDE = 0.035  # from the centre line to a corner that a sole can touch [m]
 
 
 def touched_place(number: int, travel: float) -> tuple[float, float]:
-    """Return where a person touches the container the `number`th time [m]."""
+    """Return where a person touches the container the `number`th time [m].
+
+    1 to 4: its corners; above `ENDS`: in the middle of its ends, the near one first.
+    """
+    if number > ENDS:
+        return (travel if number % 2 else 0.0), 0.0
     if number <= 4:
         return (0.0 if number <= 2 else travel), (-_ASIDE if number % 2 else _ASIDE)
     share = number * 0.618 % 1.0  # spreads out, whatever the number

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from acquisition.clock import Clock
+from fakes.ground.terrain import GroundChoice, PlateParameters
 from fakes.plant.model import PlantOptions
 from fakes.plant.push import PACES
 from fakes.sensor.kinds import SensorChoice
@@ -24,8 +25,12 @@ def _scene_of(fields: Mapping[str, Any]) -> SimulatedScene:
     frame = fields["frame"]
     return SimulatedScene(
         terrain=fields["terrain"],
-        stones=fields["stones"],
-        foot=fields["foot"],
+        ground=GroundChoice(
+            fields["stones"],
+            fields["foot"],
+            None if fields.get("sole") is None else PlateParameters(**fields["sole"]),
+            fields.get("effects", {}),
+        ),
         frame=TerrainFrame(
             frame["incline"],
             frame["heading"],

@@ -6,11 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from acquisition.clock import PERIOD_NS, Clock
-from acquisition.errors import SettingsError
 from acquisition.sample import Record
 from fakes.bus.in_process import FakeCanBus
 from fakes.clock import SteppedClock
-from fakes.ground.terrain import Container, Terrain, make_terrain
+from fakes.ground.terrain import Container, GroundChoice, Terrain, make_terrain
 from fakes.plant.grip import Side
 from fakes.plant.hand import touched_place
 from fakes.plant.model import PlantOptions
@@ -49,12 +48,11 @@ from fakes.world.true_rig import (
 from ft_sensor.payload import TerrainFrame
 from wam.model.arm_model import ArmModel
 from wam.model.constants import ArmConstants, Array
+from wam.model.start_pose import lowered_to
 from wam.model.tool import Tool
 
 _START_HEIGHT = 0.05  # the foot waits this far above the far end [m]
 LAG_NS = 600_000  # more than a cycle may be late
-_CLOSE = 1e-9  # m and rad, where the search for the start pose ends
-_LARGEST_STEP = 0.5  # rad
 _ANY_SENSOR = SensorChoice()
 
 
@@ -64,8 +62,7 @@ class SimulatedScene:
 
     Attributes:
         terrain: its name, e.g. "S10".
-        stones: "small", "big" or "none".
-        foot: "tread" or "bare".
+        ground: what the container holds, and the foot that meets it.
         frame: where the container is.
         start_q: joint positions with the foot at the far end [rad], shape (7,).
         seed: of everything random.
@@ -74,8 +71,7 @@ class SimulatedScene:
     """
 
     terrain: str
-    stones: str
-    foot: str
+    ground: GroundChoice
     frame: TerrainFrame
     start_q: Array
     seed: int
@@ -86,29 +82,10 @@ class SimulatedScene:
 def solve_start(model: ArmModel, frame: TerrainFrame, q: Array, height: float) -> Array:
     """Return joint positions near `q` with the sole `height` [m] above the far end.
 
-    The sole is parallel to the ground. Newton's method on joints 2, 4 and 6.
-
     Raises:
-        SettingsError: it ends nowhere: out of reach, or `q` is a singular pose.
+        SettingsError: as `lowered_to`.
     """
-    axes = frame.axes()
-    goal = np.array(frame.far_end) + height * axes[2]
-    start, q, joints = q, q.copy(), [1, 3, 5]
-    for _ in range(20):
-        position, rotation = model.sole_pose(q)
-        error = axes @ (goal - position)
-        turn = np.cross(rotation[:, 2], -axes[2]) @ axes[1]
-        if abs(error[0]) + abs(error[2]) < _CLOSE and abs(turn) < _CLOSE:
-            return q
-        J = model.sole_jacobian(q)[:, joints]
-        rows = np.vstack([axes[[0, 2]] @ J[:3], axes[1] @ J[3:]])
-        step = np.linalg.lstsq(rows, np.array([error[0], error[2], turn]))[0]
-        q[joints] += np.clip(step, -_LARGEST_STEP, _LARGEST_STEP)
-    raise SettingsError(
-        f"matrix.toml: the foot cannot stand at far_end = {list(frame.far_end)} "
-        f"from start_q = {start.tolist()}.",
-        hint="Correct far_end or start_q of this terrain. Nothing was started.",
-    )
+    return lowered_to(model, frame.axes(), np.array(frame.far_end), q, height)
 
 
 class FakeRig:
@@ -137,7 +114,8 @@ class FakeRig:
             options = true_options(options or PlantOptions(), departure)
             network = true_network(network, departure)
             scene = replace(scene, frame=true_frame(scene.frame, departure))
-            scene = replace(scene, stones=true_stones(scene.stones, departure))
+            stones = true_stones(scene.ground.stones, departure)
+            scene = replace(scene, ground=replace(scene.ground, stones=stones))
             q = true_start(q, departure)
         self.scene = scene
         self.plant = ArmPlant(constants, tool, scene.frame, q, options)
@@ -228,7 +206,7 @@ class FakeRig:
         scene = self.scene
         random = trial_generators(scene.seed, scene.terrain, trial)
         incline = scene.frame.incline
-        drawn = make_terrain(scene.stones, scene.foot, incline, random.ground)
+        drawn = make_terrain(scene.ground, incline, random.ground)
         self.ground: Terrain = Container(drawn)
         self.plant.terrain = self.ground
         return random
@@ -356,7 +334,9 @@ class LocalSimulation:
         The dynamics' name is kept for readers of files: once there were others.
         """
         ground = {name: f"{v:.9g}" for name, v in self.rig.ground.truth().items()}
-        return {**ground, "dynamics": "pinocchio"}
+        effects = self.rig.scene.ground.effects
+        multiples = {f"multiple:{name}": f"{v:.9g}" for name, v in effects.items()}
+        return {**ground, **multiples, "dynamics": "pinocchio"}
 
     def friction(self) -> dict[str, list[float]]:
         """Return the true friction of the motors, by the names of its model."""

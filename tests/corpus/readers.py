@@ -29,6 +29,7 @@ from experiments.settings.load import load_settings
 from experiments.settings.rig import FrictionSettings
 from experiments.status_table.summary_cache import SummaryCache, row_of
 from experiments.status_table.table import count_rows, see_sessions
+from experiments.status_table.where import Where
 from experiments.tools.pendant import read_script
 from ft_sensor.calibration.files import payload_from_toml, terrain_from_toml
 from ft_sensor.calibration.sensor_file import sensor_from_toml
@@ -80,7 +81,7 @@ def _session(folder: Path, name: str, data: bytes, journal: bytes = b"") -> None
     (path / name).write_bytes(data)
     find_unfinished(folder)
     rows = [row_of(row) for row in load_settings(None).matrix.terrains]
-    count_rows(see_sessions(folder, {}, SummaryCache()), rows)
+    count_rows(see_sessions(folder, Where(), SummaryCache()), rows)
     (session,) = list_sessions(folder)
     with session_lock(session):
         recover_session(open_journal(session, SystemClock()))

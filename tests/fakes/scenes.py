@@ -3,6 +3,7 @@
 import numpy as np
 
 from fakes.clock import SteppedClock
+from fakes.ground.terrain import GroundChoice
 from fakes.plant.model import PlantOptions
 from fakes.plant.plant import ArmPlant
 from fakes.world.rig import FakeRig, SimulatedScene, solve_start
@@ -57,7 +58,7 @@ def sole(plant):
 
 def make_rig(seed=1, terrain="S0", stones="small", network=None):
     clock = SteppedClock()
-    scene = SimulatedScene(terrain, stones, "tread", FRAME, START_Q, seed)
+    scene = SimulatedScene(terrain, GroundChoice(stones, "tread"), FRAME, START_Q, seed)
     rig = FakeRig(scene, CONSTANTS, TOOL, clock, network=network)
     clock.attach(rig)
     return rig, clock

@@ -32,7 +32,7 @@ from analysis.stance.interface import (
 from analysis.stance.outcomes import StanceOutcome
 from analysis.stance.policies import avoid_slip
 from analysis.stance.sequence import SoleView, StancePlan, StanceSequence
-from fakes.ground.terrain import make_terrain
+from fakes.ground.terrain import GroundChoice, make_terrain
 from fakes.randomness import trial_generators
 from tests.fakes.point_foot import (
     COULOMB,
@@ -63,7 +63,9 @@ class StanceBench:
     def __init__(self, terrain: str, seed: int, trial: int) -> None:
         stones, foot, incline_deg = GROUNDS[terrain]
         random = trial_generators(seed, terrain, trial)
-        self.ground = make_terrain(stones, foot, radians(incline_deg), random.ground)
+        self.ground = make_terrain(
+            GroundChoice(stones, foot), radians(incline_deg), random.ground
+        )
         self.axes = SoleAxes(TRAVEL, PERIOD)
         self.x = self.vx = self.vz = 0.0
         self.z = 0.02

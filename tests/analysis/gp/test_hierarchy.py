@@ -93,7 +93,7 @@ def test_posterior_adds_the_normal_priors():
 @pytest.mark.parametrize("index", [1, 3])
 def test_prediction_has_the_closed_form_of_conditioning(index):
     rows = drawn(per_trial=2)
-    process = GroundPosterior(rows).climbed(CENTRE)
+    process = GroundPosterior(rows).climbed(dict(zip(NAMES, CENTRE, strict=True)))
     inputs = np.random.default_rng(3).normal(size=(3, 2))
     predicted = process.given(rows).predict(GROUNDS[index], inputs)
     # the three points as a further trial of that ground, their noise taken off

@@ -73,10 +73,10 @@ def test_the_slip_risk_of_version_1_is_that_of_a_normal(tmp_path, required):
     )
 
 
-def test_a_file_of_version_1_is_written_back_as_version_2(tmp_path):
+def test_a_file_of_version_1_is_written_back_as_version_3(tmp_path):
     text = to_text(load(saved(tmp_path, OLD)))
     content = json.loads(text)
-    assert content["version"] == 2
+    assert content["version"] == 3
     assert content["terrains"]["S0"]["models"]["gp_se"]["title"] == "GP (SE)"
     again = load(saved(tmp_path, text)).terrain("S0")
     assert again.recogniser == "gp_se"
@@ -94,6 +94,27 @@ def test_what_is_written_is_read_again(tmp_path):
     first, second = (d.terrain("S0").predict(3.0, 0.1) for d in (database, again))
     assert second.forces == pytest.approx(first.forces, rel=1e-4)
     assert again.terrain("S0").parameters == {"gp_se_trial": {"c": 3.0}}
+
+
+def test_factors_and_incline_are_kept_and_bounded(tmp_path):
+    content = json.loads(to_text(skewed()))
+    content["terrains"]["S0"] |= {
+        "incline_deg": -10.0,
+        "factors": {"d50": 12, "moisture": "wet", "load": None, "odd": [1], "n": 1e99},
+    }
+    known = load(saved(tmp_path, content)).terrain("S0")
+    assert known.incline_deg == -10.0
+    assert known.factors == {"d50": 12.0, "moisture": "wet", "load": None}
+    again = json.loads(to_text(load(saved(tmp_path, content))))["terrains"]["S0"]
+    assert again["factors"] == dict(known.factors)
+
+
+def test_a_file_of_version_2_has_no_factors(tmp_path):
+    content = json.loads(to_text(skewed()))
+    content["version"] = 2
+    del content["terrains"]["S0"]["factors"], content["terrains"]["S0"]["incline_deg"]
+    known = load(saved(tmp_path, content)).terrain("S0")
+    assert (known.incline_deg, known.factors) == (None, {})
 
 
 def test_further_parts_of_a_terrain_are_kept_and_written_back(tmp_path):
@@ -143,7 +164,7 @@ def changed(**changes):
         ({"shares": [0.1, 0.9]}, "finite numbers"),
         ({"shares": [nan] * 9}, "shares"),
         ({"recogniser": "oracle"}, "lacks the model"),
-        ({"version": 3}, "version"),
+        ({"version": 4}, "version"),
     ],
 )
 def test_a_damaged_file_is_refused(tmp_path, changes, word):
@@ -181,12 +202,13 @@ def test_a_file_too_large_to_be_read_is_not_written():
 
 CHECKED = {
     "$schema", "title", "description", "type", "required", "properties", "const",
-    "additionalProperties", "items", "minItems", "maxItems", "minimum", "maxProperties",
+    "additionalProperties", "items", "minItems", "maxItems", "minimum", "maximum",
+    "maxProperties",
     "exclusiveMinimum", "exclusiveMaximum", "minProperties", "$ref", "$defs",
 }  # fmt: skip
 KINDS = {
     "object": dict, "array": list, "string": str, "boolean": bool, "integer": int,
-    "number": (int, float),
+    "number": (int, float), "null": type(None),
 }  # fmt: skip
 
 
@@ -199,7 +221,9 @@ def problems(value, schema, root, location="$"):
         yield from problems(value, root["$defs"][name], root, location)
     if "const" in schema and value != schema["const"]:
         yield f"{location} is not {schema['const']}"
-    if "type" in schema and not isinstance(value, KINDS[schema["type"]]):
+    stated = schema.get("type", [])
+    kinds = tuple(KINDS[k] for k in ([stated] if isinstance(stated, str) else stated))
+    if kinds and not any(isinstance(value, kind) for kind in kinds):
         yield f"{location} is no {schema['type']}"
         return
     if isinstance(value, dict):
@@ -223,6 +247,7 @@ def problems(value, schema, root, location="$"):
     if isinstance(value, int | float) and (
         value < schema.get("minimum", -inf)
         or value <= schema.get("exclusiveMinimum", -inf)
+        or value > schema.get("maximum", inf)
         or value >= schema.get("exclusiveMaximum", inf)
     ):
         yield f"{location} = {value} is out of range"

@@ -9,11 +9,13 @@ import pytest
 from acquisition.errors import SessionError
 from experiments.operator.console import Console
 from experiments.preflight.conditions import (
-    FILE,
-    VERSION,
     check_conditions,
     default_conditions,
     differences,
+)
+from experiments.session.recorded_conditions import (
+    FILE,
+    VERSION,
     read_conditions,
     write_conditions,
 )

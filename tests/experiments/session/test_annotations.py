@@ -14,7 +14,8 @@ from analysis.data.load import load_trial
 from experiments.session.annotations import parse_trial
 from experiments.session.reducer import replay
 from experiments.settings.load import load_settings
-from experiments.status_table.upcoming import confounding, suggest_order
+from experiments.status_table.summary_cache import matrix_of
+from experiments.status_table.upcoming import confounding, factor_columns, suggest_order
 from tests.experiments.program import (
     digest,
     journal,
@@ -282,17 +283,11 @@ def test_the_board_is_followed_until_ctrl_c(recorded, config, monkeypatch):
 
 
 def test_the_suggested_order_does_not_go_with_time():
-    rows = load_settings(None).matrix.terrains
-    names = [row.name for row in rows]
-    order = suggest_order(rows, [])
-    factors = {
-        row.name: (
-            row.incline_deg,
-            float(row.stones == "big"),
-            float(row.stones == "none"),
-        )
-        for row in rows
-    }
+    matrix = matrix_of(load_settings(None).matrix)
+    names = [row.name for row in matrix.rows]
+    order = suggest_order(matrix, [])
+    factors = factor_columns(matrix)
+    assert order == ["B0", "S15", "TF", "S10", "Tf", "B15", "B10", "S0"]
     assert sorted(order) == sorted(names)
     # as listed the plates come last; a good order has next to no trend
     assert confounding(order, factors) < 0.25
@@ -300,8 +295,8 @@ def test_the_suggested_order_does_not_go_with_time():
 
 
 def test_what_was_recorded_is_not_suggested_again():
-    rows = load_settings(None).matrix.terrains
-    assert set(suggest_order(rows, ["S0", "B15", "S0"])) == {
+    matrix = matrix_of(load_settings(None).matrix)
+    assert set(suggest_order(matrix, ["S0", "B15", "S0"])) == {
         *("S10", "S15", "B0", "B10", "TF", "Tf"),
     }
-    assert suggest_order(rows, [row.name for row in rows]) == []
+    assert suggest_order(matrix, [row.name for row in matrix.rows]) == []

@@ -19,13 +19,18 @@ FACTORS = {
     "no number": float("nan"),
 }
 # Numbers of which both signs are sound.
-_SIGNED = (".com[0]", ".sole[0]", "far_end", "start_q", "mech_at_home")
+_SIGNED = ("incline_deg", ".com[0]", ".sole[0]", "far_end", "start_q", "mech_at_home")
 
 
 def numbers(section: BaseModel, place: str = ""):
     """Yield (dotted name, value) of every number."""
     for name, field in type(section).model_fields.items():
         value = getattr(section, name)
+        if isinstance(value, dict):
+            for key, each in value.items():
+                if isinstance(each, BaseModel):
+                    yield from numbers(each, f"{place}.{name}.{key}".lstrip("."))
+            continue
         for index, each in enumerate(value if isinstance(value, tuple) else (value,)):
             item = index if isinstance(value, tuple) else None
             at = f"{place}.{name}".lstrip(".")
@@ -64,7 +69,7 @@ def test_every_wrong_number_is_refused_or_warned_of(file, kind):
     section, silent = getattr(SHIPPED, file), []
     for name, value in numbers(section):
         is_signed = FACTORS[kind] < 0.0 and any(part in name for part in _SIGNED)
-        if value == 0.0 or is_signed or name.endswith(".sign"):
+        if value == 0.0 or is_signed or name.endswith((".sign", ".seed")):
             continue
         try:
             other = with_number(section, name, FACTORS[kind] * value)

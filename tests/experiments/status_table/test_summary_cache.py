@@ -12,8 +12,14 @@ from experiments.session.kept_files import compare_kept
 from experiments.session.store import find_session, list_sessions
 from experiments.settings.load import load_settings
 from experiments.status_table.session_summaries import summarise
-from experiments.status_table.summary_cache import SummaryCache, cache_path, row_of
+from experiments.status_table.summary_cache import (
+    SummaryCache,
+    cache_path,
+    matrix_of,
+    row_of,
+)
 from experiments.status_table.table import count_rows, find_deviations, see_sessions
+from experiments.status_table.where import Where, parse_where
 from tests.experiments.program import traction
 
 LATER_NS = 10**12
@@ -49,10 +55,10 @@ def hashed(monkeypatch):
 def status(data, path):
     """Return the kept trials by session and the deviations, as a new run sees them."""
     cache = SummaryCache(path)
-    seen = see_sessions(data, {}, cache)
+    seen = see_sessions(data, Where(), cache)
     cache.save()
     kept = {s.folder.id: s.summary.kept for s in seen}
-    return kept, [d.text() for d in find_deviations(seen, {})]
+    return kept, [d.text() for d in find_deviations(seen, Where())]
 
 
 def recording(data):
@@ -240,16 +246,16 @@ def test_the_place_of_the_cache_is_the_users_choice(tmp_path, monkeypatch):
 
 
 def test_rows_are_read_again_when_the_settings_change(tmp_path):
-    terrains = load_settings(None).matrix.terrains
+    matrix = load_settings(None).matrix
     read = []
 
     def reader():
         read.append(1)
-        return terrains
+        return matrix
 
     for texts in ([b"a", b"b"], [b"a", b"b"], [b"ab", b""], None, None):
         cache = SummaryCache(tmp_path / "cache.json")
-        assert cache.rows(texts, reader) == tuple(map(row_of, terrains))
+        assert cache.matrix(texts, reader) == matrix_of(matrix)
         cache.save()
     assert len(read) == 4
 
@@ -266,9 +272,10 @@ def test_a_wrong_matrix_is_refused_again(tmp_path, config):
 
 
 def test_conditions_hash_no_other_session(data, hashed):
-    seen = see_sessions(data, {"session": "S002"}, SummaryCache())
+    where = parse_where("session=S002")
+    seen = see_sessions(data, where, SummaryCache())
     rows = [row_of(row) for row in load_settings(None).matrix.terrains]
-    (line,) = count_rows(seen, rows, {"session": "S002"})
+    (line,) = count_rows(seen, rows, where)
     assert (line.sessions, line.kept) == (("S002",), 2)
     assert hashed == ["S002"]
 

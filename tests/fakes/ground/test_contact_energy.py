@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from fakes.ground.terrain import make_terrain
+from fakes.ground.terrain import GroundChoice, make_terrain
 
 DT = 0.0005
 LIFTED, PRESS = 0.001, 4.0  # m, N
@@ -50,7 +50,9 @@ def closed_path(ground, *stations):
 
 
 def make_ground(stones, foot, seed):
-    return make_terrain(stones, foot, math.radians(5.0), np.random.default_rng(seed))
+    return make_terrain(
+        GroundChoice(stones, foot), math.radians(5.0), np.random.default_rng(seed)
+    )
 
 
 HOME = (0.0, 0.0, 0.0, 0.0, 0.0, PRESS)

@@ -7,7 +7,7 @@ from fakes.ground.contact import NO_CONTACT
 from fakes.ground.footing import Footing
 from fakes.ground.stone_sizes import STONES, slope_factor
 from fakes.ground.stones import StoneBed
-from fakes.ground.terrain import PLATES, Plate, make_terrain
+from fakes.ground.terrain import PLATES, GroundChoice, Plate, make_terrain
 from fakes.randomness import trial_generator
 
 DT = 0.0005
@@ -206,7 +206,9 @@ def test_the_centre_of_pressure_wanders_as_far_as_it_should():
 @pytest.mark.parametrize("stones", ["small", "big", "none"])
 def test_a_ground_is_the_same_for_the_same_trial_and_another_for_another(stones):
     def forces(seed, trial):
-        ground = make_terrain(stones, "tread", 0.1, trial_generator(seed, "S", trial))
+        ground = make_terrain(
+            GroundChoice(stones, "tread"), 0.1, trial_generator(seed, "S", trial)
+        )
         return drag(ground, travel=0.02)
 
     assert forces(1, 1).tobytes() == forces(1, 1).tobytes()

@@ -9,6 +9,7 @@ from acquisition.control_loop.cycle import Cycle, CycleOutputs
 from acquisition.control_loop.loop import Loop
 from acquisition.control_loop.states import ArmState
 from fakes.clock import SteppedClock
+from fakes.ground.terrain import GroundChoice
 from fakes.plant.model import PlantOptions
 from fakes.world.rig import FakeRig, SimulatedScene
 from tests.acquisition.control_loop.limits import guard_limits
@@ -73,7 +74,7 @@ class HoldBench:
         mass=0.0,
     ):
         self.clock = SteppedClock()
-        scene = SimulatedScene("S0", "small", "tread", FRAME, START_Q, 1)
+        scene = SimulatedScene("S0", GroundChoice("small", "tread"), FRAME, START_Q, 1)
         options = PlantOptions(friction, motors=motors, cables=cables)
         self.rig = FakeRig(scene, CONSTANTS, TOOL, self.clock, options)
         self.clock.attach(self.rig)

@@ -5,6 +5,7 @@ import pytest
 
 from acquisition.control_loop.states import ArmState
 from fakes.clock import SteppedClock
+from fakes.ground.terrain import GroundChoice
 from fakes.plant.model import PlantOptions
 from fakes.world.rig import FakeRig, SimulatedScene, solve_start
 from ft_sensor.payload import TerrainFrame
@@ -35,7 +36,9 @@ class ClosedLoop:
 
     def __init__(self, tool, q, friction=0.05, virtual_mass=0.0):
         self.clock = SteppedClock()
-        scene = SimulatedScene("TF", "none", "tread", FRAME, START, seed=1)
+        scene = SimulatedScene(
+            "TF", GroundChoice("none", "tread"), FRAME, START, seed=1
+        )
         options = PlantOptions(friction=friction)
         self.rig = FakeRig(scene, CONSTANTS, tool, self.clock, options)
         self.rig.plant.q = q.copy()

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fakes.clock import SteppedClock
+from fakes.ground.terrain import GroundChoice
 from fakes.plant.model import PlantOptions
 from fakes.world.departure import (
     AXES,
@@ -80,7 +81,7 @@ def test_the_same_seed_is_the_same_rig():
 
 
 def spread_rig(departure):
-    scene = SimulatedScene("S0", "small", "tread", FRAME, START_Q, 5)
+    scene = SimulatedScene("S0", GroundChoice("small", "tread"), FRAME, START_Q, 5)
     scene = replace(scene, departure=departure)
     clock = SteppedClock()
     rig = FakeRig(scene, CONSTANTS, TOOL, clock)

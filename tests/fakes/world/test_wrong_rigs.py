@@ -11,6 +11,7 @@ from acquisition.errors import SettingsError
 from experiments.rig.fake import typed_wrongly, wrong_rigs
 from experiments.settings.load import load_settings
 from fakes.clock import SteppedClock
+from fakes.ground.terrain import GroundChoice
 from fakes.plant.plant import ArmPlant
 from fakes.world.departure import Departure
 from fakes.world.rig import FakeRig, SimulatedScene
@@ -44,7 +45,7 @@ def build():
     built = []
 
     def start(name):
-        scene = SimulatedScene("S0", "small", "tread", FRAME, START_Q, 1)
+        scene = SimulatedScene("S0", GroundChoice("small", "tread"), FRAME, START_Q, 1)
         departure = wrong_rig(name).departure if name else Departure()
         clock = SteppedClock()
         rig = FakeRig(replace(scene, departure=departure), CONSTANTS, TOOL, clock)
@@ -357,7 +358,7 @@ def test_feet_are_what_they_are_named_for():
 def test_a_foot_that_is_mistyped_is_in_the_settings_or_refused_there():
     settings = load_settings(None)
     light = typed_wrongly(settings, "foot-forgotten")
-    assert {light.rig.feet.tread.mass, light.rig.feet.bare.mass} == {0.05}
+    assert {foot.mass for foot in light.rig.feet.values()} == {0.05}
     assert typed_wrongly(settings, "foot-half") is settings
     with pytest.raises(SettingsError, match=r"mass = 4\.5"):
         typed_wrongly(settings, "foot-typed-4.5kg")
@@ -458,7 +459,7 @@ def test_places_are_what_they_are_named_for(build):
     assert frame("heading-off-20deg").heading == pytest.approx(np.radians(20.0))
     assert frame("far-end-off-100mm").far_end == pytest.approx((0.70, 0.0, 0.02))
     assert frame("travel-too-long").travel == pytest.approx(FRAME.travel - 0.1)
-    assert build("label-swapped").scene.stones == "none"
+    assert build("label-swapped").scene.ground.stones == "none"
 
 
 def test_every_rig_of_the_catalogue_can_be_built(build):

@@ -1,0 +1,71 @@
+"""Factors as recordings and data packages state them, held to what is allowed."""
+
+import json
+from collections.abc import Mapping
+from typing import Any, NamedTuple, cast
+
+from analysis.data.terrain_kinds import Value
+
+MOST, LONGEST = 13, 60  # factors, the foot among them; characters of names and words
+_LARGEST = 1e12
+_FEET = {"true": "tread", "false": "bare"}  # as the first recordings state a foot
+FOOT = "foot"
+
+
+class StatedFactors(NamedTuple):
+    """What a recording states of its terrain and foot.
+
+    Attributes:
+        values: by name; None = does not apply.
+        units: of numbers, by name; "" = none.
+        logs: numbers that are compared by their logarithm.
+    """
+
+    values: dict[str, Value]
+    units: dict[str, str]
+    logs: frozenset[str]
+
+
+def foot_of(tread: str) -> str:
+    """Return the name of the foot that a recording states as `tread`; "" = none."""
+    return _FEET.get(tread, tread)
+
+
+def stated_factors(trial: Mapping[str, str]) -> StatedFactors:
+    """Return the factors in a trial's metadata; what is no factor is left out."""
+    foot = trial.get(FOOT) or foot_of(trial.get("tread", ""))
+    values = checked_factors(_parsed(trial.get("factors", "")))
+    known = {**values, FOOT: foot[:LONGEST]} if foot else values
+    texts = _parsed(trial.get("factor_units", ""))
+    units = {k: v[:LONGEST] for k, v in texts.items() if isinstance(v, str)}
+    logs = _parsed(trial.get("factor_scales", ""))
+    is_log = frozenset(name for name, scale in logs.items() if scale == "log")
+    return StatedFactors(known, units, is_log)
+
+
+def checked_factors(values: Mapping[str, Any]) -> dict[str, Value]:
+    """Return those of the values that factors may have: at most 13, finite, short."""
+    kept: dict[str, Value] = {}
+    for name, value in list(values.items())[:MOST]:
+        if isinstance(value, bool) or not _is_word(name):
+            continue
+        if value is None or (isinstance(value, str) and _is_word(value)):
+            kept[name] = value
+        elif isinstance(value, int | float) and abs(value) < _LARGEST:
+            kept[name] = float(value)
+    return kept
+
+
+def _is_word(text: str) -> bool:
+    return 0 < len(text) <= LONGEST and text.isprintable()
+
+
+def _parsed(text: str) -> dict[str, Any]:
+    """Return the object in a JSON text, {} where there is none."""
+    try:
+        value: object = json.loads(text) if text else {}
+    except (ValueError, RecursionError):
+        return {}
+    if not isinstance(value, dict):
+        return {}
+    return {str(k): v for k, v in cast("dict[str, Any]", value).items()}
