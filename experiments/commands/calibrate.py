@@ -212,7 +212,7 @@ def _without_old(
     if what == "friction":
         return settings.without_friction(), row
     if what == "terrain":
-        bare = row.model_copy(update={"calibration": None, "push_deg": 0})
+        bare = row.as_container().model_copy(update={"calibration": None})
         return settings.with_row(bare), bare
     return settings.without_sensor(row.foot, is_mounted=what == "foot"), row
 

@@ -230,7 +230,7 @@ def _sittings(
     from experiments.proving.work import SITTINGS
     from experiments.run.stop import StopRequestedError
 
-    row = settings.row(args.terrain or settings.matrix.terrains[0].name)
+    row = settings.row(args.terrain or settings.matrix.terrains[0].name).as_container()
     is_anew = args.first is not None
     for sitting in SITTINGS:
         due = [step for step in sitting if step in steps]
@@ -263,7 +263,7 @@ def _daily(
     from experiments.report.daily import write_history_page
 
     reference_of(files)  # before anything is touched
-    row = settings.row(args.terrain or settings.matrix.terrains[0].name)
+    row = settings.row(args.terrain or settings.matrix.terrains[0].name).as_container()
 
     def work(scene: Scene) -> int:
         check = do_daily(scene, files, persons, is_simulated=args.fake)

@@ -20,6 +20,7 @@ from experiments.proving.limits import Judgement, found, judged
 from experiments.proving.recording import Values, number, texts, words
 from experiments.proving.scene import Scene
 from experiments.proving.weights import POSES, bring
+from experiments.rig.build import start_of
 from experiments.run.ready import activate
 from wam.model.arm_model import ArmModel
 from wam.model.constants import GRAVITY, Array, load_constants
@@ -48,7 +49,8 @@ def collect(scene: Scene) -> Values:
     rocked = _rock(scene)
     scene.say("Bring the foot above the container, a hand's breadth clear of it.")
     if scene.simulation is not None:
-        scene.simulation.pose(scene.rig.row.start_q, CARRIED)
+        start = start_of(scene.rig.row, scene.rig.model)
+        scene.simulation.pose(start.tolist(), CARRIED)
         scene.await_hand()
     turned: dict[str, NDArray[Any]] = {}
     with scene.followed():

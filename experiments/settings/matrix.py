@@ -207,6 +207,10 @@ class TerrainRow(_Row):
         """Incline along the push, positive downhill [degrees]."""
         return -self.incline_deg if self.push_deg == 180 else self.incline_deg
 
+    def as_container(self) -> "TerrainRow":
+        """Return it as its container stands, whichever way it is crossed."""
+        return self if self.push_deg == 0 else self.model_copy(update={"push_deg": 0})
+
     def plain(self) -> dict[str, Any]:
         """Return it in plain values, without what only few rows state."""
         values = self.model_dump(mode="json")

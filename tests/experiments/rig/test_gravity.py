@@ -57,7 +57,7 @@ def folder(tmp_path):
     config = write_config(tmp_path, rig=use("calibrated"))
     config.write_text(config.read_text().replace(*LIGHTER))
     rig = load_settings(config).rig
-    assert rig.feet.bare.mass == 0.38
+    assert rig.feet["bare"].mass == 0.38
     (tmp_path / "gravity.toml").write_text(calibration(rig))
     return tmp_path
 
