@@ -106,13 +106,23 @@ def test_more_rows_are_four_times_as_many(evidence):
 
 def test_every_statement_stands_in_the_report_and_beside_it(small_study):
     results = compute_results(small_study)
-    table = statements(results)
+    (table,) = statements(results)
     assert len(table.rows) > 20
     assert {len(row) for row in table.rows} == {len(table.header)}
     plain = json.loads(json.dumps(to_plain(plain_findings(results))["paper"]))
     assert [entry["shown"] for entry in plain] == [row[2] for row in table.rows]
     shown = [entry for entry in plain if entry["agrees"] != Agreement.OPEN.value]
     assert all(entry["numbers"] for entry in shown)
+
+
+def test_terrains_that_are_not_the_papers_are_not_compared(small_study):
+    steeper = replace(small_study.terrains["S0"], incline_deg=8.0)
+    other = {**small_study.terrains, "S0": steeper}
+    results = compute_results(replace(small_study, terrains=other))
+    assert results.claims == []
+    (table,) = statements(results)
+    assert table.rows == []
+    assert table.note.endswith("These are others: S0.")
 
 
 def test_a_study_of_two_kinds_counts_slips_on_stones(evidence, small_study):

@@ -259,7 +259,7 @@ def test_an_unknown_terrain_and_an_unknown_model_are_named(path):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"version": 3}, "version: Input should be 1 or 2"),
+        ({"version": 4}, "version: Input should be 1, 2 or 3"),
         ({"terrains": {}}, "terrains: Dictionary should have at least 1 item"),
         (
             {"axes": {"F_n": [1.0, 0.0], "v_t": [0.1, 0.2]}},

@@ -16,12 +16,15 @@ NAMED = re.compile(r"\[(space|[a-z]|r?[1-9])\](?![\w.]*\()")
 CODE = Path(experiments.__file__).parent
 # Where texts of a module appear; several for a screen with a key for each.
 SHOWN_AT = {
+    "calibrating/place.py": {Prompt.TOUCH},
     "calibrating/terrain.py": {Prompt.TOUCH},
     "commands/commission.py": {Prompt.CLEAR},
     "operator/keys.py": set(KEYS),
     "operator/screens.py": {Prompt.READY},
     "proving/by_hand.py": {Prompt.CLEAR},
+    "proving/daily.py": {Prompt.CLEAR},
     "proving/guide.py": {Prompt.CLEAR},
+    "proving/lock_clock.py": {Prompt.CLEAR, Prompt.PAUSED},
     "proving/rest_pose.py": {Prompt.CLEAR},
     "proving/scales.py": {Prompt.CLEAR},
     "proving/stop_circuit.py": {Prompt.PAUSED},
