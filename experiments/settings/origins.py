@@ -37,9 +37,11 @@ def origin_lines(settings: Settings) -> list[str]:
         ("matrix.toml", settings.matrix, settings.matrix_text),
     )
     for file, model, text in files:
-        given = flatten(parse_toml(text))
+        table, values = parse_toml(text), flatten(model.model_dump())
         origin = _origin(settings, file)
-        for name, value in flatten(model.model_dump()).items():
+        # Cells of version 2 are made of several tables: none stands in one line.
+        given = values if "version" in table else flatten(table)
+        for name, value in values.items():
             line = line_of(text, name) if name in given else None
             location = f"{origin}, line {line}" if line else origin
             source = location if name in given else f"default, not in {file}"
