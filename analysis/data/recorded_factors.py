@@ -31,6 +31,18 @@ def foot_of(tread: str) -> str:
     return _FEET.get(tread, tread)
 
 
+def tread_of(foot: str) -> str:
+    """Return what recordings state as `tread` of a foot."""
+    return {name: tread for tread, name in _FEET.items()}.get(foot, foot)
+
+
+def value_text(value: Value, digits: int = 6) -> str:
+    """Return a factor's value as text; "-" = it does not apply."""
+    if value is None:
+        return "-"
+    return value if isinstance(value, str) else f"{value:.{digits}g}"
+
+
 def stated_factors(trial: Mapping[str, str]) -> StatedFactors:
     """Return the factors in a trial's metadata; what is no factor is left out."""
     foot = trial.get(FOOT) or foot_of(trial.get("tread", ""))

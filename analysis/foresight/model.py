@@ -32,14 +32,6 @@ def _is_for(features: Sequence[str]) -> AfterValidator:
     return AfterValidator(methodcaller("checked", len(features)))
 
 
-_TREADS = {"tread": "true", "bare": "false"}  # as the first recordings state a foot
-
-
-def tread_of(foot: str) -> str:
-    """Return what recordings state as `tread` of a foot."""
-    return _TREADS.get(foot, foot)
-
-
 @dataclass(frozen=True, slots=True)
 class RigIdentity:
     """What a trial states of foot and rig, as text.

@@ -16,7 +16,7 @@ import numpy as np
 from analysis.data.prepare import PreparedTrial
 from analysis.data.samples import SampleTable
 from analysis.data.series import Array
-from analysis.gp.ground import Ground, left_out, terms_of
+from analysis.gp.ground import Ground, left_out
 from analysis.study.all_ground import AllGroundModel, TerrainRows, fit_all_ground
 
 ENOUGH = 0.002  # nat per measurement, below which a further trial is not worth it
@@ -172,8 +172,3 @@ def _gains(model: AllGroundModel, cells: Sequence[Ground], point: Array) -> Arra
     total = between + noise
     ratio = (latent + total)[None, :] / (np.maximum(after, 0.0) + total[None, :])
     return 0.5 * np.log(ratio).mean(axis=1)
-
-
-def taken_factors(recorded: Sequence[Ground]) -> tuple[str, ...]:
-    """Return the names of the factors that a model of these grounds takes."""
-    return tuple(term.name for term in terms_of(recorded))

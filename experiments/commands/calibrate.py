@@ -80,7 +80,7 @@ def run(args: argparse.Namespace) -> int:
 
     command = f"traction calibrate {args.what}"
     return guide_person(
-        args, settings, row, work, command, made_anew=_MADE_ANEW.get(args.what)
+        args, settings, row, work, command, made_anew=_MADE_ANEW[args.what]
     )
 
 
@@ -193,12 +193,13 @@ _WORK = {
     "foot": _sensor,
     "terrain": _terrain,
 }
-# Those that send torque, with what of a commissioning they measure anew.
+# What of a commissioning each measures anew; all of them let the arm float or move it.
 _MADE_ANEW = {
     "gravity": ("[gravity]", "[friction]"),
     "friction": ("[friction]",),
     "sensor": ("[ft_sensor]", "[feet]"),
     "foot": ("[feet]",),
+    "terrain": (),
 }
 _FEWEST = {"gravity": 3, "sensor": 6, "foot": 6}  # poses
 

@@ -7,12 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from experiments.arguments import (
-    add_simulated_arm,
-    add_time,
     asked_time,
     friction_share,
 )
-from experiments.rig.truth_options import add_truth, check_truth, mount_of
+from experiments.calibrating.opening import add_arm
+from experiments.rig.truth_options import check_truth, mount_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -87,13 +86,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--operator", metavar="NAME", help="who does it (login name)")
     parser.add_argument("--witness", metavar="NAME", help="who stands by")
-    parser.add_argument("--fake", action="store_true", help="simulated devices")
-    add_time(parser)
-    add_simulated_arm(parser)
-    add_truth(parser)
-    parser.add_argument(
-        "--operator-script", metavar="auto", help="simulated operator, only with --fake"
-    )
+    add_arm(parser)
 
 
 def run(args: argparse.Namespace) -> int:

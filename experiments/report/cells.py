@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from acquisition.errors import TractionError
-from analysis.data.recorded_factors import FOOT
+from analysis.data.recorded_factors import FOOT, value_text
 from analysis.data.series import TractionSeries
 from analysis.data.terrain_kinds import FINE, Value, kind_title
 from analysis.figures.sections import ReportSection
@@ -53,10 +53,13 @@ def cells_table(
     rows = [
         (
             result.terrain,
-            _text(result.factors.get(FOOT, "?")),
+            value_text(result.factors.get(FOOT, "?")),
             kind_title(result.kind),
             "?" if result.incline_deg is None else f"{result.incline_deg:+.1f}",
-            *(_text(result.factors[n]) if n in result.factors else "?" for n in names),
+            *(
+                value_text(result.factors[n]) if n in result.factors else "?"
+                for n in names
+            ),
             str(len(result.trials)),
             traction_ratio(result),
         )
@@ -74,10 +77,8 @@ def cells_table(
     ]
 
 
-def _text(value: Value) -> str:
-    if value is None:
-        return "-"
-    return value if isinstance(value, str) else f"{value:g}"
+def _stated(factors: Mapping[str, Value], name: str) -> str:
+    return value_text(factors[name]) if name in factors else "?"
 
 
 def forecast_of(

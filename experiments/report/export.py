@@ -17,8 +17,7 @@ from analysis.data.data_package import (
 from analysis.data.load import RecordedTrial, load_trial
 from analysis.data.parquet_tables import to_parquet
 from analysis.data.prepare import PrepareOptions, prepare_trial
-from analysis.data.recorded_factors import FOOT, StatedFactors
-from analysis.data.terrain_kinds import Value
+from analysis.data.recorded_factors import FOOT, StatedFactors, value_text
 from experiments.operator.console import WARNING, Console
 from experiments.report.checksums import SUMS, digest_of, write_sums
 from experiments.report.quantities import KEPT, QUANTITIES, kept_rule
@@ -192,7 +191,8 @@ def export_sessions(
         console.say(f"{name}: {len(trial.t)} rows")
     columns = _factor_columns(stated)
     for row, factors in zip(rows, stated, strict=True):
-        row += [_cell(factors.values, column) for column in columns]
+        known = factors.values
+        row += [value_text(known[n], 12) if n in known else "" for n in columns]
     index = {**_INDEX_MEANINGS, **columns}
     writer.add_texts(INDEX, rows, index, "The trials.")
     meanings = dictionary_rows(form)
@@ -215,16 +215,6 @@ def _factor_columns(stated: Sequence[StatedFactors]) -> dict[str, str]:
         name: f"factor [{unit}]" if unit else "factor" for name, unit in units.items()
     }
     return {name: about.get(name, "factor") for name in names}
-
-
-def _cell(values: Mapping[str, Value], name: str) -> str:
-    """Return a factor of a trial as text: "-" = does not apply, "" = not stated."""
-    if name not in values:
-        return ""
-    value = values[name]
-    if value is None:
-        return "-"
-    return value if isinstance(value, str) else f"{value:.12g}"
 
 
 def _write_trial(

@@ -9,7 +9,8 @@ from typing import Any
 from acquisition.clock import Clock, SystemClock
 from acquisition.ipc.layout import SharedLayout
 from acquisition.simulation import SimulationControl
-from analysis.foresight.model import RigIdentity, tread_of
+from analysis.data.recorded_factors import tread_of
+from analysis.foresight.model import RigIdentity
 from experiments.arguments import FRICTION, TimeMode
 from experiments.rig.arm_lock import ArmLock
 from experiments.rig.backend import RigBackend

@@ -22,7 +22,7 @@ unit = "mm"
 kind = "number"
 scale = "log"
 """
-FAR_END, LOW_END = (0.70, 0.0, 0.12), 0.0017  # m; m higher per degree of incline
+FAR_END, RISE = (0.70, 0.0, 0.12), 0.0068  # m; m higher per degree of incline
 TRAVEL = 0.45  # m
 _LONGEST = 24  # characters of a name
 
@@ -184,7 +184,7 @@ def places_text(inclines: Sequence[float]) -> str:
     text = ""
     for incline in inclines:
         x, y, z = FAR_END
-        high = round(z + max(incline, 0.0) * 4.0 * LOW_END, 4)
+        high = round(z + max(incline, 0.0) * RISE, 4)
         text += (
             f"\n[places.{place_of(incline)}]  # traction teach {place_of(incline)}\n"
         )

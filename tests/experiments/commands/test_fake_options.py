@@ -2,6 +2,7 @@
 
 import pytest
 
+from experiments.commands.calibrate import _MADE_ANEW, _WORK
 from fakes.serving import home_arm
 from tests.experiments.program import traction
 
@@ -180,3 +181,8 @@ def test_a_script_that_orders_nonsense_starts_nothing(tmp_path):
     assert done.code == 2
     assert "line 2: '2 hang much' - expected hang KG" in done.err
     assert not (tmp_path / "bus").exists()
+
+
+def test_every_calibration_asks_a_real_arm_for_its_commissioning():
+    # without an entry none would be asked for, and all of them let the arm float
+    assert set(_MADE_ANEW) == set(_WORK)
