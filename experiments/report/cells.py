@@ -77,10 +77,6 @@ def cells_table(
     ]
 
 
-def _stated(factors: Mapping[str, Value], name: str) -> str:
-    return value_text(factors[name]) if name in factors else "?"
-
-
 def forecast_of(
     study: Study,
     series: Mapping[str, Sequence[TractionSeries]],
