@@ -205,7 +205,8 @@ def add_table_form(parser: ArgumentParser) -> None:
         "--columns",
         metavar="t=..,v_t=..,F_n=..,F_t=..",
         help="names in a CSV or Parquet file, or places from 1; a name with commas in "
-        "quotes",
+        "quotes; trial=.. and terrain=..: columns of a CSV whose words say which rows "
+        "belong together",
     )
     group.add_argument(
         "--unit", metavar="v_t=mm/s,..", help="units where a header gives none"

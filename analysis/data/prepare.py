@@ -7,8 +7,8 @@ are not evenly apart, they are times: what lies within 11 ms is averaged. A gap 
 record stays one: nothing is averaged or integrated across it.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
@@ -100,12 +100,14 @@ class Smoothed:
         v_t: velocity [m/s], shape (n,).
         F_n: normal force [N], shape (n,).
         F_t: traction force [N], shape (n,).
+        further: other inputs by name, each of shape (n,).
     """
 
     t: Array
     v_t: Array
     F_n: Array
     F_t: Array
+    further: Mapping[str, Array] = field(default_factory=dict[str, Array])
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,6 +157,8 @@ class PreparedTrial:
         is_foreign: a table that no session of this program states.
         widths: samples that were averaged, and one of how many was kept.
         is_prepared: the record's rows had been prepared before.
+        further: other inputs of the kept samples, shape (m, k); None where there are
+            none.
     """
 
     terrain: str
@@ -175,6 +179,7 @@ class PreparedTrial:
     is_prepared: bool
     is_simulated: bool = False
     is_foreign: bool = False
+    further: Array | None = None
 
     @property
     def kept(self) -> int:
@@ -253,26 +258,39 @@ def prepare_trial(series: TractionSeries, options: PrepareOptions) -> PreparedTr
         is_prepared=series.is_prepared,
         is_simulated=series.is_simulated,
         is_foreign=series.is_foreign,
+        further=_beside(smooth.further, indices),
     )
 
 
 def smoothed(series: TractionSeries, options: PrepareOptions) -> Smoothed:
     """Return a whole trial after the moving average, and nothing else of it."""
     width, _ = options.widths(series)
-    names = [field.name for field in fields(Smoothed) if field.name != "t"]
-    columns = {name: getattr(series, name) for name in names}
+    average = _average_over(series, options, width)
+    return Smoothed(
+        series.t,
+        average(series.v_t),
+        average(series.F_n),
+        average(series.F_t),
+        {name: average(x) for name, x in series.further.items()},
+    )
+
+
+def _average_over(
+    series: TractionSeries, options: PrepareOptions, width: int
+) -> Callable[[Array], Array]:
+    """Return what smooths a column of a trial, by its times."""
     if series.is_prepared:
-        return Smoothed(t=series.t, **columns)
+        return lambda x: x
     if not is_even(series.t):
         near = _nearby(series.t, options.smoothing / RATE_HZ)
-        columns = {name: _mean_of_rows(x, *near) for name, x in columns.items()}
-        return Smoothed(t=series.t, **columns)
+        return lambda x: _mean_of_rows(x, *near)
     parts = stretches(series.t)
-    averaged = {
-        name: np.concatenate([moving_average(x[a:b], width) for a, b in parts])
-        for name, x in columns.items()
-    }
-    return Smoothed(t=series.t, **averaged)
+    return lambda x: np.concatenate([moving_average(x[a:b], width) for a, b in parts])
+
+
+def _beside(further: Mapping[str, Array], rows: Indices) -> Array | None:
+    """Return rows of further inputs side by side, shape (m, k); None without any."""
+    return np.column_stack([x[rows] for x in further.values()]) if further else None
 
 
 def stretches(t: Array) -> list[tuple[int, int]]:

@@ -12,6 +12,17 @@ from analysis.data.prepare import PreparedTrial
 from analysis.data.series import Array, Indices
 
 
+def inputs_of(F_n: Array, v_t: Array, further: Array | None = None) -> Array:
+    """Return inputs of models side by side, shape (n, 2 + k).
+
+    Args:
+        F_n: normal force [N], shape (n,).
+        v_t: slip velocity [m/s], shape (n,).
+        further: other inputs, shape (n, k); None for none.
+    """
+    return np.column_stack([F_n, v_t] if further is None else [F_n, v_t, further])
+
+
 @dataclass(frozen=True, slots=True)
 class SampleTable:
     """Kept samples of one or more trials.
@@ -20,25 +31,29 @@ class SampleTable:
         F_n: normal force [N], shape (n,).
         v_t: slip velocity [m/s], shape (n,).
         F_t: traction force [N], shape (n,).
+        further: other inputs, shape (n, k); None where there are none.
     """
 
     F_n: Array
     v_t: Array
     F_t: Array
+    further: Array | None = None
 
     @classmethod
     def of(cls, trials: Sequence[PreparedTrial]) -> "SampleTable":
         """Return the kept samples of `trials`, one after the other."""
-        return cls.joined([cls(trial.F_n, trial.v_t, trial.F_t) for trial in trials])
+        return cls.joined([cls(t.F_n, t.v_t, t.F_t, t.further) for t in trials])
 
     @classmethod
     def joined(cls, parts: Sequence["SampleTable"]) -> "SampleTable":
         """Return the rows of `parts`, one after the other."""
         empty = np.zeros(0)
+        beside = [part.further for part in parts if part.further is not None]
         return cls(
             F_n=np.concatenate([empty, *(part.F_n for part in parts)]),
             v_t=np.concatenate([empty, *(part.v_t for part in parts)]),
             F_t=np.concatenate([empty, *(part.F_t for part in parts)]),
+            further=np.concatenate(beside) if beside else None,
         )
 
     @property
@@ -48,17 +63,24 @@ class SampleTable:
 
     def part(self, start: int, end: int) -> "SampleTable":
         """Return the rows from `start` to before `end`, without a copy of them."""
-        columns = (self.F_n, self.v_t, self.F_t)  # of a mapped file, in a worker
-        return SampleTable(*(np.asarray(column[start:end]) for column in columns))
+        return SampleTable(  # of a mapped file, in a worker
+            np.asarray(self.F_n[start:end]),
+            np.asarray(self.v_t[start:end]),
+            np.asarray(self.F_t[start:end]),
+            None if self.further is None else np.asarray(self.further[start:end]),
+        )
 
     def take(self, indices: Indices) -> "SampleTable":
         """Return the rows at `indices`."""
-        return SampleTable(self.F_n[indices], self.v_t[indices], self.F_t[indices])
+        further = None if self.further is None else self.further[indices]
+        return SampleTable(
+            self.F_n[indices], self.v_t[indices], self.F_t[indices], further
+        )
 
     @property
     def inputs(self) -> Array:
-        """Return (F_n, v_t) side by side, shape (n, 2)."""
-        return np.column_stack([self.F_n, self.v_t])
+        """Return (F_n, v_t) and further inputs side by side, shape (n, 2 + k)."""
+        return inputs_of(self.F_n, self.v_t, self.further)
 
 
 class PooledSamples(NamedTuple):
@@ -100,7 +122,8 @@ class PooledSamples(NamedTuple):
 
 def _digest(rows: SampleTable) -> str:
     digest = blake2b(digest_size=16)
-    for column in (rows.F_n, rows.v_t, rows.F_t):
+    further = [] if rows.further is None else [rows.further]
+    for column in (rows.F_n, rows.v_t, rows.F_t, *further):
         digest.update(np.ascontiguousarray(column, dtype="<f8").tobytes())
     return digest.hexdigest()
 

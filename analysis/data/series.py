@@ -1,6 +1,6 @@
 """The record of one trial as the analysis takes it: velocity and forces over time."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -45,6 +45,7 @@ class TractionSeries:
         is_simulated: the devices were simulated.
         is_foreign: a table that no session of this program states.
         notes: what was decided when a table was read, for people.
+        further: other inputs of every row by name, each of shape (n,): an angle, say.
         dropped_rows: number of rows that were not finite.
         repeated_rows: number of rows that were there twice.
 
@@ -68,13 +69,15 @@ class TractionSeries:
     is_simulated: bool = False
     is_foreign: bool = False
     notes: tuple[str, ...] = ()
+    further: Mapping[str, Array] = field(default_factory=dict[str, Array])
     dropped_rows: int = field(init=False)
     repeated_rows: int = field(init=False)
 
     def __post_init__(self) -> None:
         _check_name(self.terrain, self.name)
         columns = [np.asarray(getattr(self, key), dtype=np.float64) for key in _COLUMNS]
-        _check_shapes(columns, self.name)
+        columns += [np.asarray(x, dtype=np.float64) for x in self.further.values()]
+        _check_shapes(columns, (*_COLUMNS, *self.further), self.name)
         is_finite = _of_all([np.isfinite(column) for column in columns])
         rows = int(np.count_nonzero(is_finite))
         if rows < is_finite.size:
@@ -88,10 +91,13 @@ class TractionSeries:
                 hint="Check that the file is complete.",
             )
         is_new = np.concatenate([[True], ~is_repeated])
-        for key, column in zip(_COLUMNS, columns, strict=True):
-            kept = column[is_new] if repeated else np.array(column, order="C")
-            kept.setflags(write=False)
-            object.__setattr__(self, key, kept)
+        kept = [c[is_new] if repeated else np.array(c, order="C") for c in columns]
+        for column in kept:
+            column.setflags(write=False)
+        for key, column in zip(_COLUMNS, kept[: len(_COLUMNS)], strict=True):
+            object.__setattr__(self, key, column)
+        further = dict(zip(self.further, kept[len(_COLUMNS) :], strict=True))
+        object.__setattr__(self, "further", further)
         object.__setattr__(self, "dropped_rows", is_finite.size - rows)
         object.__setattr__(self, "repeated_rows", repeated)
         _check_time(self.t, self.name)
@@ -126,11 +132,12 @@ class TractionSeries:
             F_n=F_n,
             F_t=F_t,
             stamped_lag=self.stamped_lag - lag,
+            further={name: x[inside] for name, x in self.further.items()},
         )
 
 
 def _of_all(claims: list[NDArray[np.bool_]]) -> NDArray[np.bool_]:
-    """Return where all four columns are so, shape (n,)."""
+    """Return where all columns are so, shape (n,)."""
     return np.logical_and.reduce(claims)
 
 
@@ -143,13 +150,13 @@ def _check_name(terrain: str, name: str) -> None:
         )
 
 
-def _check_shapes(columns: list[Array], name: str) -> None:
+def _check_shapes(columns: list[Array], keys: Sequence[str], name: str) -> None:
     shapes = [column.shape for column in columns]
     if any(len(shape) != 1 for shape in shapes) or len(set(shapes)) != 1:
-        listed = ", ".join(f"{k} {s}" for k, s in zip(_COLUMNS, shapes, strict=True))
+        listed = ", ".join(f"{k} {s}" for k, s in zip(keys, shapes, strict=True))
         raise SettingsError(
             f"{name}: the columns differ in shape ({listed}).",
-            hint="All four must be one-dimensional and equally long.",
+            hint="All must be one-dimensional and equally long.",
         )
 
 

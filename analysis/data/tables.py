@@ -30,7 +30,7 @@ from analysis.data.data_package import (
 from analysis.data.parquet_tables import MAGIC, read_parquet
 from analysis.data.series import Array, TractionSeries
 from analysis.data.table_checks import check_clock, check_order, notes_of
-from analysis.dialects.columns import COLUMNS, factor
+from analysis.dialects.columns import COLUMNS, GROUPS, factor
 from analysis.dialects.other_formats import ENOUGH, check_kind, not_an_npz
 from analysis.dialects.reading import TextRequest, TrialTable, read_text_table
 from analysis.dialects.refusals import refusal
@@ -62,6 +62,7 @@ def load_tables(
     rate: float | None = None,
     negate: Sequence[str] = (),
     decimal: str | None = None,
+    inputs: Sequence[str] = (),
 ) -> dict[str, list[TractionSeries]]:
     """Return the trials in `paths` by terrain, in the order of the files.
 
@@ -70,7 +71,8 @@ def load_tables(
             each; folders of `traction export`, of which every whole trial is read.
             `~` and patterns such as `*.csv` are expanded.
         columns: name of each column of the analysis in a CSV or Parquet file, or its
-            place from "1"; by default its own.
+            place from "1"; by default its own. Beside them "trial" and "terrain":
+            columns of a CSV whose words part it into several trials.
         terrain: terrain of every CSV; by default that of the data package it lies in,
             or "table". An npz names its own.
         stones: size of the stones by terrain: "small", "big" or "none"; where it is
@@ -82,16 +84,17 @@ def load_tables(
             compression below zero.
         decimal: "." or ",", the decimal mark of a CSV in which the other one groups
             thousands.
+        inputs: columns of numbers that are inputs of models beside F_n and v_t.
 
     Raises:
         SettingsError: a file that is missing, too large, or not what it should be.
     """
-    _check_names({*(columns or {}), *(units or {}), *negate})
+    _check_names({*(columns or {})} - {*GROUPS} | {*(units or {}), *negate})
     if decimal not in {None, ".", ","}:
         raise SettingsError(f"{decimal!r} is no decimal mark.", hint='Give "." or ",".')
     if not (rate is None or _is_rate(rate)):
         raise SettingsError(f"{rate!r} is no rate.", hint="Give rows per second [Hz].")
-    columns = {name: name for name in COLUMNS} | dict(columns or {})
+    columns = {n: n for n in (*COLUMNS, *inputs)} | dict(columns or {})
     request = TextRequest(columns, rate, decimal)
     form = _TableForm(request, terrain, stones or {}, units or {}, frozenset(negate))
     trials: dict[str, list[TractionSeries]] = {}
@@ -179,6 +182,10 @@ class _TableForm:
             check_clock(path, rows, is_timed)
             found = notes_of(path, table, rows)
             notes = [*table.notes, *filter(None, [epoch]), *found]
+        if further := list(table.further.values()):
+            lacking = ~np.isfinite(np.column_stack(further)).all(axis=1)
+            if count := int(np.count_nonzero(lacking)):
+                notes.append(f"{count} rows without a value of an input dropped")
         terrain = self.terrain or origin.terrain or DEFAULT_TERRAIN
         return TractionSeries(
             terrain,
@@ -193,6 +200,7 @@ class _TableForm:
             is_simulated=origin.simulated or table.is_simulated is True,
             is_foreign=not origin.session,
             notes=tuple(notes),
+            further=table.further,
         )
 
     def _in_own_units(self, name: str, table: TrialTable) -> tuple[Array, str]:
@@ -225,9 +233,9 @@ def _load(path: Path, form: _TableForm) -> list[TractionSeries]:
         return _load_npz(path, replace(form, terrain=None))
     packaged = packaged_table(path)
     if packaged is None:
-        return [_load_table(path, form, None)]
+        return _load_table(path, form, None)
     packaged.check()
-    return [_load_table(path, form, packaged.origin)]
+    return _load_table(path, form, packaged.origin)
 
 
 def _first_bytes(path: Path) -> bytes:
@@ -259,10 +267,10 @@ def _load_package(path: Path, form: _TableForm) -> list[TractionSeries]:
     if not tables:
         raise refusal(path, "no trials in it", "Give a folder of traction export.")
     own = replace(form, terrain=None)  # every trial of a package names its terrain
-    return [_load_packaged(table, own) for table in tables]
+    return [series for table in tables for series in _load_packaged(table, own)]
 
 
-def _load_packaged(table: PackagedTable, form: _TableForm) -> TractionSeries:
+def _load_packaged(table: PackagedTable, form: _TableForm) -> list[TractionSeries]:
     _first_bytes(table.path)
     table.check()
     return _load_table(table.path, form, table.origin)
@@ -270,8 +278,8 @@ def _load_packaged(table: PackagedTable, form: _TableForm) -> TractionSeries:
 
 def _load_table(
     path: Path, form: _TableForm, origin: TableOrigin | None
-) -> TractionSeries:
-    """Return the trial in a CSV or Parquet file."""
+) -> list[TractionSeries]:
+    """Return the trial in a CSV or Parquet file, or the trials of a CSV."""
     with path.open("rb") as file:
         is_parquet = file.read(4) == MAGIC
     if is_parquet:
@@ -281,7 +289,73 @@ def _load_table(
         table = read_text_table(path, form.text, LARGEST_FILE)
     known = origin or TableOrigin(table="trial")
     name = known.name if known.session else path.name
-    return form.series(name, path, table, known)
+    if not table.groups:
+        return [form.series(name, path, table, known)]
+    return [
+        form.series(f"{name}:{part.label}", path, part.table, part.of(known))
+        for part in _parts(path, table, form.text.rate)
+    ]
+
+
+class _Part(NamedTuple):
+    """The rows of a table that belong to one trial."""
+
+    terrain: str
+    trial: str
+    table: TrialTable
+
+    @property
+    def label(self) -> str:
+        """Its terrain and trial, as far as the table names them."""
+        return "/".join(filter(None, (self.terrain, self.trial)))
+
+    def of(self, origin: TableOrigin) -> TableOrigin:
+        """Return the origin with the terrain that the rows name."""
+        if not self.terrain:
+            return origin
+        return origin.model_copy(update={"terrain": self.terrain})
+
+
+def _parts(path: Path, table: TrialTable, rate: float | None) -> list[_Part]:
+    """Return the trials of a table that its words part, in the order of its rows.
+
+    Where rows have no time of their own, those of a trial are numbered anew.
+
+    Raises:
+        SettingsError: a row has no word, or there are too many trials.
+    """
+    nothing = [""] * len(table.rows)
+    keys = list(zip(*(table.groups.get(n, nothing) for n in GROUPS), strict=True))
+    places = dict.fromkeys(keys)
+    for name, words in table.groups.items():
+        if "" in words:
+            where = table.place(words.index(""))
+            raise refusal(path, f"{where}: no {name}", "Name it in every row.")
+    if len(places) > MOST_TRIALS:
+        raise refusal(
+            path,
+            f"{len(places)} trials by {' and '.join(table.groups)}, the limit is "
+            f"{MOST_TRIALS}",
+            "Name a column that parts it into fewer.",
+        )
+    rows_of: dict[tuple[str, ...], list[int]] = {key: [] for key in places}
+    for row, key in enumerate(keys):
+        rows_of[key].append(row)
+    parts = []
+    for (trial, terrain), of_trial in rows_of.items():
+        chosen = np.array(of_trial)
+        rows = table.rows[chosen]
+        if rate is not None:
+            rows[:, 0] = np.arange(chosen.size) / rate
+        part = replace(
+            table,
+            rows=rows,
+            lines=None if table.lines is None else table.lines[chosen],
+            further={name: x[chosen] for name, x in table.further.items()},
+            groups={},
+        )
+        parts.append(_Part(terrain, trial, part))
+    return parts
 
 
 class _ParquetTrial(NamedTuple):
@@ -293,9 +367,22 @@ class _ParquetTrial(NamedTuple):
 
 def _load_parquet(path: Path, form: _TableForm) -> _ParquetTrial:
     _refuse_rate(path, form)
-    file = read_parquet(path, {name: form.text.columns[name] for name in COLUMNS})
+    if form.text.groups:
+        raise refusal(
+            path,
+            f"--columns {form.text.groups[0]}=: a Parquet file holds one trial",
+            "Give a file per trial, or a CSV.",
+        )
+    wanted = (*COLUMNS, *form.text.further)
+    file = read_parquet(path, {name: form.text.columns[name] for name in wanted})
     rows = np.column_stack([file.columns[name] for name in COLUMNS])
-    table = TrialTable(rows, file.units, file.is_prepared, file.is_simulated)
+    table = TrialTable(
+        rows,
+        file.units,
+        file.is_prepared,
+        file.is_simulated,
+        further={name: file.columns[name] for name in form.text.further},
+    )
     return _ParquetTrial(table, file.origin)
 
 
@@ -309,6 +396,12 @@ def _check_size(path: Path, size: int) -> None:
 
 
 def _load_npz(path: Path, form: _TableForm) -> list[TractionSeries]:
+    if form.text.further or form.text.groups:
+        raise refusal(
+            path,
+            "an npz has four columns and names its trials",
+            "For --inputs give CSV or Parquet files, for trial= and terrain= CSV.",
+        )
     try:
         with zipfile.ZipFile(path) as archive:
             members = archive.infolist()

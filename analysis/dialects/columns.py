@@ -7,6 +7,9 @@ from acquisition.errors import SettingsError
 
 COLUMNS = ("t", "v_t", "F_n", "F_t")
 PREPARED = "kept_row"  # a column of tables that were prepared before
+TRIAL, TERRAIN = "trial", "terrain"  # columns of words that part a table
+GROUPS = (TRIAL, TERRAIN)
+MOST_INPUTS = 6  # beside F_n and v_t
 SIMULATED = "simulated"  # 1 in every row where the devices were simulated
 _TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "d": 86_400.0}
 _SPEEDS = {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3, "um/s": 1e-6}
@@ -59,7 +62,8 @@ def parse_columns(text: str) -> dict[str, str]:
     """Return the names of the columns from `t=t_s,v_t="Speed, foot",F_n=3,...`.
 
     A name with commas stands in quotes; a number that is no name is a place, from 1.
-    Columns that are not mentioned keep their own name.
+    Columns that are not mentioned keep their own name. `trial=` and `terrain=` name
+    columns whose words say which rows belong together.
 
     Raises:
         SettingsError: a part is not NAME=COLUMN, or names no column of the analysis.
@@ -72,7 +76,7 @@ def parse_columns(text: str) -> dict[str, str]:
             raise _not_named(text, text[at:])
         quoted = part["quoted"]
         column = part["bare"] if quoted is None else quoted.replace('""', '"')
-        if not column or part["name"] not in columns:
+        if not column or part["name"] not in {*COLUMNS, *GROUPS}:
             raise _not_named(text, part[0].strip(" ,"))
         columns[part["name"]] = plain(column)
         at = part.end()
@@ -84,6 +88,32 @@ def _not_named(text: str, part: str) -> SettingsError:
         f"--columns {text}: {part!r} does not name a column.",
         hint="Write e.g. --columns t=t_s,v_t=vt_mps,F_n=Fn_N,F_t=Ft_N",
     )
+
+
+def parse_inputs(text: str) -> tuple[str, ...]:
+    """Return the inputs beside v_t and F_n of `v_t,F_n,skid_deg`.
+
+    Raises:
+        SettingsError: v_t or F_n is missing, a name stands twice or is no input, or
+            there are too many.
+    """
+    names = [plain(part).strip() for part in text.split(",") if part.strip()]
+    own = [name for name in names if name in {"v_t", "F_n"}]
+    further = tuple(name for name in names if name not in own)
+    taken = {*COLUMNS, *GROUPS, PREPARED, SIMULATED}
+    reason = ""
+    if sorted(own) != ["F_n", "v_t"]:
+        reason = "v_t and F_n are always inputs; name each once"
+    elif len(set(further)) < len(further) or taken & set(further):
+        reason = "a name stands twice, or is no input"
+    elif not 1 <= len(further) <= MOST_INPUTS:
+        reason = f"{len(further)} inputs beside them, 1 to {MOST_INPUTS} can be"
+    if reason:
+        raise SettingsError(
+            f"--inputs {text}: {reason}.",
+            hint="Write e.g. --inputs v_t,F_n,skid_deg, with columns of the table.",
+        )
+    return further
 
 
 def parse_units(text: str) -> dict[str, str]:
@@ -216,7 +246,7 @@ def _usual(header: Sequence[str], name: str) -> list[str]:
     return [
         column
         for column in bare
-        if re.sub(r"[^a-z]", "", column.lower()) in _KNOWN_AS[name]
+        if re.sub(r"[^a-z]", "", column.lower()) in _KNOWN_AS.get(name, ())
     ]
 
 

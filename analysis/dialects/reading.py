@@ -3,14 +3,14 @@
 import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.dialects.columns import COLUMNS, PREPARED, SIMULATED, plain
+from analysis.dialects.columns import COLUMNS, GROUPS, PREPARED, SIMULATED, plain
 from analysis.dialects.dialect import (
     BLANKS,
     Dialect,
@@ -45,6 +45,8 @@ class TrialTable:
         notes: what had to be decided to read it, for people.
         header: line of the file with the names; None where it has none.
         is_in_seconds: times are seconds by the form of the file.
+        further: other inputs by name, each of shape (n,); NaN where a value misses.
+        groups: words of every row by kind, "trial" or "terrain", that part the table.
     """
 
     rows: Array
@@ -55,6 +57,10 @@ class TrialTable:
     notes: tuple[str, ...] = ()
     header: int | None = None
     is_in_seconds: bool = False
+    further: Mapping[str, Array] = field(default_factory=dict[str, Array])
+    groups: Mapping[str, Sequence[str]] = field(
+        default_factory=dict[str, Sequence[str]]
+    )
 
     def place(self, row: int) -> str:
         """Return where a row stands, for people."""
@@ -68,7 +74,8 @@ class TextRequest:
     """How a text table is to be read.
 
     Attributes:
-        columns: its name of each column of the analysis.
+        columns: its name of each column of the analysis, of every further input, and
+            of what parts it into trials and terrains.
         rate: rows per second, where it has no time [Hz].
         decimal: "." or ",", where the user says it; then thousands may be grouped.
     """
@@ -76,6 +83,16 @@ class TextRequest:
     columns: Mapping[str, str]
     rate: float | None = None
     decimal: str | None = None
+
+    @property
+    def further(self) -> tuple[str, ...]:
+        """Inputs beside those of the analysis."""
+        return tuple(n for n in self.columns if n not in {*COLUMNS, *GROUPS})
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """What parts the table, of "trial" and "terrain"."""
+        return tuple(n for n in GROUPS if n in self.columns)
 
 
 def read_text_table(path: Path, request: TextRequest, largest: int) -> TrialTable:
@@ -90,7 +107,7 @@ def read_text_table(path: Path, request: TextRequest, largest: int) -> TrialTabl
         SettingsError: it is no such table, or its time is not that of `rate`.
     """
     lines = lines_of(path, largest)
-    names = {name: plain(request.columns[name]) for name in COLUMNS}
+    names = {name: plain(column) for name, column in request.columns.items()}
     marks = {PREPARED: PREPARED, SIMULATED: SIMULATED}
     optional = {PREPARED, SIMULATED} | ({"t"} if request.rate is not None else set())
     head = [plain(line) for line in lines[:256]]
@@ -101,8 +118,9 @@ def read_text_table(path: Path, request: TextRequest, largest: int) -> TrialTabl
     if not count:
         raise refusal(path, "a header but no rows", _COPY)
     table = _Cells(path, lines, dialect, request, count)
+    numbers = table.numbers(first.get("t", ""))
     return TrialTable(
-        table.rows(first.get("t", "")),
+        np.column_stack([numbers[name] for name in COLUMNS]),
         dialect.units,
         is_prepared=PREPARED in dialect.places,
         is_simulated=table.simulated(),
@@ -110,6 +128,8 @@ def read_text_table(path: Path, request: TextRequest, largest: int) -> TrialTabl
         notes=_notes(dialect),
         is_in_seconds=is_iso(first.get("t", "")),
         header=dialect.header_line + 1 if dialect.header_line >= 0 else None,
+        further={name: numbers[name] for name in request.further},
+        groups={n: list(map(sys.intern, table.column(n))) for n in request.groups},
     )
 
 
@@ -212,13 +232,14 @@ class _Cells:
         line, cells = next(islice(self, row, None))
         return line, plain(cells[self.dialect.places[name]]).strip()
 
-    def rows(self, first_time: str) -> Array:
-        """Return the four columns as numbers, shape (n, 4).
+    def numbers(self, first_time: str) -> dict[str, Array]:
+        """Return the columns of numbers by name, each of shape (n,).
 
         Raises:
             SettingsError: a cell is none.
         """
-        names = [name for name in COLUMNS if name in self.dialect.places]
+        wanted = (*COLUMNS, *self.request.further)
+        names = [name for name in wanted if name in self.dialect.places]
         columns: dict[str, Array] = {}
         if is_iso(first_time):
             columns["t"] = self._dates(first_time)
@@ -231,7 +252,7 @@ class _Cells:
             if wrong is not None:
                 line, cell = self.at(name, wrong)
                 raise _no_number(self.path, name, cell, line, self.request)
-        return np.column_stack([columns[name] for name in COLUMNS])
+        return columns
 
     def _dates(self, first: str) -> Array:
         since = iso_times(list(self.column("t")), MISSING)

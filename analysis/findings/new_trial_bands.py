@@ -78,7 +78,9 @@ def plain_shares(shares: HeldOutShares) -> dict[str, Any]:
 
 def _of_terrain(result: TerrainResult, model: str) -> HeldOutShares | None:
     shares = [
-        fold.models[model].model.predict(trial.F_n, trial.v_t).cdf(trial.F_t)
+        fold.models[model]
+        .model.predict(trial.F_n, trial.v_t, trial.further)
+        .cdf(trial.F_t)
         for fold in result.folds
         if model in fold.models
         for trial in [result.trials[fold.fold]]

@@ -175,7 +175,7 @@ def held_out_residual(result: TerrainResult, model: str) -> Array:
     """Return measured minus predicted F_t [N] of all trials left out, shape (n,)."""
     trials, folds = held_out_trials(result, model), result.models(model)
     rests = [
-        trial.F_t - fold.model.mean(trial.F_n, trial.v_t)
+        trial.F_t - fold.model.mean(trial.F_n, trial.v_t, trial.further)
         for trial, fold in zip(trials, folds, strict=True)
     ]
     return np.concatenate([np.zeros(0), *rests])

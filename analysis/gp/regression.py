@@ -10,6 +10,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from acquisition.errors import SettingsError
+from analysis.data.samples import inputs_of
 from analysis.data.series import Array
 from analysis.gp.kernels import Kernel, SquaredExponential
 from analysis.gp.likelihood import Factor, Likelihood, factorise, lapack, split
@@ -66,6 +67,21 @@ class GaussianProcess:
             for i in range(0, Z.shape[0], _BLOCK)
         ]
         return self.offset + np.concatenate([np.zeros(0), *blocks])
+
+    def at(self, F_n: Array, v_t: Array, further: Array | None = None) -> Array:
+        """Return inputs side by side, shape (m, d).
+
+        Further ones that are not given stand at the mean of the training rows.
+
+        Args:
+            F_n: normal force [N], shape (m,).
+            v_t: slip velocity [m/s], shape (m,).
+            further: other inputs, shape (m, d - 2).
+        """
+        means = self.centre[2:]  # of inputs beside these two
+        if further is None and means.size:
+            further = np.broadcast_to(means, (F_n.size, means.size))
+        return inputs_of(F_n, v_t, further)
 
     def factor(self) -> Factor:
         """Return the factor of the covariance of the training rows."""

@@ -282,13 +282,13 @@ def _examine(model: FittedModel, task: FoldTask) -> ModelFold:
     foreign = [rows for trials in task.others.values() for rows in trials]
     tested = SampleTable.joined([task.training, *foreign])
     # one call for all rows: small ones cost more than they compute
-    error = np.abs(model.mean(tested.F_n, tested.v_t) - tested.F_t)
+    error = np.abs(model.mean(tested.F_n, tested.v_t, tested.further) - tested.F_t)
     ends = np.cumsum([task.training.count, *(rows.count for rows in foreign)])
     on_training, *on_foreign = np.split(error, ends[:-1])
     maes = iter(float(part.mean()) for part in on_foreign)
     return ModelFold(
         model=model,
-        score=score(own.F_t, model.predict(own.F_n, own.v_t)),
+        score=score(own.F_t, model.predict(own.F_n, own.v_t, own.further)),
         train_rmse=float(np.sqrt(np.mean(on_training**2))),
         cross={
             terrain: tuple(next(maes) for _ in trials)

@@ -90,12 +90,21 @@ class FittedModel(Protocol):
         """What a reader must know before believing its parameters."""
         ...
 
-    def mean(self, F_n: Array, v_t: Array) -> Array:
-        """Return the predicted F_t [N], shape (n,)."""
+    def mean(self, F_n: Array, v_t: Array, further: Array | None = None) -> Array:
+        """Return the predicted F_t [N], shape (n,).
+
+        Args:
+            F_n: normal force [N], shape (n,).
+            v_t: slip velocity [m/s], shape (n,).
+            further: other inputs that the model was fitted with, shape (n, k); None:
+                at their means.
+        """
         ...
 
-    def predict(self, F_n: Array, v_t: Array) -> Distribution:
-        """Return what is predicted of F_t [N] at n points."""
+    def predict(
+        self, F_n: Array, v_t: Array, further: Array | None = None
+    ) -> Distribution:
+        """Return what is predicted of F_t [N] at n points; see `mean`."""
         ...
 
     def describe(self) -> dict[str, Any]:
@@ -114,13 +123,15 @@ class TustinModel:
         """Flags of the fit."""
         return self.fit.flags
 
-    def mean(self, F_n: Array, v_t: Array) -> Array:
+    def mean(self, F_n: Array, v_t: Array, further: Array | None = None) -> Array:
         """Return F_t [N] by eq. (1)."""
         return self.fit.mean(F_n, v_t)
 
-    def predict(self, F_n: Array, v_t: Array) -> Prediction:
+    def predict(
+        self, F_n: Array, v_t: Array, further: Array | None = None
+    ) -> Prediction:
         """Return the curve and the residual's standard deviation [N]."""
-        mean = self.mean(F_n, v_t)
+        mean = self.mean(F_n, v_t, further)
         return Prediction(mean, np.full(mean.shape, self.fit.residual_sd))
 
     def describe(self) -> dict[str, Any]:
@@ -150,13 +161,16 @@ class GpModel:
         jitter = ("jitter added",) if self.process.jitter else ()
         return tuple(f"{name} at bound" for name in self.process.at_bound) + jitter
 
-    def mean(self, F_n: Array, v_t: Array) -> Array:
+    def mean(self, F_n: Array, v_t: Array, further: Array | None = None) -> Array:
         """Return the predictive mean [N]."""
-        return self._around(self.process.mean(np.column_stack([F_n, v_t])), F_n, v_t)
+        mean = self.process.mean(self.process.at(F_n, v_t, further))
+        return self._around(mean, F_n, v_t)
 
-    def predict(self, F_n: Array, v_t: Array) -> Prediction:
+    def predict(
+        self, F_n: Array, v_t: Array, further: Array | None = None
+    ) -> Prediction:
         """Return the predictive mean and standard deviation [N], noise included."""
-        mean, variance = self.process.predict(np.column_stack([F_n, v_t]))
+        mean, variance = self.process.predict(self.process.at(F_n, v_t, further))
         normal = Prediction(self._around(mean, F_n, v_t), np.sqrt(variance))
         return normal if self.tails is None else self.tails.applied_to(normal)
 
@@ -230,9 +244,9 @@ class ModelFitter:
 
     def gp_with_chosen_noise(self) -> GpModel:
         """Return a Gaussian process whose noise is chosen among the training trials."""
-        training, constant = self.training, self.gp(SquaredExponential())
+        training, constant = self.training, self.gp(self.se_kernel)
         outputs = training.subset.F_t
-        changing = refit_gp(constant.process, outputs, noise=LogLinearNoise())
+        changing = refit_gp(constant.process, outputs, noise=LogLinearNoise(self._dimensions))
         choice = choose_noise(training, constant.process, changing, self.options.seed)
         if choice.chosen == "constant":
             return replace(constant, choice=choice)
@@ -249,9 +263,19 @@ class ModelFitter:
         return fit_new_trial(self.training, kernel, curve, self.options.effect)
 
     @property
+    def se_kernel(self) -> SquaredExponential:
+        """The squared exponential of eq. (4), a length for every input."""
+        return SquaredExponential(self._dimensions)
+
+    @property
     def nn_kernel(self) -> Arcsine:
         """The neural-network kernel of eq. (5), by the options as printed."""
-        return Arcsine(as_printed=self.options.is_nn_as_printed)
+        return Arcsine(self._dimensions, as_printed=self.options.is_nn_as_printed)
+
+    @property
+    def _dimensions(self) -> int:
+        further = self.training.rows.further
+        return 2 if further is None else 2 + further.shape[1]
 
 
 @dataclass(frozen=True, slots=True)
@@ -275,11 +299,11 @@ class ModelKind:
 # commands, cross-validation, tables, figures and the results that are kept.
 MODELS: Mapping[str, ModelKind] = {
     TUSTIN: ModelKind("Tustin", lambda fitter: TustinModel(fitter.curve())),
-    GP_SE: ModelKind("GP (SE)", lambda fitter: fitter.gp(SquaredExponential())),
+    GP_SE: ModelKind("GP (SE)", lambda fitter: fitter.gp(fitter.se_kernel)),
     GP_NN: ModelKind("GP (NN)", lambda fitter: fitter.gp(fitter.nn_kernel)),
     GP_SE_TUSTIN: ModelKind(
         "GP (SE, Tustin mean)",
-        lambda fitter: fitter.gp_around_tustin(SquaredExponential()),
+        lambda fitter: fitter.gp_around_tustin(fitter.se_kernel),
     ),
     GP_NN_TUSTIN: ModelKind(
         "GP (NN, Tustin mean)", lambda fitter: fitter.gp_around_tustin(fitter.nn_kernel)
@@ -289,7 +313,7 @@ MODELS: Mapping[str, ModelKind] = {
     ),
     GP_SE_TRIAL: ModelKind(
         "GP (SE, new trial)",
-        lambda fitter: fitter.new_trial(SquaredExponential()),
+        lambda fitter: fitter.new_trial(fitter.se_kernel),
         is_compared=False,
         is_of_new_trial=True,
     ),
@@ -301,7 +325,7 @@ MODELS: Mapping[str, ModelKind] = {
     ),
     GP_SE_TUSTIN_TRIAL: ModelKind(
         "GP (SE, Tustin mean, new trial)",
-        lambda fitter: fitter.new_trial(SquaredExponential(), is_around_tustin=True),
+        lambda fitter: fitter.new_trial(fitter.se_kernel, is_around_tustin=True),
         is_compared=False,
         is_of_new_trial=True,
     ),

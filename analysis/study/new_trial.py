@@ -89,17 +89,19 @@ class NewTrialModel:
         at_bound = (f"{name} at bound" for name in self.process.at_bound)
         return (*at_bound, *jitter, *clipped)
 
-    def mean(self, F_n: Array, v_t: Array) -> Array:
+    def mean(self, F_n: Array, v_t: Array, further: Array | None = None) -> Array:
         """Return the median [N], the forecast of the smallest absolute error."""
         if self.shape is not None:
-            return self.predict(F_n, v_t).point
-        inputs = np.column_stack([F_n, v_t])
+            return self.predict(F_n, v_t, further).point
+        inputs = self.process.at(F_n, v_t, further)
         z = self.process.mean(inputs) + _curve(self.curve, inputs, self.c)
         return unwarped(z, self.c)
 
-    def predict(self, F_n: Array, v_t: Array) -> NewTrialPrediction:
+    def predict(
+        self, F_n: Array, v_t: Array, further: Array | None = None
+    ) -> NewTrialPrediction:
         """Return the distribution of measurements of a new trial."""
-        inputs = np.column_stack([F_n, v_t])
+        inputs = self.process.at(F_n, v_t, further)
         mean, variance = self.process.predict(inputs)
         prediction = _prediction(
             self.process, inputs, mean, variance, self.trials, self.curve, self.c
@@ -198,7 +200,7 @@ class NewTrialFit:
         if len(self._left_out) < 2:
             return fitted
         if LOGLINEAR in self._families:
-            noise = self._noise(LogLinearNoise())
+            noise = self._noise(LogLinearNoise(self._rows.inputs.shape[1]))
             changing = refit_gp(normal, outputs, noise=noise)
             fitted.append(_Candidate(LOGLINEAR, changing, None))
         bends = bends_for(self._rows.F_t, _BENDS)
@@ -284,7 +286,7 @@ def _prediction(
 
     Args:
         process: of z.
-        inputs: where, shape (n, 2).
+        inputs: where, shape (n, d).
         mean: of z there, shape (n,).
         variance: of z there, noise included, shape (n,).
         trials: number of trials that it was given.

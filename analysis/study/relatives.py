@@ -190,7 +190,8 @@ def plan_relatives(
 ) -> list[RelativesTask]:
     """Return a task per terrain with more than three trials and another terrain.
 
-    None where no model of a new trial is asked for.
+    None where no model of a new trial is asked for, or where the trials have inputs
+    beside F_n and v_t: the model of all grounds has no place for them.
 
     Args:
         trials: prepared trials by terrain.
@@ -198,7 +199,8 @@ def plan_relatives(
         options: how own models are fitted, and the seed of rows and of trials.
         draw: another one takes another three trials as known.
     """
-    if not NEW_TRIAL & set(options.models):
+    has_further = any(t.further is not None for ts in trials.values() for t in ts)
+    if has_further or not NEW_TRIAL & set(options.models):
         return []
     tables = {
         name: {k: SampleTable.of([t]) for k, t in enumerate(trials[name]) if t.kept}

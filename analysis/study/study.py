@@ -146,7 +146,9 @@ def run_study(
     prepared = _prepared(trials, options.prepare)
     targets = _prepared(trials, options.target) if options.target else prepared
     tasks, notes = plan_folds(prepared, options.fit, targets)
-    apart = _apart(prepared, options.fit)
+    further = _further(trials)
+    notes += _notes_on_inputs(further)
+    apart = [] if further else _apart(prepared, options.fit)
     batches = [
         *beside(prepared),  # first: they are longer than a fit
         Batch(run_fold, tasks),
@@ -196,6 +198,34 @@ def _result(
 def _require_trials(trials: Mapping[str, Sequence[TractionSeries]]) -> None:
     if not any(trials.values()):
         raise SettingsError("There is no trial to analyse.", hint="Record some first.")
+
+
+def _further(trials: Mapping[str, Sequence[TractionSeries]]) -> tuple[str, ...]:
+    """Return the names of inputs beside F_n and v_t.
+
+    Raises:
+        SettingsError: some trials have others than the rest.
+    """
+    named = {tuple(s.further) for recorded in trials.values() for s in recorded}
+    if len(named) > 1:
+        raise SettingsError(
+            "The trials differ in their inputs: "
+            + "; ".join(sorted(", ".join(names) or "none" for names in named))
+            + ".",
+            hint="Give every trial the same inputs.",
+        )
+    return named.pop()
+
+
+def _notes_on_inputs(further: Sequence[str]) -> list[str]:
+    if not further:
+        return []
+    names = ", ".join(further)
+    return [
+        f"Inputs beside F_n and v_t: {names}. Curves and surfaces over F_n and v_t "
+        "show them at their means; the constant force and Tustin's law have no place "
+        "for them. Not fitted: the model of all terrains, and the spread of trials."
+    ]
 
 
 def _prepared(

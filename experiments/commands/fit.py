@@ -46,6 +46,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME=SIZE,..",
         help="stones of a terrain: small, big or none for a plate",
     )
+    parser.add_argument(
+        "--inputs",
+        metavar="v_t,F_n,..",
+        help="inputs of the models: v_t, F_n and further columns of numbers in every "
+        "table, e.g. an angle",
+    )
     add_scheduler(parser)
     add_pdf(parser)
     add_seed(parser)
@@ -112,7 +118,12 @@ def _load(args: argparse.Namespace) -> dict[str, list[TractionSeries]]:
     """Return the trials by terrain; raises SettingsError."""
     from analysis.data.tables import load_tables
     from analysis.data.terrain_kinds import parse_stones
-    from analysis.dialects.columns import parse_columns, parse_names, parse_units
+    from analysis.dialects.columns import (
+        parse_columns,
+        parse_inputs,
+        parse_names,
+        parse_units,
+    )
 
     columns = parse_columns(args.columns) if args.columns else None
     stones = parse_stones(args.stones) if args.stones else None
@@ -126,6 +137,7 @@ def _load(args: argparse.Namespace) -> dict[str, list[TractionSeries]]:
         args.rate,
         negate=parse_names(args.negate) if args.negate else (),
         decimal=args.decimal,
+        inputs=parse_inputs(args.inputs) if args.inputs else (),
     )
 
 

@@ -156,7 +156,9 @@ def test_the_search_reaches_the_best_of_twenty_starts(trials, kernel):
 def counted(name, kept, seed):
     """Return a prepared trial that has nothing but its kept samples."""
     F_n, v_t, F_t = np.random.default_rng(seed).normal(size=(3, kept))
-    return SimpleNamespace(name=name, kept=kept, F_n=F_n, v_t=v_t, F_t=F_t)
+    return SimpleNamespace(
+        name=name, kept=kept, F_n=F_n, v_t=v_t, F_t=F_t, further=None
+    )
 
 
 def many(trials):
