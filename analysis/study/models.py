@@ -246,7 +246,9 @@ class ModelFitter:
         """Return a Gaussian process whose noise is chosen among the training trials."""
         training, constant = self.training, self.gp(self.se_kernel)
         outputs = training.subset.F_t
-        changing = refit_gp(constant.process, outputs, noise=LogLinearNoise(self._dimensions))
+        changing = refit_gp(
+            constant.process, outputs, noise=LogLinearNoise(self._dimensions)
+        )
         choice = choose_noise(training, constant.process, changing, self.options.seed)
         if choice.chosen == "constant":
             return replace(constant, choice=choice)
