@@ -13,6 +13,7 @@ import numpy as np
 
 from analysis.breakaway.model import BreakAwayModel
 from analysis.data.load import RecordedTrial
+from analysis.data.series import Array
 from analysis.data.terrain_kinds import groups_of
 from analysis.foresight.curves import (
     ForesightCurves,
@@ -217,10 +218,17 @@ def _ground_rows(runs: Sequence[ForesightRun]) -> GroundRows:
     for name in dict.fromkeys(run.trial.terrain for run in runs):
         own = [shares for r in runs if r.trial.terrain == name if (shares := _own(r))]
         if own:
-            means = np.nanmean(np.array(own), axis=0)
+            means = _means(np.array(own))
             names = ("terrain", "surface", "none")
             rows[name] = dict(zip(names, map(tuple, means.tolist()), strict=True))
     return rows
+
+
+def _means(values: Array) -> Array:
+    """Return means over the first axis of what is known; NaN where nothing is."""
+    is_known = ~np.isnan(values)
+    with np.errstate(invalid="ignore"):
+        return np.where(is_known, values, 0.0).sum(axis=0) / is_known.sum(axis=0)
 
 
 def _own(run: ForesightRun) -> list[list[float]]:

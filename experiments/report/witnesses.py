@@ -2,6 +2,7 @@
 
 from pathlib import Path
 from typing import cast
+from urllib.parse import unquote
 
 from acquisition.errors import TrialFileError
 from acquisition.files import read_regular
@@ -44,7 +45,10 @@ def changed_publication(folder: Path) -> list[ChangedFile]:
 
 
 def _described(path: Path) -> list[str]:
-    """Return the files below the crate that its description names."""
+    """Return the files below the crate that its description names.
+
+    Its identifiers are addresses: "+" and other signs are written in percent.
+    """
     with reading(path):
         content = parse_object(read_regular(path, _LARGEST))
     graph = None if content is None else content.get("@graph")
@@ -56,8 +60,8 @@ def _described(path: Path) -> list[str]:
     for entity in cast("list[object]", graph):
         known = cast("dict[str, object]", entity if isinstance(entity, dict) else {})
         name = known.get("@id") if known.get("@type") == "File" else None
-        if isinstance(name, str) and _is_below(name):
-            names.append(name)
+        if isinstance(name, str) and _is_below(path := unquote(name)):
+            names.append(path)
     return names
 
 

@@ -4,8 +4,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
 from acquisition.settings import parse_toml
+from analysis.data.recorded_factors import value_text
 from experiments.settings.explaining import line_of
 from experiments.settings.load import SHIPPED, Settings
+from experiments.settings.matrix import TerrainRow
 
 
 def flatten(value: object, prefix: str = "") -> dict[str, object]:
@@ -30,17 +32,24 @@ def flatten(value: object, prefix: str = "") -> dict[str, object]:
 
 
 def origin_lines(settings: Settings) -> list[str]:
-    """Return one line per setting: name, value, file and line it comes from."""
+    """Return one line per setting: name, value, file and line it comes from.
+
+    A cell of version 2 is one line: it is made of several tables.
+    """
     lines: list[str] = []
     files: tuple[tuple[str, Any, str], ...] = (
         ("rig.toml", settings.rig, settings.rig_text),
         ("matrix.toml", settings.matrix, settings.matrix_text),
     )
     for file, model, text in files:
-        table, values = parse_toml(text), flatten(model.model_dump())
+        table, dump = parse_toml(text), model.model_dump()
         origin = _origin(settings, file)
-        # Cells of version 2 are made of several tables: none stands in one line.
-        given = values if "version" in table else flatten(table)
+        has_cells = "version" in table
+        if has_cells:
+            del dump["terrains"]
+            lines += [f"{_cell(r)}   ({origin})" for r in settings.matrix.terrains]
+        values = flatten(dump)
+        given = values if has_cells else flatten(table)
         for name, value in values.items():
             line = line_of(text, name) if name in given else None
             location = f"{origin}, line {line}" if line else origin
@@ -55,6 +64,16 @@ def _origin(settings: Settings, file: str) -> str:
     if file == "rig.toml" and not is_shipped:
         return settings.origin
     return SHIPPED if is_shipped or not path.is_file() else str(path)
+
+
+def _cell(row: TerrainRow) -> str:
+    """Return a cell of a matrix with everything that was stated or taken for it."""
+    factors = ", ".join(f"{n} {value_text(v)}" for n, v in row.factors.items())
+    where = row.place or f"far end {list(row.far_end)}"
+    return (
+        f"cell {row.name}: foot {row.foot}, {factors or 'no factors'}, {where}, "
+        f"{row.incline_deg:+g} degrees, push {row.push_deg}, {row.trials} trials"
+    )
 
 
 def _shown(value: object) -> str:

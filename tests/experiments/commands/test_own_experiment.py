@@ -1,0 +1,183 @@
+"""Another experiment than the paper's, from an empty folder to a publication."""
+
+import io
+import json
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from experiments.session.store import create_session, list_sessions
+from experiments.settings.load import load_settings
+from tests.experiments.program import traction
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
+
+ANSWERS = """\
+12 19 37
+moisture: dry, wet
+
+-10 0 10
+tread bare round
+3
+"""
+WET = "\n[simulate.moisture.wet]\ns_inf = 0.8\nk_w = 1.2\n"
+# a tenth of the 54 cells: every gravel, word, foot and incline among them
+RECORDED = ("G12dt+0", "G19wt+0", "G37dt+0", "G37wb+10", "G12db-10", "G19wr+10")
+
+
+@dataclass(frozen=True)
+class Lab:
+    """A folder with settings and recordings."""
+
+    folder: Path
+
+    @property
+    def config(self) -> Path:
+        return self.folder / "lab" / "rig.toml"
+
+    @property
+    def data(self) -> Path:
+        return self.folder / "data"
+
+    def run(self, *arguments):
+        """Run a command with the settings and data of the folder; it has to succeed."""
+        done = traction(*arguments, "--config", self.config, "--data", self.data)
+        assert (done.code, done.err) == (0, ""), done
+        return done.out
+
+
+@pytest.fixture(scope="module")
+def lab(tmp_path_factory):
+    """Return a folder in which an own experiment was set up, taught and recorded."""
+    lab = Lab(tmp_path_factory.mktemp("own"))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("sys.stdin", io.StringIO(ANSWERS))
+        done = traction("init", lab.config.parent, "--ask")
+    assert done.code == 0
+    assert "54 cells" in done.out
+    rig = lab.config.read_text().replace("travel = 0.45", "travel = 0.07")
+    lab.config.write_text(rig)
+    matrix = lab.config.with_name("matrix.toml")
+    matrix.write_text(matrix.read_text() + WET)
+    auto = ("--fake", "--fast", "--operator-script", "auto")
+    for place in ("up10", "level", "down10"):
+        lab.run("teach", place, *auto)
+        rig = lab.config.read_text()
+        section = re.compile(rf"(\[places\.{place}\][^\n]*\n)(?:[^\n]+\n)+")
+        rig, count = section.subn(rf'\1taught = "place_{place}.fake.toml"\n', rig)
+        assert count == 1
+        lab.config.write_text(rig)
+    for cell in RECORDED:
+        assert "kept 3 of 3" in lab.run("run", cell, "--trials", "3", *auto)
+    return lab
+
+
+def test_every_session_is_counted_under_its_own_number(lab):
+    found = {session.id: session.terrain for session in list_sessions(lab.data)}
+    assert found == {f"S00{k}": cell for k, cell in enumerate(RECORDED, 1)}
+    counted = json.loads(lab.run("status", "--json"))
+    assert "journal, but not the name" not in json.dumps(counted)
+
+
+def test_status_takes_words_and_comparisons_of_the_factors(lab):
+    lines = lab.run("status", "--where", "moisture=wet,d50>=19,incline_deg>0")
+    names = {line.split()[0] for line in lines.splitlines() if line.startswith("G")}
+    wet = {f"G{d}w{foot}+10" for d in (19, 37) for foot in "tbr"}
+    assert names == wet
+    (recorded,) = [w for w in lines.splitlines() if w.startswith("G37wb+10  sim")]
+    assert "3/3" in recorded
+
+
+def test_every_cell_is_one_line_of_the_settings(lab):
+    lines = lab.run("check", "--config-only").splitlines()
+    cells = [line for line in lines if line.startswith("   cell ")]
+    assert len(cells) == 54
+    (one,) = [line for line in cells if " G37wb+10:" in line]
+    for part in ("foot bare", "d50 37", "moisture wet", "down10", "+10 degrees"):
+        assert part in one
+
+
+@pytest.fixture(scope="module")
+def reported(lab):
+    """Return the page of the report of everything that was recorded."""
+    lab.run("report", "--all")
+    return (lab.data / "study" / "report" / "index.html").read_text()
+
+
+def test_the_report_has_cells_forecasts_and_no_statement_of_the_paper(lab, reported):
+    for cell in RECORDED:
+        assert cell in reported
+    assert "moisture" in reported
+    assert "The matrix: forecasts, and which cell next" in reported
+    assert "Not compared: the paper&#39;s statements" in reported
+    fits = json.loads((lab.data / "study" / "fits.json").read_text())
+    assert set(fits["terrains"]) == set(RECORDED)
+
+
+@pytest.fixture(scope="module")
+def database(lab):
+    """Return the terrain database of everything that was recorded."""
+    path = lab.folder / "db.json"
+    lab.run("export", "--all", "--terrain-db", path)
+    return path
+
+
+def test_the_database_states_factors_and_feet_and_tells_a_trial(lab, database):
+    content = json.loads(database.read_text())
+    assert content["version"] == 3
+    known = content["terrains"]
+    assert set(known) == set(RECORDED)
+    factors = {"d50": 37.0, "moisture": "wet", "foot": "bare"}
+    assert known["G37wb+10"]["factors"] == factors
+    (session,) = [s for s in list_sessions(lab.data) if s.terrain == "G19wt+0"]
+    trial = session.path / "trials" / "T01.mcap"
+    out = json.loads(lab.run("identify", trial, "--terrain-db", database, "--json"))
+    assert "G19wt+0" in json.dumps(out)
+
+
+def test_a_publication_holds_it_all_and_its_results_come_out_again(lab, reported):
+    crate = lab.folder / "crate"
+    person = ("--author", "Family, Given", "--licence", "CC-BY-4.0")
+    assert "18 trials published" in lab.run("publish", "--all", "--to", crate, *person)
+    again = lab.run("verify", crate, "--rebuild")
+    assert "the largest relative difference is 0.0e+00" in again
+    (crate / "sessions").rename(crate / "elsewhere")
+    done = traction("verify", crate)
+    assert done.code == 6
+    assert "G12dt+0" in done.out + done.err
+
+
+def test_every_name_of_a_cell_is_that_of_a_session(tmp_path):
+    for name in ("A", "9+", "G12dt+10", "a-b+c", "Z" * 24):
+        made = create_session(tmp_path, name, is_simulated=True, utc_ns=10**18)
+        assert made.terrain == name
+    ids = [session.id for session in list_sessions(tmp_path)]
+    assert len(set(ids)) == len(ids) == 5
+
+
+def test_the_shipped_matrices_are_the_same_cells_in_the_newer_form(tmp_path):
+    for name, options in (("shipped", ()), ("asked", ("--from",))):
+        folder = tmp_path / name
+        source = (*options, str(tmp_path / "shipped" / "rig.toml")) if options else ()
+        assert traction("init", folder, *source).code == 0
+    old, new = (
+        load_settings(tmp_path / name / "rig.toml").matrix.terrains
+        for name in ("shipped", "asked")
+    )
+    assert [row.name for row in new] == [row.name for row in old]
+    for before, after in zip(old, new, strict=True):
+        for key in (
+            "foot",
+            "far_end",
+            "travel",
+            "heading_deg",
+            "incline_deg",
+            "trials",
+            "reset",
+            "target",
+            "kind",
+            "stones",
+        ):
+            assert getattr(after, key) == getattr(before, key), (before.name, key)
