@@ -30,7 +30,6 @@ PAPER_INCLINES: Mapping[str, float] = {
     **dict.fromkeys(("S10", "B10"), 10.0),
     **dict.fromkeys(("S15", "B15"), 15.0),
 }
-LEVELS = ("terrain", "stones", "surface")
 _OTHER_INCLINE = 2.5  # degrees; half of what the paper's differ by
 _TITLES = {
     SMALL: "small stones",

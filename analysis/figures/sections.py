@@ -43,6 +43,7 @@ PAGE_ORDER = (
     "confusion_terrains",
     "confusion_stones",
     "confusion_surface",
+    "factors",
     "coverage",
     "trials",
     "trends",

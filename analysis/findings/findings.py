@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from analysis.breakaway.model import BreakAwayModel
-from analysis.data.terrain_kinds import LEVELS
 from analysis.findings.break_away import (
     BREAK_AWAY_UNITS,
     TerrainBreakAway,
@@ -206,7 +205,7 @@ def _recognised(
         CsvRow("", "", "", f"recognised by {rule}, {level}, {size} samples", share, "1")
         for rule, sizes in identification.rules.items()
         for size, levels in sizes.items()
-        for level in LEVELS
+        for level in identification.levels
         if level in levels and np.isfinite(share := levels[level].accuracy)
     ]
 

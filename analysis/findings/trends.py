@@ -95,13 +95,18 @@ _MEASURES: Mapping[str, Callable[[PreparedTrial], float]] = {
 }
 
 
+def ratios_of(result: TerrainResult) -> Array:
+    """Return F_t/F_n of the trials of a terrain, the ratio of the means of each."""
+    ratios = np.array([_ratio(trial) for trial in result.trials if trial.kept])
+    return ratios[np.isfinite(ratios)]
+
+
 def traction_ratio(result: TerrainResult) -> str:
     """Return F_t/F_n of a terrain as text: mean of its trials ± their deviation.
 
     Of a trial it is the ratio of its means. A dash where there is none.
     """
-    ratios = np.array([_ratio(trial) for trial in result.trials if trial.kept])
-    ratios = ratios[np.isfinite(ratios)]
+    ratios = ratios_of(result)
     if not ratios.size:
         return "–"
     if ratios.size == 1:

@@ -125,6 +125,7 @@ def figure_specs() -> Mapping[str, FigureSpec]:
         curves,
         errors,
         excerpts,
+        factors,
         rig,
         surfaces,
         trials,
@@ -139,6 +140,7 @@ def figure_specs() -> Mapping[str, FigureSpec]:
         uncertainty,
         break_away,
         confusion,
+        factors,
         trials,
         rig,
     )

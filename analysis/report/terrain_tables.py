@@ -1,13 +1,18 @@
 """Tables of what terrains give and of how they are told apart."""
 
 from analysis.breakaway.model import SLIDING
-from analysis.data.terrain_kinds import LEVELS
 from analysis.figures.sections import ReportSection
 from analysis.findings.break_away import RISKS, TerrainBreakAway
 from analysis.findings.findings import StudyResults
 from analysis.report.page_model import ReportTable
 from analysis.terrains.evidence import Exclusion
 from analysis.terrains.identify import KEPT_PER_SECOND, Identification
+
+_LEVELS = {  # in words; a factor has its own name
+    "terrain": "each terrain",
+    "stones": "size of stones",
+    "surface": "flat or rocky",
+}
 
 
 def terrain_tables(results: StudyResults) -> list[ReportTable]:
@@ -78,12 +83,12 @@ def recognition_tables(results: StudyResults) -> list[ReportTable]:
             *(
                 f"{rule[size][level].accuracy:.2f}"
                 for rule in rules
-                for level in LEVELS
+                for level in identification.levels
             ),
         )
         for size in identification.sizes
     ]
-    names = ("each terrain", "size of stones", "flat or rocky")
+    names = [_LEVELS.get(level, level) for level in identification.levels]
     return [
         ReportTable(
             "Terrain classification",

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from analysis.data.prepare import PreparedTrial
-from analysis.data.terrain_kinds import LEVELS, groups_of
+from analysis.data.recorded_factors import FOOT
+from analysis.data.terrain_kinds import groups_of
 from analysis.study.jobs import run_tasks, running_workers
 from analysis.study.models import GP_SE
 from analysis.study.study import Study
@@ -122,6 +123,11 @@ class Identification:
         return float(confusion.counts[rows, rows].sum()) / total
 
     @property
+    def levels(self) -> tuple[str, ...]:
+        """What windows are told apart by: terrain, stones, surface, words stated."""
+        return tuple(next(iter(self.by_density.values())))
+
+    @property
     def sizes(self) -> tuple[int, ...]:
         """Sizes that at least one trial has a window of."""
         return tuple(
@@ -176,7 +182,7 @@ def identify_study(study: Study, model: str = GP_SE) -> Identification | None:
     evidence = _evidence(study, model, rho)
     if len(evidence.trials) < 2:
         return None
-    groups = groups_of(study.kinds)
+    groups = groups_of(study.kinds) | words_of(study)
     density, error = _by_models(evidence, groups)
     probabilities = {size: surface_probabilities(evidence, size) for size in WINDOWS}
     known = {size: found for size, found in probabilities.items() if found}
@@ -219,7 +225,7 @@ def _by_models(
                     for t, s, r in windows
                 ]
             )
-            for level in LEVELS
+            for level in groups
         }
         error[size] = {
             level: confusion_of(
@@ -228,9 +234,29 @@ def _by_models(
                     for t, s, r in windows
                 ]
             )
-            for level in LEVELS
+            for level in groups
         }
     return density, error
+
+
+def words_of(study: Study) -> dict[str, dict[str, str]]:
+    """Return the words of every terrain by factor, where all state one and they vary.
+
+    The foot is one where the experiment has factors of its own.
+    """
+    stated = {name: result.factors for name, result in study.terrains.items()}
+    names = dict.fromkeys(name for factors in stated.values() for name in factors)
+    words = {
+        name: {
+            t: str(f[name]) for t, f in stated.items() if isinstance(f.get(name), str)
+        }
+        for name in (names if set(names) - {FOOT} else ())
+    }
+    return {
+        name: of_terrain
+        for name, of_terrain in words.items()
+        if len(of_terrain) == len(stated) and len(set(of_terrain.values())) > 1
+    }
 
 
 def _correlations(study: Study, model: str) -> dict[str, float]:

@@ -40,9 +40,14 @@ class PointFoot:
     """The state of one trial."""
 
     def __init__(
-        self, terrain: str, seed: int, trial: int, pace: Pace | None = None
+        self,
+        terrain: str,
+        seed: int,
+        trial: int,
+        pace: Pace | None = None,
+        kind: tuple[str, str, float] | None = None,
     ) -> None:
-        stones, foot, incline_deg = GROUNDS[terrain]
+        stones, foot, incline_deg = kind or GROUNDS[terrain]
         random = trial_generators(seed, terrain, trial)
         incline = math.radians(incline_deg)
         self.terrain, self.trial = terrain, trial

@@ -109,7 +109,8 @@ def reported(lab):
 def test_the_report_has_cells_forecasts_and_no_statement_of_the_paper(lab, reported):
     for cell in RECORDED:
         assert cell in reported
-    assert "moisture" in reported
+    assert "by density: moisture" in reported
+    assert "by density: foot" in reported
     assert "The matrix: forecasts, and which cell next" in reported
     assert "Not compared: the paper&#39;s statements" in reported
     fits = json.loads((lab.data / "study" / "fits.json").read_text())
