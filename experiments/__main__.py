@@ -43,6 +43,7 @@ COMMANDS = {
     "export": "write trials as CSV or Parquet tables with units and checksums",
     "publish": "write recordings, tables and results as an RO-Crate for an archive",
     "init": "write rig.toml and matrix.toml to be edited",
+    "setup": "print or install what the computer at the arm needs",
     "bundle": "collect what happened in a session in one file, for help",
     "verify": "verify kept trials, or a publication, by their checksums",
     "recover": "recover the readable part of unfinished trial files",

@@ -271,7 +271,9 @@ def _check_rights(rig: Rig, add: Add) -> dict[str, str]:
             if not g.is_granted
         ]
     if fields:
-        text = "; ".join(refused) or "real-time scheduling, memory locked, awake"
+        text = "real-time scheduling, memory locked, awake"
+        if refused:
+            text = f"{'; '.join(refused)}; all of it: sudo traction setup --install"
         add(WARNING if refused else GOOD, "scheduler", text)
     return fields
 
