@@ -7,7 +7,7 @@ STAMP := $(VENV)/.installed
 DOCS := $(VENV)/.docs
 WHEEL := build/wheel
 
-.PHONY: demo test docs wheel lock lab lab-page lint types contracts crate-validator sbom clean
+.PHONY: demo test docs wheel lock lab lab-page lint types contracts crate-validator sbom release man clean
 
 $(STAMP): pyproject.toml constraints.txt
 	@echo "Setting up $(VENV) (a few minutes the first time) ..."
@@ -79,5 +79,11 @@ lock: $(STAMP)  ## pylock.toml and constraints.lock, of wheels for every Python 
 sbom: $(STAMP)  ## what is installed, as CycloneDX JSON: sbom.json
 	$(BIN)/python -m tests.sbom > sbom.json
 
+release: $(STAMP)  ## wheel, sdist, man pages, bill of materials, checksums: dist/
+	.ci/release
+
+man: $(STAMP)  ## manual pages of all commands: build/man
+	$(BIN)/python docs/man_pages.py build/man
+
 clean:
-	rm -rf $(VENV) .venv-crate demo build sbom.json docs/_build docs/api docs/project *.egg-info
+	rm -rf $(VENV) .venv-crate demo build dist sbom.json docs/_build docs/api docs/project *.egg-info
