@@ -1,11 +1,13 @@
 """Tables of the report beyond the paper's: uncertainty, comparisons, trends."""
 
 from collections.abc import Sequence
+from math import isinf
 from statistics import median
 
 from analysis.data.plausibility import LATEST_MS
 from analysis.figures.sections import ReportSection
 from analysis.findings.findings import StudyResults
+from analysis.findings.look_first import LIMIT, look_first
 from analysis.findings.trends import MEAN_FORCE, MEAN_LOAD, TRACTION_RATIO, Trend
 from analysis.report.new_trial_tables import new_trial_tables
 from analysis.report.page_model import ReportTable
@@ -21,6 +23,7 @@ from analysis.study.models import TITLES
 from analysis.study.study import Study
 from analysis.study.terrain_fit import TerrainResult
 
+_MOST_ODD = 10  # trials to look at first
 _SHOWN = ("rmse", "nlpd", "crps", "coverage50", "coverage90", "coverage95", "variance")
 _HEADS = (
     "RMSE [N]",
@@ -47,6 +50,34 @@ def beyond_tables(results: StudyResults) -> list[ReportTable]:
         trend_table(results),
     ]
     return [table for table in tables if table.rows]
+
+
+def look_first_tables(study: Study) -> list[ReportTable]:
+    """Return the trials that stand out, the farthest first; none where none does."""
+    odd = look_first(study)
+    if not odd:
+        return []
+    table = ReportTable(
+        name="Look at these first",
+        header=("terrain", "trial", "name", "stands out by", "why"),
+        rows=[
+            [
+                trial.terrain,
+                str(trial.number),
+                trial.name,
+                "cannot be right" if isinf(trial.score) else f"{trial.score:.0f}",
+                "; ".join(trial.reasons),
+            ]
+            for trial in odd[:_MOST_ODD]
+        ],
+        note="Distance from the median of the terrain's other trials, in robust "
+        f"standard deviations; named beyond {LIMIT:g}, or where motion and forces "
+        "contradict each other. A trial that stands out is not wrong by that: look at "
+        "its curve, then decide."
+        + (f" {len(odd) - _MOST_ODD} more." if odd[_MOST_ODD:] else ""),
+        section=ReportSection.SUMMARY,
+    )
+    return [table]
 
 
 def lag_table(study: Study) -> ReportTable:

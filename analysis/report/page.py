@@ -21,7 +21,7 @@ from analysis.findings.findings import (
 from analysis.foresight.model import ForesightModel
 from analysis.report.drawing import kept_figures
 from analysis.report.foresight_page import FORESIGHT_KEY
-from analysis.report.further_tables import beyond_tables
+from analysis.report.further_tables import beyond_tables, look_first_tables
 from analysis.report.page_model import (
     PageSection,
     ReportContext,
@@ -176,6 +176,7 @@ def sections(
     """Return the sections that have something to show, in the order of the page."""
     study = results.study
     tables = [
+        *look_first_tables(study),
         summary(study),
         parameters(study),
         *statements(results),

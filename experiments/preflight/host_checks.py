@@ -1,7 +1,9 @@
 """What the preflight says of the computer, the running force sensor and the loads."""
 
 import shutil
+import tomllib
 from collections.abc import Callable, Mapping
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +31,13 @@ from wam.model.gravity import MAX_VIRTUAL_MASS
 CPUS = Path("/sys/devices/system/cpu")
 FAST = "performance"
 SESSION_GB = 0.9
+# Days after which a calibration is due: drives wear, feet and containers are moved.
+CALIBRATION_DAYS = {
+    "gravity": 180,
+    "friction": 90,
+    "sensor": 365,
+    "terrain": 90,
+}
 NOISY = 0.5  # N, several times what a quiet sensor shows
 
 
@@ -108,6 +117,50 @@ def check_masses(rig: Rig) -> CheckResult | None:
     most = f"set {mass:.2f}, at most {MAX_VIRTUAL_MASS:g}"
     mark = GOOD if mass >= masses.down else WARNING
     return CheckResult(mark, "load", f"foot {', '.join(steps)} ({most})")
+
+
+def check_ages(rig: Rig) -> CheckResult | None:
+    """Grade the calibrations that are used by their age; None = none is used."""
+    section = rig.settings.rig
+    used = [
+        (section.gravity.file, "gravity", rig.calibrations.gravity),
+        (section.friction.file, "friction", rig.calibrations.friction),
+    ]
+    for name, text in rig.settings.calibrations.items():
+        kind = "terrain" if "far_end" in text else "sensor"
+        used.append((name.rpartition(":")[2], kind, text))
+    now = datetime.fromtimestamp(rig.clock.utc_ns() * 1e-9, UTC)
+    words: list[str] = []
+    is_due = False
+    for name, kind, text in used:
+        if not text:
+            continue
+        days, most = age_days(text, now), CALIBRATION_DAYS[kind]
+        is_old = days is None or days > most
+        is_due = is_due or is_old
+        age = "of unknown age" if days is None else f"{days} d"
+        again = f" (due after {most}: traction calibrate {kind})" if is_old else ""
+        words.append(f"{name} {age}{again}")
+    if not words:
+        return None
+    return CheckResult(WARNING if is_due else GOOD, "calibrated", ", ".join(words))
+
+
+def age_days(text: str, now: datetime) -> int | None:
+    """Return how many days ago a calibration was made; None where it does not say.
+
+    Args:
+        text: of its file, TOML.
+        now: with its zone.
+    """
+    try:
+        stated = tomllib.loads(text).get("measured_utc")
+        made = datetime.fromisoformat(stated) if isinstance(stated, str) else None
+    except ValueError:
+        return None
+    if made is None or made.tzinfo is None:
+        return None
+    return max((now - made).days, 0)
 
 
 def check_wrenches(samples: Record, now_ns: int, stale_ms: float) -> CheckResult:

@@ -16,6 +16,7 @@ from experiments.preflight.commissioned import check_commissioned
 from experiments.preflight.connecting import as_preflight, not_reached
 from experiments.preflight.host_checks import (
     DiskProbe,
+    check_ages,
     check_code,
     check_contact_limits,
     check_disk,
@@ -126,6 +127,7 @@ def _check_host(rig: Rig, data: Path, page: ChecksPage, probe: DiskProbe) -> Non
         page.add(WARNING, "settings", text)
     for text in forced_calibrations(rig.settings, rig.calibrations):
         page.add(WARNING, "calibration", text)
+    page.add_result(check_ages(rig))
     page.add_result(check_masses(rig))
     page.add_result(check_code(provenance.collect()))
     if not rig.is_stepped:

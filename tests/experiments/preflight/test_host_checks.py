@@ -1,4 +1,5 @@
 import re
+from datetime import UTC, datetime
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -8,6 +9,9 @@ import pytest
 from acquisition.ipc.shared_sensor import WRENCH_DTYPE
 from experiments.operator.console import BAD, GOOD, WARNING
 from experiments.preflight.host_checks import (
+    CALIBRATION_DAYS,
+    age_days,
+    check_ages,
     check_code,
     check_governor,
     check_origin,
@@ -143,3 +147,58 @@ def test_every_command_of_the_first_day_names_its_rig():
         c for c in commands if "--config lab/rig.toml" not in " ".join(c.split())
     ]
     assert unnamed == ["traction init lab"]
+
+
+NOW = datetime(2027, 5, 1, tzinfo=UTC)
+
+
+def rig_with(gravity="", friction="", **files):
+    """Return what is asked of a rig whose calibrations have these texts."""
+    section = SimpleNamespace(
+        gravity=SimpleNamespace(file="gravity.toml"),
+        friction=SimpleNamespace(file="friction.toml"),
+    )
+    return SimpleNamespace(
+        settings=SimpleNamespace(
+            rig=section,
+            calibrations={f"calibration:{n}.toml": text for n, text in files.items()},
+        ),
+        calibrations=SimpleNamespace(gravity=gravity, friction=friction),
+        clock=SimpleNamespace(utc_ns=lambda: int(NOW.timestamp()) * 10**9),
+    )
+
+
+def made(day, more=""):
+    return f'measured_utc = "{day}T10:00:00Z"\n{more}'
+
+
+def test_calibrations_in_use_are_graded_by_their_age():
+    assert check_ages(rig_with()) is None
+    fresh = check_ages(rig_with(gravity=made("2027-04-20")))
+    assert (fresh.mark, fresh.text) == (GOOD, "gravity.toml 10 d")
+    old = check_ages(
+        rig_with(
+            friction=made("2027-01-01"),
+            mount=made("2027-01-01"),
+            bay=made("2027-01-01", "far_end = [0.7, 0.0, 0.1]\n"),
+        )
+    )
+    assert old.mark == WARNING
+    assert "friction.toml 119 d (due after 90: traction calibrate friction)" in old.text
+    assert "mount.toml 119 d, " in old.text
+    assert "bay.toml 119 d (due after 90: traction calibrate terrain)" in old.text
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["rms = 1", "measured_utc = 5", made("2027-99-01"), "= broken", 'a = "'],
+)
+def test_a_calibration_that_states_no_day_is_due(text):
+    assert age_days(text, NOW) is None
+    found = check_ages(rig_with(friction=text))
+    assert found.mark == WARNING
+    assert f"of unknown age (due after {CALIBRATION_DAYS['friction']}" in found.text
+
+
+def test_a_calibration_of_tomorrow_is_of_today():
+    assert age_days(made("2027-05-02"), NOW) == 0

@@ -1,0 +1,70 @@
+"""Trials that stand out are named with the reason, and no others."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.data.prepare import PrepareOptions
+from analysis.data.series import TractionSeries
+from analysis.findings.look_first import LIMIT, look_first
+from analysis.report.further_tables import look_first_tables
+from analysis.study.models import TUSTIN, FitOptions
+from analysis.study.study import StudyOptions, run_study
+
+OPTIONS = StudyOptions(
+    PrepareOptions(), fit=FitOptions(models=(TUSTIN,), draws=0), n_jobs=1
+)
+
+
+def push(number, mu=0.8):
+    """Return a push whose load, velocity and friction vary from trial to trial."""
+    rng = np.random.default_rng(number)
+    t = np.arange(2000) / 500.0
+    v = 0.05 * np.exp(rng.normal(0.0, 0.1)) * (1.2 + np.sin(7.0 * t))
+    load = 5.0 + rng.normal(0.0, 0.3) + np.sin(3.0 * t + rng.uniform(0.0, 6.0))
+    force = mu * load + rng.normal(0.0, 0.1) + rng.normal(0.0, 0.1, t.size)
+    return TractionSeries("X", f"T{number + 1:02d}", t, v, load, force)
+
+
+def found(trials):
+    return look_first(run_study({"X": trials}, OPTIONS, simulated=True))
+
+
+def test_nothing_stands_out_among_trials_that_are_alike():
+    trials = [push(k) for k in range(10)]
+    assert found(trials) == []
+    study = run_study({"X": trials}, OPTIONS, simulated=True)
+    assert look_first_tables(study) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda s: replace(s, F_t=s.F_t + 2.0), "F_t of the same load and velocity +2"),
+        (lambda s: replace(s, F_n=s.F_n + 4.0), "normal force +"),
+        (lambda s: replace(s, v_t=0.3 * s.v_t), "velocity 0."),
+        (
+            lambda s: replace(
+                s, F_t=s.F_t + np.random.default_rng(1).normal(0.0, 3.0, s.t.size)
+            ),
+            "change from sample to sample",
+        ),
+        (lambda s: replace(s, F_t=-s.F_t), "the ground drives the foot"),
+    ],
+)
+def test_a_trial_with_something_wrong_is_the_first_and_says_what(change, words):
+    trials = [push(k) for k in range(10)]
+    trials[3] = change(trials[3])
+    odd = found(trials)
+    assert (odd[0].terrain, odd[0].number, odd[0].name) == ("X", 4, "T04")
+    assert odd[0].score > LIMIT
+    assert any(words in reason for reason in odd[0].reasons), odd[0].reasons
+    (table,) = look_first_tables(run_study({"X": trials}, OPTIONS, simulated=True))
+    assert table.rows[0][1] == "4"
+
+
+def test_three_trials_are_too_few_to_compare():
+    trials = [push(k) for k in range(3)]
+    trials[1] = replace(trials[1], F_t=trials[1].F_t + 5.0)
+    assert found(trials) == []
