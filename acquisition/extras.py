@@ -10,6 +10,7 @@ EXTRAS: Mapping[str, Mapping[str, str]] = {
     "report": {"jinja2": "Jinja2", "matplotlib": "matplotlib", "PIL": "pillow"},
     "cluster": {"dask": "dask", "distributed": "distributed"},
     "live": {"foxglove": "foxglove-sdk"},
+    "onnx": {"onnx": "onnx"},
     "pandas": {"pandas": "pandas"},
     "parquet": {"pyarrow": "pyarrow"},
     "publish": {"rocrate": "rocrate"},

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cache
 
 from acquisition.errors import SettingsError
+from acquisition.extras import require_extra
 from analysis.exports.source import TerrainExport
 
 README, SOURCE = "README.md", "source.json"
@@ -24,11 +25,13 @@ class ExportTarget:
         title: of the README.
         files: content by path below the folder, of what is exported.
         about: six lines of the README: what is there, how it is used, what is lost.
+        extra: of Traction, without which it cannot be written; "" = none.
     """
 
     title: str
     files: Callable[[TerrainExport], Files]
     about: Callable[[TerrainExport], tuple[str, str, str, str, str, str]]
+    extra: str = ""
 
 
 @cache
@@ -56,6 +59,20 @@ def parse_targets(text: str) -> tuple[str, ...]:
     return names
 
 
+def require_target(name: str) -> None:
+    """Refuse before anything is read what would fail for want of a library.
+
+    Raises:
+        MissingLibraryError: the target needs a library that is not installed.
+    """
+    if extra := _target(name).extra:
+        require_extra(extra)
+
+
+def _target(name: str) -> ExportTarget:
+    return importlib.import_module(f"{_PACKAGE}.{name}").TARGET
+
+
 def target_files(name: str, export: TerrainExport) -> dict[str, bytes]:
     """Return everything that a target writes, by path below its folder.
 
@@ -63,7 +80,8 @@ def target_files(name: str, export: TerrainExport) -> dict[str, bytes]:
         SettingsError: the target cannot be had of this database.
         MissingLibraryError: it needs a library that is not installed.
     """
-    target: ExportTarget = importlib.import_module(f"{_PACKAGE}.{name}").TARGET
+    require_target(name)
+    target = _target(name)
     files = dict(target.files(export))
     source = json.dumps({"target": name, **export.source()}, indent=1)
     return {

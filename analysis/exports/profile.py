@@ -135,7 +135,7 @@ class FrictionProfile:
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain values, for JSON."""
-        return asdict(self)
+        return asdict(self) | {"static_over_sliding": self.static_over_sliding}
 
 
 def profile_of(

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from acquisition.errors import SettingsError
 from acquisition.files import UnfitFileError, read_regular
-from analysis.exports.folder import target_files
+from analysis.exports.folder import require_target, target_files
 from analysis.exports.source import ExportOptions, TerrainExport
 from analysis.terrains.database import LARGEST, load
 from experiments.operator.console import WARNING, Console
@@ -49,10 +49,13 @@ def export_for(request: TargetRequest, console: Console) -> None:
     """Write the folder of every target below the one that is asked for.
 
     Raises:
+        MissingLibraryError: a target needs a library that is not installed.
         SettingsError: the database cannot be read or has no such terrain or model.
         SessionError: the folder holds something.
         TrialFileError: a file cannot be written.
     """
+    for name in request.targets:
+        require_target(name)
     database = load(request.database)
     content = read_regular(request.database, LARGEST, is_link_followed=True)
     options = request.options

@@ -5,45 +5,18 @@ from importlib import resources
 import numpy as np
 
 from acquisition.errors import SettingsError
-from analysis.breakaway.censored import Family
 from analysis.breakaway.model import BREAK_AWAY, BreakAwayModel
 from analysis.data.series import Array
 from analysis.exports.folder import ExportTarget, Files
 from analysis.exports.names import shown
+from analysis.exports.rest import REST_POINTS, rest_distances, rest_risks
 from analysis.exports.source import ExportedTerrain, TerrainExport
 from analysis.terrains.recognition import TAU
 from analysis.terrains.table import Table, TractionEstimates, normal_scores
 
 HEADER = "traction_terrains.h"
 _NORMAL_POINTS, _NORMAL_END = 513, 6.0
-_REST_POINTS = 2049
-_REFERENCE_LOAD = 3.5  # N, where the slope of a law of break-away begins
 _WIDTH = 88  # columns
-
-
-def rest_distances(model: BreakAwayModel) -> Array:
-    """Return distances from the centre of a law over which its risk is tabulated.
-
-    In log F_t [nat] or, where the model is of sliding, in F_t [N]; shape (2049,).
-    """
-    _, _, spread, trial_sd = model.law.values
-    is_skew = model.kind == BREAK_AWAY and model.family is Family.WEIBULL
-    low, high = (14.0, 4.0) if is_skew else (5.5, 5.5)
-    return np.linspace(
-        -low * spread - 5.5 * trial_sd, high * spread + 5.5 * trial_sd, _REST_POINTS
-    )
-
-
-def rest_risks(model: BreakAwayModel) -> Array:
-    """Return the risk at `rest_distances`, from 0 to 1."""
-    distances = rest_distances(model)
-    if model.kind == BREAK_AWAY:
-        forces = np.exp(model.law.level + distances)
-        risks = model.risks(forces, np.full(forces.size, _REFERENCE_LOAD))
-    else:
-        risks = model.risks(model.law.level + distances, np.zeros(distances.size))
-    risks[0], risks[-1] = 0.0, 1.0
-    return np.maximum.accumulate(risks)
 
 
 def _files(export: TerrainExport) -> Files:
@@ -101,7 +74,7 @@ typedef {real} traction_real;
 #define TRACTION_SHARES {len(shares)}
 #define TRACTION_NORMAL_POINTS {_NORMAL_POINTS}
 #define TRACTION_NORMAL_PER_UNIT {(_NORMAL_POINTS - 1) / _NORMAL_END!r}
-#define TRACTION_REST_POINTS {_REST_POINTS}
+#define TRACTION_REST_POINTS {REST_POINTS}
 #define TRACTION_SAMPLES_AS_ONE {TAU!r} /* samples of a belief that count as one */
 """
 

@@ -10,7 +10,8 @@ import pytest
 from analysis.breakaway.censored import Family
 from analysis.breakaway.model import BREAK_AWAY
 from analysis.exports.folder import target_files
-from analysis.exports.targets.c import HEADER, rest_distances, rest_risks
+from analysis.exports.rest import rest_distances, rest_risks
+from analysis.exports.targets.c import HEADER
 from analysis.study.metrics import Prediction
 from analysis.terrains.recognition import TAU, log_densities
 from tests.analysis.exports.compiled import FLAGS, ask, build
