@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from datetime import UTC, datetime, timedelta
 from typing import Any
 
 from acquisition.errors import SettingsError
@@ -147,6 +148,19 @@ class TerrainExport:
             f"{shown(self.title)}, database {self.digest[:16]} of "
             f"{shown(self.made_utc)}"
         )
+
+    @property
+    def made_ns(self) -> int:
+        """When the database was made, UTC [ns]; 0 where it does not say."""
+        try:
+            made = datetime.fromisoformat(self.made_utc)
+        except ValueError:
+            return 0
+        since = made.replace(tzinfo=made.tzinfo or UTC) - datetime(
+            1970, 1, 1, tzinfo=UTC
+        )
+        seconds = since // timedelta(seconds=1)
+        return seconds * 10**9 if 0 <= seconds < 2**31 else 0
 
     def source(self) -> dict[str, Any]:
         """Return the content of `source.json`."""
