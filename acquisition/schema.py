@@ -122,9 +122,7 @@ _DEPENDENCIES = {
     "std_msgs/MultiArrayLayout": (
         "std_msgs/MultiArrayDimension[] dim\nuint32 data_offset"
     ),
-    "std_msgs/Float32MultiArray": (
-        "std_msgs/MultiArrayLayout layout\nfloat32[] data"
-    ),
+    "std_msgs/Float32MultiArray": ("std_msgs/MultiArrayLayout layout\nfloat32[] data"),
     "grid_map_msgs/GridMapInfo": (
         "float64 resolution\nfloat64 length_x\nfloat64 length_y\n"
         "geometry_msgs/Pose pose"

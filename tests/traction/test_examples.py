@@ -13,7 +13,13 @@ FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 
 @pytest.mark.parametrize(
     ("module", "least"),
-    [("loading", 3), ("trials", 1), ("trial_sets", 1), ("models", 3)],
+    [
+        ("loading", 3),
+        ("trials", 1),
+        ("trial_sets", 1),
+        ("models", 3),
+        ("simulations", 1),
+    ],
 )
 def test_examples_of_a_module_print_what_they_say(module, least):
     found = importlib.import_module(f"traction.{module}")
