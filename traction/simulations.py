@@ -53,7 +53,7 @@ def simulate(
     from experiments.arguments import add_global_options
     from experiments.commands import run
 
-    parser = _Parser(add_help=False)
+    parser = _RefusingParser(add_help=False)
     add_global_options(parser)
     run.add_arguments(parser)
     options = ["--fake", "--fast", "--operator-script", "auto", f"--pace={pace}"]
@@ -72,7 +72,7 @@ def simulate(
     return load_session(newest.id, data)
 
 
-class _Parser(argparse.ArgumentParser):
+class _RefusingParser(argparse.ArgumentParser):
     """Refuses arguments by an error of this program."""
 
     def error(self, message: str) -> None:  # type: ignore[override]

@@ -85,6 +85,11 @@ class StanceBed:
         self.F_t, self.F_n = F_t / SUBSTEPS, F_n / SUBSTEPS
         self.cycles += 1
 
+    def advance(self) -> None:
+        """Advance by 20 ms."""
+        for _ in range(TICK_CYCLES):
+            self.cycle()
+
     def carry(self, x: float) -> None:
         """Be carried through the air to `x`: nothing happens there."""
         self.x, self.z, self.vx, self.vz = x, _CARRIED, 0.0, 0.0

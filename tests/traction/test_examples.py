@@ -19,6 +19,7 @@ FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
         ("trial_sets", 1),
         ("models", 3),
         ("simulations", 1),
+        ("gym", 1),
     ],
 )
 def test_examples_of_a_module_print_what_they_say(module, least):
