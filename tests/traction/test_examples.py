@@ -49,3 +49,14 @@ def test_the_example_of_the_readme_runs_as_it_is(tmp_path, monkeypatch, workplac
     monkeypatch.chdir(tmp_path)
     exec(compile(block, str(page), "exec"), {})
     assert (tmp_path / "T01.pdf").stat().st_size > 1000
+
+
+def test_the_page_for_policies_runs_as_it_is(tmp_path, monkeypatch, capsys):
+    pytest.importorskip("gymnasium")
+    page = ROOT / "docs" / "own-policy.md"
+    blocks = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    for block in blocks:
+        exec(compile(block, str(page), "exec"), {})
+    assert "slipped" in capsys.readouterr().out
+    assert len(blocks) == 2
