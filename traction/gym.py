@@ -32,7 +32,7 @@ from analysis.stance.interface import (
     StanceSample,
 )
 from analysis.stance.outcomes import StanceOutcome, StanceTotals, totals
-from analysis.stance.sequence import TOUCH, StancePlan, lowering
+from analysis.stance.sequence import TOUCH, lowering, place_at
 from analysis.stance.standing import TICK, StandingFoot
 from experiments.rig.fake import stance_bed
 from experiments.settings.load import load_settings
@@ -129,7 +129,7 @@ class StanceEnv(gymnasium.Env["NDArray[np.float32]", "NDArray[np.float32]"]):
         super().reset(seed=seed)
         number = int(self.np_random.integers(2**31))
         self._bed = bed = stance_bed(self._rig, self._row, (number, 0))
-        spot = self._spot(float(self.np_random.random()))
+        spot = place_at(float(self.np_random.random()), self._row.travel)
         bed.carry(spot)
         for _ in range(_LONGEST_LOWERING):
             if bed.F_n > TOUCH:
@@ -189,18 +189,6 @@ class StanceEnv(gymnasium.Env["NDArray[np.float32]", "NDArray[np.float32]"]):
             return reward, False, False, {}
         info = {"outcome": outcome.to_dict(), "is_success": outcome.is_success}
         return reward, True, False, info
-
-    def _spot(self, phase: float) -> float:
-        """Return a place [m] inside the container, as `traction stance` chooses it."""
-        travel = self._row.travel
-        return StancePlan(_ask_nothing, self.request, 1, travel, phase).spot(0)
-
-
-def _ask_nothing(
-    sample: StanceSample, foresight: StanceForesight, request: StanceRequest
-) -> StanceCommand:
-    del foresight, request
-    return sample.last
 
 
 def score(

@@ -2,18 +2,16 @@
 
 import importlib
 import json
-import pkgutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache
 
 from acquisition.errors import SettingsError
 from acquisition.extras import require_extra
+from analysis.exports.names import TARGETS, target_names
 from analysis.exports.source import TerrainExport
 
 README, SOURCE = "README.md", "source.json"
 README_LINES = 10
-_PACKAGE = "analysis.exports.targets"
 Files = Mapping[str, bytes]
 
 
@@ -32,13 +30,6 @@ class ExportTarget:
     files: Callable[[TerrainExport], Files]
     about: Callable[[TerrainExport], tuple[str, str, str, str, str, str]]
     extra: str = ""
-
-
-@cache
-def target_names() -> tuple[str, ...]:
-    """Return the names of all targets: those of the modules of `targets`."""
-    package = importlib.import_module(_PACKAGE)
-    return tuple(sorted(each.name for each in pkgutil.iter_modules(package.__path__)))
 
 
 def parse_targets(text: str) -> tuple[str, ...]:
@@ -70,7 +61,7 @@ def require_target(name: str) -> None:
 
 
 def _target(name: str) -> ExportTarget:
-    return importlib.import_module(f"{_PACKAGE}.{name}").TARGET
+    return importlib.import_module(f"{TARGETS}.{name}").TARGET
 
 
 def target_files(name: str, export: TerrainExport) -> dict[str, bytes]:

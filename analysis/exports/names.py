@@ -1,9 +1,18 @@
-"""Names out of a database as parts of other languages: whatever they hold, harmless."""
+"""Names: of the targets, and of terrains as harmless parts of other languages."""
 
+import importlib
+import pkgutil
 import re
 from collections.abc import Iterable
 
+TARGETS = "analysis.exports.targets"  # package, a module for each
 _LONGEST, _LONGEST_SHOWN = 40, 60  # characters
+
+
+def target_names() -> tuple[str, ...]:
+    """Return the names of all targets: those of the modules of `targets`."""
+    package = importlib.import_module(TARGETS)
+    return tuple(sorted(each.name for each in pkgutil.iter_modules(package.__path__)))
 
 
 def shown(text: str) -> str:

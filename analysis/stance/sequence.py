@@ -93,8 +93,12 @@ class StancePlan:
 
     def spot(self, number: int) -> float:
         """Return where stance `number`, from 0, stands [m]."""
-        free = self.travel - 2.0 * _MARGIN
-        return _MARGIN + free * ((self.phase + _GOLDEN * number) % 1.0)
+        return place_at((self.phase + _GOLDEN * number) % 1.0, self.travel)
+
+
+def place_at(share: float, travel: float) -> float:
+    """Return a place [m] at a share, 0 to 1, of a container of `travel` [m]."""
+    return _MARGIN + (travel - 2.0 * _MARGIN) * share
 
 
 def lowering(x: float) -> SoleGoal:

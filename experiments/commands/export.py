@@ -30,6 +30,15 @@ _OF_TARGETS = (
     "sole_area",
 )
 
+_ONLY_FOR = {  # the one target that has an option
+    "float": "c",
+    "grid": "gridmap",
+    "resolution": "gridmap",
+    "required": "gridmap",
+    "load": "gridmap",
+    "sole_area": "chrono",
+}
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `export`."""
@@ -64,6 +73,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_targets(parser: argparse.ArgumentParser) -> None:
+    from analysis.exports.names import target_names
+
     group = parser.add_argument_group(
         "terrains for other programs: --terrain-db FILE --for NAME,.. --to DIR"
     )
@@ -71,8 +82,7 @@ def _add_targets(parser: argparse.ArgumentParser) -> None:
         "--for",
         dest="targets",
         metavar="NAME,..",
-        help="c, onnx, jax (controllers), mjx, mjlab, isaaclab, chrono (simulators), "
-        "gridmap, ros2 (maps and messages)",
+        help=f"controllers, simulators and maps: {', '.join(target_names())}",
     )
     group.add_argument(
         "--terrain", metavar="NAME,..", help="terrains of the database (all)"
@@ -146,7 +156,7 @@ def _check_use(args: argparse.Namespace) -> None:
     from acquisition.errors import SettingsError
 
     def given(names: tuple[str, ...]) -> str:
-        named = [n for n in names if getattr(args, n) not in (None, False)]
+        named = [name for name in names if _is_given(args, name)]
         return ", ".join(f"--{name.replace('_', '-')}" for name in named)
 
     if args.targets is None:
@@ -186,7 +196,13 @@ def _check_use(args: argparse.Namespace) -> None:
         )
 
 
+def _is_given(args: argparse.Namespace, name: str) -> bool:
+    value = getattr(args, name)
+    return value is not None and value is not False
+
+
 def _export_for(args: argparse.Namespace, console: Console) -> int:
+    from acquisition.errors import SettingsError
     from analysis.exports.folder import parse_targets
     from analysis.exports.source import ExportOptions
     from experiments.report.terrain_targets import TargetRequest, export_for
@@ -199,9 +215,16 @@ def _export_for(args: argparse.Namespace, console: Console) -> int:
         "resolution": args.resolution,
         "sole_area": args.sole_area,
     }
+    targets = parse_targets(args.targets)
+    for name, target in _ONLY_FOR.items():
+        if _is_given(args, name) and target not in targets:
+            raise SettingsError(
+                f"--{name.replace('_', '-')} is for {target}, which is not in --for.",
+                hint=f"Leave it out, or add {target}. {_NOTHING}",
+            )
     request = TargetRequest(
         database=args.terrain_db,
-        targets=parse_targets(args.targets),
+        targets=targets,
         to=args.to,
         terrains=_names(args.terrain),
         model=args.model or "",

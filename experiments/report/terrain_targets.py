@@ -83,7 +83,7 @@ def export_for(request: TargetRequest, console: Console) -> None:
     if any(t.profile.level_sd is None for t in export.terrains):
         console.say(
             f"{WARNING} The model knows no effect of a trial: friction per episode is "
-            "one number. The default model has it."
+            "one number. Those of a new trial have it, e.g. gp_se_trial."
         )
 
 

@@ -7,9 +7,10 @@ from xml.etree import ElementTree
 import pytest
 
 from acquisition.errors import SettingsError
-from analysis.exports.folder import parse_targets, target_files, target_names
-from analysis.exports.names import identifiers, shown
-from tests.analysis.exports.databases import DIGEST, export
+from analysis.exports.folder import parse_targets, target_files
+from analysis.exports.names import identifiers, shown, target_names
+from analysis.exports.source import TerrainExport
+from tests.analysis.exports.databases import DIGEST, database, export
 
 HOSTILE = (
     '*/ int x; /* "\\\n#error ]]> --> <a> & ../../etc ??/',
@@ -27,6 +28,26 @@ def target(request):
 def test_the_nine_are_there():
     nine = "c,onnx,jax,mjx,mjlab,isaaclab,chrono,gridmap,ros2"
     assert set(parse_targets(nine)) == set(target_names())
+
+
+TENTH = """
+from analysis.exports.folder import ExportTarget
+
+TARGET = ExportTarget(
+    "A tenth", lambda e: {"a.txt": e.origin.encode()}, lambda e: ("What it is.",) * 6
+)
+"""
+
+
+def test_a_tenth_target_is_one_file(tmp_path, monkeypatch):
+    from analysis.exports import targets
+
+    (tmp_path / "tenth.py").write_text(TENTH)
+    monkeypatch.setattr(targets, "__path__", [*targets.__path__, str(tmp_path)])
+    assert parse_targets("c,tenth") == ("c", "tenth")
+    made = target_files("tenth", export())
+    assert set(made) == {"a.txt", "README.md", "source.json"}
+    assert made["README.md"].count(b"\n") == 10
 
 
 @pytest.mark.parametrize("text", ["", "c,c", "c,unity", "../c", "__init__"])
@@ -92,9 +113,6 @@ def test_what_is_shown_is_one_harmless_line(text):
 
 
 def test_unknown_terrains_and_models_are_refused():
-    from analysis.exports.source import TerrainExport
-    from tests.analysis.exports.databases import database
-
     with pytest.raises(SettingsError, match="no terrain 'X'"):
         TerrainExport.of(database(), DIGEST, "1", ("X",))
     with pytest.raises(SettingsError, match="no model 'tustin'"):
