@@ -195,3 +195,33 @@ def test_the_randomiser_writes_the_floor_of_every_world(tmp_path, monkeypatch):
     assert largest_distance(friction[:, 0, 0], own.shares, own.mu) <= 0.02
     assert (friction[:, 1, 0] == 3.0).all()
     assert axes.geom_friction == 0
+
+
+def test_what_a_wrapped_randomiser_draws_stays(tmp_path, monkeypatch):
+    jax = pytest.importorskip("jax")
+    mujoco = pytest.importorskip("mujoco")
+    mjx = pytest.importorskip("mujoco.mjx")
+    folder = write(tmp_path, "mjx")
+    (folder / "model.xml").write_text(MODEL)
+    module = load_module(folder, "traction_mjx", monkeypatch)
+    model = mjx.put_model(mujoco.MjModel.from_xml_path(str(folder / "model.xml")))
+
+    def base(model, rng):
+        feet = jax.vmap(lambda key: jax.random.uniform(key, minval=1.0, maxval=2.0))
+        worlds = jax.numpy.tile(model.geom_friction, (len(rng), 1, 1))
+        friction = worlds.at[:, 1, 0].set(feet(rng)).at[:, 0, 0].set(9.0)
+        mass = jax.numpy.tile(model.body_mass, (len(rng), 1)) * feet(rng)[:, None]
+        changed = {"geom_friction": friction, "body_mass": mass}
+        axes = jax.tree_util.tree_map(lambda _: None, model)
+        axes = axes.tree_replace({"geom_friction": 0, "body_mass": 0})
+        return model.tree_replace(changed), axes
+
+    keys = jax.random.split(jax.random.key(2), 500)
+    plain, _ = base(model, keys)
+    made, axes = module.with_terrain(base, "S0")(model, keys)
+    assert np.array_equal(made.body_mass, plain.body_mass)
+    assert np.array_equal(made.geom_friction[:, 1], plain.geom_friction[:, 1])
+    assert not (np.asarray(made.geom_friction[:, 0, 0]) == 9.0).any()
+    assert (axes.geom_friction, axes.body_mass) == (0, 0)
+    floor, feet = np.asarray(made.geom_friction[:, :2, 0]).T
+    assert abs(np.corrcoef(floor, feet)[0, 1]) < 0.15  # a stream of its own
