@@ -33,10 +33,7 @@ def simulate(
     --trials N --seed N`, byte for byte: arm, sensor, loop, recorder and review are the
     same objects. A trial takes some seconds.
 
-    >>> import traction as tr
-    >>> session = tr.simulate("Tf", trials=1, seed=2, data="simulated")
-    >>> session
-    <S001: 1 trial on Tf, simulated>
+        session = tr.simulate("Tf", trials=1, seed=2, data="simulated")
 
     Args:
         terrain: a name in matrix.toml.

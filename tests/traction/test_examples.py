@@ -18,7 +18,6 @@ FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
         ("trials", 1),
         ("trial_sets", 1),
         ("models", 3),
-        ("simulations", 1),
         ("gym", 1),
     ],
 )
@@ -54,9 +53,7 @@ def test_the_example_of_the_readme_runs_as_it_is(tmp_path, monkeypatch, workplac
 def test_the_page_for_policies_runs_as_it_is(tmp_path, monkeypatch, capsys):
     pytest.importorskip("gymnasium")
     page = ROOT / "docs" / "own-policy.md"
-    blocks = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
+    (block,) = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
     monkeypatch.chdir(tmp_path)
-    for block in blocks:
-        exec(compile(block, str(page), "exec"), {})
+    exec(compile(block, str(page), "exec"), {})
     assert "slipped" in capsys.readouterr().out
-    assert len(blocks) == 2

@@ -16,16 +16,17 @@ def files(data):
 
 
 def test_a_session_has_the_bytes_of_the_command(config, tmp_path, capsys):
-    session = tr.simulate("TF", 2, 5, tmp_path / "own", config=config)
-    assert len(session) == 2
+    session = tr.simulate("TF", 1, 5, tmp_path / "own", config=config)
+    assert len(session) == 1
     assert capsys.readouterr().out == ""
-    numbers = ("--trials", 2, "--seed", 5)
+    numbers = ("--trials", 1, "--seed", 5)
     where = ("--config", config, "--data", tmp_path / "command")
     assert traction("run", "TF", *AUTO, *numbers, *where).code == 0
     assert files(tmp_path / "own") == files(tmp_path / "command")
     assert len(files(tmp_path / "own")) > 5
 
 
+@pytest.mark.slow
 def test_a_further_session_is_the_one_that_is_returned(config, tmp_path):
     first, second = (
         tr.simulate("TF", 1, seed, tmp_path, config=config) for seed in (1, 2)
@@ -46,7 +47,7 @@ def test_what_cannot_be_simulated_is_refused(arguments, config, tmp_path):
 def test_an_unfinished_session_is_not_touched(config, tmp_path):
     options = ("--trials", 2, "--config", config, "--data", tmp_path)
     script = tmp_path / "keys"
-    script.write_text("keep\nquit\n")
+    script.write_text("last\n")
     done = traction("run", "TF", *AUTO[:2], "--operator-script", script, *options)
     assert done.code == 5
     with pytest.raises(SessionError, match="unfinished"):
