@@ -43,19 +43,20 @@ def test_risks_equal_python_and_rise_with_the_force(module, terrains, name):
     F_t, F_n, v_t = single(
         rng.uniform(-1, 15, 500), rng.uniform(0, 12, 500), rng.uniform(0.005, 0.2, 500)
     )
-    risks = module.risk_sliding(terrains[name], F_t, F_n, v_t)
+    sliding, rest = jax.jit(module.risk_sliding), jax.jit(module.risk_rest)
+    risks = sliding(terrains[name], F_t, F_n, v_t)
     rows = zip(F_t, F_n, v_t, strict=True)
     expected = [known.risk_in_motion(*map(float, row)) for row in rows]
     assert np.abs(np.asarray(risks) - expected).max() <= 1e-4
     required = np.abs(F_t)
-    risks = module.risk_rest(terrains[name], required, F_n)
+    risks = rest(terrains[name], required, F_n)
     model = known.from_rest
     expected = model.risks(required.astype(np.float64), F_n.astype(np.float64))
     assert np.abs(np.asarray(risks) - expected).max() <= 1e-4
     rising = np.linspace(0.0, 30.0, 5000, dtype=np.float32)
     for made in (
-        module.risk_sliding(terrains[name], rising, 4.0, 0.03),
-        module.risk_rest(terrains[name], rising, 4.0),
+        sliding(terrains[name], rising, 4.0, 0.03),
+        rest(terrains[name], rising, 4.0),
     ):
         assert (np.diff(np.asarray(made)) >= -1e-6).all()
         assert made[-1] - made[0] > 0.8
