@@ -215,7 +215,12 @@ def _export_for(args: argparse.Namespace, console: Console) -> int:
         "resolution": args.resolution,
         "sole_area": args.sole_area,
     }
-    targets = parse_targets(args.targets)
+    targets, names = parse_targets(args.targets), _names(args.terrain)
+    if args.terrain is not None and not names:
+        raise SettingsError(
+            f"--terrain {args.terrain:.80} names no terrain.",
+            hint=f"Leave it out for all of them. {_NOTHING}",
+        )
     for name, target in _ONLY_FOR.items():
         if _is_given(args, name) and target not in targets:
             raise SettingsError(
@@ -226,7 +231,7 @@ def _export_for(args: argparse.Namespace, console: Console) -> int:
         database=args.terrain_db,
         targets=targets,
         to=args.to,
-        terrains=_names(args.terrain),
+        terrains=names,
         model=args.model or "",
         options=ExportOptions(**{k: v for k, v in asked.items() if v is not None}),
         grid=args.grid,

@@ -64,6 +64,7 @@ def test_terrain_model_spread_and_precision_are_chosen(db, tmp_path):
         (("--for", "c", "--allow-missing"), "--allow-missing"),
         (("--for", "c", "S001"), "not S001"),
         ((), "Export what"),
+        (("--for", "c", "--terrain", ","), "names no terrain"),
         (("--for", "jax", "--float"), "--float is for c"),
         (("--for", "c", "--sole-area", "0.01"), "--sole-area is for chrono"),
         (("--for", "c", "--load", "0"), "--load is for gridmap"),
