@@ -11,6 +11,7 @@
     scores = tr.compare(session)            # one whole trial left out at a time
     rest = tr.fit_break_away(tables)        # before a foot at rest slips
     known = tr.load_terrains("terrains.json")
+    session = tr.simulate("S0", trials=10)  # as `traction run --fake --fast` does
 
 SI units throughout: forces in N, velocities in m/s; v_t and F_t are positive in
 ordinary slip, F_n in compression. Begin with `loading`, then `models`.
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
         fit_break_away,
         load_terrains,
     )
+    from traction.simulations import simulate
     from traction.trial_sets import TrialSet
     from traction.trials import Trial
 
@@ -51,6 +53,7 @@ _MODULES = {
     "load_tables": "loading",
     "load_terrains": "models",
     "load_trial": "loading",
+    "simulate": "simulations",
 }
 
 __all__ = [
@@ -67,6 +70,7 @@ __all__ = [
     "load_tables",
     "load_terrains",
     "load_trial",
+    "simulate",
 ]
 
 

@@ -15,30 +15,21 @@ from acquisition.control_loop.law import SoleGoal
 from analysis.foresight.engine import RiskTable
 from analysis.stance.interface import (
     BEGIN,
-    StanceCommand,
     StanceForesight,
-    StancePhase,
     StancePolicy,
     StanceRequest,
-    StanceSample,
 )
-from analysis.stance.outcomes import (
-    StanceOutcome,
-    StanceWatch,
-    adapted,
-    stated_risk,
-)
+from analysis.stance.outcomes import StanceOutcome, adapted
+from analysis.stance.standing import TICK, Loading, StandingFoot
 
-TICK: Final = 0.02  # s
 HEIGHT = 0.022  # m, the foot is lifted 20 mm
 _ALOFT = 0.012  # m, above which it is carried on
 _BELOW = 0.02  # m, where a foot that is lowered aims at
 _LOWERING, _CARRYING = 0.05, 0.15  # m/s
-_TOUCH = 1.0  # N
+TOUCH: Final = 1.0  # N, from which a foot stands on the ground
 _CLOSE, _SLOW = 0.004, 0.02  # m, m/s: a foot has arrived
 # An arm that rubs stops short of its spot; there it stands as well.
 _NEAR, _RESTED = 0.04, 15  # m, ticks at rest
-_WITHIN, _SETTLED, _LONGEST_LOADING = 0.1, 5, 1.5  # of F_n, ticks, s
 _MARGIN = 0.03  # m of the container that is not stood on, at both ends
 _GOLDEN = 0.618034
 # Neighbours in the row lie 0.38 of the free way apart: 2 d50 of the big stones here.
@@ -102,8 +93,17 @@ class StancePlan:
 
     def spot(self, number: int) -> float:
         """Return where stance `number`, from 0, stands [m]."""
-        free = self.travel - 2.0 * _MARGIN
-        return _MARGIN + free * ((self.phase + _GOLDEN * number) % 1.0)
+        return place_at((self.phase + _GOLDEN * number) % 1.0, self.travel)
+
+
+def place_at(share: float, travel: float) -> float:
+    """Return a place [m] at a share, 0 to 1, of a container of `travel` [m]."""
+    return _MARGIN + (travel - 2.0 * _MARGIN) * share
+
+
+def lowering(x: float) -> SoleGoal:
+    """Return the goal of a foot that is set down at `x` [m]."""
+    return SoleGoal(nan, nan, x, -_BELOW, _LOWERING)
 
 
 class StanceSequence:
@@ -125,9 +125,8 @@ class StanceSequence:
         self._since = 0.0
         self._before: float | None = None
         self._calm = 0
-        self._command: StanceCommand = BEGIN
-        self._watch: StanceWatch | None = None
-        self._t = 0.0
+        self._loading = Loading()
+        self._foot = StandingFoot(0.0, plan.scale)
 
     @property
     def is_over(self) -> bool:
@@ -143,7 +142,7 @@ class StanceSequence:
     def state(self) -> str:
         """What the foot is doing, in a word."""
         if self._step is StanceStep.STAND:
-            return self._command.phase.value
+            return self._foot.command.phase.value
         return self._step.name.lower().replace("_", " ")
 
     def next_goal(self, view: SoleView) -> SoleGoal:
@@ -167,6 +166,7 @@ class StanceSequence:
 
     def _enter(self, step: StanceStep) -> None:
         self._step, self._since, self._calm = step, 0.0, 0
+        self._loading = Loading()
 
     @property
     def _goal_x(self) -> float:
@@ -185,19 +185,20 @@ class StanceSequence:
         return SoleGoal(nan, nan, x if is_aloft else view.x, HEIGHT, _CARRYING)
 
     def _lower(self, view: SoleView) -> SoleGoal:
-        if view.F_n <= _TOUCH:
-            return SoleGoal(nan, nan, self._goal_x, -_BELOW, _LOWERING)
+        if view.F_n <= TOUCH:
+            return lowering(self._goal_x)
         if not self._is_felt:
             self._enter(StanceStep.FEEL_LOAD)
             return SoleGoal(nan, PROBE_LOAD, view.x, 0.0, _LOWERING)
         self._enter(StanceStep.STAND)
-        self._command, self._watch, self._t = BEGIN, None, 0.0
+        self._foot = StandingFoot(self._goal_x, self.scale)
         return SoleGoal(0.0, BEGIN.F_n, view.x, 0.0, 0.0)
 
     def _feel(self, view: SoleView) -> SoleGoal:
         """Load the foot, then draw it on, so that the ground is recognised."""
         if self._step is StanceStep.FEEL_LOAD:
-            if self._is_loaded(view, PROBE_LOAD):
+            self._loading.seconds += TICK
+            if self._loading.is_over(view.F_n, PROBE_LOAD):
                 self._enter(StanceStep.FEEL)
             return SoleGoal(nan, PROBE_LOAD, view.x, 0.0, 0.0)
         end = _MARGIN + PROBE_WAY
@@ -206,51 +207,16 @@ class StanceSequence:
             self._enter(StanceStep.LIFT)
         return SoleGoal(nan, PROBE_LOAD, end, 0.0, PROBE_SPEED)
 
-    def _is_loaded(self, view: SoleView, wanted: float) -> bool:
-        """Return whether the load has been there for 0.1 s, or will not come."""
-        is_there = abs(view.F_n - wanted) < _WITHIN * wanted + 0.2
-        self._calm = self._calm + 1 if is_there else 0
-        return self._calm >= _SETTLED or self._since > _LONGEST_LOADING
-
     def _stand(self, view: SoleView, v_t: float) -> SoleGoal:
-        foresight = StanceForesight(
-            self.shares, self._plan.tables, self.scale, view.capacity
-        )
-        command = self._command
-        is_loading = self._watch is None
-        is_begun = (
-            is_loading and self._since > TICK and self._is_loaded(view, command.F_n)
-        )
-        if is_begun:
-            risk = stated_risk(foresight, command.most, command.F_n)
-            self._watch = StanceWatch(self._goal_x, risk, self.scale, view.x)
-        elif self._watch is not None:
-            self._t += TICK
-            self._watch.push(TICK, view.x, v_t, view.F_t, view.F_n)
-        watch = self._watch
-        sample = StanceSample(
-            t=self._t,
-            is_loaded=watch is not None,
-            x=0.0 if watch is None else view.x - watch.x0,
-            v_t=v_t,
-            F_t=view.F_t,
-            F_n=view.F_n,
-            impulse=0.0 if watch is None else watch.delivered,
-            last=command,
-        )
-        self._command = self._plan.policy(sample, foresight, self._plan.request)
-        if watch is not None and self._command.phase is StancePhase.DONE:
-            self._end(watch)
-        # A foot that slipped is held where it is; with no force it would coast on.
-        is_held = self._command.phase is StancePhase.BACK_OFF
-        F_t = nan if is_held else self._command.F_t
-        return SoleGoal(F_t, self._command.F_n, view.x, 0.0, 0.0)
-
-    def _end(self, watch: StanceWatch) -> None:
-        outcome = watch.outcome(self._plan.request)
-        self.outcomes.append(outcome)
-        self.scale = adapted(self.scale, outcome)
-        self._enter(StanceStep.LIFT)
+        foot, plan = self._foot, self._plan
+        foresight = StanceForesight(self.shares, plan.tables, self.scale, view.capacity)
+        sample = foot.sample(view.x, v_t, view.F_t, view.F_n, foresight)
+        goal = foot.goal(plan.policy(sample, foresight, plan.request), view.x)
+        if foot.is_done and (outcome := foot.outcome(plan.request)) is not None:
+            self.outcomes.append(outcome)
+            self.scale = adapted(self.scale, outcome)
+            self._enter(StanceStep.LIFT)
+        return goal
 
     def _lift(self, view: SoleView) -> SoleGoal:
         if view.z > _ALOFT and self._step is StanceStep.LIFT:

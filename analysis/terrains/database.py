@@ -27,7 +27,7 @@ from analysis.terrains.table import Rows, Table
 
 FORMAT, VERSION = "traction-terrain-db", 3
 _OLD = 1  # mean and sd instead of quantiles
-_LARGEST = 6_000_000  # bytes; in memory it takes thirty times as much
+LARGEST = 6_000_000  # bytes; in memory it takes thirty times as much
 _MOST = 1_000_000_000  # trials or samples
 _MOST_POINTS = 400  # of an axis
 _MOST_SHARES = 99
@@ -115,7 +115,7 @@ def load(path: Path | str) -> TerrainDatabase:
     """
     path = Path(path)
     try:
-        content = read_regular(path, _LARGEST, is_link_followed=True)
+        content = read_regular(path, LARGEST, is_link_followed=True)
         return _database(_File.model_validate(json.loads(content)))
     except UnfitFileError as error:
         raise _no_database(path, f"it {error}") from error
@@ -223,10 +223,10 @@ def to_text(database: TerrainDatabase) -> str:
         parts=database.parts,
     )
     text = json.dumps(file.model_dump(), default=str)
-    if len(text.encode()) > _LARGEST:
+    if len(text.encode()) > LARGEST:
         raise SettingsError(
             f"{len(known)} terrains make a file of {len(text) / 1e6:.1f} MB, larger "
-            f"than the {_LARGEST / 1e6:.0f} MB that are read.",
+            f"than the {LARGEST / 1e6:.0f} MB that are read.",
             hint="Export fewer sessions at a time.",
         )
     return text

@@ -1,13 +1,43 @@
-"""traction export: trials as tables, or terrains as one file of models."""
+"""traction export: trials as tables, terrains as models, models for other programs."""
+
+from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from experiments.arguments import add_allow_missing, add_seed
+from experiments.arguments import add_allow_missing, add_seed, number_within
+
+if TYPE_CHECKING:
+    from experiments.operator.console import Console
 
 EXAMPLES = """\
   traction export S012 --to tables          kept trials of a session
-  traction export --terrain-db terrains.json   all models of all sessions' terrains"""
+  traction export --terrain-db terrains.json --for c,onnx --to controller"""
+
+_NOTHING = "Nothing was written."
+# Options that belong to one use; each is None or False where it is not given.
+_OF_TRIALS = ("format", "standard_rate")
+_OF_TARGETS = (
+    "terrain",
+    "model",
+    "spread",
+    "float",
+    "grid",
+    "resolution",
+    "required",
+    "load",
+    "sole_area",
+)
+
+_ONLY_FOR = {  # the one target that has an option
+    "float": "c",
+    "grid": "gridmap",
+    "resolution": "gridmap",
+    "required": "gridmap",
+    "load": "gridmap",
+    "sole_area": "chrono",
+}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -16,46 +46,225 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "sessions", nargs="*", metavar="SESSION", help="S012 or a folder"
     )
     parser.add_argument(
-        "--to", type=Path, metavar="DIR", help="tables into an empty or new folder"
-    )
-    parser.add_argument(
-        "--format",
-        choices=("csv", "parquet"),
-        default="csv",
-        help="format of the tables (csv); parquet needs the extra traction[parquet]",
-    )
-    parser.add_argument(
-        "--terrain-db", type=Path, metavar="FILE", help="the terrain database, JSON"
+        "--to", type=Path, metavar="DIR", help="into an empty or new folder"
     )
     add_allow_missing(parser)
     add_seed(parser)
+    trials = parser.add_argument_group("trials: SESSION... --to DIR")
+    trials.add_argument(
+        "--format",
+        choices=("csv", "parquet"),
+        help="format of the tables (csv); parquet needs the extra traction[parquet]",
+    )
+    trials.add_argument(
+        "--standard-rate",
+        action="store_true",
+        help="no tables, but MCAP files of the standard ROS 2 topics /joint_states, "
+        "/wrench, /foot/pose and /foot/twist at the recorded 500 Hz",
+    )
+    models = parser.add_argument_group("models: [SESSION...] --terrain-db FILE")
+    models.add_argument(
+        "--terrain-db",
+        type=Path,
+        metavar="FILE",
+        help="the terrain database, JSON: written, or read where --for is given",
+    )
+    _add_targets(parser)
+
+
+def _add_targets(parser: argparse.ArgumentParser) -> None:
+    from analysis.exports.names import target_names
+
+    group = parser.add_argument_group(
+        "terrains for other programs: --terrain-db FILE --for NAME,.. --to DIR"
+    )
+    group.add_argument(
+        "--for",
+        dest="targets",
+        metavar="NAME,..",
+        help=f"controllers, simulators and maps: {', '.join(target_names())}",
+    )
+    group.add_argument(
+        "--terrain", metavar="NAME,..", help="terrains of the database (all)"
+    )
+    group.add_argument("--model", metavar="NAME", help="one of its models (default)")
+    group.add_argument(
+        "--spread",
+        choices=("episode", "all"),
+        help="what simulators draw once an episode: the trial's level (episode), or "
+        "what changes within a trial too (all)",
+    )
+    group.add_argument(
+        "--float", action="store_true", help="single precision in C (double)"
+    )
+    group.add_argument(
+        "--grid",
+        type=Path,
+        metavar="FILE",
+        help="CSV with the terrain of every cell of the map (one patch of each)",
+    )
+    group.add_argument(
+        "--resolution",
+        type=number_within(0.001, 100, "a length 0.001..100 m, e.g. 0.1"),
+        metavar="M",
+        help="side of a cell of the map [m] (0.1)",
+    )
+    group.add_argument(
+        "--required",
+        type=number_within(0, 1000, "a force 0..1000 N, e.g. 4"),
+        metavar="N",
+        help="traction that slip_risk of the map is for [N] (4)",
+    )
+    group.add_argument(
+        "--load",
+        type=number_within(0, 1000, "a force 0..1000 N, e.g. 5"),
+        metavar="N",
+        help="normal force of the map [N] (5)",
+    )
+    group.add_argument(
+        "--sole-area",
+        type=number_within(1e-6, 1, "an area up to 1 m2, e.g. 0.002"),
+        metavar="M2",
+        help="area of the sole, without which chrono has no cohesion [m2]",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write the tables and return the exit code."""
+    """Write what is asked for and return the exit code."""
     from acquisition.errors import SettingsError
     from experiments.operator.console import Console
+
+    _check_use(args)
+    console = Console(color=not args.no_color)
+    if args.targets is not None:
+        return _export_for(args, console)
+    if (args.to is None) == (args.terrain_db is None):
+        raise SettingsError(
+            "Export what: tables with --to DIR, models with --terrain-db FILE, or "
+            "models for other programs with both and --for NAME,..?",
+            hint=f"Name one of the three. {_NOTHING}",
+        )
+    return _export_sessions(args, console)
+
+
+def _check_use(args: argparse.Namespace) -> None:
+    """Refuse options that belong to another use of the command.
+
+    Raises:
+        SettingsError: there are some, or what their use needs is missing.
+    """
+    from acquisition.errors import SettingsError
+
+    def given(names: tuple[str, ...]) -> str:
+        named = [name for name in names if _is_given(args, name)]
+        return ", ".join(f"--{name.replace('_', '-')}" for name in named)
+
+    if args.targets is None:
+        if options := given(_OF_TARGETS):
+            raise SettingsError(
+                f"{options}: only terrains for other programs have that.",
+                hint="Write: traction export --terrain-db FILE --for NAME,.. --to DIR. "
+                f"{_NOTHING}",
+            )
+        if (options := given(_OF_TRIALS)) and args.terrain_db is not None:
+            raise SettingsError(
+                f"{options}: only trials have that.",
+                hint=f"Write: traction export SESSION --to DIR. {_NOTHING}",
+            )
+        if args.standard_rate and args.format:
+            raise SettingsError(
+                "--standard-rate writes recordings, --format tables.",
+                hint=f"Leave one of them out. {_NOTHING}",
+            )
+        return
+    if options := given((*_OF_TRIALS, "allow_missing")):
+        raise SettingsError(
+            f"{options}: only trials have that; --for exports terrains of a database.",
+            hint=f"Leave them out. {_NOTHING}",
+        )
+    if args.sessions:
+        raise SettingsError(
+            f"--for exports terrains of a database, not {' '.join(args.sessions):.80}.",
+            hint="Make a database of the sessions first: traction export "
+            f"{' '.join(args.sessions):.80} --terrain-db FILE. {_NOTHING}",
+        )
+    if args.terrain_db is None or args.to is None:
+        raise SettingsError(
+            "--for needs the database to read and the folder to write.",
+            hint="Write: traction export --terrain-db FILE --for "
+            f"{args.targets:.80} --to DIR. {_NOTHING}",
+        )
+
+
+def _is_given(args: argparse.Namespace, name: str) -> bool:
+    value = getattr(args, name)
+    return value is not None and value is not False
+
+
+def _export_for(args: argparse.Namespace, console: Console) -> int:
+    from acquisition.errors import SettingsError
+    from analysis.exports.folder import parse_targets
+    from analysis.exports.source import ExportOptions
+    from experiments.report.terrain_targets import TargetRequest, export_for
+
+    asked = {
+        "spread": args.spread,
+        "is_float": args.float or None,
+        "required": args.required,
+        "load": args.load,
+        "resolution": args.resolution,
+        "sole_area": args.sole_area,
+    }
+    targets, names = parse_targets(args.targets), _names(args.terrain)
+    if args.terrain is not None and not names:
+        raise SettingsError(
+            f"--terrain {args.terrain:.80} names no terrain.",
+            hint=f"Leave it out for all of them. {_NOTHING}",
+        )
+    for name, target in _ONLY_FOR.items():
+        if _is_given(args, name) and target not in targets:
+            raise SettingsError(
+                f"--{name.replace('_', '-')} is for {target}, which is not in --for.",
+                hint=f"Leave it out, or add {target}. {_NOTHING}",
+            )
+    request = TargetRequest(
+        database=args.terrain_db,
+        targets=targets,
+        to=args.to,
+        terrains=names,
+        model=args.model or "",
+        options=ExportOptions(**{k: v for k, v in asked.items() if v is not None}),
+        grid=args.grid,
+    )
+    export_for(request, console)
+    return 0
+
+
+def _names(text: str | None) -> tuple[str, ...]:
+    return tuple(name.strip() for name in (text or "").split(",") if name.strip())
+
+
+def _export_sessions(args: argparse.Namespace, console: Console) -> int:
+    from acquisition.errors import SettingsError
     from experiments.report.choices import choose_sessions, tell_missing
     from experiments.report.export import export_sessions
     from experiments.report.sessions import ReportRequest, export_terrains
+    from experiments.report.standard_topics import export_standard_topics
     from experiments.settings.load import load_settings
 
-    if (args.to is None) == (args.terrain_db is None):
-        raise SettingsError(
-            "Export what: tables with --to DIR, or models with --terrain-db FILE?",
-            hint="Name one of the two. Nothing was written.",
-        )
-    console = Console(color=not args.no_color)
     every = args.to is None and not args.sessions
     sessions = choose_sessions(args.data, args.sessions, every=every)
     tell_missing(sessions, console, allow_missing=args.allow_missing)
     if args.to is not None:
-        export_sessions(sessions, args.to, args.format, console)
+        if args.standard_rate:
+            export_standard_topics(sessions, args.to, console)
+        else:
+            export_sessions(sessions, args.to, args.format or "csv", console)
         return 0
     if args.terrain_db.exists():
         raise SettingsError(
             f"{args.terrain_db} exists and is never overwritten.",
-            hint="Choose another name. Nothing was written.",
+            hint=f"Choose another name. {_NOTHING}",
         )
     order = [row.name for row in load_settings(args.config).matrix.terrains]
     wanted = ReportRequest(order, args.seed)

@@ -95,6 +95,7 @@ def test_an_extra_whose_library_is_hidden_is_named(extra, monkeypatch):
         ("publish", ("publish", "--all", "--to", "crate", *AUTHOR)),
         ("parquet", ("export", "S001", "--to", "tables", "--format", "parquet")),
         ("live", ("watch",)),
+        ("onnx", ("export", "--terrain-db", "none.json", "--for", "onnx", "--to", "m")),
     ],
 )
 @pytest.mark.parametrize("nth", [0, -1])

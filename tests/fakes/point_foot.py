@@ -14,6 +14,15 @@ from fakes.ground.terrain import GroundChoice, make_terrain
 from fakes.plant.push import HandView, Pace, Push
 from fakes.randomness import trial_generators
 from fakes.sensor.errors import FORCE_ERRORS, SensorErrors
+from fakes.world.stance_bed import (
+    COULOMB,
+    DT,
+    MASS_X,
+    MASS_Z,
+    PERIOD,
+    SUBSTEPS,
+    VISCOUS,
+)
 
 GROUNDS = {
     "S0": ("small", "tread", 0.0),
@@ -25,11 +34,7 @@ GROUNDS = {
     "TF": ("none", "tread", 0.0),
     "Tf": ("none", "bare", 0.0),
 }
-SUBSTEPS, DT = 4, 0.0005
-PERIOD = SUBSTEPS * DT
 CYCLES = round(1.0 / PERIOD)  # in a second
-MASS_X, MASS_Z = 4.0, 3.5  # the arm's inertia at the foot, with the forearm [kg]
-COULOMB, VISCOUS = 0.5, 2.0  # joint drag seen at the foot: N, N s/m
 RESIDUAL, RESIDUAL_LENGTH = 0.15, 0.12  # of gravity compensation: N rms, m
 EFFECTIVE_MASS, TOOL_MASS = 0.30, 0.45  # kg
 TRAVEL, REST_AFTER, LONGEST = 0.45, 0.4, 30.0  # m, s, s

@@ -32,83 +32,29 @@ from analysis.stance.interface import (
 from analysis.stance.outcomes import StanceOutcome
 from analysis.stance.policies import avoid_slip
 from analysis.stance.sequence import SoleView, StancePlan, StanceSequence
-from fakes.ground.terrain import GroundChoice, make_terrain
-from fakes.randomness import trial_generators
-from tests.fakes.point_foot import (
-    COULOMB,
-    DT,
-    GROUNDS,
-    MASS_X,
-    MASS_Z,
-    PERIOD,
-    SUBSTEPS,
-    VISCOUS,
-)
-from wam.control.sole_impedance import SoleAxes
+from fakes.ground.terrain import GroundChoice
+from fakes.world.stance_bed import PERIOD, TICK_CYCLES, StanceBed
+from tests.fakes.point_foot import GROUNDS
 
 TRAVEL = 0.45  # m
-TICK_CYCLES = 10
 RIG = RigIdentity("true", "true", "0.3", "0.45")
 _STONES = "small", "big"
 KINDS = {name: stones for name, (stones, _, _) in GROUNDS.items()}
 TRAINING = 10_000  # trials of this number and more teach
 _PROBES, _BEDS, _STANCES = 6, 8, 25  # that teach, of every terrain
-_CARRIED, _ALOFT = 0.014, 2.0  # m, s, as the arm takes
 _LONGEST = 2000  # ticks of a stance and the way to it
 
 
-class StanceBench:
-    """One bed under a foot that nothing but the law of the sole moves."""
+class StanceBench(StanceBed):
+    """One bed of a terrain of the study."""
 
     def __init__(self, terrain: str, seed: int, trial: int) -> None:
         stones, foot, incline_deg = GROUNDS[terrain]
-        random = trial_generators(seed, terrain, trial)
-        self.ground = make_terrain(
-            GroundChoice(stones, foot), radians(incline_deg), random.ground
-        )
-        self.axes = SoleAxes(TRAVEL, PERIOD)
-        self.x = self.vx = self.vz = 0.0
-        self.z = 0.02
-        self.F_t = self.F_n = 0.0
-        self.cycles = 0
-        self.axes.begin(self.x, self.z, 0)
-
-    @property
-    def now_ns(self) -> int:
-        return round(self.cycles * PERIOD * 1e9)
-
-    def cycle(self) -> None:
-        """Advance by 2 ms."""
-        position, speed = (self.x, self.z), (self.vx, self.vz)
-        f_x, f_z = self.axes.force(position, speed, self.now_ns)
-        F_t = F_n = 0.0
-        for _ in range(SUBSTEPS):
-            vx, vz = self.vx, self.vz
-            motion = (self.x, 0.0, self.z, vx, 0.0, vz, 0.0, 0.0, 0.0)
-            t, _, n, *_ = self.ground.step(DT, motion)
-            F_t, F_n = F_t + t, F_n + n
-            slow_x = 1.0 if vx > 0.01 else -1.0 if vx < -0.01 else 100.0 * vx
-            slow_z = 1.0 if vz > 0.01 else -1.0 if vz < -0.01 else 100.0 * vz
-            drag_x = COULOMB * slow_x + VISCOUS * vx
-            drag_z = COULOMB * slow_z + VISCOUS * vz
-            self.vx += DT * (f_x - t - drag_x) / MASS_X
-            self.vz += DT * (f_z + n - drag_z) / MASS_Z
-            self.x += DT * self.vx
-            self.z += DT * self.vz
-        self.F_t, self.F_n = F_t / SUBSTEPS, F_n / SUBSTEPS
-        self.cycles += 1
-
-    def carry(self, x: float) -> None:
-        """Be carried through the air to `x`: nothing happens there."""
-        self.x, self.z, self.vx, self.vz = x, _CARRIED, 0.0, 0.0
-        self.ground.step(_ALOFT, (x, 0.0, _CARRIED, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
-        self.axes.begin(x, self.z, self.now_ns)
-
-    def aim(self, goal: SoleGoal) -> None:
-        self.axes.aim(goal, self.x, self.z, self.now_ns)
+        choice = GroundChoice(stones, foot)
+        super().__init__(terrain, choice, radians(incline_deg), TRAVEL, (seed, trial))
 
     def view(self, shares: Mapping[str, float]) -> SoleView:
-        capacity = self.ground.capacity(self.x, self.F_n) if self.F_n > 0.0 else nan
+        capacity = self.capacity if self.F_n > 0.0 else nan
         return SoleView(self.x, self.z, self.F_t, self.F_n, shares, capacity)
 
 

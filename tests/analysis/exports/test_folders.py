@@ -1,0 +1,119 @@
+"""Every target: README, source, whose trials they are, and names that mean harm."""
+
+import json
+import re
+from xml.etree import ElementTree
+
+import pytest
+
+from acquisition.errors import SettingsError
+from analysis.exports.folder import parse_targets, target_files
+from analysis.exports.names import identifiers, shown, target_names
+from analysis.exports.source import TerrainExport
+from tests.analysis.exports.databases import DIGEST, database, export
+
+HOSTILE = (
+    '*/ int x; /* "\\\n#error ]]> --> <a> & ../../etc ??/',
+    "../../../tmp/x\0$(rm -rf)`'\"\u202e\u0000",
+)
+
+
+@pytest.fixture(params=target_names())
+def target(request):
+    if request.param == "onnx":
+        pytest.importorskip("onnx")
+    return request.param
+
+
+def test_the_nine_are_there():
+    nine = "c,onnx,jax,mjx,mjlab,isaaclab,chrono,gridmap,ros2"
+    assert set(parse_targets(nine)) == set(target_names())
+
+
+TENTH = """
+from analysis.exports.folder import ExportTarget
+
+TARGET = ExportTarget(
+    "A tenth", lambda e: {"a.txt": e.origin.encode()}, lambda e: ("What it is.",) * 6
+)
+"""
+
+
+def test_a_tenth_target_is_one_file(tmp_path, monkeypatch):
+    from analysis.exports import targets
+
+    (tmp_path / "tenth.py").write_text(TENTH)
+    monkeypatch.setattr(targets, "__path__", [*targets.__path__, str(tmp_path)])
+    assert parse_targets("c,tenth") == ("c", "tenth")
+    made = target_files("tenth", export())
+    assert set(made) == {"a.txt", "README.md", "source.json"}
+    assert made["README.md"].count(b"\n") == 10
+
+
+@pytest.mark.parametrize("text", ["", "c,c", "c,unity", "../c", "__init__"])
+def test_other_targets_are_refused(text):
+    with pytest.raises(SettingsError, match="--for"):
+        parse_targets(text)
+
+
+def test_a_readme_has_ten_lines_and_says_where_it_is_from(target):
+    lines = target_files(target, export())["README.md"].decode().splitlines()
+    assert len(lines) == 10
+    assert lines[0].startswith("# ")
+    assert DIGEST[:16] in lines[1]
+    assert all(len(line) > 20 for line in lines)
+
+
+def test_the_source_is_complete(target):
+    source = json.loads(target_files(target, export(is_simulated=False))["source.json"])
+    assert source["target"] == target
+    assert source["database_sha256"] == DIGEST
+    assert (source["model"], source["traction"]) == ("gp_se_trial", "1.2.3")
+    assert source["simulated"] is False
+    assert source["terrains"]["S0"]["trials"] == 10
+
+
+def test_simulated_trials_are_named_in_every_artefact(target):
+    for path, content in target_files(target, export()).items():
+        if path.endswith((".msg", "CMakeLists.txt")):
+            continue  # definitions of any recording, simulated or not
+        assert b"simulated" in content.lower(), path
+    for path, content in target_files(target, export(is_simulated=False)).items():
+        if path.endswith((".msg", "CMakeLists.txt")):
+            continue
+        assert b"SIMULATED trials" not in content, path
+
+
+def test_hostile_names_stay_harmless(target):
+    for path, content in target_files(target, export(names=HOSTILE)).items():
+        assert re.fullmatch(r"[A-Za-z0-9_]+([./][A-Za-z0-9_]+)*", path)
+        if path.endswith((".h", ".py", ".md")):
+            text = content.decode()
+            assert "#error ]]" not in text
+            assert "rm -rf)`" not in text
+        if path.endswith(".xml"):
+            ElementTree.fromstring(content)
+
+
+def test_hostile_names_keep_their_own_in_data(target):
+    source = json.loads(target_files(target, export(names=HOSTILE))["source.json"])
+    assert tuple(source["terrains"]) == HOSTILE
+
+
+def test_identifiers_are_words_and_differ():
+    names = ["S0", "s0", "S 0", "", "0", "é", "ä", *HOSTILE, "x" * 500, "x" * 501]
+    words = list(identifiers(names).values())
+    assert all(re.fullmatch(r"[A-Za-z0-9_]{1,44}", word) for word in words)
+    assert len({word.lower() for word in words}) == len(names)
+
+
+@pytest.mark.parametrize("text", [*HOSTILE, "", "\n", "é" * 300])
+def test_what_is_shown_is_one_harmless_line(text):
+    assert re.fullmatch(r"[A-Za-z0-9 .,:()_+?-]{1,60}", shown(text))
+
+
+def test_unknown_terrains_and_models_are_refused():
+    with pytest.raises(SettingsError, match="no terrain 'X'"):
+        TerrainExport.of(database(), DIGEST, "1", ("X",))
+    with pytest.raises(SettingsError, match="no model 'tustin'"):
+        TerrainExport.of(database(), DIGEST, "1", model="tustin")

@@ -1,0 +1,60 @@
+"""Programs in the documentation: compiled, run, and right."""
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from tests.analysis.exports.compiled import FLAGS, build
+from tests.analysis.exports.databases import database
+from tests.analysis.exports.written import write
+
+DOCS = Path(__file__).parents[3] / "docs"
+
+
+def block(page, language):
+    """Return the one block of code of a language on a page."""
+    text = (DOCS / page).read_text()
+    (code,) = re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL)
+    return code
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return write(tmp_path_factory.mktemp("pages"), "c")
+
+
+def test_the_loop_of_the_controllers_page_bears_the_risk_it_says(folder):
+    program = build(folder, block("controller.md", "c"), *FLAGS)
+    rows = "5.0 0.0 0.0\n9.0 0.0 0.0\n0.0 0.0 0.0\nnan 0.0 0.0\n"
+    done = subprocess.run(
+        [program], input=rows, capture_output=True, text=True, check=True
+    )
+    asked = [float(line) for line in done.stdout.split()]
+    models = [known.from_rest for known in database().terrains.values()]
+    for load, force in zip((5.0, 9.0), asked, strict=False):
+        risks = [
+            sum(m.slip_risk(f, load).risk for m in models) / 2
+            for f in (force, force + 0.11)
+        ]
+        assert risks[0] <= 0.05 + 1e-5
+        assert risks[1] > 0.05 or force == 6.0
+    assert asked[0] < asked[1] <= 6.0
+    assert asked[3] == 0.0  # nothing is asked of a foot that is not known
+
+
+def test_the_loop_is_as_short_as_the_page_says():
+    code = block("controller.md", "c")
+    body = code[code.index("int main") :].splitlines()
+    assert len(body) <= 30
+
+
+def test_the_example_in_cpp_prints_medians(folder):
+    flags = ("-std=c++17", "-Wall", "-Wextra", "-Werror")
+    program = build(folder, block("controller.md", "cpp"), *flags, suffix="cc")
+    done = subprocess.run([program], capture_output=True, text=True, check=True)
+    lines = dict(line.split() for line in done.stdout.splitlines())
+    for name, known in database().terrains.items():
+        median = known.predict(3.5, 0.05).median
+        assert float(lines[name]) == pytest.approx(median, abs=1e-3)

@@ -1,0 +1,135 @@
+"""`traction export --for`: what is written, and which mixed uses are refused."""
+
+import json
+
+import pytest
+
+from tests.analysis.exports.databases import database_file
+from tests.experiments.program import traction
+
+FOR = ("--for", "c,jax,mjx,mjlab,isaaclab,chrono,gridmap,ros2")
+
+
+@pytest.fixture(scope="module")
+def db(tmp_path_factory):
+    return database_file(tmp_path_factory.mktemp("db"))
+
+
+def export(db, to, *options):
+    return traction("export", "--terrain-db", db, "--to", to, *options)
+
+
+def test_every_target_has_its_folder(db, tmp_path):
+    done = export(db, tmp_path / "made", *FOR, "--sole-area", "0.002")
+    assert (done.code, done.err) == (0, "")
+    assert "SIMULATED" in done.out
+    folders = {path.name for path in (tmp_path / "made").iterdir()}
+    assert folders == set(FOR[1].split(","))
+    for folder in (tmp_path / "made").iterdir():
+        source = json.loads((folder / "source.json").read_text())
+        assert source["target"] == folder.name
+        assert list(source["terrains"]) == ["S0", "TF"]
+
+
+def test_two_runs_write_the_same_bytes(db, tmp_path):
+    made = []
+    for name in ("a", "b"):
+        assert export(db, tmp_path / name, *FOR).code == 0
+        folder = tmp_path / name
+        files = sorted(p for p in folder.rglob("*") if p.is_file())
+        made.append({str(p.relative_to(folder)): p.read_bytes() for p in files})
+    assert made[0] == made[1]
+
+
+def test_terrain_model_spread_and_precision_are_chosen(db, tmp_path):
+    options = ("--terrain", "TF", "--model", "gp_se", "--spread", "all", "--float")
+    done = export(db, tmp_path / "made", "--for", "c,mjx", *options)
+    assert done.code == 0
+    assert "no effect of a trial" in done.out
+    source = json.loads((tmp_path / "made/mjx/source.json").read_text())
+    assert list(source["terrains"]) == ["TF"]
+    assert (source["model"], source["spread"]) == ("gp_se", "all")
+    header = (tmp_path / "made/c/traction_terrains.h").read_text()
+    assert "typedef float traction_real" in header
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--for", "c,unity"), "no target unity"),
+        (("--for", "c", "--terrain", "S9"), "no terrain 'S9'"),
+        (("--for", "c", "--model", "tustin"), "no model 'tustin'"),
+        (("--for", "c", "--format", "csv"), "--format"),
+        (("--for", "c", "--standard-rate"), "--standard-rate"),
+        (("--for", "c", "--allow-missing"), "--allow-missing"),
+        (("--for", "c", "S001"), "not S001"),
+        ((), "Export what"),
+        (("--for", "c", "--terrain", ","), "names no terrain"),
+        (("--for", "jax", "--float"), "--float is for c"),
+        (("--for", "c", "--sole-area", "0.01"), "--sole-area is for chrono"),
+        (("--for", "c", "--load", "0"), "--load is for gridmap"),
+        (("--spread", "all"), "--spread"),
+        (("--float", "--terrain", "S0"), "--terrain, --float"),
+    ],
+)
+def test_mixed_and_unknown_uses_are_refused(db, tmp_path, options, said):
+    done = export(db, tmp_path / "made", *options)
+    assert done.code == 2
+    assert said in done.err
+    assert "Nothing was written" in done.err or "Terrains: S0, TF" in done.err
+    assert not (tmp_path / "made").exists()
+
+
+def test_what_the_targets_need_is_asked_for(db, tmp_path):
+    done = traction("export", "--for", "c", "--to", tmp_path / "made")
+    assert (done.code, "needs the database" in done.err) == (2, True)
+    done = traction("export", "--for", "c", "--terrain-db", db)
+    assert (done.code, "the folder to write" in done.err) == (2, True)
+    done = export(tmp_path / "none.json", tmp_path / "made", "--for", "c")
+    assert (done.code, "cannot be read" in done.err) == (2, True)
+
+
+def test_a_folder_that_holds_something_is_left_alone(db, tmp_path):
+    (tmp_path / "mine.txt").write_text("mine")
+    done = export(db, tmp_path, "--for", "c")
+    assert done.code == 2
+    assert "not empty" in done.err
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"S0,TF\nS0\n", "no rectangle"),
+        (b"", "no rectangle"),
+        (b"S0,S9\n", "row 1 names the terrain 'S9'"),
+        (b"\xff\xfe\x00", "no CSV"),
+        (b"S0,\x00\n", "row 1 names"),
+        (b"S0," * 2000, "no rectangle"),
+    ],
+)
+def test_a_grid_that_is_none_is_refused(db, tmp_path, content, said):
+    grid = tmp_path / "grid.csv"
+    grid.write_bytes(content)
+    done = export(db, tmp_path / "made", "--for", "gridmap", "--grid", grid)
+    assert done.code == 2
+    assert said in done.err
+    assert not (tmp_path / "made").exists()
+
+
+def test_a_grid_is_mapped(db, tmp_path):
+    grid = tmp_path / "grid.csv"
+    grid.write_text("S0,TF\n,S0\n")
+    done = export(db, tmp_path / "made", "--for", "gridmap", "--grid", grid)
+    assert done.code == 0
+    assert (tmp_path / "made/gridmap/terrain_map.mcap").stat().st_size > 1000
+
+
+def test_a_database_without_a_load_is_refused(tmp_path):
+    content = json.loads(database_file(tmp_path).read_text())
+    content["axes"]["F_n"] = [x / 100.0 for x in content["axes"]["F_n"]]
+    path = tmp_path / "small.json"
+    path.write_text(json.dumps(content))
+    done = export(path, tmp_path / "made", "--for", "mjx")
+    assert done.code == 2
+    assert "too little load" in done.err

@@ -1,0 +1,97 @@
+"""Recordings as standard topics at 500 Hz: the same numbers as `/cycle`, as rosbags."""
+
+import hashlib
+
+import numpy as np
+import pytest
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
+
+from acquisition.errors import TrialFileError
+from acquisition.trial_file.reader import TrialReader
+from tests.experiments.program import traction
+
+TOPICS = {"/joint_states", "/wrench", "/foot/pose", "/foot/twist"}
+
+
+@pytest.fixture(scope="module")
+def standard(recorded, tmp_path_factory):
+    to = tmp_path_factory.mktemp("standard") / "bags"
+    done = traction(
+        "export", "S001", "--to", to, "--standard-rate", "--data", recorded.data
+    )
+    assert (done.code, done.err) == (0, "")
+    return to / recorded.folder.name / "T01.mcap"
+
+
+def messages(path, topic):
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    with AnyReader([path], default_typestore=store) as bag:
+        chosen = [c for c in bag.connections if c.topic == topic]
+        return [
+            (time, bag.deserialize(raw, connection.msgtype))
+            for connection, time, raw in bag.messages(chosen)
+        ]
+
+
+@pytest.mark.parametrize("topic", sorted(TOPICS))
+def test_there_is_a_message_of_every_cycle(standard, first_trial, topic):
+    rows = TrialReader(first_trial).cycles()
+    times = [time for time, _ in messages(standard, topic)]
+    assert times == rows.log_time.tolist()
+
+
+def test_numbers_are_those_of_the_cycles(standard, first_trial):
+    cycles = TrialReader(first_trial).cycles().data
+    joints = [message for _, message in messages(standard, "/joint_states")]
+    assert np.array_equal([m.position for m in joints], cycles["position"])
+    assert np.array_equal([m.effort for m in joints], cycles["torque_command"])
+    wrenches = [message.wrench for _, message in messages(standard, "/wrench")]
+    forces = [(w.force.x, w.force.y, w.force.z) for w in wrenches]
+    assert np.array_equal(forces, cycles["wrench"][:, :3])
+    poses = [message.pose for _, message in messages(standard, "/foot/pose")]
+    places = [(p.position.x, p.position.y, p.position.z) for p in poses]
+    assert np.array_equal(places, cycles["foot_position"])
+    twists = [message.twist for _, message in messages(standard, "/foot/twist")]
+    turns = [(t.angular.x, t.angular.y, t.angular.z) for t in twists]
+    assert np.array_equal(turns, cycles["foot_velocity"][:, 3:])
+
+
+def test_nothing_but_standard_types_is_inside(standard):
+    with AnyReader([standard]) as bag:
+        topics = {c.topic: c.msgtype for c in bag.connections}
+    assert set(topics) == {*TOPICS, "/robot_description"}
+    assert not any("traction" in name for name in topics.values())
+
+
+def test_metadata_say_simulated_and_of_which_recording(standard, first_trial):
+    from mcap.reader import make_reader
+
+    with standard.open("rb") as file:
+        metadata = {m.name: m.metadata for m in make_reader(file).iter_metadata()}
+    with standard.open("rb") as file:
+        names = {a.name for a in make_reader(file).iter_attachments()}
+    assert metadata["recording"]["simulated"] == "true"
+    digest = hashlib.sha256(first_trial.read_bytes()).hexdigest()
+    assert metadata["recording"]["sha256"] == digest
+    assert {"terrain.toml", "ft_calibration.toml", "robot.urdf"} <= names
+
+
+def test_it_is_told_apart_from_a_trial(standard):
+    with pytest.raises(TrialFileError, match=r"no trial of Traction.*/joint_states"):
+        TrialReader(standard)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("S001", "--terrain-db", "x.json", "--standard-rate"),
+        ("S001", "--to", "x", "--standard-rate", "--format", "csv"),
+    ],
+)
+def test_mixed_use_is_refused(recorded, tmp_path, monkeypatch, options):
+    monkeypatch.chdir(tmp_path)
+    done = traction("export", *options, "--data", recorded.data)
+    assert done.code == 2
+    assert "--standard-rate" in done.err
+    assert not list(tmp_path.iterdir())
