@@ -60,8 +60,8 @@ def _described(path: Path) -> list[str]:
     for entity in cast("list[object]", graph):
         known = cast("dict[str, object]", entity if isinstance(entity, dict) else {})
         name = known.get("@id") if known.get("@type") == "File" else None
-        if isinstance(name, str) and _is_below(path := unquote(name)):
-            names.append(path)
+        if isinstance(name, str) and _is_below(file := unquote(name)):
+            names.append(file)
     return names
 
 
