@@ -99,8 +99,8 @@ def _opened(path: Path, scratch: Path) -> LogFile:
     if start.startswith(b"PAR1"):
         raise SettingsError(
             f"{path}: a table in Parquet, no log.",
-            hint="Where it has t, v_t, F_n and F_t: traction fit FILE. States of joints "
-            "alone hold no force of the ground, so no traction follows from them.",
+            hint="Where it has t, v_t, F_n and F_t: traction fit FILE. States of "
+            "joints alone hold no force of the ground: no traction follows from them.",
         )
     if start.startswith(b"#ROSBAG V1"):
         raise damaged(path, "a bag of ROS before 2010", "Convert it: rosbag migrate.")

@@ -1,4 +1,4 @@
-"""rosbag2 logs in SQLite (.db3), opened for reading only; no view or trigger is used."""
+"""rosbag2 logs in SQLite (.db3), opened for reading only; no view or trigger runs."""
 
 from __future__ import annotations
 
@@ -134,7 +134,9 @@ class SqliteLog:
         except SettingsError:
             raise
         except (sqlite3.Error, UnicodeError, ValueError, OverflowError) as error:
-            raise damaged(self.path, f"cannot be read as a database ({error})") from error
+            raise damaged(
+                self.path, f"cannot be read as a database ({error})"
+            ) from error
 
 
 def _as_texts(row: Any) -> list[str]:  # noqa: ANN401
