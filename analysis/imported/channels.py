@@ -5,6 +5,7 @@ from __future__ import annotations
 from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -127,9 +128,14 @@ class WrenchField:
         return tuple(float(part[axis]) for part in (force, torque) for axis in _AXES)
 
 
+def joint_states(log: LogFile) -> list[LogTopic]:
+    """Return the topics that hold states of joints."""
+    return [t for t in log.topics.values() if t.type_name == JOINT_STATE]
+
+
 def choose_joints(log: LogFile, name: str | None) -> LogTopic:
     """Return the topic of the joints; raises SettingsError."""
-    states = [t for t in log.topics.values() if t.type_name == JOINT_STATE]
+    states = joint_states(log)
     if name is not None:
         topic = _named(log, name)
         if topic.type_name != JOINT_STATE:
@@ -258,6 +264,7 @@ def _offer(what: str, option: str, topics: Sequence[LogTopic]) -> str:
     return f"Name that of the {what} by {option}: {names}."
 
 
+@lru_cache(maxsize=256)
 def _type_of(topic: LogTopic) -> MessageType:
     try:
         return message_type(topic.type_name, topic.definition, topic.serialization)
@@ -276,6 +283,24 @@ def stamp_path(kind: MessageType, near: tuple[str, ...]) -> tuple[str, ...] | No
         if (*path, "sec") in paths:
             return path
     return None
+
+
+def stamp_of(topic: LogTopic, data: bytes) -> tuple[int, str]:
+    """Return stamp [UTC ns] and frame of a message that begins with a header.
+
+    0 and "" where it has none, or is damaged.
+    """
+    try:
+        kind = _type_of(topic)
+        first = kind.fields[0]
+        if first.nested is None or first.nested.name != "std_msgs/Header":
+            return 0, ""
+        head = MessageType(kind.name, (first,))
+        header = decoded(data, head, topic.serialization)[first.name]
+    except (SettingsError, MessageError, IndexError):
+        return 0, ""
+    stamp = header["stamp"]
+    return stamp["sec"] * 10**9 + stamp["nanosec"], header["frame_id"]
 
 
 class ChannelReader:
