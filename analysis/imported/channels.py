@@ -313,8 +313,8 @@ class ChannelReader:
         wrench: tuple[LogTopic, WrenchField],
     ) -> None:
         """Say which topics, joints and field are read; raises SettingsError."""
-        self._joints = _Collector(joints, (), 2 * len(names))
-        self._wrench = _Collector(wrench[0], wrench[1].path, _WRENCH_SIZE)
+        self._joints = _TopicRows(joints, (), 2 * len(names))
+        self._wrench = _TopicRows(wrench[0], wrench[1].path, _WRENCH_SIZE)
         self._names = list(names)
         self._field = wrench[1]
         self.incomplete = 0
@@ -388,7 +388,7 @@ def read_wrench(
 ) -> WrenchChannel:
     """Return a wrench alone, e.g. of a log that was recorded for the tare."""
     topic, field = wrench
-    collector = _Collector(topic, field.path, _WRENCH_SIZE)
+    collector = _TopicRows(topic, field.path, _WRENCH_SIZE)
     read_into(log, {collector: field.of})
     rows, clocked = collector.rows(log, clock)
     return WrenchChannel(
@@ -401,7 +401,7 @@ def read_wrench(
     )
 
 
-def read_into(log: LogFile, readers: dict[_Collector, Any]) -> None:
+def read_into(log: LogFile, readers: dict[_TopicRows, Any]) -> None:
     """Read the messages of a log into the collectors of their topics."""
     by_topic = {each.topic.name: (each, row) for each, row in readers.items()}
     for message in log.messages(by_topic):
@@ -409,7 +409,7 @@ def read_into(log: LogFile, readers: dict[_Collector, Any]) -> None:
         collector.take(log, message.received_ns, message.data, row_of)
 
 
-class _Collector:
+class _TopicRows:
     """Gathers the rows of one topic; nine numbers a message at most for a wrench."""
 
     def __init__(self, topic: LogTopic, field: tuple[str, ...], width: int) -> None:

@@ -42,6 +42,8 @@ SURE = 0.005  # s: no lag is known better, the maximum is flat
 SHORTEST_WAY = 0.1  # m in the plane
 LARGEST_MISFIT = 0.003  # m
 _WIDE = 0.02  # m across the way, from which a plane can be told
+_UPRIGHT = 0.1  # of a direction in the ground: nearly along its normal
+_STEEPEST = 0.5  # of the normal along z: ground of 60 degrees
 _SPAN = 3.5  # standard deviations from end to end of an even distribution
 
 
@@ -65,7 +67,9 @@ class Estimate:
 
 
 def find_unloaded(t: Array, wrench: Array, height: Array) -> Bools:
-    """Return the rows of the longest span in which a lifted foot reads the same.
+    """Return the rows of all spans of half a second in which a lifted foot is quiet.
+
+    A sensor that stands otherwise in another of them shows the weight that it carries.
 
     Args:
         t: time [s], shape (n,).
@@ -78,20 +82,17 @@ def find_unloaded(t: Array, wrench: Array, height: Array) -> Bools:
     is_lifted = height > np.nanmin(height) + LIFTED
     step = float(np.median(np.diff(t)))
     is_quiet = is_lifted & _is_quiet(wrench[:, :3], round(_MEAN / step) or 1)
-    best = (0, 0)
+    rows = np.zeros(len(t), bool)
     for first, end in _runs(is_quiet):
-        if t[end - 1] - t[first] > t[max(best[1] - 1, 0)] - t[best[0]]:
-            best = (first, end)
-    first, end = best
-    if end == 0 or t[end - 1] - t[first] < SHORTEST_REST:
+        if t[end - 1] - t[first] >= SHORTEST_REST:
+            rows[first:end] = True
+    if not rows.any():
         raise SettingsError(
             f"No unloaded span of {SHORTEST_REST} s: the foot is nowhere quiet "
             f"{LIFTED * 1e3:.0f} mm above its lowest place.",
             hint="Name one by --tare T0:T1 in seconds of the log, or a log of the free "
             "foot by --tare FILE.",
         )
-    rows = np.zeros(len(t), bool)
-    rows[first:end] = True
     return rows
 
 
@@ -99,7 +100,7 @@ def _is_quiet(force: Array, width: int) -> Bools:
     """Return where forces do not wander from those of the rows around them."""
     noise = np.nanmedian(np.abs(np.diff(force, axis=0)), axis=0) / 0.9539
     kernel = np.ones(width) / width
-    is_quiet = np.isfinite(force).all(axis=1)
+    is_quiet = np.array(np.isfinite(force).all(axis=1))
     filled = np.where(np.isfinite(force), force, 0.0)
     for axis, sd in enumerate(noise):
         mean = np.convolve(filled[:, axis], kernel, "same")
@@ -160,7 +161,8 @@ def tare_of(
         raise SettingsError(
             f"The span of the tare is not unloaded: its halves differ by "
             f"{np.linalg.norm(drift[:3]):.1f} N.",
-            hint="Name one in which the foot is in the air by --tare T0:T1.",
+            hint="Name one in which the foot is in the air by --tare T0:T1; give "
+            "--tool-mass where the sensor carries a weight and turns.",
         )
     spread = np.maximum(drift, sd / np.sqrt(len(rest)))
     tare = Estimate(
@@ -241,8 +243,9 @@ def find_lag(t: Array, v_t: Array, F_n: Array, F_t: Array) -> Lag | None:
             explained = _explained(every.sum(axis=0))
             best = int(explained.argmax())
             if explained[best] >= _EXPLAINED and 0 < best < len(shifts) - 1:
-                each = shifts[[_explained(one).argmax() for one in every]] * step
-                flat = shifts[explained >= explained[best] - _FLAT] * step
+                tops = [int(_explained(one).argmax()) for one in every]
+                each = np.float64(step) * shifts[tops]
+                flat = np.float64(step) * shifts[explained >= explained[best] - _FLAT]
                 return _lag_of(shifts[best] * step, each, flat, step)
     found = force_lag(t, v_t, F_t)
     if found is None:
@@ -343,6 +346,12 @@ def find_ground(foot: Array, given_normal: Array | None) -> tuple[Array, Estimat
         normal = up - (up @ axes[0]) * axes[0]
         how = "across a straight way, level sideways"
     normal = normal / np.linalg.norm(normal) * (1.0 if normal[2] >= 0.0 else -1.0)
+    if normal[2] < _STEEPEST:
+        raise SettingsError(
+            "The pressed foot's way lies in an upright plane: a wall, or forces of "
+            "another kind than those of the ground.",
+            hint="Check the tare and --tool-mass, or give --normal X,Y,Z.",
+        )
     line = centred @ normal
     misfit = float(np.sqrt(np.mean(line**2)))
     if misfit > LARGEST_MISFIT:
@@ -382,7 +391,7 @@ def find_direction(
             "direction.",
             hint="Give --along X,Y,Z in the axes of the base.",
         )
-    if size <= 1e-6 * float(np.linalg.norm(chord)):
+    if size <= _UPRIGHT * float(np.linalg.norm(chord)):
         raise SettingsError(
             "The direction of the slip stands on the ground as its normal does.",
             hint="Check --along and --normal.",

@@ -9,7 +9,7 @@ slip, z_T the normal of the ground:
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -50,7 +50,12 @@ from analysis.imported.motion import (
     seconds_since,
 )
 from analysis.imported.robot import FramePath, RobotLeg, Urdf, read_urdf
-from analysis.imported.signs import Check, sign_checks
+from analysis.imported.signs import (
+    Check,
+    moment_warnings,
+    side_warnings,
+    sign_checks,
+)
 from analysis.imported.velocities import compare_velocities
 from analysis.logs.log_file import LogFile
 from analysis.logs.opening import open_log
@@ -58,6 +63,7 @@ from ft_sensor.payload import Payload, traction
 from wam.model.constants import GRAVITY
 
 Acts = Literal["ground-on-foot", "foot-on-ground"]
+Tare = tuple[float, float] | Path | Array | Literal["none"] | None
 PRESSED_FORCE = 2.0  # N; below it a foot is in the air
 SLOWEST_RATE, USUAL_RATE = 50.0, 100.0  # Hz
 _JOIN = 0.3  # s; a shorter lift parts no stroke
@@ -66,6 +72,7 @@ _ON_GROUND = 0.001  # m above its lowest place at which a foot is not free
 _FORGOTTEN = 1.0  # N that a tared sensor may read in the air
 _TURN_TOLD = 2.0  # degrees of turn under load from which an unknown weight is named
 _LITTLE = 0.1  # kg
+_CHECK_OPTIONS = "check --sensor, --acts, --tare, --along and the URDF"
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +111,7 @@ class ImportRequest:
     acts: Acts
     wrench: str | None = None
     joints: str | None = None
-    tare: tuple[float, float] | Path | Array | Literal["none"] | None = None
+    tare: Tare = None
     mass: float | None = None
     along: Array | None = None
     normal: Array | None = None
@@ -272,7 +279,10 @@ class _Import:
             force = self._force(payload, raw)
         self._say_of_weight(payload.mass, strokes)
         values = traction(axes, self._path.velocity, force)
-        checks = sign_checks(values, force @ axes[1])
+        lateral = force @ axes[1]
+        checks = sign_checks(values, lateral)
+        self._warnings += side_warnings(values, lateral)
+        self._warnings += self._of_moments(payload, raw)
         trials = self._trials(values, raw, force, float(axes[0][2]))
         return ImportedLog(
             request,
@@ -353,7 +363,11 @@ class _Import:
             raw[rows], self._path.sensor[rows], self._sign, mass
         )
         t = self._motion.t[rows]
-        how = "given" if tare is not None else "longest quiet span of the lifted foot"
+        how = (
+            "given"
+            if tare is not None
+            else "quiet spans of the lifted foot, first to last row"
+        )
         ends = (float(t[0]), float(t[-1]))
         span = Estimate("unloaded", ends, "s of the log", (), how)
         return self._with(bias, weight), [span, *estimates], rows
@@ -422,6 +436,11 @@ class _Import:
         """Return the force of the ground on the foot in the base, shape (n, 3)."""
         sensor = self._path.sensor
         return payload.to_base(payload.contact(raw, sensor), sensor)
+
+    def _of_moments(self, payload: Payload, raw: Array) -> list[str]:
+        """Hold the moments against the lever of the foot, in the sensor's axes."""
+        wrench = payload.contact(raw, self._path.sensor)
+        return moment_warnings(wrench[:, 3:], self._path.lever, wrench[:, :3])
 
     def _strokes(self, load: Array) -> list[tuple[int, int]]:
         """Return the stretches in which something presses the foot."""
@@ -558,7 +577,9 @@ class _Import:
             is_foreign=True,
         )
         prepared = prepare_trial(series, PrepareOptions())
-        self._warnings += [f"{name}: {doubt.text}" for doubt in doubts_of(prepared)]
+        for doubt in doubts_of(prepared):
+            remedy = "--lag MS" if doubt.name == "lag" else _CHECK_OPTIONS
+            self._warnings.append(f"{name}: {replace(doubt, remedy=remedy).text}")
         path = self._path
         return ImportedTrial(
             name,

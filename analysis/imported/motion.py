@@ -47,7 +47,7 @@ def joint_motion(channel: JointChannel) -> JointMotion:
     """
     times = seconds_since(channel.clock.times_ns, int(channel.clock.times_ns[0]))
     step = float(np.median(np.diff(times)))
-    grid = np.arange(round(float(times[-1]) / step) + 1) * step
+    grid = np.arange(round(float(times[-1]) / step) + 1, dtype=np.float64) * step
     grid = grid[grid <= times[-1] + 1e-9]
     is_near = covered(times, grid, LONGEST_GAP * step)
     t = grid[is_near]

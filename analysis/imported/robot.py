@@ -14,6 +14,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
+from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -149,8 +150,8 @@ def _parsed(path: Path, data: bytes) -> ET.Element:
         except UnicodeDecodeError as error:
             raise _refused(path, "it is not UTF-8") from error
     depth = count = 0
-    root: ET.Element | None = None
-    parser = ET.XMLPullParser(("start", "end"))
+    root: Any = None
+    parser: Any = ET.XMLPullParser(("start", "end"))
     try:
         for start in range(0, len(data), 65_536):
             parser.feed(data[start : start + 65_536])
@@ -260,11 +261,13 @@ class FramePath:
         foot: position of the foot [m], shape (n, 3).
         velocity: of the foot [m/s], shape (n, 3).
         sensor: orientation, sensor to base, shape (n, 3, 3).
+        lever: from the sensor's origin to the foot, in its axes [m], shape (n, 3).
     """
 
     foot: Array
     velocity: Array
     sensor: Array
+    lever: Array
 
 
 class RobotLeg:
@@ -301,16 +304,18 @@ class RobotLeg:
             qd: velocities [rad/s, m/s], shape (n, joints).
         """
         n, model, data = len(q), self._model, self._data
-        foot, velocity, sensor = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 3, 3))
+        foot, velocity, lever = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 3))
+        sensor = np.empty((n, 3, 3))
         axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         for k in range(n):
             pin.computeJointJacobians(model, data, q[k])
             pin.updateFramePlacements(model, data)
             foot[k] = data.oMf[self._foot].translation
             sensor[k] = data.oMf[self._sensor].rotation
+            lever[k] = data.oMf[self._sensor].actInv(data.oMf[self._foot]).translation
             jacobian = pin.getFrameJacobian(model, data, self._foot, axes)
             velocity[k] = jacobian[:3] @ qd[k]
-        return FramePath(foot, velocity, sensor)
+        return FramePath(foot, velocity, sensor, lever)
 
 
 def _plain_urdf(base: str, joints: Iterable[UrdfJoint]) -> str:

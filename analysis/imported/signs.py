@@ -13,6 +13,9 @@ from analysis.data.series import Array
 _PRESSED = 2.0  # N
 LEAST_PRESSING = 0.95  # share of pressed samples with F_n > 0
 LEAST_BRAKING = 0.80  # share of sliding samples with F_t v_t > 0
+USUAL_ASIDE = 0.3  # of the force along the way; more is named
+_LEAST_MOMENT = 0.02  # N m rms
+_MIRRORED = -0.3  # of the moment that a force at the foot has
 MOST_ASIDE = 1.0  # of the force along the way
 
 
@@ -29,6 +32,55 @@ class Check:
     name: str
     value: float
     limit: str
+
+
+def side_warnings(values: Array, lateral: Array) -> list[str]:
+    """Return that a force across the way tells of a sensor that is turned.
+
+    Args:
+        values: v_t [m/s], F_t [N], F_n [N], shape (n, 3).
+        lateral: force across the way [N], shape (n,).
+    """
+    v_t, F_t, F_n = values.T
+    sliding = (F_n > _PRESSED) & (v_t > SLOWEST)
+    if not sliding.any():
+        return []
+    aside, along = float(np.median(lateral[sliding])), float(np.median(F_t[sliding]))
+    if abs(aside) <= USUAL_ASIDE * along:
+        return []
+    angle = float(np.degrees(np.arctan2(aside, along)))
+    return [
+        f"{aside:+.1f} N across the way, {along:.1f} N along it: are axes exchanged, "
+        f"or is the sensor turned by {angle:+.0f} degrees about the normal? Check "
+        "--sensor, the URDF and --along"
+    ]
+
+
+def moment_warnings(moment: Array, lever: Array, force: Array) -> list[str]:
+    """Return that the moments are those of mirrored axes.
+
+    A force at the foot has the moment r x F about the sensor's origin. Two exchanged
+    axes are a mirror: forces may still look right, moments then have the other sign.
+
+    Args:
+        moment: of the ground about the sensor's origin [N m], shape (n, 3).
+        lever: from there to the foot, same axes [m], shape (n, 3).
+        force: of the ground, same axes [N], shape (n, 3).
+    """
+    expected = np.cross(lever, force)
+    sound = np.isfinite(expected).all(axis=1) & np.isfinite(moment).all(axis=1)
+    sound &= np.linalg.norm(force, axis=1) > _PRESSED
+    power = float(np.sum(expected[sound] ** 2))
+    if not sound.any() or power < np.count_nonzero(sound) * _LEAST_MOMENT**2:
+        return []
+    gain = float(np.sum(moment[sound] * expected[sound])) / power
+    if gain >= _MIRRORED:
+        return []
+    return [
+        f"the moments are {gain:.1f} times those of a force at the foot: two axes of "
+        "the wrench are exchanged, or moments have the other sign. Check --sensor and "
+        "the URDF"
+    ]
 
 
 def sign_checks(values: Array, lateral: Array) -> list[Check]:

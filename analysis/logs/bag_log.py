@@ -9,7 +9,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Collection, Iterator
 from pathlib import Path
-from typing import BinaryIO, Literal
+from typing import BinaryIO
 
 from acquisition.files import open_regular
 from analysis.logs.log_file import (
@@ -33,7 +33,7 @@ _Header = dict[bytes, bytes]
 class BagLog:
     """Implements `analysis.logs.log_file.LogFile`."""
 
-    format: Literal["ROS 1 bag"] = "ROS 1 bag"
+    format = "ROS 1 bag"
 
     def __init__(self, path: Path) -> None:
         """Look at the file once for its topics.

@@ -10,7 +10,7 @@ import struct
 import zlib
 from collections.abc import Collection, Iterator
 from pathlib import Path
-from typing import BinaryIO, Literal
+from typing import BinaryIO
 
 from acquisition.files import open_regular
 from analysis.logs.log_file import (
@@ -37,7 +37,7 @@ _ENCODINGS = ("ros2msg", "ros1msg")
 class McapLog:
     """Implements `analysis.logs.log_file.LogFile`."""
 
-    format: Literal["MCAP"] = "MCAP"
+    format = "MCAP"
 
     def __init__(self, path: Path) -> None:
         """Look at the file once for its topics.

@@ -6,7 +6,7 @@ import sqlite3
 from collections.abc import Collection, Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 from urllib.parse import quote
 
 from acquisition.errors import SettingsError
@@ -34,7 +34,7 @@ _CACHE_KB = 16_000
 class SqliteLog:
     """Implements `analysis.logs.log_file.LogFile`."""
 
-    format: Literal["rosbag2, SQLite"] = "rosbag2, SQLite"
+    format = "rosbag2, SQLite"
 
     def __init__(self, path: Path) -> None:
         """Read which topics there are.

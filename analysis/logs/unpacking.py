@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bz2
+from typing import Any
 
 import lz4.frame  # pyright: ignore[reportMissingTypeStubs]
 import zstandard
@@ -61,7 +62,7 @@ def _bz2(data: bytes, most: int) -> bytes:
 
 
 def _lz4(data: bytes, most: int) -> bytes:
-    unpacker = lz4.frame.LZ4FrameDecompressor()
+    unpacker: Any = lz4.frame.LZ4FrameDecompressor()
     return _whole(unpacker.decompress(data, most + 1), unpacker.eof, most)
 
 

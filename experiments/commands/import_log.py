@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from analysis.data.terrain_kinds import Value
     from analysis.imported.estimates import Estimate
-    from analysis.imported.importing import ImportRequest
+    from analysis.imported.importing import ImportRequest, Tare
 
 EXAMPLES = """\
   traction import log.mcap --urdf robot.urdf --list     topics, rates, links
@@ -210,11 +210,11 @@ def request_of(args: argparse.Namespace) -> ImportRequest:
     )
 
 
-def _tare(
-    text: str | None,
-) -> tuple[float, float] | Path | NDArray[np.float64] | str | None:
-    if text is None or text == "none":
-        return text
+def _tare(text: str | None) -> Tare:
+    if text is None:
+        return None
+    if text == "none":
+        return "none"
     path = Path(text)
     if path.exists():
         return path
