@@ -141,7 +141,10 @@ MAKES = {
 class SensorBench:
     """A sensor on a simulated device, both in one hand."""
 
-    def __init__(self, kind, load=LOAD, line_xor=0, chunk=4096, **options) -> None:
+    def __init__(
+        self, kind, load=LOAD, line_xor=0, chunk=4096, network=None, **options
+    ) -> None:
+        """`network` makes a stream of the device's: what happens on the way."""
         self.make = MAKES[kind]
         self.clock = SteppedTime()
         self.errors = SensorErrors(np.random.default_rng(1))
@@ -151,7 +154,8 @@ class SensorBench:
             self.make.options(**options),
             self.clock.now_ns(),
         )
-        self.port = ChunkedPort(self.device, self.clock, line_xor)
+        stream = network(self.device) if network else self.device
+        self.port = ChunkedPort(stream, self.clock, line_xor)
         self.port.chunk = chunk
         self.clock.world = self.port
         self.driver = self.make.device(
