@@ -18,6 +18,7 @@ _ORDER = 2  # of the local polynomial
 _SPAN = PrepareOptions().smoothing / RATE_HZ  # s: that of the moving average
 LONGEST_GAP = 3.5  # steps that a line may bridge, as in analysis.data.prepare
 _NS = 1e-9
+_LITTLE = 1e-6  # of a step: rounding of times
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,15 +48,29 @@ def joint_motion(channel: JointChannel) -> JointMotion:
     """
     times = seconds_since(channel.clock.times_ns, int(channel.clock.times_ns[0]))
     step = float(np.median(np.diff(times)))
-    grid = np.arange(round(float(times[-1]) / step) + 1, dtype=np.float64) * step
-    grid = grid[grid <= times[-1] + 1e-9]
-    is_near = covered(times, grid, LONGEST_GAP * step)
-    t = grid[is_near]
+    longest = LONGEST_GAP * step
+    # only where there are messages: a log may pause for hours
+    parts = [
+        np.arange(
+            np.ceil(first / step - _LITTLE), np.floor(last / step + _LITTLE) + 1.0
+        )
+        for first, last in _covered_spans(times, longest)
+    ]
+    t: Array = np.concatenate(parts) * np.float64(step)
     q = interpolated(t, times, channel.q)
     qd = np.zeros_like(q)
     for first, end in _stretches(t, step):
         qd[first:end] = _slope(q[first:end], step)
-    return JointMotion(t, step, q, qd, int(np.count_nonzero(~is_near)))
+    dropped = round(float(times[-1]) / step) + 1 - len(t)
+    return JointMotion(t, step, q, qd, max(dropped, 0))
+
+
+def _covered_spans(times: Array, longest: float) -> list[tuple[float, float]]:
+    """Return (first, last) time of every stretch without a gap over `longest` [s]."""
+    breaks = np.flatnonzero(np.diff(times) > longest)
+    firsts = times[np.concatenate([[0], breaks + 1])]
+    lasts = times[np.concatenate([breaks, [len(times) - 1]])]
+    return list(zip(firsts.tolist(), lasts.tolist(), strict=True))
 
 
 def rows_averaged(step: float) -> int:
