@@ -26,6 +26,7 @@ JOINT_STATE = "sensor_msgs/JointState"
 MOST_JOINTS = 10_000
 _AXES = ("x", "y", "z")
 _WRENCH_SIZE = 6
+_ABSURD = 1e9  # N, N m, rad: what is beyond was never measured
 _DISTINCT = 0.9  # share of the messages whose times differ
 _LONGEST_DELAY = 2.0  # s of buffers; where delays differ by more, the stamps jump
 _NS = 1e-9
@@ -96,7 +97,7 @@ class WrenchChannel:
         frame_id: what its header names; empty in many logs.
         clock: when it was.
         wrench: as recorded [N, N m], shape (n, 6).
-        lost_numbers: messages whose numbers were not finite.
+        lost_numbers: messages whose numbers were not finite, or absurd.
     """
 
     topic: LogTopic
@@ -149,7 +150,7 @@ def choose_joints(log: LogFile, name: str | None) -> LogTopic:
     if not states:
         raise SettingsError(
             f"{log.path}: no topic of {JOINT_STATE}, so no motion: without the joints "
-            "there is no velocity of the foot.",
+            f"there is no velocity of the foot.{_losses(log)}",
             hint="Record the joints and the wrench into one log. --list shows the "
             "topics.",
         )
@@ -181,7 +182,7 @@ def choose_wrench(log: LogFile, named: str | None) -> tuple[LogTopic, WrenchFiel
             return log.topics[name], field
         _refuse_counts(log)
         raise SettingsError(
-            f"{log.path}: {len(found) or 'no'} topics with a wrench.",
+            f"{log.path}: {len(found) or 'no'} topics with a wrench.{_losses(log)}",
             hint=_offer("wrench", "--wrench", [log.topics[name] for name in found]),
         )
     name, _, wanted = named.partition(":")
@@ -246,6 +247,11 @@ def _refuse_counts(log: LogFile) -> None:
                 f"{NO_TANGENTIAL}.",
                 hint="Mount a six-axis sensor at the foot and record its wrench.",
             )
+
+
+def _losses(log: LogFile) -> str:
+    """Return what of a log could not be read, as a sentence; "" for nothing."""
+    return "".join(f" Of the log {loss}." for loss in log.losses[:1])
 
 
 def _named(log: LogFile, name: str) -> LogTopic:
@@ -443,7 +449,7 @@ class _TopicRows:
             ) from error
         if row is None or not -(2**63) <= received_ns < 2**63:
             return
-        if not np.isfinite(row).all():
+        if not all(-_ABSURD < value < _ABSURD for value in row):  # nan is not, either
             self.lost_numbers += 1
             return
         self._stamps.append(stamp_ns)
