@@ -72,6 +72,7 @@ _ON_GROUND = 0.001  # m above its lowest place at which a foot is not free
 _FORGOTTEN = 1.0  # N that a tared sensor may read in the air
 _TURN_TOLD = 2.0  # degrees of turn under load from which an unknown weight is named
 _LITTLE = 0.1  # kg
+_OWN = "traction_msgs/Cycle"
 _CHECK_OPTIONS = "check --sensor, --acts, --tare, --along and the URDF"
 
 
@@ -196,6 +197,12 @@ def import_log(request: ImportRequest) -> ImportedLog:
     urdf = read_urdf(request.urdf)
     leg = RobotLeg(urdf, request.foot, request.sensor)
     with open_log(request.log) as log:
+        if any(each.type_name == _OWN for each in log.topics.values()):
+            raise SettingsError(
+                f"{log.path}: this is a trial of Traction: report, fit and export read "
+                "it.",
+                hint="Write: traction export SESSION --to DIR, then traction fit DIR.",
+            )
         topic = choose_wrench(log, request.wrench)
         if request.joints is None and not joint_states(log):
             raise _no_motion(log, request)
