@@ -119,7 +119,7 @@ def doubts_of_record(recorded: RecordedTrial) -> list[Doubt]:
     return [
         *_way(recorded, moving),
         *_sideways(recorded.lateral[moving], F_t[moving]),
-        *_free_moment(wrench[:, :3], wrench[:, 3:]),
+        *free_moment(wrench[:, :3], wrench[:, 3:]),
         *_pressure(recorded, wrench),
     ]
 
@@ -298,7 +298,7 @@ def _sideways(lateral: Array, along: Array) -> Iterator[Doubt]:
         )
 
 
-def _free_moment(force: Array, moment: Array) -> Iterator[Doubt]:
+def free_moment(force: Array, moment: Array) -> Iterator[Doubt]:
     """Judge the part of the moment along the force, which no point of action gives.
 
     A force at a point has no moment along itself; what a sliding sole adds about the

@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 
 from acquisition.errors import SettingsError
-from analysis.data.plausibility import SLOWEST, doubts_of
+from analysis.data.plausibility import SLOWEST, doubts_of, free_moment
 from analysis.data.prepare import PrepareOptions, moving_average, prepare_trial
 from analysis.data.series import Array, TractionSeries
 from analysis.data.terrain_kinds import Value
@@ -55,6 +55,7 @@ from analysis.imported.signs import (
     moment_warnings,
     side_warnings,
     sign_checks,
+    way_warnings,
 )
 from analysis.imported.velocities import compare_velocities
 from analysis.logs.log_file import LogFile
@@ -289,7 +290,12 @@ class _Import:
         lateral = force @ axes[1]
         checks = sign_checks(values, lateral)
         self._warnings += side_warnings(values, lateral)
-        self._warnings += self._of_moments(payload, raw)
+        self._warnings += self._of_moments(payload, raw, values)
+        self._warnings += [
+            text
+            for a, b in strokes
+            for text in way_warnings(self._path.foot[a:b], axes)
+        ]
         trials = self._trials(values, raw, force, float(axes[0][2]))
         return ImportedLog(
             request,
@@ -444,10 +450,14 @@ class _Import:
         sensor = self._path.sensor
         return payload.to_base(payload.contact(raw, sensor), sensor)
 
-    def _of_moments(self, payload: Payload, raw: Array) -> list[str]:
+    def _of_moments(self, payload: Payload, raw: Array, values: Array) -> list[str]:
         """Hold the moments against the lever of the foot, in the sensor's axes."""
         wrench = payload.contact(raw, self._path.sensor)
-        return moment_warnings(wrench[:, 3:], self._path.lever, wrench[:, :3])
+        force, moment = wrench[:, :3], wrench[:, 3:]
+        sliding = (values[:, 0] > SLOWEST) & (values[:, 2] > PRESSED_FORCE)
+        doubts = free_moment(force[sliding], moment[sliding])
+        found = [replace(d, remedy=_CHECK_OPTIONS).text for d in doubts]
+        return [*found, *moment_warnings(moment, self._path.lever, force)]
 
     def _strokes(self, load: Array) -> list[tuple[int, int]]:
         """Return the stretches in which something presses the foot."""

@@ -7,7 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from acquisition.errors import SettingsError
-from analysis.data.plausibility import FEWEST, SLOWEST
+from analysis.data.plausibility import (
+    FEWEST,
+    HEADING,
+    INCLINE,
+    SHORTEST,
+    SLOWEST,
+    UNEVEN,
+)
 from analysis.data.series import Array
 
 _PRESSED = 2.0  # N
@@ -81,6 +88,31 @@ def moment_warnings(moment: Array, lever: Array, force: Array) -> list[str]:
         "the wrench are exchanged, or moments have the other sign. Check --sensor and "
         "the URDF"
     ]
+
+
+def way_warnings(way: Array, axes: Array) -> list[str]:
+    """Return that a stroke goes elsewhere than its direction and ground say.
+
+    Args:
+        way: positions of the pressed foot in one stroke [m], shape (n, 3).
+        axes: rows x_T, y_T, z_T, shape (3, 3).
+    """
+    ahead, aside, above = ((way - way[0]) @ axes.T).T
+    length = float(np.ptp(ahead))
+    if length < SHORTEST:
+        return []
+    found: list[str] = []
+    for option, limit, other in (
+        ("--along or --heading", HEADING, aside),
+        ("--normal or --incline", INCLINE, above),
+    ):
+        angle = float(np.degrees(np.arctan(np.polyfit(ahead, other, 1)[0])))
+        beside = length * np.tan(np.radians(abs(angle)))
+        if abs(angle) > limit and beside > UNEVEN:
+            found.append(
+                f"the foot's way is {angle:+.1f} degrees off {option} (limit {limit:g})"
+            )
+    return found
 
 
 def sign_checks(values: Array, lateral: Array) -> list[Check]:
