@@ -56,7 +56,7 @@ def joint_motion(channel: JointChannel) -> JointMotion:
         )
         for first, last in _covered_spans(times, longest)
     ]
-    t: Array = np.concatenate(parts) * np.float64(step)
+    t: Array = np.concatenate(parts) * np.float64(step) + 0.0  # no -0.0
     q = interpolated(t, times, channel.q)
     qd = np.zeros_like(q)
     for first, end in _stretches(t, step):

@@ -125,11 +125,10 @@ class UdpDevice:
         self.send([data for _, data in packets])
 
     def send(self, packets: Sequence[bytes]) -> None:
-        """Send datagrams to whoever asked last."""
+        """Send datagrams to whoever asked last; to nobody before."""
+        if self._socket is None or self._reader is None:
+            return
         for data in packets:
-            if self._socket is None or self._reader is None:
-                self.overrun += len(data)
-                continue
             try:
                 self._socket.sendto(data, self._reader)
             except OSError:  # full, or the reader has gone
