@@ -382,7 +382,6 @@ class ChannelReader:
     def _indices(self, names: Sequence[str]) -> list[int]:
         if len(names) > MOST_JOINTS:
             raise MessageError(f"it names {len(names)} joints")
-        self.seen = names
         try:
             return [names.index(name) for name in self._names]
         except ValueError:

@@ -44,6 +44,7 @@ class BagLog:
         self.path = path
         self.topics: dict[str, LogTopic] = {}
         self.losses: list[str] = []
+        self.unread: dict[str, str] = {}
         self._connections: dict[int, str] = {}
         for _ in self._records(set()):
             pass

@@ -57,12 +57,14 @@ class LogFile(Protocol):
         format: what it is, in words.
         topics: by name.
         losses: what could not be read, in words; complete after `messages` ended.
+        unread: types and encodings of topics that cannot be read, by name.
     """
 
     path: Path
     format: str
     topics: dict[str, LogTopic]
     losses: list[str]
+    unread: dict[str, str]
 
     def messages(self, topics: Collection[str]) -> Iterator[LogMessage]:
         """Give every message of `topics`, in the order of the file.

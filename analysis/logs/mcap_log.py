@@ -48,7 +48,7 @@ class McapLog:
         self.path = path
         self.topics: dict[str, LogTopic] = {}
         self.losses: list[str] = []
-        self.unread: dict[str, str] = {}  # topics of other encodings
+        self.unread: dict[str, str] = {}
         for _ in self._records(is_whole=False):
             pass
 
@@ -73,9 +73,8 @@ class _Records:
 
     def __init__(self, log: McapLog, *, is_whole: bool) -> None:
         self._log, self._is_whole = log, is_whole
-        self._schemas: dict[int, tuple[str, str, str]] = {}
+        self._schemas: dict[int, tuple[str, str]] = {}  # type, definition
         self._channels: dict[int, str] = {}
-        self._seen: set[int] = set()
 
     def of_file(self, file: BinaryIO) -> Iterator[LogMessage]:
         offset = len(MAGIC)
@@ -150,7 +149,6 @@ class _Records:
             raise damaged(path, f"over {MOST_TOPICS} types")
         self._schemas[number] = (
             short_type(checked_name(path, name, "the name of a type")),
-            encoding,
             checked_definition(path, definition, name),
         )
 
@@ -160,13 +158,14 @@ class _Records:
         encoding, _ = _text(body, at)
         path = self._log.path
         topic = checked_name(path, topic, "the name of a topic")
-        type_name, _, definition = self._schemas.get(schema, ("", "", ""))
+        type_name, definition = self._schemas.get(schema, ("", ""))
         serialization = _SERIALIZATIONS.get(encoding)
         if serialization is None:
             self._log.unread[topic] = f"{type_name or 'no type'}, {encoding[:40]}"
-            return
-        if len(self._log.topics) >= MOST_TOPICS:
+        if len(self._log.topics) + len(self._log.unread) > MOST_TOPICS:
             raise damaged(path, f"over {MOST_TOPICS} topics")
+        if serialization is None:
+            return
         self._channels[number] = topic
         self._log.topics[topic] = LogTopic(topic, type_name, serialization, definition)
 

@@ -49,8 +49,10 @@ class LogOfParts:
         self.format = f"{parts[0].format}, {len(parts)} files"
         self.losses: list[str] = []
         self.topics: dict[str, LogTopic] = {}
+        self.unread: dict[str, str] = {}
         for part in parts:
             self.topics |= part.topics
+            self.unread |= part.unread
         self._parts = parts
 
     def messages(self, topics: Collection[str]) -> Iterator[LogMessage]:

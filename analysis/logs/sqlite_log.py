@@ -44,6 +44,7 @@ class SqliteLog:
         """
         self.path = path
         self.losses: list[str] = []
+        self.unread: dict[str, str] = {}
         self.topics: dict[str, LogTopic] = {}
         self._numbers: dict[int, str] = {}
         with self._opened() as database:
@@ -111,6 +112,7 @@ class SqliteLog:
         for number, *texts in rows:
             name, kind, serialization = _as_texts(texts)
             if serialization != "cdr" or not isinstance(number, int):
+                self.unread[name[:100]] = f"{kind[:100]}, {serialization[:40]}"
                 continue
             name = checked_name(self.path, name, "the name of a topic")
             kind = short_type(checked_name(self.path, kind, "the name of a type"))

@@ -42,6 +42,8 @@ def list_log(path: Path, urdf: Path | None, console: Console) -> None:
         console.say(f"{path}: {log.format}, {len(log.topics)} topics")
         for name, topic in list(log.topics.items())[:_MOST]:
             console.say(_line(topic, times[name], frames.get(name, "")))
+        for name, about in list(log.unread.items())[:_MOST]:
+            console.say(f"  {name}  {about}: not read")
         for loss in log.losses:
             console.say(f"{WARNING} {loss}")
     if urdf is not None:

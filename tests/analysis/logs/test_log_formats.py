@@ -5,6 +5,7 @@ import sqlite3
 import numpy as np
 import pytest
 import zstandard
+from mcap.writer import Writer
 
 from acquisition.errors import SettingsError
 from analysis.logs.opening import open_log
@@ -68,6 +69,21 @@ def test_a_cut_log_is_read_to_where_it_was_cut(logs, tmp_path, name, share):
     assert len(losses) == 1
     assert "nothing is read behind byte" in losses[0]
     assert len(found) < 2400
+
+
+def test_a_topic_of_another_encoding_is_told_and_not_read(tmp_path):
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        schema = writer.register_schema("foxglove.Log", "jsonschema", b"{}")
+        channel = writer.register_channel("/log", "json", schema)
+        writer.add_message(channel, 1, b"{}", 1)
+        writer.finish()
+    with open_log(path) as log:
+        assert log.topics == {}
+        assert log.unread == {"/log": "foxglove.Log, json"}
+        assert list(log.messages(["/log"])) == []
 
 
 def test_what_is_no_log_is_refused(tmp_path):
