@@ -1,4 +1,4 @@
-"""What one frame of a serial wrist sensor costs, from bytes to a dated sample.
+"""What one frame of a wrist sensor costs, from bytes to a dated sample.
 
     python -m benchmarks.parsing [--frames 20000]
 
@@ -16,6 +16,7 @@ from fakes.sensor.kinds import SERIAL_KINDS, SensorChoice, make_stream
 from ft_sensor.serial_line.link import PortSettings
 from ft_sensor.serial_line.sensor import SerialDevice
 from ft_sensor.serial_line.timestamps import SampleTimestamper
+from ft_sensor.vendors.ati_device import AtiDevice, AtiSettings
 from ft_sensor.vendors.bota_device import BotaDevice, BotaSettings
 from ft_sensor.vendors.optoforce_device import OptoForceDevice, OptoForceSettings
 from ft_sensor.vendors.robotous_device import RobotousDevice, RobotousSettings
@@ -24,6 +25,7 @@ GOAL_US = 20.0
 PIECE_NS = 3_000_000
 ROUNDS = 9
 CLOCK = SystemClock()
+RANGES = (130.0, 130.0, 400.0, 10.0, 10.0, 10.0)
 SENSITIVITY = (18.28, 18.41, 2.12, 278.72, 259.55, 448.47)
 
 
@@ -34,6 +36,9 @@ def devices() -> dict[str, SerialDevice]:
         "robotous": RobotousDevice(PortSettings("none", 921600), RobotousSettings()),
         "optoforce": OptoForceDevice(
             PortSettings("none", 1_000_000), OptoForceSettings(SENSITIVITY, "HEX00042")
+        ),
+        "ati": AtiDevice(
+            PortSettings("none", 100_000_000), AtiSettings(1e6, 1e6, RANGES)
         ),
     }
 

@@ -41,6 +41,7 @@ COMMANDS = {
     "replay": "replay a trial, or decode a bus log",
     "watch": "serve the running session to a second screen, read only",
     "export": "write trials as CSV or Parquet tables with units and checksums",
+    "import": "make trials from the log of another robot and its URDF",
     "publish": "write recordings, tables and results as an RO-Crate for an archive",
     "init": "write rig.toml and matrix.toml to be edited",
     "setup": "print or install what the computer at the arm needs",
@@ -52,6 +53,7 @@ COMMANDS = {
     "identify": "classify the terrain of a trial: probabilities over time",
     "fit": "fit and compare models of external data, npz or CSV",
 }
+_MODULES = {"import": "import_log"}  # where a command has a name that Python keeps
 _OF_THE_DISK = {
     errno.EIO,
     errno.ENOSPC,
@@ -135,7 +137,8 @@ def build_parser(wanted: Collection[str] = COMMANDS) -> argparse.ArgumentParser:
         if name not in wanted:
             commands.add_parser(name, help=help_text)
             continue
-        command = importlib.import_module(f"experiments.commands.{name}")
+        module = _MODULES.get(name, name)
+        command = importlib.import_module(f"experiments.commands.{module}")
         child = commands.add_parser(
             name,
             help=help_text,

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from acquisition.settings import File, Number, SettingsSection, Usual, Whole
 from ft_sensor.reading import Wrench
-from ft_sensor.serial_line.link import PortSettings
+from ft_sensor.serial_line.link import OpenedPort, PortSettings, open_port
 from ft_sensor.serial_line.sensor import SerialDevice
 
 
@@ -38,6 +38,10 @@ class SensorSection(SettingsSection):
     def known_ranges(self) -> Wrench | None:
         """Return what it measures at most [N, N m]; None = it has to be asked."""
         return None
+
+    def open_port(self, port: str) -> OpenedPort:
+        """Open the serial device at the path `port`; raises LinkError."""
+        return open_port(port, self.baudrate)
 
     def build(self, line: PortSettings) -> SerialDevice | None:
         """Return the serial sensor at the end of `line`; None if it is on the bus.

@@ -44,7 +44,9 @@ class TableOrigin(BaseModel):
         logs: numbers among the factors that are compared by their logarithm.
         force_age: how much older than the joints the forces are [s].
         simulated: the devices were simulated.
-        recording: SHA-256 of the recorded trial.
+        recording: SHA-256 of the recorded trial, or of the log it was imported from.
+        imported: it comes from the log of another robot; `import.json` tells how.
+        rig: name of that robot.
     """
 
     model_config = ConfigDict(frozen=True, extra="ignore")
@@ -60,6 +62,8 @@ class TableOrigin(BaseModel):
     force_age: float = Field(default=0.0, ge=-1, le=1)
     simulated: bool = False
     recording: str = Field(default="", max_length=64)
+    imported: bool = False
+    rig: str = Field(default="", max_length=200)
 
     @field_validator("factors")
     @classmethod

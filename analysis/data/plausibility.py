@@ -95,6 +95,8 @@ def _doubts_of(trial: PreparedTrial) -> list[Doubt]:
     if units:
         return units
     late = list(_timing(trial))
+    if _is_numbered(smooth):
+        late.append(_NUMBERED)
     sliding = (np.abs(smooth.v_t) > SLOWEST) & (np.abs(smooth.F_n) > PRESSED)
     if np.count_nonzero(sliding) < FEWEST:
         return late
@@ -117,7 +119,7 @@ def doubts_of_record(recorded: RecordedTrial) -> list[Doubt]:
     return [
         *_way(recorded, moving),
         *_sideways(recorded.lateral[moving], F_t[moving]),
-        *_free_moment(wrench[:, :3], wrench[:, 3:]),
+        *free_moment(wrench[:, :3], wrench[:, 3:]),
         *_pressure(recorded, wrench),
     ]
 
@@ -146,12 +148,31 @@ def _units(smooth: Smoothed) -> Iterator[Doubt]:
     for name, value, limit, unit, looks in (
         ("v_t", fastest, _FASTEST, "m/s", "mm/s"),
         ("F_n", strongest, _STRONGEST, "N", "mN"),
-        ("t", step, _RAREST, "s between samples", "ms"),
+        (
+            "t",
+            0.0 if _is_numbered(smooth) else step,
+            _RAREST,
+            "s between samples",
+            "ms",
+        ),
     ):
         if value > limit:
             yield _unit(name, value, unit, looks)
     if 0.0 < strongest < _WEAKEST:
         yield _unit("F_n", strongest, "N", "kN")
+
+
+def _is_numbered(smooth: Smoothed) -> bool:
+    """Return whether the times are 0, 1, 2, ...: numbers of rows."""
+    return bool((np.diff(smooth.t) == 1.0).all() and smooth.t[0] in (0.0, 1.0))
+
+
+_NUMBERED = Doubt(
+    "unit",
+    "t counts the rows: 0, 1, 2, ...",
+    "rows are conditions or means, not samples of a motion",
+    "slips and lags are not to be seen in them",
+)
 
 
 def _unit(name: str, value: float, unit: str, looks: str) -> Doubt:
@@ -277,7 +298,7 @@ def _sideways(lateral: Array, along: Array) -> Iterator[Doubt]:
         )
 
 
-def _free_moment(force: Array, moment: Array) -> Iterator[Doubt]:
+def free_moment(force: Array, moment: Array) -> Iterator[Doubt]:
     """Judge the part of the moment along the force, which no point of action gives.
 
     A force at a point has no moment along itself; what a sliding sole adds about the

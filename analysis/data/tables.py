@@ -198,7 +198,7 @@ class _TableForm:
             stamped_lag=origin.force_age,
             is_prepared=table.is_prepared,
             is_simulated=origin.simulated or table.is_simulated is True,
-            is_foreign=not origin.session,
+            is_foreign=origin.imported or not origin.session,
             notes=tuple(notes),
             further=table.further,
         )

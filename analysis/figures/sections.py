@@ -16,6 +16,7 @@ class ReportSection(Enum):
     COMMISSIONING = "Steps of the commissioning"
     HEALTH = "Rig health"
     REACH = "Measurement limits"
+    IMPORTED = "Imported"
     ORIGIN = "Analysis settings and provenance"
 
     @property

@@ -7,7 +7,7 @@ import numpy as np
 
 from acquisition.errors import SettingsError
 from analysis.data.events import find_slips
-from analysis.data.plausibility import doubts_of, summed_up
+from analysis.data.plausibility import FEWEST, doubts_of, summed_up
 from analysis.data.prepare import (
     MINIMUM_KEPT,
     PreparedTrial,
@@ -42,6 +42,9 @@ from analysis.study.trial_components import (
     TrialComponents,
     fit_components,
 )
+
+_LOADED = 5.0  # N: below it F_t/F_n says little, whatever the ground
+_PLOUGHING = 1.5  # of F_t/F_n in the upper quarter; stones of one layer stay below
 
 
 @dataclass(frozen=True, slots=True)
@@ -336,6 +339,7 @@ def _warnings(result: TerrainResult, has_container: bool) -> list[str]:
     repeated = sum(trial.repeated_rows for trial in result.trials)
     if repeated:
         warnings.append(f"{result.terrain}: {repeated} duplicate rows were dropped.")
+    warnings += _ploughing(result)
     constant = [name for name in ("F_n", "v_t") if _is_constant(result.trials, name)]
     if constant:
         warnings.append(
@@ -343,6 +347,26 @@ def _warnings(result: TerrainResult, has_container: bool) -> list[str]:
             "is not identifiable."
         )
     return warnings
+
+
+def _ploughing(result: TerrainResult) -> list[str]:
+    """Return that a terrain's traction is not that of friction, at loads that count."""
+    F_n, F_t = (
+        np.concatenate([getattr(trial, name) for trial in result.trials])
+        for name in ("F_n", "F_t")
+    )
+    loaded = F_n >= _LOADED
+    if np.count_nonzero(loaded) < FEWEST:
+        return []
+    ratio = F_t[loaded] / F_n[loaded]
+    low, high = np.quantile(ratio, (0.25, 0.75))
+    if high <= _PLOUGHING:
+        return []
+    return [
+        f"{result.terrain}: F_t/F_n is {low:.2f} to {high:.2f} in the middle half of "
+        f"the samples with F_n >= {_LOADED:g} N: a foot that ploughs, not friction "
+        "alone; mu is a poor summary here."
+    ]
 
 
 def _is_constant(trials: Sequence[PreparedTrial], column: str) -> bool:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from analysis.data.series import TractionSeries
+    from analysis.report.page_model import ReportTable
 
 EXAMPLES = """\
   traction fit trials.npz --to fit
@@ -100,7 +101,10 @@ def run(args: argparse.Namespace) -> int:
         is_simulated=study.simulated,
         is_foreign=True,
         generated_utc=iso_utc(SystemClock().utc_ns()),
-        tables=[side_by_side(choice, study, other) for choice, other in others],
+        tables=[
+            *(side_by_side(choice, study, other) for choice, other in others),
+            *_import_tables(args.files),
+        ],
         further_numbers={
             "what_if": [plain_choice(c, study, other) for c, other in others]
         },
@@ -139,6 +143,16 @@ def _load(args: argparse.Namespace) -> dict[str, list[TractionSeries]]:
         decimal=args.decimal,
         inputs=parse_inputs(args.inputs) if args.inputs else (),
     )
+
+
+def _import_tables(files: Sequence[Path]) -> list[ReportTable]:
+    """Return what the folders of imported trials tell of themselves."""
+    from analysis.imported.record import read_record
+    from analysis.report.import_page import import_tables
+
+    folders = dict.fromkeys(path if path.is_dir() else path.parent for path in files)
+    records = [read_record(folder) for folder in folders]
+    return [t for record in records if record for t in import_tables(record)]
 
 
 def _refuse_repeated(trials: Mapping[str, Sequence[TractionSeries]]) -> None:

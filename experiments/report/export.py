@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from acquisition.clock import SystemClock
 from acquisition.errors import SessionError, TrialFileError
@@ -22,6 +23,7 @@ from experiments.operator.console import WARNING, Console
 from experiments.report.checksums import SUMS, digest_of, write_sums
 from experiments.report.quantities import KEPT, QUANTITIES, kept_rule
 from experiments.report.table_columns import (
+    Quantity,
     TableColumn,
     columns_of,
     csv_of,
@@ -41,7 +43,7 @@ _METADATA = (
     "tread",
     "simulated",
 )
-_DICTIONARY_MEANINGS = {
+DICTIONARY_MEANINGS = {
     "table": "file, the first trial in the place of all",
     "column": "its name without the unit",
     "unit": "of the numbers; empty for words",
@@ -196,7 +198,7 @@ def export_sessions(
     index = {**_INDEX_MEANINGS, **columns}
     writer.add_texts(INDEX, rows, index, "The trials.")
     meanings = dictionary_rows(form)
-    writer.add_texts(DICTIONARY, meanings, _DICTIONARY_MEANINGS, "Every column.")
+    writer.add_texts(DICTIONARY, meanings, DICTIONARY_MEANINGS, "Every column.")
     what = f"Kept trials of {', '.join(s.id for s in sessions)}"
     is_simulated = sessions[0].is_simulated
     writer.finish(what, "SIMULATED trials." if is_simulated else "Recorded trials.")
@@ -254,13 +256,8 @@ def dictionary_rows(form: str) -> list[list[str]]:
     The resolution is that of the instrument, the largest rounding what was lost when
     the number was written, both in the unit of the column.
     """
-    rows: list[list[str]] = []
-    for table, quantities in ((f"T01.{form}", QUANTITIES), (f"T01.kept.{form}", KEPT)):
-        for q in quantities:
-            is_number = q.kind == "number"
-            steps = [f"{q.resolution:g}", f"{0.5 * 10.0**-q.decimals:g}"]
-            about = [q.unit, q.frame, q.kind, *(steps if is_number else ["", ""])]
-            rows += [[table, name, *about, q.meaning] for name in q.names]
+    rows = column_rows(f"T01.{form}", QUANTITIES)
+    rows += column_rows(f"T01.kept.{form}", KEPT)
     rule = kept_rule(PrepareOptions())
     about = ["", "", "rule", "", ""]
     rows.append([f"T01.kept.{form}", "(which rows)", *about, rule])
@@ -268,6 +265,17 @@ def dictionary_rows(form: str) -> list[list[str]]:
         [INDEX, name, "", "", "string", "", "", meaning]
         for name, meaning in _INDEX_MEANINGS.items()
     ]
+
+
+def column_rows(table: str, quantities: Sequence[Quantity[Any]]) -> list[list[str]]:
+    """Return what every column of a table means, a row each."""
+    rows: list[list[str]] = []
+    for q in quantities:
+        is_number = q.kind == "number"
+        steps = [f"{q.resolution:g}", f"{0.5 * 10.0**-q.decimals:g}"]
+        about = [q.unit, q.frame, q.kind, *(steps if is_number else ["", ""])]
+        rows += [[table, name, *about, q.meaning] for name in q.names]
+    return rows
 
 
 def make_empty(folder: Path) -> None:

@@ -185,7 +185,8 @@ def typed_wrongly(settings: Settings, wrong: str) -> Settings:
 
 def sensor_metadata(section: AnySensor) -> dict[str, Any]:
     """Return which simulated sensor fits the settings, in plain values."""
-    options = {"kind", "sinc", "baudrate", "sensitivity", "serial_number"}
+    options = {"kind", "sinc", "baudrate", "sensitivity", "serial_number", "rate"}
+    options |= {"counts_per_force", "counts_per_torque"}
     return section.model_dump(include=options)
 
 

@@ -31,7 +31,6 @@ from experiments.rig.law_calibrations import LawCalibrations, build_law
 from experiments.rig.services import ControlService, SensorService
 from experiments.settings.matrix import TerrainRow
 from experiments.settings.rig import RigSettings
-from ft_sensor.serial_line.link import open_port
 from ft_sensor.serial_line.reconnect import ReconnectingSensor, stream_metadata
 from ft_sensor.serial_line.sensor import SerialSensor
 from wam.bus.link import CanLink
@@ -227,7 +226,7 @@ class SensorWorker:
     def _connect(self) -> SerialSensor:
         settings = self._context.settings
         rig = RigSettings.model_validate(settings["rig"])
-        port = open_port(settings["port"], rig.ft_sensor.baudrate).port
+        port = rig.ft_sensor.open_port(settings["port"]).port
         is_simulated = bool(settings["is_simulated"])
         return build_sensor(rig, port, self._clock, is_simulated=is_simulated)
 

@@ -81,6 +81,7 @@ class BotaFirmware:
     """
 
     frame_size = bota.FRAME_SIZE
+    is_checked = False
 
     def __init__(self, options: BotaOptions, start_ns: int) -> None:
         self.baudrate = options.baudrate

@@ -49,8 +49,10 @@ class Firmware(Protocol):
         on_since_ns: when its power was switched on, or it reset itself.
         clock_rate: how fast its clock runs, 1 = right.
         frame_size: [bytes].
+        is_checked: a frame that was damaged on its way does not arrive.
     """
 
+    is_checked: bool
     baudrate: int
     schedule: SampleSchedule | None
     on_since_ns: int

@@ -2,15 +2,19 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
+from fakes.sensor.ati import COUNTS, AtiOptions, ati_stream
 from fakes.sensor.bota import BotaOptions, bota_stream
 from fakes.sensor.errors import SensorErrors
+from fakes.sensor.network import UdpDevice
 from fakes.sensor.optoforce import (
     SENSITIVITY,
     SERIAL_NUMBER,
     OptoForceOptions,
     optoforce_stream,
 )
+from fakes.sensor.pty import SerialPty
 from fakes.sensor.robotous import RobotousOptions, robotous_stream
 from fakes.sensor.stream import SensorStream, Source
 from ft_sensor.reading import Wrench
@@ -23,11 +27,15 @@ class SensorChoice:
     """A wrist sensor that fits a rig.toml.
 
     Attributes:
-        kind: "bota", "robotous", "optoforce", or "barrett" on the arm's bus.
+        kind: "bota", "robotous", "optoforce", "ati" on the network, or "barrett" on the
+            arm's bus.
         sinc: filter length that a bota is found running with.
         baudrate: speed of the line [bit/s]; None = the usual one of the kind.
         sensitivity: of an optoforce [counts/N, counts/N m]; None = of the fake's own.
         serial_number: of an optoforce; None = the fake's own.
+        rate: of an ati [Hz].
+        counts_per_force: of an ati [counts/N]; None = the fake's own.
+        counts_per_torque: of an ati [counts/N m]; None = the fake's own.
     """
 
     kind: str = "bota"
@@ -35,6 +43,9 @@ class SensorChoice:
     baudrate: int | None = None
     sensitivity: Wrench | None = None
     serial_number: str | None = None
+    rate: int = 1000
+    counts_per_force: float | None = None
+    counts_per_torque: float | None = None
 
     @property
     def is_on_bus(self) -> bool:
@@ -88,6 +99,20 @@ def _optoforce(
     return optoforce_stream(source, errors, options, t_ns)
 
 
+def _ati(
+    choice: SensorChoice, source: Source, errors: SensorErrors | None, t_ns: int
+) -> SensorStream:
+    force, torque = choice.counts_per_force, choice.counts_per_torque
+    options = AtiOptions(
+        counts=(force or COUNTS[0], torque or COUNTS[1]),
+        rate=choice.rate,
+        is_running=True,
+        baudrate=choice.baudrate or AtiOptions().baudrate,
+        clock_error_ppm=DRIFT_PPM,
+    )
+    return ati_stream(source, errors, options, t_ns)
+
+
 _Maker = Callable[
     [SensorChoice, Source, SensorErrors | None, int],
     SensorStream,
@@ -96,5 +121,27 @@ _MAKERS: dict[str, _Maker] = {
     "bota": _bota,
     "robotous": _robotous,
     "optoforce": _optoforce,
+    "ati": _ati,
 }
 SERIAL_KINDS = tuple(_MAKERS)
+
+
+def plug(
+    choice: SensorChoice, stream: SensorStream, t_ns: int, link: Path | None
+) -> SerialPty | UdpDevice:
+    """Return a sensor's end of the wire that it has: a serial line or the network.
+
+    Args:
+        choice: which sensor.
+        stream: what it says.
+        t_ns: when it is plugged in.
+        link: name of the line that stays; on the network its last part may be
+            ADDRESS:PORT, else any port is taken.
+
+    Raises:
+        OSError: the name or the port is taken.
+    """
+    if choice.kind != "ati":
+        return SerialPty(stream, t_ns, link)
+    _, _, port = (link.name if link is not None else "").partition(":")
+    return UdpDevice(stream, t_ns, int(port) if port.isdecimal() else 0)

@@ -184,12 +184,14 @@ class SensorStream:
         if self._wire_free_ns > t_ns + period_ns:
             self._is_skipping = True  # the line is too slow for the rate
             return
-        data = self.firmware.frame(self._measured(t_ns, wrench), self.status)
+        whole = data = self.firmware.frame(self._measured(t_ns, wrench), self.status)
         self._is_skipping = False
         if self._fault is not None:
             data = damage(data, *self._fault)
             self._fault = None
-        self._send(t_ns, self.faults.carry(data))
+        data = self.faults.carry(data)
+        if data == whole or not self.firmware.is_checked:
+            self._send(t_ns, data)
 
     def _measured(self, t_ns: int, wrench: Sequence[float]) -> Measurement:
         warmth = 0.0 if self.errors is None else self.errors.warmth

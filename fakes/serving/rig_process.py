@@ -20,6 +20,8 @@ from acquisition.simulation import (
 from acquisition.temporary_folders import temporary_folder
 from fakes.bus.hub import SocketHub
 from fakes.pucks.wire import WiredNetwork
+from fakes.sensor.kinds import plug
+from fakes.sensor.network import UdpDevice
 from fakes.sensor.pty import SerialPty
 from fakes.truth import Truth, truth_records
 from fakes.world.plain_world import simulated_rig
@@ -33,9 +35,9 @@ LINGER_NS = 5_000_000_000  # an arm whose console has died is idled within this
 
 
 class PtyCable:
-    """Implements `fakes.world.faults.Cable` over a pseudo-terminal."""
+    """Implements `fakes.world.faults.Cable` over a pseudo-terminal or loopback."""
 
-    def __init__(self, pty: SerialPty, clock: WorldClock) -> None:
+    def __init__(self, pty: SerialPty | UdpDevice, clock: WorldClock) -> None:
         self._pty = pty
         self._clock = clock
 
@@ -64,7 +66,8 @@ class RigServer:
         self._channel = channel
         self._hub = SocketHub(folder / "can")
         now_ns = self._clock.now_ns()
-        self._pty = SerialPty(self._rig.stream, now_ns, folder / "sensor")
+        choice = rig.scene.sensor
+        self._pty = plug(choice, self._rig.stream, now_ns, folder / "sensor")
         rig.lay_cable(PtyCable(self._pty, clock))
         self._can_path = folder / "can"
         self._server = RpcServer(

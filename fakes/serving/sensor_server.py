@@ -9,8 +9,7 @@ from acquisition.clock import Clock
 from acquisition.errors import SettingsError
 from fakes.randomness import trial_generator
 from fakes.sensor.errors import SensorErrors
-from fakes.sensor.kinds import SensorChoice, make_stream
-from fakes.sensor.pty import SerialPty
+from fakes.sensor.kinds import SensorChoice, make_stream, plug
 from fakes.sensor.stream import Source
 from fakes.world_clock import TICK_NS, WorldClock
 from wam.model.constants import GRAVITY
@@ -42,7 +41,7 @@ class SensorServer:
         errors = SensorErrors(trial_generator(_SEED, "home", 0))
         stream = make_stream(line.choice, source, errors, now_ns)
         try:
-            self._pty = SerialPty(stream, now_ns, line.path)
+            self._pty = plug(line.choice, stream, now_ns, line.path)
         except OSError as error:
             raise SettingsError(
                 f"--serial {line.path} cannot be served ({error.strerror}).",

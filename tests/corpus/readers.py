@@ -35,9 +35,15 @@ from ft_sensor.calibration.files import payload_from_toml, terrain_from_toml
 from ft_sensor.calibration.sensor_file import sensor_from_toml
 from ft_sensor.reading import StreamTiming
 from ft_sensor.serial_line.timestamps import SampleTimestamper
-from ft_sensor.vendors import bota, optoforce, robotous
+from ft_sensor.vendors import ati, bota, optoforce, robotous
 from tests.corpus.copied_session import use_lines, use_names
 from tests.corpus.foresight import read_foreseen, read_models
+from tests.corpus.logs import (
+    read_definition,
+    read_import_record,
+    read_log,
+    read_urdf_bytes,
+)
 from tests.corpus.used_session import use
 from wam.bus.decoder import BusReader
 from wam.bus.frames import (
@@ -206,6 +212,7 @@ def _sensor(data: bytes, _: Path) -> None:
         bota.scanner(_RANGES),
         robotous.scanner(lambda: 1000.0),
         optoforce.scanner(_RANGES),
+        ati.RdtScanner(_RANGES, _RANGES),
     )
     for scanner in scanners:
         timestamper = SampleTimestamper(_TIMING)
@@ -278,6 +285,12 @@ READERS: dict[str, Callable[[bytes, Path], None]] = {
     "journal-lines": use_lines,
     "session-names": use_names,
     "bundle": _bundle,
+    "log-bag": read_log("log.bag"),
+    "log-mcap": read_log("log.mcap"),
+    "log-db3": read_log("log.db3"),
+    "urdf": read_urdf_bytes,
+    "definition": read_definition,
+    "import-record": read_import_record,
 }
 RESULTS = """\
 terrain,model,fold,quantity,value,unit

@@ -32,6 +32,7 @@ from tests.acquisition.trials import (
     write_trial,
 )
 from tests.corpus.copied_session import all_lines, all_names
+from tests.corpus.logs import log_samples
 from tests.corpus.readers import PACKAGED, RESULTS, RUNNING
 from tests.corpus.used_session import session_file
 from wam.bus.frames import encode_force, encode_position, encode_torques
@@ -303,4 +304,5 @@ def samples() -> dict[str, bytes]:
         "sensor": _stream(),
         "journal-lines": all_lines(),
         "session-names": all_names(),
+        **log_samples(),
     }

@@ -9,6 +9,7 @@ import numpy as np
 from acquisition.devices import WrenchSample
 from fakes.pucks.ft_puck import Load
 from fakes.pucks.options import NetworkOptions
+from fakes.sensor.ati import COUNTS, RANGES, AtiOptions, ati_stream
 from fakes.sensor.bota import BotaOptions, bota_stream
 from fakes.sensor.errors import SensorErrors
 from fakes.sensor.optoforce import (
@@ -22,6 +23,7 @@ from fakes.sensor.robotous import RobotousOptions, robotous_stream
 from fakes.sensor.stream import SensorStream
 from ft_sensor.serial_line.link import PortSettings, SerialLink
 from ft_sensor.serial_line.sensor import SerialDevice, SerialSensor
+from ft_sensor.vendors.ati_device import AtiDevice, AtiSettings
 from ft_sensor.vendors.barrett import BarrettSensor
 from ft_sensor.vendors.bota_device import BotaDevice, BotaSettings
 from ft_sensor.vendors.optoforce_device import OptoForceDevice, OptoForceSettings
@@ -82,6 +84,7 @@ class Make:
     has_clock: bool
     quiet_start: dict[str, Any]
     running_start: dict[str, Any]
+    is_checked: bool = False  # the network drops what is damaged
 
 
 MAKES = {
@@ -120,13 +123,28 @@ MAKES = {
         {},
         {"is_running": True},
     ),
+    "ati": Make(
+        ati_stream,
+        AtiOptions,
+        lambda line: AtiDevice(line, AtiSettings(*COUNTS, RANGES)),
+        100_000_000,
+        1000.0,
+        (1e-6,) * 6,
+        True,
+        {},
+        {"is_running": True},
+        is_checked=True,
+    ),
 }
 
 
 class SensorBench:
     """A sensor on a simulated device, both in one hand."""
 
-    def __init__(self, kind, load=LOAD, line_xor=0, chunk=4096, **options) -> None:
+    def __init__(
+        self, kind, load=LOAD, line_xor=0, chunk=4096, network=None, **options
+    ) -> None:
+        """`network` makes a stream of the device's: what happens on the way."""
         self.make = MAKES[kind]
         self.clock = SteppedTime()
         self.errors = SensorErrors(np.random.default_rng(1))
@@ -136,7 +154,8 @@ class SensorBench:
             self.make.options(**options),
             self.clock.now_ns(),
         )
-        self.port = ChunkedPort(self.device, self.clock, line_xor)
+        stream = network(self.device) if network else self.device
+        self.port = ChunkedPort(stream, self.clock, line_xor)
         self.port.chunk = chunk
         self.clock.world = self.port
         self.driver = self.make.device(

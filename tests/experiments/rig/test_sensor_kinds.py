@@ -21,8 +21,17 @@ OPTOFORCE = """kind = "optoforce"
 sensitivity = [18.28, 18.41, 2.12, 278.72, 259.55, 448.47]
 serial_number = "HEX00042"
 """
-KINDS = {"robotous": 'kind = "robotous"', "optoforce": OPTOFORCE}
-NAMES = {"robotous": "Robotous RFT60-HA01", "optoforce": "OptoForce / OnRobot HEX"}
+ATI = """kind = "ati"
+counts_per_force = 1000000.0
+counts_per_torque = 1000000.0
+ranges = [130.0, 130.0, 400.0, 10.0, 10.0, 10.0]
+"""
+KINDS = {"robotous": 'kind = "robotous"', "optoforce": OPTOFORCE, "ati": ATI}
+NAMES = {
+    "robotous": "Robotous RFT60-HA01",
+    "optoforce": "OptoForce / OnRobot HEX",
+    "ati": "ATI network F/T sensor",
+}
 
 
 @pytest.fixture

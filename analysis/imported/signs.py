@@ -1,0 +1,167 @@
+"""Whether a force can be that of the ground: its signs while the foot is pressed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from acquisition.errors import SettingsError
+from analysis.data.plausibility import (
+    FEWEST,
+    HEADING,
+    INCLINE,
+    SHORTEST,
+    SLOWEST,
+    UNEVEN,
+)
+from analysis.data.series import Array
+
+_PRESSED = 2.0  # N
+LEAST_PRESSING = 0.95  # share of pressed samples with F_n > 0
+LEAST_BRAKING = 0.80  # share of sliding samples with F_t v_t > 0
+USUAL_ASIDE = 0.3  # of the force along the way; more is named
+_LEAST_MOMENT = 0.02  # N m rms
+_MIRRORED = -0.3  # of the moment that a force at the foot has
+MOST_ASIDE = 1.0  # of the force along the way
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One check of the signs.
+
+    Attributes:
+        name: what was looked at.
+        value: what was found.
+        limit: what it may be at least or at most, in words.
+    """
+
+    name: str
+    value: float
+    limit: str
+
+
+def side_warnings(values: Array, lateral: Array) -> list[str]:
+    """Return that a force across the way tells of a sensor that is turned.
+
+    Args:
+        values: v_t [m/s], F_t [N], F_n [N], shape (n, 3).
+        lateral: force across the way [N], shape (n,).
+    """
+    v_t, F_t, F_n = values.T
+    sliding = (F_n > _PRESSED) & (v_t > SLOWEST)
+    if not sliding.any():
+        return []
+    aside, along = float(np.median(lateral[sliding])), float(np.median(F_t[sliding]))
+    if abs(aside) <= USUAL_ASIDE * along:
+        return []
+    angle = float(np.degrees(np.arctan2(aside, along)))
+    return [
+        f"{aside:+.1f} N across the way, {along:.1f} N along it: are axes exchanged, "
+        f"or is the sensor turned by {angle:+.0f} degrees about the normal? Check "
+        "--sensor, the URDF and --along"
+    ]
+
+
+def moment_warnings(moment: Array, lever: Array, force: Array) -> list[str]:
+    """Return that the moments are those of mirrored axes.
+
+    A force at the foot has the moment r x F about the sensor's origin. Two exchanged
+    axes are a mirror: forces may still look right, moments then have the other sign.
+
+    Args:
+        moment: of the ground about the sensor's origin [N m], shape (n, 3).
+        lever: from there to the foot, same axes [m], shape (n, 3).
+        force: of the ground, same axes [N], shape (n, 3).
+    """
+    expected = np.cross(lever, force)
+    sound = np.isfinite(expected).all(axis=1) & np.isfinite(moment).all(axis=1)
+    sound &= np.linalg.norm(force, axis=1) > _PRESSED
+    power = float(np.sum(expected[sound] ** 2))
+    if not sound.any() or power < np.count_nonzero(sound) * _LEAST_MOMENT**2:
+        return []
+    gain = float(np.sum(moment[sound] * expected[sound])) / power
+    if gain >= _MIRRORED:
+        return []
+    return [
+        f"the moments are {gain:.1f} times those of a force at the foot: two axes of "
+        "the wrench are exchanged, or moments have the other sign. Check --sensor and "
+        "the URDF"
+    ]
+
+
+def way_warnings(way: Array, axes: Array) -> list[str]:
+    """Return that a stroke goes elsewhere than its direction and ground say.
+
+    Args:
+        way: positions of the pressed foot in one stroke [m], shape (n, 3).
+        axes: rows x_T, y_T, z_T, shape (3, 3).
+    """
+    ahead, aside, above = ((way - way[0]) @ axes.T).T
+    length = float(np.ptp(ahead))
+    if length < SHORTEST:
+        return []
+    found: list[str] = []
+    for option, limit, other in (
+        ("--along or --heading", HEADING, aside),
+        ("--normal or --incline", INCLINE, above),
+    ):
+        angle = float(np.degrees(np.arctan(np.polyfit(ahead, other, 1)[0])))
+        beside = length * np.tan(np.radians(abs(angle)))
+        if abs(angle) > limit and beside > UNEVEN:
+            found.append(
+                f"the foot's way is {angle:+.1f} degrees off {option} (limit {limit:g})"
+            )
+    return found
+
+
+def sign_checks(values: Array, lateral: Array) -> list[Check]:
+    """Return what the signs of the forces are.
+
+    Args:
+        values: v_t [m/s], F_t [N], F_n [N], shape (n, 3).
+        lateral: force across the way [N], shape (n,).
+
+    Raises:
+        SettingsError: the force cannot be that of the ground on the foot.
+    """
+    v_t, F_t, F_n = values.T
+    size = np.sqrt(F_t**2 + F_n**2 + lateral**2)
+    pressed = size > _PRESSED
+    sliding = pressed & (np.abs(v_t) > SLOWEST)
+    if np.count_nonzero(sliding) < FEWEST:
+        raise SettingsError(
+            f"The pressed foot slides in {np.count_nonzero(sliding)} rows only (limit "
+            f"{FEWEST}).",
+            hint="Check the log: is the foot pushed over the ground in it?",
+        )
+    pressing = float(np.mean(F_n[pressed] > 0.0))
+    braking = float(np.mean((F_t * v_t)[sliding] > 0.0))
+    aside, along = (float(np.median(np.abs(x[sliding]))) for x in (lateral, F_t))
+    said = (
+        f"F_n > 0 in {pressing:.0%} of the pressed rows (limit {LEAST_PRESSING:.0%}), "
+        f"F_t against the motion in {braking:.0%} of the sliding ones (limit "
+        f"{LEAST_BRAKING:.0%})"
+    )
+    is_pressing, is_braking = pressing >= LEAST_PRESSING, braking >= LEAST_BRAKING
+    if pressing < 1.0 - LEAST_PRESSING and braking < 1.0 - LEAST_BRAKING:
+        raise SettingsError(
+            f"The wrench has the other sign: {said}.",
+            hint="Give the other --acts; or is --sensor another frame?",
+        )
+    if not (is_pressing and is_braking):
+        raise SettingsError(
+            f"The axes of the wrench are not those of the sensor's frame: {said}.",
+            hint="Check --sensor, the URDF, --normal and --along, and the tare.",
+        )
+    if aside > MOST_ASIDE * along:
+        raise SettingsError(
+            f"The axes of the wrench are not those of the sensor's frame: "
+            f"{aside:.1f} N across the way, {along:.1f} N along it.",
+            hint="Check --sensor, the URDF and --along.",
+        )
+    return [
+        Check("F_n > 0 while pressed", pressing, f">= {LEAST_PRESSING:g}"),
+        Check("F_t against the motion", braking, f">= {LEAST_BRAKING:g}"),
+        Check("force across over along", aside / along, f"<= {MOST_ASIDE:g}"),
+    ]

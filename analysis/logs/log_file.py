@@ -1,0 +1,110 @@
+"""What a log holds, whatever its format: topics, and their messages in file order."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, NamedTuple, Protocol
+
+from acquisition.errors import SettingsError
+
+LARGEST_LOG = 2 * 10**9  # bytes on the disk
+MOST_MESSAGES = 10**7  # of the topics that are read
+LONGEST_NAME = 4096  # bytes of a topic, a type, a frame or a joint
+LARGEST_DEFINITION = 100_000  # bytes
+MOST_TOPICS = 5_000
+
+Serialization = Literal["cdr", "ros1"]
+
+
+@dataclass(frozen=True, slots=True)
+class LogTopic:
+    """One topic of a log.
+
+    Attributes:
+        name: e.g. /joint_states.
+        type_name: package and type, e.g. sensor_msgs/JointState.
+        serialization: how its messages are written.
+        definition: of the message, with what it uses; "" where the log has none.
+    """
+
+    name: str
+    type_name: str
+    serialization: Serialization
+    definition: str
+
+
+class LogMessage(NamedTuple):
+    """One message as it is stored.
+
+    Attributes:
+        topic: name of its topic.
+        received_ns: when it was received [UTC ns].
+        data: its bytes.
+    """
+
+    topic: str
+    received_ns: int
+    data: bytes
+
+
+class LogFile(Protocol):
+    """A log of one format.
+
+    Attributes:
+        path: the file.
+        format: what it is, in words.
+        topics: by name.
+        losses: what could not be read, in words; complete after `messages` ended.
+        unread: types and encodings of topics that cannot be read, by name.
+    """
+
+    path: Path
+    format: str
+    topics: dict[str, LogTopic]
+    losses: list[str]
+    unread: dict[str, str]
+
+    def messages(self, topics: Collection[str]) -> Iterator[LogMessage]:
+        """Give every message of `topics`, in the order of the file.
+
+        Raises:
+            SettingsError: the log is damaged where nothing behind it can be read.
+        """
+        ...
+
+
+def damaged(path: Path, what: str, hint: str = "") -> SettingsError:
+    """Return a refusal of a log."""
+    return SettingsError(
+        f"{path}: {what}.", hint=hint or "Was the log copied completely?"
+    )
+
+
+def short_type(name: str) -> str:
+    """Return a type without the folder that ROS 2 puts into its name.
+
+    sensor_msgs/msg/JointState and sensor_msgs/JointState are the same type.
+    """
+    package, _, rest = name.partition("/")
+    return f"{package}/{rest.rpartition('/')[2]}" if rest else name
+
+
+def checked_name(path: Path, name: bytes | str, what: str) -> str:
+    """Return a name of a log as text; raises SettingsError where it is too long."""
+    size = len(name if isinstance(name, bytes) else name.encode(errors="replace"))
+    if size > LONGEST_NAME:
+        raise damaged(path, f"{what} of {size} bytes, the limit is {LONGEST_NAME}")
+    return name.decode(errors="replace") if isinstance(name, bytes) else name
+
+
+def checked_definition(path: Path, text: bytes | str, type_name: str) -> str:
+    """Return a definition as text; raises SettingsError where it is too long."""
+    if len(text) > LARGEST_DEFINITION:
+        raise damaged(
+            path,
+            f"the definition of {type_name[:60]} has {len(text)} bytes, the limit is "
+            f"{LARGEST_DEFINITION}",
+        )
+    return text.decode(errors="replace") if isinstance(text, bytes) else text

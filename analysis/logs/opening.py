@@ -1,0 +1,148 @@
+"""A log by its path: a file, or a folder of rosbag2 with one or more files."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import zstandard
+
+from acquisition.errors import SettingsError
+from acquisition.files import UnfitFileError, open_regular
+from analysis.logs import bag_log, mcap_log, sqlite_log
+from analysis.logs.bag_log import BagLog
+from analysis.logs.log_file import LARGEST_LOG, LogFile, LogMessage, LogTopic, damaged
+from analysis.logs.mcap_log import McapLog
+from analysis.logs.sqlite_log import SqliteLog
+from analysis.logs.unpacking import LARGEST_PART, LARGEST_RATIO, ZSTD_MAGIC
+
+_SUFFIXES = (".mcap", ".db3", ".bag", ".mcap.zstd", ".db3.zstd")
+_MOST_FILES = 200
+_FORMATS = "Give an .mcap, a folder or .db3 of rosbag2, or a ROS 1 .bag."
+_NO_TRACTION = (
+    "it holds states of joints and no force of the ground, so no traction can follow "
+    "from it"
+)
+
+
+@contextmanager
+def open_log(path: Path) -> Iterator[LogFile]:
+    """Give the log at `path`.
+
+    Raises:
+        SettingsError: it is missing, no log, too large, or damaged.
+    """
+    files = _files(path)
+    with tempfile.TemporaryDirectory(prefix="traction-import-") as scratch:
+        logs = [_opened(file, Path(scratch) / f"{k}") for k, file in enumerate(files)]
+        yield logs[0] if len(logs) == 1 else LogOfParts(path, logs)
+
+
+class LogOfParts:
+    """The files of one log one behind another; implements `LogFile`."""
+
+    def __init__(self, path: Path, parts: list[LogFile]) -> None:
+        self.path = path
+        self.format = f"{parts[0].format}, {len(parts)} files"
+        self.losses: list[str] = []
+        self.topics: dict[str, LogTopic] = {}
+        self.unread: dict[str, str] = {}
+        for part in parts:
+            self.topics |= part.topics
+            self.unread |= part.unread
+        self._parts = parts
+
+    def messages(self, topics: Collection[str]) -> Iterator[LogMessage]:
+        """Give every message of `topics`, in the order of the files."""
+        self.losses.clear()
+        for part in self._parts:
+            yield from part.messages(topics)
+            self.losses += [f"{part.path.name}: {loss}" for loss in part.losses]
+
+
+def log_files(path: Path) -> list[Path]:
+    """Return the files that a log at `path` consists of; raises SettingsError."""
+    return _files(path)
+
+
+def _files(path: Path) -> list[Path]:
+    if not path.is_dir():
+        return [path]
+    if (path / "meta" / "info.json").is_file():
+        raise SettingsError(
+            f"{path}: a data set of LeRobot: {_NO_TRACTION}.",
+            hint="Record the wrench of a sensor beside it.",
+        )
+    try:
+        names = sorted(p for p in path.iterdir() if p.name.endswith(_SUFFIXES))
+    except OSError as error:
+        raise damaged(path, f"cannot be read ({error.strerror})") from error
+    if not names or len(names) > _MOST_FILES:
+        raise SettingsError(
+            f"{path}: {len(names) or 'no'} logs in this folder.", hint=_FORMATS
+        )
+    return names
+
+
+def _opened(path: Path, scratch: Path) -> LogFile:
+    start = _first_bytes(path)
+    if start.startswith(ZSTD_MAGIC):
+        _unpack_file(path, scratch)
+        path, start = scratch, _first_bytes(scratch)
+    if start.startswith(mcap_log.MAGIC):
+        return McapLog(path)
+    if start.startswith(sqlite_log.MAGIC):
+        return SqliteLog(path)
+    if start.startswith(bag_log.MAGIC):
+        return BagLog(path)
+    if start.startswith(b"PAR1"):
+        raise SettingsError(
+            f"{path}: a table in Parquet, no log.",
+            hint="Where it has t, v_t, F_n and F_t: traction fit FILE. States of "
+            "joints alone hold no force of the ground: no traction follows from them.",
+        )
+    if start.startswith(b"#ROSBAG V1"):
+        raise damaged(path, "a bag of ROS before 2010", "Convert it: rosbag migrate.")
+    raise damaged(path, "no log that is known", _FORMATS)
+
+
+def _first_bytes(path: Path) -> bytes:
+    try:
+        with open_regular(path, is_link_followed=True) as file:
+            size = os.fstat(file.fileno()).st_size
+            start = file.read(16)
+    except UnfitFileError as error:
+        raise damaged(path, f"it {error}", _FORMATS) from error
+    except OSError as error:
+        raise damaged(
+            path, f"cannot be read ({error.strerror})", "Check the name."
+        ) from error
+    if size > LARGEST_LOG:
+        raise damaged(
+            path,
+            f"{size / 1e9:.1f} GB, the limit is {LARGEST_LOG / 1e9:.0f} GB",
+            "Cut it: ros2 bag convert, or mcap filter, with the two topics only.",
+        )
+    return start
+
+
+def _unpack_file(path: Path, scratch: Path) -> None:
+    """Write the content of a packed file into `scratch`."""
+    most = min(LARGEST_LOG, max(2**20, LARGEST_RATIO * path.stat().st_size))
+    unpacker = zstandard.ZstdDecompressor(max_window_size=LARGEST_PART)
+    written = 0
+    try:
+        with (
+            open_regular(path, is_link_followed=True) as packed,
+            scratch.open("wb") as out,
+        ):
+            for part in unpacker.read_to_iter(packed):
+                written += len(part)
+                if written > most:
+                    raise damaged(path, f"it unpacks to over {most} bytes")
+                out.write(part)
+    except zstandard.ZstdError as error:
+        raise damaged(path, f"cannot be unpacked ({error})") from error

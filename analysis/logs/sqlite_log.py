@@ -1,0 +1,145 @@
+"""rosbag2 logs in SQLite (.db3), opened for reading only; no view or trigger runs."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Collection, Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from acquisition.errors import SettingsError
+from analysis.logs.log_file import (
+    MOST_TOPICS,
+    LogMessage,
+    LogTopic,
+    checked_definition,
+    checked_name,
+    damaged,
+    short_type,
+)
+from analysis.logs.unpacking import (
+    LARGEST_PART,
+    ZSTD_MAGIC,
+    UnpackError,
+    unpacked,
+)
+
+MAGIC = b"SQLite format 3\0"
+_DEFINITIONS = "message_definitions"
+_CACHE_KB = 16_000
+
+
+class SqliteLog:
+    """Implements `analysis.logs.log_file.LogFile`."""
+
+    format = "rosbag2, SQLite"
+
+    def __init__(self, path: Path) -> None:
+        """Read which topics there are.
+
+        Raises:
+            SettingsError: it is no log of rosbag2, or damaged.
+        """
+        self.path = path
+        self.losses: list[str] = []
+        self.unread: dict[str, str] = {}
+        self.topics: dict[str, LogTopic] = {}
+        self._numbers: dict[int, str] = {}
+        with self._opened() as database:
+            tables = {
+                name
+                for (name,) in database.execute(
+                    "SELECT name FROM sqlite_master WHERE type = 'table' AND "
+                    "sql NOT LIKE 'CREATE VIRTUAL%' LIMIT 1000"
+                )
+            }
+            if not {"topics", "messages"} <= tables:
+                raise damaged(
+                    path,
+                    "no log of rosbag2: the tables topics and messages are missing",
+                    "Give a bag folder, an .mcap, a .db3 or a .bag.",
+                )
+            has_definitions = _DEFINITIONS in tables
+            definitions = self._definitions(database) if has_definitions else {}
+            self._take_topics(database, definitions)
+
+    def messages(self, topics: Collection[str]) -> Iterator[LogMessage]:
+        """Give every message of `topics`, in the order of the file."""
+        self.losses.clear()
+        with self._opened() as database:
+            rows = database.execute("SELECT topic_id, timestamp, data FROM messages")
+            while True:
+                try:
+                    row = rows.fetchone()
+                    if row is None:
+                        return
+                    number, received_ns, data = row
+                    topic = self._topic(number)
+                    if topic not in topics:
+                        continue
+                    if not (isinstance(received_ns, int) and isinstance(data, bytes)):
+                        raise UnpackError("a message is no bytes")
+                    if data.startswith(ZSTD_MAGIC):
+                        data = unpacked(data, "zstd")
+                except (sqlite3.Error, UnpackError, OverflowError) as error:
+                    self.losses[:] = [f"nothing is read behind a message: {error}"]
+                    return
+                yield LogMessage(topic, received_ns, data)
+
+    def _topic(self, number: object) -> str:
+        return self._numbers.get(number, "") if isinstance(number, int) else ""
+
+    def _definitions(self, database: sqlite3.Connection) -> dict[str, str]:
+        rows = database.execute(
+            "SELECT topic_type, encoding, encoded_message_definition FROM "
+            f"message_definitions LIMIT {MOST_TOPICS}"
+        )
+        return {
+            short_type(kind): checked_definition(self.path, text, kind)
+            for kind, encoding, text in map(_as_texts, rows)
+            if encoding == "ros2msg"
+        }
+
+    def _take_topics(
+        self, database: sqlite3.Connection, definitions: dict[str, str]
+    ) -> None:
+        rows = database.execute(
+            "SELECT id, name, type, serialization_format FROM topics "
+            f"LIMIT {MOST_TOPICS}"
+        )
+        for number, *texts in rows:
+            name, kind, serialization = _as_texts(texts)
+            if serialization != "cdr" or not isinstance(number, int):
+                self.unread[name[:100]] = f"{kind[:100]}, {serialization[:40]}"
+                continue
+            name = checked_name(self.path, name, "the name of a topic")
+            kind = short_type(checked_name(self.path, kind, "the name of a type"))
+            self._numbers[number] = name
+            self.topics[name] = LogTopic(name, kind, "cdr", definitions.get(kind, ""))
+
+    @contextmanager
+    def _opened(self) -> Iterator[sqlite3.Connection]:
+        """Give the database; what SQLite refuses becomes a SettingsError."""
+        name = quote(str(self.path.absolute()))
+        try:
+            with closing(
+                sqlite3.connect(f"file:{name}?mode=ro&immutable=1", uri=True)
+            ) as database:
+                database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST_PART)
+                database.execute("PRAGMA trusted_schema=OFF")
+                database.execute("PRAGMA mmap_size=0")
+                database.execute(f"PRAGMA cache_size=-{_CACHE_KB}")
+                database.text_factory = lambda raw: raw.decode(errors="replace")
+                yield database
+        except SettingsError:
+            raise
+        except (sqlite3.Error, UnicodeError, ValueError, OverflowError) as error:
+            raise damaged(
+                self.path, f"cannot be read as a database ({error})"
+            ) from error
+
+
+def _as_texts(row: Any) -> list[str]:  # noqa: ANN401
+    return [each if isinstance(each, str) else str(each)[:100] for each in row]

@@ -1,0 +1,187 @@
+"""An ATI sensor on the network: stopped, started, and its records checked."""
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from acquisition.clock import NS_PER_S
+from acquisition.errors import (
+    DeviceFaultError,
+    LinkTimeoutError,
+    SettingsError,
+)
+from acquisition.settings import Number, Usual, Whole
+from ft_sensor.network.datagrams import DatagramPort, parse_address
+from ft_sensor.reading import Reading, StreamTiming, Wrench
+from ft_sensor.section import SensorSection
+from ft_sensor.serial_line.framing import FrameScanner, wire_time_ns
+from ft_sensor.serial_line.link import OpenedPort, PortSettings
+from ft_sensor.serial_line.startup import SerialDialog, silent_error
+from ft_sensor.vendors import ati
+
+NETWORK = 100_000_000  # bit/s of its Ethernet
+RATE = 1000  # Hz, as its web page is to be set
+_FROZEN_NS = 50_000_000  # 32-bit counts of noise never repeat that long
+_ANSWER_NS = NS_PER_S // 2
+_QUIET_NS = 100_000_000  # what was under way when it was told to stop
+_TRIES = 3  # requests may be lost
+
+
+@dataclass(frozen=True, slots=True)
+class AtiSettings:
+    """What the sensor's web page says of it.
+
+    Attributes:
+        counts_per_force: counts per N.
+        counts_per_torque: counts per N m.
+        ranges: fx fy fz tx ty tz it measures up to [N, N m].
+        rate: records a second [Hz].
+    """
+
+    counts_per_force: float
+    counts_per_torque: float
+    ranges: Wrench
+    rate: int = RATE
+
+    @property
+    def counts(self) -> Wrench:
+        """Counts per N and N m of each axis."""
+        force, torque = self.counts_per_force, self.counts_per_torque
+        return force, force, force, torque, torque, torque
+
+
+class AtiDevice:
+    """Implements `ft_sensor.serial_line.sensor.SerialDevice` for RDT.
+
+    RDT answers no request: that a sensor obeys is seen by its stream, which ends and
+    begins. Nothing of its settings can be asked for; they stand in rig.toml.
+    """
+
+    stop = ati.encode_request(ati.STOP)
+
+    def __init__(self, line: PortSettings, settings: AtiSettings) -> None:
+        period_ns = NS_PER_S / settings.rate
+        self.line = line
+        self.ranges = settings.ranges
+        self.timing = StreamTiming(
+            period_ns=period_ns,
+            wire_ns=wire_time_ns(ati.FRAME_SIZE, line.baudrate),
+            modulus=ati.MODULUS,
+            tick_ns=period_ns,
+            frozen_ns=_FROZEN_NS,
+            frame_size=ati.FRAME_SIZE,
+        )
+        self._settings = settings
+
+    def scanner(self) -> FrameScanner[Reading]:
+        """Return a scanner for the records of the stream."""
+        return ati.RdtScanner(self._settings.counts, self.ranges)
+
+    def status_words(self, status: int) -> tuple[str, ...]:
+        """Return what the set bits of `status` say."""
+        return ati.status_words(status)
+
+    def start(self, dialog: SerialDialog) -> dict[str, str]:
+        """End a stream that may be running, and start a new one.
+
+        Raises:
+            LinkError: the network failed.
+            LinkTimeoutError: the sensor is silent, or goes on when it is stopped.
+            DeviceFaultError: it reports a failure.
+        """
+        self._end_stream(dialog)
+        for _ in range(_TRIES):
+            dialog.write(ati.encode_request(ati.STREAM))
+            before = dialog.frames
+            if dialog.wait_for(lambda b=before: dialog.frames > b or None, _ANSWER_NS):
+                break
+        else:
+            raise silent_error()
+        self._refuse_failure(dialog.first_readings())
+        return {
+            "model": "ATI network F/T sensor, RDT",
+            "serial_number": "unknown (RDT does not tell it)",
+            "firmware": "unknown (RDT does not tell it)",
+            "filter": "unknown (as its web page is set)",
+            "time": "number of the packet, fitted to arrival; filter unknown",
+        }
+
+    def _end_stream(self, dialog: SerialDialog) -> None:
+        for _ in range(_TRIES):
+            dialog.write(self.stop)
+            dialog.pause(_QUIET_NS)
+            dialog.discard()
+            before = dialog.frames
+            dialog.wait_for(lambda b=before: dialog.frames > b or None, _QUIET_NS)
+            if dialog.frames == before:
+                return
+        raise LinkTimeoutError(
+            f"The F/T sensor did not answer: it streams although it was told to stop "
+            f"{_TRIES} times.",
+            hint="Does another program read it? Cycle its power.",
+        )
+
+    def _refuse_failure(self, readings: list[Reading]) -> None:
+        ill = next((r for r in reversed(readings) if not r.is_trusted), None)
+        if ill is not None:
+            words = ", ".join(self.status_words(ill.status))
+            raise DeviceFaultError(
+                f"The F/T sensor reports: {words} (status 0x{ill.status:08x}).",
+                hint="Its web page tells more; check the cable of the transducer.",
+            )
+
+
+_Force = Annotated[Number, Usual(0.05, 50_000.0, "N")]
+_Torque = Annotated[Number, Usual(0.005, 5_000.0, "N m")]
+
+
+class AtiSection(SensorSection):
+    """[ft_sensor] of an ATI sensor on the network; see `AtiSettings`."""
+
+    kind: Literal["ati"] = Field(examples=["ati"])
+    port: str = Field(examples=["192.168.1.1"])
+    baudrate: Whole = Field(
+        default=NETWORK, gt=0, le=10_000_000_000, examples=[NETWORK]
+    )
+    rate: Whole = Field(default=RATE, ge=500, le=8000, examples=[RATE])
+    counts_per_force: Number | None = Field(
+        default=None, gt=0, le=1e9, examples=[1_000_000.0]
+    )
+    counts_per_torque: Number | None = Field(
+        default=None, gt=0, le=1e9, examples=[1_000_000.0]
+    )
+    ranges: tuple[_Force, _Force, _Force, _Torque, _Torque, _Torque] | None = Field(
+        default=None, examples=[[130.0, 130.0, 400.0, 10.0, 10.0, 10.0]]
+    )
+
+    def known_ranges(self) -> Wrench | None:
+        """Return what it measures at most [N, N m], if that is given."""
+        return self.ranges
+
+    def open_port(self, port: str) -> OpenedPort:
+        """Open the way to the sensor at the address `port`.
+
+        Raises:
+            SettingsError: it is no address.
+            LinkError: no way leads there.
+        """
+        address = parse_address(port, ati.PORT)
+        return OpenedPort(DatagramPort(address, ati.FRAME_SIZE), "")
+
+    def build(self, line: PortSettings) -> AtiDevice:
+        """Return the sensor at the end of `line`.
+
+        Raises:
+            SettingsError: what its web page says is missing.
+        """
+        scales = self.counts_per_force, self.counts_per_torque
+        if scales[0] is None or scales[1] is None or self.ranges is None:
+            raise SettingsError(
+                "an ati needs counts_per_force, counts_per_torque and ranges, e.g. "
+                "counts_per_force = 1000000.0, counts_per_torque = 1000000.0, ranges = "
+                "[130.0, 130.0, 400.0, 10.0, 10.0, 10.0].",
+                hint="They stand on its web page, under configurations.",
+            )
+        settings = AtiSettings(scales[0], scales[1], self.ranges, self.rate)
+        return AtiDevice(line, settings)

@@ -1,0 +1,134 @@
+"""Logs that another library wrote are read whole; cut and packed ones within bounds."""
+
+import sqlite3
+
+import numpy as np
+import pytest
+import zstandard
+from mcap.writer import Writer
+
+from acquisition.errors import SettingsError
+from analysis.logs.opening import open_log
+from analysis.logs.unpacking import UnpackError, unpacked
+from tests.analysis.imported.gantry import Rubbing, write_bag, write_bag2
+
+SHORT = Rubbing(joint_rate=100.0, wrench_rate=100.0)
+WRENCH = "/ft/wrench"
+FORMATS = {
+    "bag": (write_bag, ()),
+    "bag-bz2": (write_bag, ("BZ2",)),
+    "bag-lz4": (write_bag, ("LZ4",)),
+    "mcap": (write_bag2, ("MCAP",)),
+    "mcap-message": (write_bag2, ("MCAP", "STORAGE")),
+    "db3": (write_bag2, ("SQLITE3",)),
+    "db3-message": (write_bag2, ("SQLITE3", "MESSAGE")),
+    "db3-file": (write_bag2, ("SQLITE3", "FILE")),
+}
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory):
+    """Return the same log in every format."""
+    folder = tmp_path_factory.mktemp("logs")
+    return {
+        name: write(folder / f"{name}.bag", SHORT, *more)
+        for name, (write, more) in FORMATS.items()
+    }
+
+
+def read(path):
+    with open_log(path) as log:
+        found = [
+            (m.topic, m.received_ns, len(m.data)) for m in log.messages(log.topics)
+        ]
+        return {t.name: t.type_name for t in log.topics.values()}, found, log.losses
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_every_message_of_every_format_is_read(logs, name):
+    topics, found, losses = read(logs[name])
+    assert topics == {
+        "/joint_states": "sensor_msgs/JointState",
+        WRENCH: "geometry_msgs/WrenchStamped",
+    }
+    assert len(found) == 2400
+    assert losses == []
+    _, same, _ = read(logs["bag"])
+    assert [row[:2] for row in found] == [row[:2] for row in same]
+
+
+@pytest.mark.parametrize("name", ["bag", "bag-lz4", "mcap"])
+@pytest.mark.parametrize("share", [0.2, 0.4, 0.6])
+def test_a_cut_log_is_read_to_where_it_was_cut(logs, tmp_path, name, share):
+    path = logs[name]
+    file = next(path.glob("*.mcap")) if path.is_dir() else path
+    cut = tmp_path / file.name
+    data = file.read_bytes()
+    cut.write_bytes(data[: int(share * len(data))])
+    _, found, losses = read(cut)
+    assert len(losses) == 1
+    assert "nothing is read behind byte" in losses[0]
+    assert len(found) < 2400
+
+
+def test_a_topic_of_another_encoding_is_told_and_not_read(tmp_path):
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        schema = writer.register_schema("foxglove.Log", "jsonschema", b"{}")
+        channel = writer.register_channel("/log", "json", schema)
+        writer.add_message(channel, 1, b"{}", 1)
+        writer.finish()
+    with open_log(path) as log:
+        assert log.topics == {}
+        assert log.unread == {"/log": "foxglove.Log, json"}
+        assert list(log.messages(["/log"])) == []
+
+
+def test_what_is_no_log_is_refused(tmp_path):
+    for name, data, why in (
+        ("a.csv", b"t,v_t\n1,2\n", "no log that is known"),
+        ("a.parquet", b"PAR1" + bytes(20), "States of joints alone hold no force"),
+        ("a.db3", b"SQLite format 3\0" + bytes(200), "cannot be read as a database"),
+        ("a.mcap.zstd", zstandard.compress(bytes(9_000_000)), "unpacks to over"),
+    ):
+        path = tmp_path / name
+        path.write_bytes(data)
+        with pytest.raises(SettingsError, match=why), open_log(path):
+            pass
+    with pytest.raises(SettingsError, match="no logs in this folder"):
+        read(tmp_path / "..")
+    (tmp_path / "meta").mkdir()
+    (tmp_path / "meta" / "info.json").write_text("{}")
+    with pytest.raises(SettingsError, match="no force of the ground"):
+        read(tmp_path)
+
+
+def test_a_view_in_the_place_of_a_table_is_not_read(tmp_path):
+    path = tmp_path / "a.db3"
+    database = sqlite3.connect(path)
+    database.execute("CREATE TABLE topics(id, name, type, serialization_format)")
+    database.execute(
+        "CREATE VIEW messages AS WITH RECURSIVE c(x) AS (SELECT 1 UNION ALL SELECT x+1 "
+        "FROM c) SELECT 1 AS topic_id, x AS timestamp, x'00' AS data FROM c"
+    )
+    database.commit()
+    database.close()
+    with pytest.raises(SettingsError, match="no log of rosbag2"):
+        read(path)
+
+
+@pytest.mark.parametrize("compression", ["zstd", "lz4", "bz2"])
+def test_a_bomb_is_refused_and_not_unpacked(compression):
+    import bz2
+
+    import lz4.frame
+
+    pack = {"zstd": zstandard.compress, "lz4": lz4.frame.compress, "bz2": bz2.compress}
+    bomb = pack[compression](bytes(80 * 2**20))
+    for size in (None, 80 * 2**20):
+        with pytest.raises(UnpackError):
+            unpacked(bomb, compression, size)
+    fine = np.random.default_rng(1).bytes(100_000)
+    assert unpacked(pack[compression](fine), compression, len(fine)) == fine
