@@ -101,7 +101,8 @@ def _setup_of(args: argparse.Namespace, settings: Settings) -> HostSetup:
     import getpass
     import os
 
-    from experiments.tools.host_setup import HostSetup, adapter_serial
+    from experiments.tools.host_setup import HostSetup
+    from ft_sensor.serial_line.link import adapter_serial
 
     can, port = settings.rig.can, _port_of(settings)
     serial = args.sensor_serial

@@ -201,12 +201,3 @@ def run_all(commands: Sequence[Sequence[str]]) -> list[str]:
             told = done.stderr.strip() or f"exit code {done.returncode}"
             failed.append(f"{' '.join(command)}: {told[:200]}")
     return failed
-
-
-def adapter_serial(port: str) -> str | None:
-    """Return the serial number of the adapter behind a port; None = none is known."""
-    from serial.tools import list_ports
-
-    real = os.path.realpath(port)
-    found = (p.serial_number for p in list_ports.comports() if p.device == real)
-    return next((serial for serial in found if serial), None)

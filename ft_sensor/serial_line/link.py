@@ -1,11 +1,13 @@
 """Serial ports that are drained, never waited on; the only importer of pyserial."""
 
+import os
 import termios
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
 import serial
+from serial.tools import list_ports
 
 from acquisition.clock import NS_PER_S
 from acquisition.errors import LinkError, SettingsError
@@ -227,3 +229,10 @@ def _broken(error: Exception) -> LinkError:
         f"The serial port of the F/T sensor failed: {error}.",
         hint="Unplugged? Check the cable, then open the sensor again.",
     )
+
+
+def adapter_serial(port: str) -> str | None:
+    """Return the serial number of the adapter behind a port; None = none is known."""
+    real = os.path.realpath(port)
+    found = (p.serial_number for p in list_ports.comports() if p.device == real)
+    return next((serial for serial in found if serial), None)
