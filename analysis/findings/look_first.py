@@ -27,6 +27,7 @@ LIMIT = 6.0  # scales from the median of the terrain's trials
 _FEWEST = 4  # trials of a terrain that are compared
 _PRIOR = 5.0  # trials that the scale of all terrains counts as
 _TO_SD = 1.4826  # of a median absolute deviation of normal values
+_SMOOTH = "friction"  # a doubt that smooth ground raises; the ratio is compared
 _TOLD = 3  # measures in one reason
 
 
@@ -100,7 +101,7 @@ def look_first(study: Study, limit: float = LIMIT) -> list[OddTrial]:
     for name, result in study.terrains.items():
         compared = _compared(measured[name], scales)
         for k, trial in enumerate(result.trials):
-            doubts = [doubt.seen for doubt in doubts_of(trial)]
+            doubts = [d.seen for d in doubts_of(trial) if d.name != _SMOOTH]
             ranked = sorted(compared[k], key=lambda found: -abs(found[0]))
             told = [text for z, text in ranked if abs(z) > limit][:_TOLD]
             if doubts or told:
