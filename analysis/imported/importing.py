@@ -173,6 +173,7 @@ class ImportedLog:
         trials: the strokes.
         warnings: what a person should know.
         losses: what could not be read of the log.
+        is_simulated: the log says that its devices were simulated.
     """
 
     request: ImportRequest
@@ -186,6 +187,7 @@ class ImportedLog:
     trials: Sequence[ImportedTrial]
     warnings: Sequence[str]
     losses: Sequence[str]
+    is_simulated: bool
 
 
 def import_log(request: ImportRequest) -> ImportedLog:
@@ -296,7 +298,10 @@ class _Import:
             for a, b in strokes
             for text in way_warnings(self._path.foot[a:b], axes)
         ]
-        trials = self._trials(values, raw, force, float(axes[0][2]))
+        trials = [
+            replace(trial, series=replace(trial.series, is_simulated=log.is_simulated))
+            for trial in self._trials(values, raw, force, float(axes[0][2]))
+        ]
         return ImportedLog(
             request,
             log.format,
@@ -309,6 +314,7 @@ class _Import:
             trials,
             self._warnings,
             list(log.losses),
+            log.is_simulated,
         )
 
     def _check_rates(self) -> None:

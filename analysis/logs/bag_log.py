@@ -33,6 +33,7 @@ _Header = dict[bytes, bytes]
 class BagLog:
     """Implements `analysis.logs.log_file.LogFile`."""
 
+    is_simulated = False  # this format has no metadata that could say so
     format = "ROS 1 bag"
 
     def __init__(self, path: Path) -> None:

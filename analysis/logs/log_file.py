@@ -58,6 +58,7 @@ class LogFile(Protocol):
         topics: by name.
         losses: what could not be read, in words; complete after `messages` ended.
         unread: types and encodings of topics that cannot be read, by name.
+        is_simulated: its own metadata says that the devices were simulated.
     """
 
     path: Path
@@ -65,6 +66,7 @@ class LogFile(Protocol):
     topics: dict[str, LogTopic]
     losses: list[str]
     unread: dict[str, str]
+    is_simulated: bool
 
     def messages(self, topics: Collection[str]) -> Iterator[LogMessage]:
         """Give every message of `topics`, in the order of the file.

@@ -26,7 +26,7 @@ from analysis.logs.log_file import (
 from analysis.logs.unpacking import LARGEST_PART, UnpackError, unpacked
 
 MAGIC = b"\x89MCAP0\r\n"
-_SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _DATA_END = 3, 4, 5, 6, 15
+_SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _METADATA, _DATA_END = 3, 4, 5, 6, 12, 15
 _HEAD = struct.Struct("<BQ")
 _MESSAGE_HEAD = struct.Struct("<HIQQ")
 _CHUNK_HEAD = struct.Struct("<QQQI")
@@ -49,6 +49,7 @@ class McapLog:
         self.topics: dict[str, LogTopic] = {}
         self.losses: list[str] = []
         self.unread: dict[str, str] = {}
+        self.is_simulated = False
         for _ in self._records(is_whole=False):
             pass
 
@@ -135,7 +136,20 @@ class _Records:
             self._take_schema(body)
         elif opcode == _CHANNEL:
             self._take_channel(body)
+        elif opcode == _METADATA:
+            self._take_metadata(body)
         return None
+
+    def _take_metadata(self, body: memoryview) -> None:
+        """Take from a record of metadata whether the devices were simulated."""
+        _, at = _text(body, 0)
+        (size,) = struct.unpack_from("<I", body, at)
+        at, end = at + 4, at + 4 + size
+        while at < end:
+            key, at = _text(body, at)
+            value, at = _text(body, at)
+            if (key, value) == ("simulated", "true"):
+                self._log.is_simulated = True
 
     def _take_schema(self, body: memoryview) -> None:
         (number,) = struct.unpack_from("<H", body)

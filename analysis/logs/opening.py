@@ -53,6 +53,7 @@ class LogOfParts:
         for part in parts:
             self.topics |= part.topics
             self.unread |= part.unread
+        self.is_simulated = any(part.is_simulated for part in parts)
         self._parts = parts
 
     def messages(self, topics: Collection[str]) -> Iterator[LogMessage]:

@@ -34,6 +34,7 @@ _CACHE_KB = 16_000
 class SqliteLog:
     """Implements `analysis.logs.log_file.LogFile`."""
 
+    is_simulated = False  # this format has no metadata that could say so
     format = "rosbag2, SQLite"
 
     def __init__(self, path: Path) -> None:

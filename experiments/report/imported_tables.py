@@ -90,8 +90,11 @@ def write_imported(
     meanings += column_rows(f"T01.kept.{form}", KEPT)
     writer.add_texts(DICTIONARY, meanings, DICTIONARY_MEANINGS, "Every column.")
     write_new(to / RECORD, record.text().encode())
-    about = f"Imported trials; {RECORD} tells how."
+    kind = "Imported SIMULATED trials" if imported.is_simulated else "Imported trials"
+    about = f"{kind}; {RECORD} tells how."
     writer.finish(f"Trials imported from {imported.request.log.name}", about)
+    if imported.is_simulated:
+        console.say(f"{WARNING} SIMULATED by the metadata of the log.")
     for warning in imported.warnings:
         console.say(f"{WARNING} {warning}")
 
@@ -164,6 +167,7 @@ def _write_trial(
         recording=digest,
         imported=True,
         rig=imported.urdf.name,
+        simulated=imported.is_simulated,
     )
     whole = columns_of(quantities_of(imported), trial)
     file = writer.add(trial.name, whole, origin, "A trial at the rate of the joints.")

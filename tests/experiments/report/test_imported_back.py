@@ -12,9 +12,13 @@ from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.views import VIEW_TOPICS, encode_views
 from analysis.data.load import load_trial
 from analysis.data.prepare import PrepareOptions, moving_average, prepare_trial
+from analysis.data.tables import load_tables
 from analysis.imported.importing import ImportRequest, import_log
+from analysis.logs.opening import open_log
+from experiments.report.standard_topics import standard_topics
 from tests.disturbances.measure import recorded_trial
 from tests.disturbances.rows import RECORDINGS, Outcome, Recording
+from tests.experiments.program import traction
 
 FRAMES = """
   <link name="ft_sensor"/><joint name="gauges" type="fixed">
@@ -177,3 +181,28 @@ def test_an_own_recording_itself_is_refused_with_who_reads_it(own, first_trial):
                 first_trial, request.urdf, "sole", "ft_sensor", "ground-on-foot"
             )
         )
+
+
+def test_what_a_log_says_of_its_devices_goes_along(first_trial, tmp_path):
+    log = tmp_path / "T01.mcap"
+    log.write_bytes(standard_topics(TrialReader(first_trial)))
+    with open_log(log) as opened:
+        assert opened.is_simulated
+    bare = tmp_path / "bare.mcap"
+    rows = TrialReader(first_trial).cycles()
+    write_topics(bare, rows.data, rows.log_time.tolist())
+    with open_log(bare) as opened:
+        assert not opened.is_simulated
+    trial, reader = load_trial(first_trial), TrialReader(first_trial)
+    urdf = write_frames(tmp_path, reader, trial, trial.sole_point)
+    x_T, _, z_T = trial.frame.axes()
+    done = traction(
+        *("import", log, "--urdf", urdf, "--foot", "sole", "--sensor", "ft_sensor"),
+        *("--acts", "ground-on-foot", "--tare", "none", "--lag", "0"),
+        *(f"--along={','.join(map(str, x_T))}", f"--normal={','.join(map(str, z_T))}"),
+        *("--to", tmp_path / "out"),
+    )
+    assert done.code == 0, done.err
+    assert "SIMULATED" in done.out
+    (series,) = load_tables([tmp_path / "out"])["table"]
+    assert series.is_simulated
