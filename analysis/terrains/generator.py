@@ -1,0 +1,323 @@
+"""A ground that can be sampled: F_t along a motion, as a trial to come would show it.
+
+A mixture of linear experts for the next force (Jacobs et al. 1991; in time Weigend,
+Mangeas and Srivastava 1995). With F the force less the level of the trial, D its last
+increment, f = F_n, v = v_t, v+ = max(v, 0), v- = min(v, 0), m the median of a new trial
+at (f, v), and ' for the new sample, one step of 10 ms is
+
+    x  = (1, F, D, f', f' - f, v'+, v'-, v' - v, v, m', m' - m, F v'+)
+    g  = (x, F / max(f', 0.8), s, F s),   s = min(|v'| / 0.02, 1)
+    g  = 1 for its first number, else clip((g - centre) / scale, -4, 4)
+    k  : the first expert with  sum_{j <= k} softmax(W g)_j > u,   u ~ U(0, 1)
+    F' = F + b_k . x + drift(v') + s_k z,                          z ~ N(0, 1)
+    F' = F' - pull(v') (F' - m')                  0.01 at |v'| < 0.008 m/s, else 0.003
+    F' = F' - 0.1 (F' - min(max(F', low'), high'))
+    F' = min(max(F', least), most),   D' = F' - F
+
+low and high are what a new trial does not reach with -2 and +2 sd; drift is linear
+between its knots and constant beyond. m, low, high are bilinear in a table and those of
+its edge beyond. What is returned is F' plus the level of the trial,
+
+    level = sc n sqrt((J - 1) / c),   n ~ N(0, 1),  c ~ chi^2 of J - 1 (4 at least).
+
+A path begins at m, half a second before its first sample, on a motion that is held.
+v_t of a record tells when the ground gave way: a sample is a possible F_t for this
+motion, no forecast of a planned one.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.errors import SettingsError
+from analysis.data.series import Array
+from analysis.study.distribution import FEWEST
+from analysis.terrains.table import Table
+
+FEATURES, GATES = 12, 15
+KNOTS = (-0.03, -0.004, 0.0, 0.004, 0.012, 0.03, 0.07, 0.13, 0.22)  # m/s, of the drift
+EDGES = 2.0  # sd from the median to low and high
+MOST_STEPS = 30_000_000  # samples of all paths together
+
+_LEAST_LOAD, _FULL = 0.8, 0.02  # N and m/s of the gate
+_CLIPPED = 4.0
+_SLOW, _PULL, _SLOW_PULL, _WALL = 0.008, 0.003, 0.01, 0.1
+_BEFORE = 50  # samples that a path goes before its first one
+
+
+class Experts(NamedTuple):
+    """What the mixture is made of.
+
+    Attributes:
+        weights: b of every expert, shape (K, 12).
+        sd: s of every expert [N], shape (K,).
+        gate: W, shape (K, 15).
+        centre: of the gate's numbers, shape (15,); the first is not used.
+        scale: of the gate's numbers, shape (15,).
+    """
+
+    weights: Array
+    sd: Array
+    gate: Array
+    centre: Array
+    scale: Array
+
+
+@dataclass(frozen=True, slots=True)
+class SampledTraction:
+    """Forces that a new trial may show along a motion.
+
+    Attributes:
+        forces: F_t [N] of n paths, shape (n, T).
+        is_extrapolated: at which samples load or velocity lie outside of what was
+            recorded, shape (T,).
+    """
+
+    forces: Array
+    is_extrapolated: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Generator:
+    """F_t of a terrain along F_n and v_t; its equations stand above.
+
+    Attributes:
+        experts: the mixture; a single one is linear.
+        drift: at the knots [N], shape (9,).
+        bands: low, median and high of a new trial.
+        between: spread between trials, sc [N].
+        trials: J that it was fitted to.
+        least: smallest F [N],
+        most: and largest.
+        is_stable: it passed the test of free runs.
+    """
+
+    experts: Experts
+    drift: Array
+    bands: Table
+    between: float
+    trials: int
+    least: float
+    most: float
+    is_stable: bool = True
+
+    @property
+    def size(self) -> int:
+        """Number of experts."""
+        return len(self.experts.sd)
+
+    def sample(
+        self, F_n: Array, v_t: Array, seed: int, paths: int = 1
+    ) -> SampledTraction:
+        """Return possible forces along a motion; the same for the same seed.
+
+        Path k is the same however many there are.
+
+        Args:
+            F_n: normal force [N] every 10 ms, shape (T,).
+            v_t: velocity [m/s], shape (T,).
+            seed: of the draws, not negative.
+            paths: how many.
+
+        Raises:
+            SettingsError: no motion, one that is not finite, or too many samples.
+        """
+        _check_motion(F_n, v_t, seed, paths)
+        draws = Draws.of(seed, paths, F_n.size, self.trials)
+        forces = self.run(F_n, v_t, draws) + self.between * draws.level[:, None]
+        return SampledTraction(forces, ~self.bands.covers_many(F_n, v_t))
+
+    def run(self, F_n: Array, v_t: Array, draws: "Draws") -> Array:
+        """Return F along a motion without the level of a trial, shape (n, T)."""
+        before = np.zeros(_BEFORE, dtype=int)
+        rows = np.concatenate([before, np.arange(F_n.size)])
+        motion = Motion.of(F_n[rows], v_t[rows], self.bands)
+        return self.along([motion], draws)[0][:, _BEFORE:]
+
+    def along(self, motions: Sequence["Motion"], draws: "Draws") -> list[Array]:
+        """Return F along motions, each (n / number of motions, T) from its first on.
+
+        Args:
+            motions: of any length.
+            draws: of n paths, a group of the same size for every motion.
+        """
+        experts, count = self.experts, draws.uniform.shape[0] // len(motions)
+        longest = max(motion.m.size for motion in motions)
+        parts = [_Prepared.of(self, motion, longest) for motion in motions]
+        steps, at = _Prepared.joined(parts), np.repeat(np.arange(len(motions)), count)
+        W = np.ascontiguousarray(experts.gate[:, [1, 2, 11, 12, 14]].T)
+        centre, scale = (x[[1, 2, 11, 12, 14]] for x in experts[3:])
+        slope_D, slope_Fv = experts.weights[:, 2], experts.weights[:, 11]
+        F = steps.m[at, 0]
+        D, found = np.zeros(F.size), np.empty((F.size, longest))
+        found[:, 0] = F
+        for i in range(1, longest):
+            fast, load, share = (x[at, i] for x in steps[3:6])
+            logits = steps.logits[at, i]
+            gates = (F, D, F * fast, F * load, F * share)
+            for number, w, c, s in zip(gates, W, centre, scale, strict=True):
+                scaled = np.minimum(np.maximum((number - c) / s, -_CLIPPED), _CLIPPED)
+                logits = logits + scaled[:, None] * w
+            shares = np.exp(logits - logits.max(axis=1, keepdims=True))
+            shares = np.cumsum(shares, axis=1)
+            wanted = draws.uniform[:, i - 1] * shares[:, -1]
+            k = (shares <= wanted[:, None]).sum(axis=1)
+            step = steps.mean[at, i, k] + F * (
+                experts.weights[k, 1] + slope_Fv[k] * fast
+            )
+            step = step + D * slope_D[k] + experts.sd[k] * draws.normal[:, i - 1]
+            new, m = F + step, steps.m[at, i]
+            new = new - steps.pull[at, i] * (new - m)
+            inside = np.minimum(np.maximum(new, steps.low[at, i]), steps.high[at, i])
+            new = new - _WALL * (new - inside)
+            new = np.minimum(np.maximum(new, self.least), self.most)
+            F, D = new, new - F
+            found[:, i] = F
+        each = np.split(found, len(motions))
+        return [
+            part[:, : motion.m.size]
+            for part, motion in zip(each, motions, strict=True)
+        ]
+
+
+class Draws(NamedTuple):
+    """Random numbers of n paths, each path by a stream of its own.
+
+    Attributes:
+        uniform: shape (n, T).
+        normal: shape (n, T).
+        level: of the trial in units of sc, shape (n,).
+    """
+
+    uniform: Array
+    normal: Array
+    level: Array
+
+    @classmethod
+    def of(cls, seed: int, paths: int, steps: int, trials: int) -> "Draws":
+        """Return the draws of paths of so many samples."""
+        length = steps + _BEFORE
+        uniform, normal = np.empty((paths, length)), np.empty((paths, length))
+        level, freedom = np.empty(paths), max(trials - 1, FEWEST)
+        for k in range(paths):
+            rng = np.random.default_rng((seed, k))
+            level[k] = rng.standard_normal() * np.sqrt(freedom / rng.chisquare(freedom))
+            uniform[k], normal[k] = rng.random(length), rng.standard_normal(length)
+        return cls(uniform, normal, level)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """A motion and what a new trial gives on it, each of shape (T,).
+
+    Attributes:
+        F_n: normal force [N].
+        v_t: velocity [m/s].
+        low: force [N] that is reached but for -2 sd.
+        m: median force [N].
+        high: force [N] that is not reached but for +2 sd.
+    """
+
+    F_n: Array
+    v_t: Array
+    low: Array
+    m: Array
+    high: Array
+
+    @classmethod
+    def of(cls, F_n: Array, v_t: Array, bands: Table) -> "Motion":
+        """Return a motion with its bands."""
+        return cls(F_n, v_t, *bands.over(F_n, v_t))
+
+    def features(self, F: Array, D: Array) -> Array:
+        """Return x of every sample but the first, shape (T - 1, 12).
+
+        Args:
+            F: force less the level of the trial [N], before the step, shape (T - 1,).
+            D: its last increment [N], shape (T - 1,).
+        """
+        f, v, m = self.F_n, self.v_t, self.m
+        forward, backward = np.maximum(v[1:], 0.0), np.minimum(v[1:], 0.0)
+        columns = (np.ones(F.size), F, D, f[1:], np.diff(f), forward, backward)
+        more = (np.diff(v), v[:-1], m[1:], np.diff(m), F * forward)
+        return np.column_stack([*columns, *more])
+
+    def gates(self, x: Array) -> Array:
+        """Return g of every sample but the first, not scaled, shape (T - 1, 15)."""
+        F, share = x[:, 1], self.share[1:]
+        return np.column_stack([x, F * self.over_load[1:], share, F * share])
+
+    @property
+    def over_load(self) -> Array:
+        """Return 1 / max(f, 0.8) [1/N]."""
+        return 1.0 / np.maximum(self.F_n, _LEAST_LOAD)
+
+    @property
+    def share(self) -> Array:
+        """Return min(|v| / 0.02, 1)."""
+        return np.minimum(np.abs(self.v_t) / _FULL, 1.0)
+
+
+def scaled_gates(gates: Array, experts: Experts) -> Array:
+    """Return g as the gate takes it, shape (n, 15)."""
+    scaled = (gates - experts.centre) / experts.scale
+    scaled = np.minimum(np.maximum(scaled, -_CLIPPED), _CLIPPED)
+    scaled[:, 0] = 1.0
+    return scaled
+
+
+class _Prepared(NamedTuple):
+    """What of the steps does not depend on F, by motion, sample and expert."""
+
+    m: Array
+    low: Array
+    high: Array
+    forward: Array
+    over_load: Array
+    share: Array
+    pull: Array
+    mean: Array
+    logits: Array
+
+    @classmethod
+    def of(cls, generator: Generator, motion: Motion, length: int) -> "_Prepared":
+        experts, zero = generator.experts, np.zeros(motion.m.size - 1)
+        x = motion.features(zero, zero)
+        g = scaled_gates(motion.gates(x), experts)
+        g[:, [1, 2, 11, 12, 14]] = 0.0  # those of F and D are added step by step
+        drift = np.interp(motion.v_t, KNOTS, generator.drift)
+        first = ((1, 0), (0, 0))
+        columns = (
+            *(motion.m, motion.low, motion.high, np.maximum(motion.v_t, 0.0)),
+            *(motion.over_load, motion.share),
+            np.where(np.abs(motion.v_t) < _SLOW, _SLOW_PULL, _PULL),
+            np.pad(np.einsum("ti,ki->tk", x, experts.weights), first) + drift[:, None],
+            np.pad(np.einsum("ti,ki->tk", g, experts.gate), first),
+        )
+        missing = length - motion.m.size
+        return cls(
+            *(np.pad(c, ((0, missing),) + ((0, 0),) * (c.ndim - 1)) for c in columns)
+        )
+
+    @classmethod
+    def joined(cls, parts: Sequence["_Prepared"]) -> "_Prepared":
+        """Return all of them, with the number of the motion first."""
+        return cls(*(np.stack(column) for column in zip(*parts, strict=True)))
+
+
+def _check_motion(F_n: Array, v_t: Array, seed: int, paths: int) -> None:
+    is_line = F_n.ndim == 1 and F_n.shape == v_t.shape and F_n.size >= 2
+    if not is_line or not (np.isfinite(F_n).all() and np.isfinite(v_t).all()):
+        raise SettingsError(
+            f"No motion to sample along: F_n {F_n.shape}, v_t {v_t.shape}.",
+            hint="Give both every 10 ms, finite, in two arrays of the same length.",
+        )
+    if seed < 0 or paths < 1 or paths * F_n.size > MOST_STEPS:
+        raise SettingsError(
+            f"{paths} paths of {F_n.size} samples with the seed {seed} cannot be drawn.",
+            hint="Give a seed of 0 or more, one path at least, and at most "
+            f"{MOST_STEPS:,} samples in all.",
+        )
