@@ -3,10 +3,11 @@
 A mixture of linear experts for the next force (Jacobs et al. 1991; in time Weigend,
 Mangeas and Srivastava 1995). With F the force less the level of the trial, D its last
 increment, f = F_n, v = v_t, v+ = max(v, 0), v- = min(v, 0), m the median of a new trial
-at (f, v), and ' for the new sample, one step of 10 ms is
+at (f, v), w a mean of v over the last 50 ms and ' for the new sample, one step of 10 ms is
 
-    x  = (1, F, D, f', f' - f, v'+, v'-, v' - v, v, m', m' - m, F v'+)
-    g  = (x, F / max(f', 0.8), s, F s),   s = min(|v'| / 0.02, 1)
+    w' = w + 0.2 (v' - w)
+    x  = (1, F, D, F v'+, F w', f', f' - f, v'+, v'-, v' - v, v, w', m', m' - m)
+    g  = (x, F / max(f', 0.8), F s, s),   s = min(|v'| / 0.02, 1)
     g  = 1 for its first number, else clip((g - centre) / scale, -4, 4)
     k  : the first expert with  sum_{j <= k} softmax(W g)_j > u,   u ~ U(0, 1)
     F' = F + b_k . x + drift(v') + s_k z,                          z ~ N(0, 1)
@@ -37,14 +38,16 @@ from analysis.data.series import Array
 from analysis.study.distribution import FEWEST
 from analysis.terrains.table import Table
 
-FEATURES, GATES = 12, 15
+FEATURES, GATES = 14, 17
 KNOTS = (-0.03, -0.004, 0.0, 0.004, 0.012, 0.03, 0.07, 0.13, 0.22)  # m/s, of the drift
 EDGES = 2.0  # sd from the median to low and high
 MOST_STEPS = 30_000_000  # samples of all paths together
 
 _LEAST_LOAD, _FULL = 0.8, 0.02  # N and m/s of the gate
 _CLIPPED = 4.0
-_SLOW, _PULL, _SLOW_PULL, _WALL = 0.008, 0.003, 0.01, 0.1
+_SLOW, _PULL, _SLOW_PULL, _WALL, _FLOOR = 0.008, 0.003, 0.01, 0.1, 0.5
+_FORGOTTEN = 0.2  # of the mean velocity in a step
+_OF_F = (1, 2, 3, 4, 14, 15)  # numbers of g that depend on F: those of x, then the rest
 _BEFORE = 50  # samples that a path goes before its first one
 
 
@@ -52,11 +55,11 @@ class Experts(NamedTuple):
     """What the mixture is made of.
 
     Attributes:
-        weights: b of every expert, shape (K, 12).
+        weights: b of every expert, shape (K, 14).
         sd: s of every expert [N], shape (K,).
-        gate: W, shape (K, 15).
-        centre: of the gate's numbers, shape (15,); the first is not used.
-        scale: of the gate's numbers, shape (15,).
+        gate: W, shape (K, 17).
+        centre: of the gate's numbers, shape (17,); the first is not used.
+        scale: of the gate's numbers, shape (17,).
     """
 
     weights: Array
@@ -148,31 +151,29 @@ class Generator:
         longest = max(motion.m.size for motion in motions)
         parts = [_Prepared.of(self, motion, longest) for motion in motions]
         steps, at = _Prepared.joined(parts), np.repeat(np.arange(len(motions)), count)
-        W = np.ascontiguousarray(experts.gate[:, [1, 2, 11, 12, 14]].T)
-        centre, scale = (x[[1, 2, 11, 12, 14]] for x in experts[3:])
-        slope_D, slope_Fv = experts.weights[:, 2], experts.weights[:, 11]
+        of_F = list(_OF_F)
+        W, b = experts.gate[:, of_F].T, experts.weights[:, of_F[:4]].T
+        centre, scale = experts.centre[of_F], experts.scale[of_F]
         F = steps.m[at, 0]
         D, found = np.zeros(F.size), np.empty((F.size, longest))
         found[:, 0] = F
         for i in range(1, longest):
-            fast, load, share = (x[at, i] for x in steps[3:6])
-            logits = steps.logits[at, i]
-            gates = (F, D, F * fast, F * load, F * share)
-            for number, w, c, s in zip(gates, W, centre, scale, strict=True):
+            factors, logits = steps.factors[at, i], steps.logits[at, i]
+            of_F = (F, D, *(F[:, None] * factors).T)
+            for number, w, c, s in zip(of_F, W, centre, scale, strict=True):
                 scaled = np.minimum(np.maximum((number - c) / s, -_CLIPPED), _CLIPPED)
                 logits = logits + scaled[:, None] * w
             shares = np.exp(logits - logits.max(axis=1, keepdims=True))
             shares = np.cumsum(shares, axis=1)
             wanted = draws.uniform[:, i - 1] * shares[:, -1]
             k = (shares <= wanted[:, None]).sum(axis=1)
-            step = steps.mean[at, i, k] + F * (
-                experts.weights[k, 1] + slope_Fv[k] * fast
-            )
-            step = step + D * slope_D[k] + experts.sd[k] * draws.normal[:, i - 1]
+            step = steps.mean[at, i, k] + experts.sd[k] * draws.normal[:, i - 1]
+            for number, slope in zip(of_F, b, strict=False):
+                step = step + number * slope[k]
             new, m = F + step, steps.m[at, i]
             new = new - steps.pull[at, i] * (new - m)
-            inside = np.minimum(np.maximum(new, steps.low[at, i]), steps.high[at, i])
-            new = new - _WALL * (new - inside)
+            new = new - _FLOOR * np.minimum(new - steps.low[at, i], 0.0)
+            new = new - _WALL * np.maximum(new - steps.high[at, i], 0.0)
             new = np.minimum(np.maximum(new, self.least), self.most)
             F, D = new, new - F
             found[:, i] = F
@@ -233,36 +234,38 @@ class Motion:
         return cls(F_n, v_t, *bands.over(F_n, v_t))
 
     def features(self, F: Array, D: Array) -> Array:
-        """Return x of every sample but the first, shape (T - 1, 12).
+        """Return x of every sample but the first, shape (T - 1, 14).
 
         Args:
             F: force less the level of the trial [N], before the step, shape (T - 1,).
             D: its last increment [N], shape (T - 1,).
         """
-        f, v, m = self.F_n, self.v_t, self.m
+        f, v, m, factors = self.F_n, self.v_t, self.m, self.factors[1:]
         forward, backward = np.maximum(v[1:], 0.0), np.minimum(v[1:], 0.0)
-        columns = (np.ones(F.size), F, D, f[1:], np.diff(f), forward, backward)
-        more = (np.diff(v), v[:-1], m[1:], np.diff(m), F * forward)
-        return np.column_stack([*columns, *more])
+        of_F = (F, D, F * factors[:, 0], F * factors[:, 1])
+        of_motion = (f[1:], np.diff(f), forward, backward, np.diff(v), v[:-1])
+        more = (factors[:, 1], m[1:], np.diff(m))
+        return np.column_stack([np.ones(F.size), *of_F, *of_motion, *more])
 
     def gates(self, x: Array) -> Array:
-        """Return g of every sample but the first, not scaled, shape (T - 1, 15)."""
-        F, share = x[:, 1], self.share[1:]
-        return np.column_stack([x, F * self.over_load[1:], share, F * share])
+        """Return g of every sample but the first, not scaled, shape (T - 1, 17)."""
+        F, share = x[:, 1, None], self.factors[1:, 3:]
+        return np.column_stack([x, F * self.factors[1:, 2:], share])
 
     @property
-    def over_load(self) -> Array:
-        """Return 1 / max(f, 0.8) [1/N]."""
-        return 1.0 / np.maximum(self.F_n, _LEAST_LOAD)
-
-    @property
-    def share(self) -> Array:
-        """Return min(|v| / 0.02, 1)."""
-        return np.minimum(np.abs(self.v_t) / _FULL, 1.0)
+    def factors(self) -> Array:
+        """What F is multiplied with: v+, w, 1 / max(f, 0.8) and s, shape (T, 4)."""
+        w = np.empty(self.v_t.size)
+        mean = w[0] = self.v_t[0]
+        for i, v in enumerate(self.v_t[1:].tolist(), 1):
+            mean = w[i] = mean + _FORGOTTEN * (v - mean)
+        over_load = 1.0 / np.maximum(self.F_n, _LEAST_LOAD)
+        share = np.minimum(np.abs(self.v_t) / _FULL, 1.0)
+        return np.column_stack([np.maximum(self.v_t, 0.0), w, over_load, share])
 
 
 def scaled_gates(gates: Array, experts: Experts) -> Array:
-    """Return g as the gate takes it, shape (n, 15)."""
+    """Return g as the gate takes it, shape (n, 17)."""
     scaled = (gates - experts.centre) / experts.scale
     scaled = np.minimum(np.maximum(scaled, -_CLIPPED), _CLIPPED)
     scaled[:, 0] = 1.0
@@ -275,9 +278,7 @@ class _Prepared(NamedTuple):
     m: Array
     low: Array
     high: Array
-    forward: Array
-    over_load: Array
-    share: Array
+    factors: Array
     pull: Array
     mean: Array
     logits: Array
@@ -287,12 +288,11 @@ class _Prepared(NamedTuple):
         experts, zero = generator.experts, np.zeros(motion.m.size - 1)
         x = motion.features(zero, zero)
         g = scaled_gates(motion.gates(x), experts)
-        g[:, [1, 2, 11, 12, 14]] = 0.0  # those of F and D are added step by step
+        g[:, _OF_F] = 0.0  # those of F and D are added step by step
         drift = np.interp(motion.v_t, KNOTS, generator.drift)
         first = ((1, 0), (0, 0))
         columns = (
-            *(motion.m, motion.low, motion.high, np.maximum(motion.v_t, 0.0)),
-            *(motion.over_load, motion.share),
+            *(motion.m, motion.low, motion.high, motion.factors),
             np.where(np.abs(motion.v_t) < _SLOW, _SLOW_PULL, _PULL),
             np.pad(np.einsum("ti,ki->tk", x, experts.weights), first) + drift[:, None],
             np.pad(np.einsum("ti,ki->tk", g, experts.gate), first),
