@@ -57,11 +57,13 @@ def load_pool(folder: Path, terrain: str, seed: int, count: int) -> list[Process
     if not path.is_file():
         folder.mkdir(parents=True, exist_ok=True)
         made = {f"{k:03d}": simulate(terrain, seed, k) for k in range(count)}
-        np.savez(path, **made)
+        np.savez(path, allow_pickle=False, **made)
     with np.load(path, allow_pickle=False) as stored:
         tables = [stored[key].astype(float) for key in sorted(stored)[:count]]
     series = [
-        TractionSeries(terrain, f"{seed}-{k}", PERIOD * np.arange(len(x)), *x[:, 1:].T)
+        TractionSeries(
+            terrain, f"{seed}-{k}", PERIOD * np.arange(float(len(x))), *x[:, 1:].T
+        )
         for k, x in enumerate(tables)
     ]
     return list(process_trials([prepare_trial(s, PrepareOptions()) for s in series]))
@@ -121,7 +123,9 @@ class Residual:
             level = rng.standard_normal((PATHS, 1))
             e = np.sqrt(self.eta) * level + np.sqrt(1.0 - self.eta) * e
         forces = self._model.predict(*clipped(trial)).quantiles(ndtr(np.array(SCORES)))
-        at = np.clip(np.interp(e, SCORES, np.arange(len(SCORES))), 0, len(SCORES) - 1.01)
+        at = np.clip(
+            np.interp(e, SCORES, np.arange(len(SCORES))), 0, len(SCORES) - 1.01
+        )
         k = at.astype(int)
         columns = np.arange(T)
         return forces[k, columns] + (at - k) * (
@@ -187,7 +191,7 @@ def one(
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
+    parser = argparse.ArgumentParser(description="Sampled ground against trials.")
     parser.add_argument("pool", type=Path)
     parser.add_argument("--terrains", default=",".join(GROUNDS))
     parser.add_argument("--sets", type=int, default=5)
@@ -214,8 +218,9 @@ def line(terrain: str, number: int, found: Mapping[str, Outcome]) -> str:
     events = "  ".join(f"{k} {g[k]:+.2f}" for k in ("slips", "drops", "sd", "time"))
     ks = " ".join(f"{g[k]:.2f}" for k in ("KS way", "KS drop", "KS impulse"))
     return (
-        f"{terrain:4} set {number + 1}: {g['experts']:.0f} experts  {scores}  {events}  "
-        f"KS {ks}  off {g['off']:.1f}  held {g['held']:.2f}  fit {g['fit']:.1f} s"
+        f"{terrain:4} set {number + 1}: {g['experts']:.0f} experts  {scores}  "
+        f"{events}  KS {ks}  off {g['off']:.1f}  held {g['held']:.2f}  "
+        f"fit {g['fit']:.1f} s"
     )
 
 

@@ -90,16 +90,17 @@ class LevelSums:
             before = np.searchsorted(t, t - gap, "left")
             total = np.concatenate([[0.0], np.cumsum(r)])[before]
             columns[:, k] = before.sum(), r @ total, (r * before + total).sum()
-        return cls(*columns, residuals.means)
+        pairs, products, sums = columns
+        return cls(pairs, products, sums, residuals.means)
 
     def variance(self) -> float:
         """Return sc^2; 0 where the moments are negative."""
-        return float(_variance(*map(np.sum, self._parts()), self.means.size))
+        return float(_variance([part.sum() for part in self._parts()], self.means.size))
 
     def without_each(self) -> Array:
         """Return sc^2 without each of the trials, shape (J,)."""
         rest = [part.sum() - part for part in self._parts()]
-        return _variance(*rest, self.means.size - 1)
+        return _variance(rest, self.means.size - 1)
 
     def error(self) -> float:
         """Return the standard error of sc^2 over the trials, by the jackknife."""
@@ -110,10 +111,9 @@ class LevelSums:
         return self.pairs, self.products, self.sums, self.means, self.means**2
 
 
-def _variance(
-    pairs: Array, products: Array, sums: Array, means: Array, squares: Array, J: int
-) -> Array:
-    """Return sc^2 of sums over trials."""
+def _variance(parts: Sequence[Array], J: int) -> Array:
+    """Return sc^2 of sums over J trials, in the order of `LevelSums`."""
+    pairs, products, sums, means, squares = parts
     R = means / J
     shared = (products - R * sums + R**2 * pairs) / np.maximum(pairs, 1.0)
     taken = (squares - J * R**2) / max(J - 1, 1) / J  # by the mean of the trials
@@ -214,7 +214,9 @@ class RestrictedLikelihood:
         rows = residuals.r[is_row]
         self._sd = max(float(rows.std()), 1e-9)
 
-    def likeliest(self, weight: Array | None = None, start: Array | None = None) -> Array:
+    def likeliest(
+        self, weight: Array | None = None, start: Array | None = None
+    ) -> Array:
         """Return theta of the largest restricted likelihood.
 
         Args:

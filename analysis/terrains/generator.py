@@ -3,7 +3,8 @@
 A mixture of linear experts for the next force (Jacobs et al. 1991; in time Weigend,
 Mangeas and Srivastava 1995). With F the force less the level of the trial, D its last
 increment, f = F_n, v = v_t, v+ = max(v, 0), v- = min(v, 0), m the median of a new trial
-at (f, v), w a mean of v over the last 50 ms and ' for the new sample, one step of 10 ms is
+at (f, v), w a mean of v over the last 50 ms and ' for the new sample, one step of 10 ms
+is
 
     w' = w + 0.2 (v' - w)
     x  = (1, F, D, F v'+, F w', f', f' - f, v'+, v'-, v' - v, v, w', m', m' - m)
@@ -26,23 +27,28 @@ v_t of a record tells when the ground gave way: a sample is a possible F_t for t
 motion, no forecast of a planned one.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
 
 from acquisition.errors import SettingsError
+from acquisition.validation import Many
 from analysis.data.series import Array
 from analysis.study.distribution import FEWEST
+from analysis.terrains.process_rows import STEP
 from analysis.terrains.table import Table
 
 FEATURES, GATES = 14, 17
 KNOTS = (-0.03, -0.004, 0.0, 0.004, 0.012, 0.03, 0.07, 0.13, 0.22)  # m/s, of the drift
 EDGES = 2.0  # sd from the median to low and high
+MOST_EXPERTS = 16
 MOST_STEPS = 30_000_000  # samples of all paths together
 
+_MOST_POINTS = 100  # of an axis of the bands
 _LEAST_LOAD, _FULL = 0.8, 0.02  # N and m/s of the gate
 _CLIPPED = 4.0
 _SLOW, _PULL, _SLOW_PULL, _WALL, _FLOOR = 0.008, 0.003, 0.01, 0.1, 0.5
@@ -95,7 +101,6 @@ class Generator:
         trials: J that it was fitted to.
         least: smallest F [N],
         most: and largest.
-        is_stable: it passed the test of free runs.
     """
 
     experts: Experts
@@ -105,7 +110,60 @@ class Generator:
     trials: int
     least: float
     most: float
-    is_stable: bool = True
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the generator as plain values, for JSON."""
+        bands = self.bands
+        return {
+            "step_ms": round(1000.0 * STEP),
+            "trials": self.trials,
+            "between": self.between,
+            "range": [self.least, self.most],
+            "drift": self.drift.tolist(),
+            "weights": self.experts.weights.tolist(),
+            "sd": self.experts.sd.tolist(),
+            "gate": self.experts.gate.tolist(),
+            "centre": self.experts.centre.tolist(),
+            "scale": self.experts.scale.tolist(),
+            "bands": {
+                "F_n": bands.F_n,
+                "v_t": bands.v_t,
+                "shares": bands.shares,
+                "forces": bands.forces,
+            },
+        }
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> "Generator":
+        """Return the generator of plain values.
+
+        Raises:
+            ValueError: a value is missing or not what it should be.
+        """
+        stored = _StoredGenerator.model_validate(content)
+        experts = Experts(*(np.array(getattr(stored, n)) for n in Experts._fields))
+        shapes = {name: getattr(experts, name).shape for name in Experts._fields}
+        K = len(experts.sd)
+        if shapes != {
+            "weights": (K, FEATURES),
+            "sd": (K,),
+            "gate": (K, GATES),
+            "centre": (GATES,),
+            "scale": (GATES,),
+        }:
+            raise ValueError(f"its {K} experts do not have {FEATURES}, {GATES} numbers")
+        least, most = stored.range
+        if least >= most:
+            raise ValueError("its range is empty")
+        return cls(
+            experts=experts,
+            drift=np.array(stored.drift),
+            bands=stored.bands.table(),
+            between=stored.between,
+            trials=stored.trials,
+            least=least,
+            most=most,
+        )
 
     @property
     def size(self) -> int:
@@ -179,9 +237,57 @@ class Generator:
             found[:, i] = F
         each = np.split(found, len(motions))
         return [
-            part[:, : motion.m.size]
-            for part, motion in zip(each, motions, strict=True)
+            part[:, : motion.m.size] for part, motion in zip(each, motions, strict=True)
         ]
+
+
+_Number = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-1e6, le=1e6)]
+_Positive = Annotated[float, Field(strict=True, gt=0.0, le=1e6)]
+_Several = Annotated[Many[Many[_Number]], Field(min_length=1, max_length=MOST_EXPERTS)]
+
+
+class _StoredBands(BaseModel):
+    """Bands as they are stored."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    F_n: Annotated[Many[_Number], Field(min_length=2, max_length=_MOST_POINTS)]
+    v_t: Annotated[Many[_Number], Field(min_length=2, max_length=_MOST_POINTS)]
+    shares: Annotated[Many[_Number], Field(min_length=3, max_length=3)]
+    forces: Annotated[Many[Many[Many[_Number]]], Field(min_length=3, max_length=3)]
+
+    def table(self) -> Table:
+        """Return the table.
+
+        Raises:
+            ValueError: it is none.
+        """
+        forces = np.array(self.forces)
+        if forces.shape != (3, len(self.F_n), len(self.v_t)):
+            raise ValueError("its bands do not have the size of their axes")
+        if any((np.diff(axis) <= 0.0).any() for axis in (self.F_n, self.v_t)):
+            raise ValueError("an axis of its bands does not increase")
+        if (np.diff(forces, axis=0) < 0.0).any():
+            raise ValueError("its bands cross")
+        return Table(self.F_n, self.v_t, self.shares, self.forces)
+
+
+class _StoredGenerator(BaseModel):
+    """A generator as it is stored."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    step_ms: Literal[10]
+    trials: Annotated[int, Field(strict=True, ge=2, le=1_000_000)]
+    between: Annotated[float, Field(strict=True, ge=0.0, le=1e6)]
+    range: tuple[_Number, _Number]
+    drift: Annotated[Many[_Number], Field(min_length=9, max_length=9)]
+    weights: _Several
+    sd: Annotated[Many[_Positive], Field(min_length=1, max_length=MOST_EXPERTS)]
+    gate: _Several
+    centre: Many[_Number]
+    scale: Many[_Positive]
+    bands: _StoredBands
 
 
 class Draws(NamedTuple):
@@ -317,7 +423,7 @@ def _check_motion(F_n: Array, v_t: Array, seed: int, paths: int) -> None:
         )
     if seed < 0 or paths < 1 or paths * F_n.size > MOST_STEPS:
         raise SettingsError(
-            f"{paths} paths of {F_n.size} samples with the seed {seed} cannot be drawn.",
+            f"{paths} paths of {F_n.size} samples, seed {seed}: they cannot be drawn.",
             hint="Give a seed of 0 or more, one path at least, and at most "
             f"{MOST_STEPS:,} samples in all.",
         )

@@ -8,14 +8,18 @@ better, by energy score, variogram score and events; never by the likelihood of 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
+from acquisition.errors import SettingsError
 from analysis.data.samples import SampleTable, TrainingSet
 from analysis.data.series import Array
+from analysis.data.terrain_kinds import FLAT
 from analysis.gp.kernels import SquaredExponential
 from analysis.gp.trial_level import TrialLevels, TrialResiduals, levels_of
 from analysis.study.new_trial import LEVEL, NewTrialModel, fit_new_trial
+from analysis.study.study import Study
 from analysis.terrains.generator import (
     EDGES,
     FEATURES,
@@ -27,7 +31,19 @@ from analysis.terrains.generator import (
     Motion,
     scaled_gates,
 )
-from analysis.terrains.process_rows import STEP, ProcessTrial, held_longer
+from analysis.terrains.process_rows import (
+    STEP,
+    ProcessTrial,
+    held_longer,
+    process_trials,
+)
+from analysis.terrains.process_scores import (
+    PLATE_DROP,
+    STONES_DROP,
+    energy_score,
+    events_of,
+    variogram_score,
+)
 from analysis.terrains.table import Table, rows_of
 
 EXPERTS = 6
@@ -45,10 +61,13 @@ _LEAST_SD = 0.02  # N
 _CALIBRATED, _PATHS = 12, 6  # rounds of free runs, and paths along every trial
 _RATES = (0.02, 0.01)  # of the drift in the first and the last rounds
 _FULL_COUNT = 100.0  # samples near a knot at which its rate is half
-_BELOW, _ABOVE = 1.0, 2.0  # N that F may leave the range seen
+_BELOW, _ABOVE = 0.5, 2.0  # N that F may leave the range seen
 _HELD = 20.0  # s of a stick in the test of stability
 _RUNS = 1000
 _DRIFTED = 3.0  # N
+_FEWEST = 4  # trials
+_JUDGED = 8  # paths along a trial left out
+_CLEARLY = 0.05  # of the logarithms of scores and events
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,16 +84,55 @@ class Prepared:
     bands: Table
     levels: TrialLevels
 
+    def part(self, trials: slice) -> "Prepared":
+        """Return some of the trials, with the bands and the spread of all."""
+        levels = replace(self.levels, levels=self.levels.levels[trials])
+        return Prepared(self.trials[trials], self.bands, levels)
+
     def motion(self, trial: ProcessTrial) -> Motion:
         """Return the motion of a trial."""
         return Motion.of(trial.F_n, trial.v_t, self.bands)
+
+
+@dataclass(frozen=True, slots=True)
+class GeneratorTask:
+    """Everything the generator of one terrain needs.
+
+    Attributes:
+        trials: whole trials.
+        seed: of everything that is drawn.
+        least: fall of force [N] that makes an event of this ground.
+    """
+
+    trials: tuple[ProcessTrial, ...]
+    seed: int
+    least: float
+
+    @classmethod
+    def of(cls, study: Study, terrain: str) -> "GeneratorTask":
+        """Return the task of a terrain of a study."""
+        result, seed = study.terrains[terrain], study.options.fit.seed
+        least = PLATE_DROP if result.kind == FLAT else STONES_DROP
+        return cls(process_trials(result.trials), seed, least)
+
+
+def generator_of(task: GeneratorTask) -> dict[str, Any]:
+    """Return a generator as plain values, nothing where there is none.
+
+    A pure function of the task.
+    """
+    try:
+        generator = fit_generator(task.trials, task.seed, task.least)
+    except SettingsError:
+        return {}
+    return {} if generator is None else generator.to_dict()
 
 
 def prepare(trials: Sequence[ProcessTrial], seed: int) -> Prepared:
     """Return bands and levels of trials of one terrain, two at least."""
     bands = fit_bands(trials, seed)
     residuals = [
-        (STEP * np.arange(t.F_t.size), t.F_t - Motion.of(t.F_n, t.v_t, bands).m)
+        (STEP * np.arange(float(t.F_t.size)), t.F_t - Motion.of(t.F_n, t.v_t, bands).m)
         for t in trials
     ]
     return Prepared(tuple(trials), bands, levels_of(TrialResiduals(residuals)))
@@ -99,8 +157,8 @@ def fit_bands(trials: Sequence[ProcessTrial], seed: int) -> Table:
     """Return low, median and high of a new trial as a table."""
     from scipy.special import ndtr
 
-    loads = np.percentile(np.concatenate([t.F_n for t in trials]), _LOAD_ENDS)
-    loads = np.linspace(*loads, _LOADS)
+    ends = np.percentile(np.concatenate([t.F_n for t in trials]), _LOAD_ENDS)
+    loads = np.linspace(float(ends[0]), float(ends[1]), _LOADS)
     grid = [x.ravel() for x in np.meshgrid(loads, _SPEEDS, indexing="ij")]
     shares = tuple(ndtr(np.array([-EDGES, 0.0, EDGES])).tolist())
     forces = band_model(trials, seed).predict(*grid).quantiles(shares)
@@ -117,9 +175,51 @@ def fit_generator(
         trials: of one terrain.
         seed: of everything that is drawn.
         least: fall of force [N] that makes an event of this ground.
+
+    Raises:
+        SettingsError: forces that no model can be fitted to.
     """
+    if len(trials) < _FEWEST:
+        return None
     known = prepare(trials, seed)
-    return fit_generator_of_size(known, EXPERTS, seed)
+    sizes = (EXPERTS, 1) if _is_mixture_better(known, seed, least) else (1,)
+    for size in sizes:
+        generator = fit_generator_of_size(known, size, seed)
+        if held_drift(generator, trials, seed) <= _DRIFTED:
+            return generator
+    return None
+
+
+def _is_mixture_better(known: Prepared, seed: int, least: float) -> bool:
+    """Return whether six experts generate trials left out clearly better than one."""
+    learnt, tested = (known.part(slice(k, None, 2)) for k in (0, 1))
+    costs: list[float] = []
+    for size in (1, EXPERTS):
+        generator = fit_generator_of_size(learnt, size, seed)
+        paths = [
+            generator.sample(t.F_n, t.v_t, k, _JUDGED).forces
+            for k, t in enumerate(tested.trials)
+        ]
+        costs.append(_cost(paths, tested.trials, least))
+    return costs[1] < costs[0] - _CLEARLY
+
+
+def _cost(
+    paths: Sequence[Array], trials: Sequence[ProcessTrial], least: float
+) -> float:
+    """Return how unlike the trials paths are; a tenth more of a score is 0.1."""
+    pairs = list(zip(paths, trials, strict=True))
+    scores = [
+        float(np.mean([score(x, t.F_t) for x, t in pairs]))
+        for score in (energy_score, variogram_score)
+    ]
+    recorded = events_of([t.F_t for t in trials], trials, least)
+    made = events_of(paths, trials, least)
+    ratios = [
+        (made.slips / len(paths[0]) + 1.0) / (recorded.slips + 1.0),
+        (made.drops.size / len(paths[0]) + 1.0) / (recorded.drops.size + 1.0),
+    ]
+    return float(np.log(scores).sum() + np.abs(np.log(ratios)).sum())
 
 
 def held_drift(
@@ -127,18 +227,18 @@ def held_drift(
 ) -> float:
     """Return how far the level goes while a foot stands still for 20 s [N].
 
-    Along every trial with its longest stick made 20 s longer the mean force of many
-    free runs is compared with what was recorded in the whole stick: the largest
-    distance over the trials.
+    A thousand free runs along the trials with their longest sticks made 20 s longer:
+    of the mean force in what was added, trial by trial, the largest distance from the
+    median of a new trial there.
     """
     helds = [held_longer(trial, _HELD) for trial in trials]
     motions = [Motion.of(h.trial.F_n, h.trial.v_t, generator.bands) for h in helds]
     longest = max(m.m.size for m in motions)
-    draws = Draws.of(seed, _RUNS // len(helds) * len(helds), longest, 2)
+    draws = Draws.of(seed, -(-_RUNS // len(helds)) * len(helds), longest, 2)
     runs = generator.along(motions, draws)
     return max(
-        abs(float(run[:, h.start : h.end].mean() - h.trial.F_t[h.start : h.end].mean()))
-        for run, h in zip(runs, helds, strict=True)
+        abs(float((run - motion.m)[:, held.start : held.end].mean()))
+        for run, motion, held in zip(runs, motions, helds, strict=True)
     )
 
 
@@ -194,7 +294,7 @@ def fit_experts(x: Array, g: Array, d: Array, size: int, seed: int) -> Experts:
         scale,
     )
     G = scaled_gates(g, empty)
-    ridge = 1e-4 * np.diag((x**2).sum(axis=0) / len(x))
+    ridge = 1e-4 * np.diag(np.maximum((x**2).sum(axis=0), 1e-9) / len(x))
     if size == 1:
         b = np.linalg.solve(x.T @ x + ridge, x.T @ d)
         sd = max(float((d - x @ b).std()), _LEAST_SD)
@@ -202,7 +302,7 @@ def fit_experts(x: Array, g: Array, d: Array, size: int, seed: int) -> Experts:
     # rows sorted by increment start in different experts
     order = np.argsort(np.argsort(d)) * size // d.size
     shares = 0.1 / size + 0.9 * np.eye(size)[order]
-    W = empty.gate
+    weights, sd, W = empty[:3]
     for _ in range(_ROUNDS):
         weights, sd = np.empty((size, FEATURES)), np.empty(size)
         for k in range(size):
