@@ -142,7 +142,7 @@ class TrialLevels:
 
     Attributes:
         between: sc, the spread between trials, in the unit of the residuals.
-        error: standard error of sc.
+        error: standard error of sc by the moments; None where they say nothing.
         is_by_moments: sc is by moments, else by the restricted likelihood.
         other: sc by the other of the two; None where it could not be found.
         within: pooled standard deviation of rows within a trial.
@@ -152,7 +152,7 @@ class TrialLevels:
     """
 
     between: float
-    error: float
+    error: float | None
     is_by_moments: bool
     other: float | None
     within: float
@@ -163,8 +163,9 @@ class TrialLevels:
     @property
     def do_differ(self) -> bool:
         """Whether the two ways differ by more than twice the standard error."""
-        other = self.between if self.other is None else self.other
-        return abs(other - self.between) > 2.0 * self.error
+        if self.other is None or self.error is None:
+            return False
+        return abs(self.other - self.between) > 2.0 * self.error
 
 
 def levels_of(residuals: TrialResiduals) -> TrialLevels:
@@ -183,11 +184,10 @@ def levels_of(residuals: TrialResiduals) -> TrialLevels:
     moments = float(np.sqrt(sums.variance())) if has_pairs else None
     is_by_moments = moments is not None and residuals.count >= FEW
     between = moments if is_by_moments and moments is not None else components.between
-    variance_error = sums.error() if has_pairs else np.inf
     level, mean = likelihood.levels(theta, between)
     return TrialLevels(
         between=between,
-        error=variance_error / max(2.0 * between, np.sqrt(variance_error), 1e-12),
+        error=_error_of_root(sums.error(), between) if has_pairs else None,
         is_by_moments=is_by_moments,
         other=components.between if is_by_moments else moments,
         within=float(np.sqrt(residuals.within())),
@@ -289,6 +289,11 @@ class RestrictedLikelihood:
             mean[1] += gain * h
             variance = variance * (1.0 - gain)
         return sums
+
+
+def _error_of_root(error: float, root: float) -> float:
+    """Return the standard error of a root whose square has the given one."""
+    return error / max(2.0 * root, float(np.sqrt(error)), 1e-12)
 
 
 def _components(theta: Array) -> LevelComponents:

@@ -42,7 +42,7 @@ from analysis.study.crossval import FoldResult, ModelFold
 from analysis.study.digests import code_digest, value_digest
 from analysis.study.metrics import Score
 from analysis.study.models import GpModel, TustinModel
-from analysis.study.new_trial import FamilyChoice, NewTrialModel
+from analysis.study.new_trial import FamilyChoice, LevelSpread, NewTrialModel
 from analysis.study.noise_selection import NoiseChoice, TailedNoise
 from analysis.study.relatives import RelativesOutcome
 from analysis.study.skew import ShapeMap
@@ -71,6 +71,7 @@ TYPES = KERNELS | {
         GpModel,
         Ground,
         Interval,
+        LevelSpread,
         ModelFold,
         NewTrialModel,
         NoiseChoice,
