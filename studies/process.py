@@ -27,6 +27,7 @@ from threadpoolctl import threadpool_limits
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.series import Array, TractionSeries
 from analysis.study.new_trial import NewTrialModel
+from analysis.terrains.generator import Draws
 from analysis.terrains.generator_fit import (
     band_model,
     clipped,
@@ -149,8 +150,8 @@ def judged(
     return {
         "ES": float(np.mean([energy_score(p, t.F_t) for p, t in pairs])),
         "VS": float(np.mean([variogram_score(p, t.F_t) for p, t in pairs])),
-        "slips": made.slips_per_metre / max(true.slips_per_metre, 1e-9) - 1.0,
-        "drops": made.drops_per_metre / max(true.drops_per_metre, 1e-9) - 1.0,
+        "slips": _ratio(made.slips_per_metre, true.slips_per_metre) - 1.0,
+        "drops": _ratio(made.drops_per_metre, true.drops_per_metre) - 1.0,
         "KS way": ks_distance(made.ways, true.ways),
         "KS drop": ks_distance(made.drops, true.drops),
         "KS impulse": ks_distance(made.impulses, true.impulses),
@@ -161,25 +162,29 @@ def judged(
     }
 
 
+def _ratio(made: float, true: float) -> float:
+    return made / true if true > 0.0 else 1.0
+
+
 def one(
     pool: Path, terrain: str, number: int, tested: Sequence[ProcessTrial]
 ) -> dict[str, Outcome]:
     """Return the outcome of one training set by the way forces are drawn."""
     trials = load_pool(pool, terrain, FIRST + number, PER_SET)
     least = PLATE_DROP if terrain.startswith("T") else STONES_DROP
-    started = time.perf_counter()
+    started = time.process_time()
     generator = fit_generator(trials, seed=0, least=least)
-    seconds = time.perf_counter() - started
-    assert generator is not None
+    seconds = time.process_time() - started
+    if generator is None:
+        return {}
     residual = Residual(band_model(trials, 0), trials)
     rng = np.random.default_rng(number)
+    longest = max(t.F_t.size for t in tested)
+    draws = Draws.of(number, PATHS * len(tested), longest, generator.trials)
     drawn: dict[str, list[Array]] = {
         "rows": [residual.sample(t, rng, is_white=True) for t in tested],
         "OU": [residual.sample(t, rng, is_white=False) for t in tested],
-        "generator": [
-            generator.sample(t.F_n, t.v_t, k, PATHS).forces
-            for k, t in enumerate(tested)
-        ],
+        "generator": generator.run([(t.F_n, t.v_t) for t in tested], draws),
     }
     found = {name: judged(paths, tested, least) for name, paths in drawn.items()}
     found["generator"] |= {
@@ -197,21 +202,67 @@ def main() -> int:
     parser.add_argument("--sets", type=int, default=5)
     parser.add_argument("--tested", type=int, default=100)
     args = parser.parse_args()
-    every: dict[str, list[dict[str, Outcome]]] = {}
+    terrains = args.terrains.split(",")
+    every: dict[str, list[dict[str, Outcome]]] = {name: [] for name in terrains}
     with threadpool_limits(1):
-        for terrain in args.terrains.split(","):
-            tested = load_pool(args.pool, terrain, TESTED_SEED, 100)[: args.tested]
-            for number in range(args.sets):
-                found = one(args.pool, terrain, number, tested)
-                every.setdefault(terrain, []).append(found)
-                sys.stdout.write(line(terrain, number, found) + "\n")
+        tested = {
+            name: load_pool(args.pool, name, TESTED_SEED, 100)[: args.tested]
+            for name in terrains
+        }
+        for number in range(args.sets):
+            for name in terrains:
+                found = one(args.pool, name, number, tested[name])
+                every[name].append(found)
+                sys.stdout.write(line(name, number, found) + "\n")
                 sys.stdout.flush()
-    (args.pool / "outcomes.json").write_text(json.dumps(every))
+            (args.pool / "outcomes.json").write_text(json.dumps(every))
+    sys.stdout.write("\n".join(summary(every)) + "\n")
     return 0
+
+
+def summary(every: Mapping[str, Sequence[Mapping[str, Outcome]]]) -> list[str]:
+    """Return the lines of all stones and all plates."""
+    lines = []
+    for kind, is_plate in (("stones", False), ("plates", True)):
+        sets = [
+            found
+            for name, outcomes in every.items()
+            for found in outcomes
+            if name.startswith("T") == is_plate
+        ]
+        kept = [found for found in sets if found]
+        if not kept:
+            continue
+        own = [found["generator"] for found in kept]
+        energy = [f["generator"]["ES"] / f["rows"]["ES"] for f in kept]
+        texture = [f["generator"]["VS"] / f["OU"]["VS"] for f in kept]
+        events = ("slips", "drops", "sd", "time")
+        parts = [
+            f"{kind}: {len(sets)} training sets, {len(sets) - len(kept)} without",
+            f"energy score over rows, median {np.median(energy):.2f}, largest "
+            f"{max(energy):.2f}; variogram over OU {np.median(texture):.2f}, "
+            f"largest {max(texture):.2f}",
+            "median of |relative error|: "
+            + ", ".join(
+                f"{k} {np.median([abs(g[k]) for g in own]):.2f}" for k in events
+            ),
+            "median of KS: "
+            + ", ".join(
+                f"{k[3:]} {np.median([g[k] for g in own]):.2f}"
+                for k in ("KS way", "KS drop", "KS impulse")
+            ),
+            f"largest: mean of a trial off {max(g['off'] for g in own):.1f} N, held "
+            f"{max(g['held'] for g in own):.2f} N, fit {max(g['fit'] for g in own):.1f} "
+            f"s of one core",
+        ]
+        lines += [parts[0], *(f"  {part}" for part in parts[1:])]
+    return lines
 
 
 def line(terrain: str, number: int, found: Mapping[str, Outcome]) -> str:
     """Return the line of one training set."""
+    if not found:
+        return f"{terrain:4} set {number + 1}: none is stable"
     g, rows, ou = found["generator"], found["rows"], found["OU"]
     scores = f"ES {g['ES'] / rows['ES']:.2f} (OU {ou['ES'] / rows['ES']:.2f})"
     scores += f"  VS {g['VS'] / ou['VS']:.2f}"

@@ -11,7 +11,8 @@ is
     g  = (x, F / max(f', 0.8), F s, s),   s = min(|v'| / 0.02, 1)
     g  = 1 for its first number, else clip((g - centre) / scale, -4, 4)
     k  : the first expert with  sum_{j <= k} softmax(W g)_j > u,   u ~ U(0, 1)
-    F' = F + b_k . x + drift(v') + s_k z,                          z ~ N(0, 1)
+    F' = F + a (b_k . x + drift(v') + s_k z),                      z ~ N(0, 1)
+    a  = min(max((h' - 0.002) / 0.004, 0), 1),   h' = h + 0.02 (|w'| - h)
     F' = F' - pull(v') (F' - m')                  0.01 at |v'| < 0.008 m/s, else 0.003
     F' = F' - 0.1 (F' - min(max(F', low'), high'))
     F' = min(max(F', least), most),   D' = F' - F
@@ -22,6 +23,8 @@ its edge beyond. What is returned is F' plus the level of the trial,
 
     level = sc n sqrt((J - 1) / c),   n ~ N(0, 1),  c ~ chi^2 of J - 1 (4 at least).
 
+A foot that has stood still for longer than a second keeps its force (a = 0), but for
+the pull: no motion tells it, and no trial that was learnt from may have had it.
 A path begins at m, half a second before its first sample, on a motion that is held.
 v_t of a record tells when the ground gave way: a sample is a possible F_t for this
 motion, no forecast of a planned one.
@@ -53,6 +56,7 @@ _LEAST_LOAD, _FULL = 0.8, 0.02  # N and m/s of the gate
 _CLIPPED = 4.0
 _SLOW, _PULL, _SLOW_PULL, _WALL, _FLOOR = 0.008, 0.003, 0.01, 0.1, 0.5
 _FORGOTTEN = 0.2  # of the mean velocity in a step
+_STOOD, _STILL = 0.02, (0.002, 0.004)  # of the mean speed in a step; m/s
 _OF_F = (1, 2, 3, 4, 14, 15)  # numbers of g that depend on F: those of x, then the rest
 _BEFORE = 50  # samples that a path goes before its first one
 
@@ -188,15 +192,25 @@ class Generator:
         """
         _check_motion(F_n, v_t, seed, paths)
         draws = Draws.of(seed, paths, F_n.size, self.trials)
-        forces = self.run(F_n, v_t, draws) + self.between * draws.level[:, None]
+        (forces,) = self.run([(F_n, v_t)], draws)
         return SampledTraction(forces, ~self.bands.covers_many(F_n, v_t))
 
-    def run(self, F_n: Array, v_t: Array, draws: "Draws") -> Array:
-        """Return F along a motion without the level of a trial, shape (n, T)."""
-        before = np.zeros(_BEFORE, dtype=int)
-        rows = np.concatenate([before, np.arange(F_n.size)])
-        motion = Motion.of(F_n[rows], v_t[rows], self.bands)
-        return self.along([motion], draws)[0][:, _BEFORE:]
+    def run(
+        self, motions: Sequence[tuple[Array, Array]], draws: "Draws"
+    ) -> list[Array]:
+        """Return possible forces along motions, each (n / number of motions, T).
+
+        Args:
+            motions: F_n [N] and v_t [m/s] of each, shape (T,).
+            draws: of n paths, a group of the same size for every motion.
+        """
+        begun = []
+        for F_n, v_t in motions:
+            rows = np.concatenate([np.zeros(_BEFORE, dtype=int), np.arange(F_n.size)])
+            begun.append(Motion.of(F_n[rows], v_t[rows], self.bands))
+        levels = np.split(self.between * draws.level[:, None], len(motions))
+        found = self.along(begun, draws)
+        return [F[:, _BEFORE:] + u for F, u in zip(found, levels, strict=True)]
 
     def along(self, motions: Sequence["Motion"], draws: "Draws") -> list[Array]:
         """Return F along motions, each (n / number of motions, T) from its first on.
@@ -228,7 +242,7 @@ class Generator:
             step = steps.mean[at, i, k] + experts.sd[k] * draws.normal[:, i - 1]
             for number, slope in zip(of_F, b, strict=False):
                 step = step + number * slope[k]
-            new, m = F + step, steps.m[at, i]
+            new, m = F + steps.fade[at, i] * step, steps.m[at, i]
             new = new - steps.pull[at, i] * (new - m)
             new = new - _FLOOR * np.minimum(new - steps.low[at, i], 0.0)
             new = new - _WALL * np.maximum(new - steps.high[at, i], 0.0)
@@ -361,13 +375,25 @@ class Motion:
     @property
     def factors(self) -> Array:
         """What F is multiplied with: v+, w, 1 / max(f, 0.8) and s, shape (T, 4)."""
-        w = np.empty(self.v_t.size)
-        mean = w[0] = self.v_t[0]
-        for i, v in enumerate(self.v_t[1:].tolist(), 1):
-            mean = w[i] = mean + _FORGOTTEN * (v - mean)
+        w = _running_mean(self.v_t, _FORGOTTEN)
         over_load = 1.0 / np.maximum(self.F_n, _LEAST_LOAD)
         share = np.minimum(np.abs(self.v_t) / _FULL, 1.0)
         return np.column_stack([np.maximum(self.v_t, 0.0), w, over_load, share])
+
+    @property
+    def fade(self) -> Array:
+        """Return a: 1 in motion, 0 when the foot has stood still for long, (T,)."""
+        recent = _running_mean(np.abs(self.factors[:, 1]), _STOOD)
+        return np.clip((recent - _STILL[0]) / _STILL[1], 0.0, 1.0)
+
+
+def _running_mean(values: Array, share: float) -> Array:
+    """Return the mean of what came before, of which a share is forgotten, (T,)."""
+    found = np.empty(values.size)
+    mean = found[0] = values[0]
+    for i, value in enumerate(values[1:].tolist(), 1):
+        mean = found[i] = mean + share * (value - mean)
+    return found
 
 
 def scaled_gates(gates: Array, experts: Experts) -> Array:
@@ -386,6 +412,7 @@ class _Prepared(NamedTuple):
     high: Array
     factors: Array
     pull: Array
+    fade: Array
     mean: Array
     logits: Array
 
@@ -400,6 +427,7 @@ class _Prepared(NamedTuple):
         columns = (
             *(motion.m, motion.low, motion.high, motion.factors),
             np.where(np.abs(motion.v_t) < _SLOW, _SLOW_PULL, _PULL),
+            motion.fade,
             np.pad(np.einsum("ti,ki->tk", x, experts.weights), first) + drift[:, None],
             np.pad(np.einsum("ti,ki->tk", g, experts.gate), first),
         )

@@ -261,13 +261,14 @@ def fit_generator_of_size(known: Prepared, size: int, seed: int) -> Generator:
 
 
 def _steps(known: Prepared) -> tuple[Array, Array, Array]:
-    """Return x, g and the increment of every step of all trials."""
+    """Return x, g and the increment of every step of all trials in motion."""
     parts = []
     for trial, level in zip(known.trials, known.levels.levels, strict=True):
         motion, F = known.motion(trial), trial.F_t - level
         D = np.diff(F)
         x = motion.features(F[:-1], np.concatenate([[0.0], D[:-1]]))
-        parts.append((x, motion.gates(x), D))
+        is_moving = motion.fade[1:] == 1.0
+        parts.append((x[is_moving], motion.gates(x)[is_moving], D[is_moving]))
     x, g, d = (np.concatenate(column) for column in zip(*parts, strict=True))
     return x, g, d
 

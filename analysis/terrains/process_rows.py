@@ -5,7 +5,7 @@ window of velocities alone.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -94,7 +94,7 @@ class Held(NamedTuple):
 def held_longer(trial: ProcessTrial, seconds: float) -> Held:
     """Return a trial whose longest stick lasts `seconds` longer.
 
-    What was recorded during the stick is repeated forth and back.
+    What was recorded during the stick is repeated forth and back, without its creep.
     """
     first, last = longest_stick(trial)
     added = round(seconds / STEP)
@@ -104,7 +104,10 @@ def held_longer(trial: ProcessTrial, seconds: float) -> Held:
     more = np.tile(there_and_back, repeats)[:added]
     rows = np.arange(trial.F_t.size)
     longer = np.concatenate([rows[: last + 1], more, rows[last + 1 :]])
-    return Held(trial.take(longer), last + 1, last + 1 + added)
+    found, start, end = trial.take(longer), last + 1, last + 1 + added
+    v_t = found.v_t.copy()
+    v_t[start:end] -= v_t[start:end].mean()
+    return Held(replace(found, v_t=v_t), start, end)
 
 
 def longest_stick(trial: ProcessTrial) -> tuple[int, int]:
