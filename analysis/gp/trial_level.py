@@ -32,6 +32,8 @@ REMEMBERED = 3.0  # times tau, beyond which two rows share the level only
 _TAUS = (0.02, 20.0)  # s
 _START_TAU = 0.5  # s
 _STEP = 1e-5  # of a logarithm, over which a slope is taken
+_WIDE = 1e-3  # of a logarithm, over which a curvature is taken
+_LEAST_CURVATURE = 1e-3  # of the largest
 _LEAST_PAIRS = 10  # pairs of rows far apart, below which moments say nothing
 
 
@@ -102,6 +104,15 @@ class LevelSums:
         rest = [part.sum() - part for part in self._parts()]
         return _variance(rest, self.means.size - 1)
 
+    def drawn(self, weight: Array) -> Array:
+        """Return sc^2 of trials drawn again, not below 0, shape (d,).
+
+        Args:
+            weight: how often each trial was drawn, shape (d, J).
+        """
+        parts = [weight @ part for part in self._parts()]
+        return _variance(parts, self.means.size)
+
     def error(self) -> float:
         """Return the standard error of sc^2 over the trials, by the jackknife."""
         each, J = self.without_each(), self.means.size
@@ -134,6 +145,10 @@ class LevelComponents(NamedTuple):
     within: float
     tau: float
     measurement: float
+
+    def theta(self) -> Array:
+        """Return the logarithms of sn, sc, so and tau."""
+        return np.log([self.measurement, self.between, self.within, self.tau])
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,14 +229,12 @@ class RestrictedLikelihood:
         rows = residuals.r[is_row]
         self._sd = max(float(rows.std()), 1e-9)
 
-    def likeliest(
-        self, weight: Array | None = None, start: Array | None = None
-    ) -> Array:
+    def likeliest(self, start: Array | None = None, *, is_level: bool = True) -> Array:
         """Return theta of the largest restricted likelihood.
 
         Args:
-            weight: how often each trial counts, shape (J,); None = once.
             start: where the search begins.
+            is_level: sc is sought, too; else it stays that of the start.
         """
         from scipy.optimize import minimize
 
@@ -229,10 +242,12 @@ class RestrictedLikelihood:
         if start is None:
             start = np.array([sd - 2.0, sd - 1.2, sd - 0.3, np.log(_START_TAU)])
         box = [(sd - 6.0, sd + 1.0)] * 3 + [tuple(np.log(_TAUS))]
+        if not is_level:
+            box[1] = (float(start[1]), float(start[1]))
         steps = np.vstack([np.zeros(start.size), _STEP * np.eye(start.size)])
 
         def cost(theta: Array) -> tuple[float, Array]:
-            values = self.costs(theta + steps, weight)
+            values = self.costs(theta + steps)
             return float(values[0]), (values[1:] - values[0]) / _STEP
 
         return minimize(
@@ -244,20 +259,55 @@ class RestrictedLikelihood:
             options={"ftol": 1e-7, "maxiter": 60},
         ).x
 
-    def costs(self, theta: Array, weight: Array | None = None) -> Array:
+    def costs(self, theta: Array) -> Array:
         """Return minus the restricted log likelihood, without its constant, (p,).
 
         Args:
             theta: hyperparameters, shape (p, 4).
-            weight: how often each trial counts, shape (J,); None = once.
         """
         A, B, C, D = self._sums(theta)
-        w = np.ones(A.shape[1]) if weight is None else weight
         sc2 = np.exp(2.0 * theta[:, 1])[:, None]
         k = 1.0 + sc2 * A
         each = D + np.log(k) + C - sc2 * B**2 / k
-        precision = (A / k) @ w
-        return 0.5 * (each @ w - ((B / k) @ w) ** 2 / precision + np.log(precision))
+        precision, sums = (A / k).sum(axis=1), (B / k).sum(axis=1)
+        return 0.5 * (each.sum(axis=1) - sums**2 / precision + np.log(precision))
+
+    def drawn(self, theta: Array, weight: Array) -> Array:
+        """Return theta without sc for trials drawn again, one Newton step away, (d, 3).
+
+        Args:
+            theta: where the likelihood of all trials is largest.
+            weight: how often each trial was drawn, shape (d, J).
+        """
+        free, _, mean = [0, 2, 3], *self.levels(theta, float(np.exp(theta[1])))
+        steps = _WIDE * np.eye(4)[free]
+        at = [theta, *(theta + s for s in steps), *(theta - s for s in steps)]
+        both = [theta + a + b for a in steps for b in steps]
+        costs = self._each(np.array([*at, *both]), mean)
+        slopes = (costs[1:4] - costs[4:7]).T / (2.0 * _WIDE)
+        total = costs.sum(axis=1)
+        mixed = total[7:].reshape(3, 3) - total[1:4, None] - total[1:4] + total[0]
+        curvature = mixed / _WIDE**2
+        least = _LEAST_CURVATURE * max(float(np.abs(curvature).max()), 1.0)
+        values, vectors = np.linalg.eigh(0.5 * (curvature + curvature.T))
+        inverse = vectors / np.maximum(values, least) @ vectors.T
+        return theta[free] - (weight - 1.0) @ slopes @ inverse
+
+    def _each(self, theta: Array, mean: float) -> Array:
+        """Return the cost of every trial around a known mean at p theta, (p, J)."""
+        A, B, C, D = self._sums(theta)
+        sc2 = np.exp(2.0 * theta[:, 1])[:, None]
+        k, around = 1.0 + sc2 * A, B - mean * A
+        squares = C - 2.0 * mean * B + mean**2 * A
+        return 0.5 * (D + np.log(k) + squares - sc2 * around**2 / k)
+
+    def gain(self, theta: Array) -> float:
+        """Return the log likelihood that a level of every trial gains."""
+        without = theta.copy()
+        without[1] = np.log(self._sd) - 6.0
+        fixed = self.likeliest(start=without, is_level=False)
+        costs = self.costs(np.array([fixed, theta]))
+        return max(0.0, float(costs[0] - costs[1]))
 
     def levels(self, theta: Array, between: float) -> tuple[Array, float]:
         """Return the level of every trial around their mean, (J,), and that mean."""
