@@ -44,7 +44,7 @@ from analysis.terrains.process_scores import (
     ks_distance,
     variogram_score,
 )
-from tests.fakes.point_foot import GROUNDS, PERIOD, PointFoot
+from tests.fakes.point_foot import GROUNDS, PointFoot
 
 FIRST, TESTED_SEED = 4801, 4900  # seeds of the first training set and the tested ones
 PER_SET, PATHS, COUNTED = 10, 16, 4  # trials, paths of a trial, those with events
@@ -251,9 +251,9 @@ def summary(every: Mapping[str, Sequence[Mapping[str, Outcome]]]) -> list[str]:
                 f"{k[3:]} {np.median([g[k] for g in own]):.2f}"
                 for k in ("KS way", "KS drop", "KS impulse")
             ),
-            f"largest: mean of a trial off {max(g['off'] for g in own):.1f} N, held "
-            f"{max(g['held'] for g in own):.2f} N, fit {max(g['fit'] for g in own):.1f} "
-            f"s of one core",
+            f"largest: mean of a trial off {max(g['off'] for g in own):.1f} N, "
+            f"held {max(g['held'] for g in own):.2f} N, "
+            f"fit {max(g['fit'] for g in own):.1f} s of one core",
         ]
         lines += [parts[0], *(f"  {part}" for part in parts[1:])]
     return lines
