@@ -62,9 +62,7 @@ def load_pool(folder: Path, terrain: str, seed: int, count: int) -> list[Process
     with np.load(path, allow_pickle=False) as stored:
         tables = [stored[key].astype(float) for key in sorted(stored)[:count]]
     series = [
-        TractionSeries(
-            terrain, f"{seed}-{k}", PERIOD * np.arange(float(len(x))), *x[:, 1:].T
-        )
+        TractionSeries(terrain, f"{seed}-{k}", np.round(x[:, 0], 6), *x[:, 1:].T)
         for k, x in enumerate(tables)
     ]
     return list(process_trials([prepare_trial(s, PrepareOptions()) for s in series]))
