@@ -109,7 +109,11 @@ def database_of(
         SettingsError: no terrain has kept samples.
     """
     axes, tasks = _tasks(study)
-    sampled = [GeneratorTask.of(study, task.terrain) for task in tasks]
+    kinds, seed = study.kinds, study.options.fit.seed
+    sampled = [
+        GeneratorTask.of(study.terrains[name].trials, kinds[name], seed)
+        for name in (task.terrain for task in tasks)
+    ]
     batches = [Batch(generator_of, sampled), Batch(tabulate, tasks)]
     generators, tables = run_batches(batches, workers, store=store)
     models, from_rest = study.options.fit.models, break_away_of(study, store)

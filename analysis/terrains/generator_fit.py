@@ -13,13 +13,12 @@ from typing import Any
 import numpy as np
 
 from acquisition.errors import SettingsError
+from analysis.data.prepare import PreparedTrial
 from analysis.data.samples import SampleTable, TrainingSet
 from analysis.data.series import Array
-from analysis.data.terrain_kinds import FLAT
 from analysis.gp.kernels import SquaredExponential
 from analysis.gp.trial_level import TrialLevels, TrialResiduals, levels_of
 from analysis.study.new_trial import LEVEL, NewTrialModel, fit_new_trial
-from analysis.study.study import Study
 from analysis.terrains.generator import (
     EDGES,
     FEATURES,
@@ -38,10 +37,9 @@ from analysis.terrains.process_rows import (
     process_trials,
 )
 from analysis.terrains.process_scores import (
-    PLATE_DROP,
-    STONES_DROP,
     energy_score,
     events_of,
+    least_drop,
     variogram_score,
 )
 from analysis.terrains.table import Table, rows_of
@@ -109,11 +107,11 @@ class GeneratorTask:
     least: float
 
     @classmethod
-    def of(cls, study: Study, terrain: str) -> "GeneratorTask":
-        """Return the task of a terrain of a study."""
-        result, seed = study.terrains[terrain], study.options.fit.seed
-        least = PLATE_DROP if result.kind == FLAT else STONES_DROP
-        return cls(process_trials(result.trials), seed, least)
+    def of(
+        cls, trials: Sequence[PreparedTrial], kind: str, seed: int
+    ) -> "GeneratorTask":
+        """Return the task of the trials of a terrain of a kind."""
+        return cls(process_trials(trials), seed, least_drop(kind))
 
 
 def generator_of(task: GeneratorTask) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from analysis.data.series import Array
+from analysis.data.terrain_kinds import FLAT
 from analysis.terrains.process_rows import STEP, ProcessTrial
 
 SEGMENT = 50  # samples of the energy score
@@ -51,6 +52,11 @@ def variogram_score(paths: Array, record: Array) -> float:
         recorded = np.sqrt(np.abs(record[h:] - record[:-h]))
         found.append(np.mean((recorded - sampled) ** 2))
     return float(np.mean(found))
+
+
+def least_drop(kind: str) -> float:
+    """Return the fall of force [N] that makes an event on a kind of terrain."""
+    return PLATE_DROP if kind == FLAT else STONES_DROP
 
 
 class Events(NamedTuple):

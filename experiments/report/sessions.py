@@ -25,7 +25,7 @@ from analysis.report.page_model import BedPhoto, ReportContext
 from analysis.report.what_if import StudyVariant
 from analysis.report.what_if_tables import plain_choice, side_by_side
 from analysis.study.crossval import Prepared
-from analysis.study.jobs import Batch, Shard
+from analysis.study.jobs import Batch, Shard, run_tasks
 from analysis.study.models import (
     GP_SE,
     GP_SE_TRIAL,
@@ -35,6 +35,12 @@ from analysis.study.models import (
 from analysis.study.store import TYPES, ResultStore
 from analysis.study.study import Study, StudyOptions, run_study, run_study_shard
 from analysis.terrains.export import break_away_batch, break_away_of, database_of
+from analysis.terrains.generator_check import (
+    SAMPLED_TYPES,
+    SampledTrials,
+    generator_tasks,
+    judge_generator,
+)
 from analysis.terrains.identify import identify_study
 from experiments.operator.console import Console
 from experiments.report.cells import (
@@ -155,7 +161,9 @@ class StudySession:
 
 def results_below(data: Path) -> ResultStore:
     """Return the store of results below a folder of data."""
-    return ResultStore(data / FOLDS, types={**TYPES, **JUDGED_TYPES, **DRAWN_TYPES})
+    return ResultStore(
+        data / FOLDS, types={**TYPES, **JUDGED_TYPES, **DRAWN_TYPES, **SAMPLED_TYPES}
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,7 +227,12 @@ class StudyInputs:
             name: terrain_kind(name, [t.stones for t in group])
             for name, group in self.series.items()
         }
-        return [break_away_batch(prepared, kinds, self.options.fit.seed)]
+        seed = self.options.fit.seed
+        judged = list(generator_tasks(prepared, kinds, seed).values())
+        return [
+            Batch(judge_generator, judged),
+            break_away_batch(prepared, kinds, seed),
+        ]
 
 
 def study_sessions(
@@ -358,7 +371,8 @@ def report_sessions(
     others = repeat_study(study, analysed.files, order.choices.variants, console, store)
     every = [trial for group in trials.values() for trial in group]
     rig = with_tares([trial.health for trial in every], every)
-    findings = cache(partial(compute_results, study, rig, break_away))
+    sampled = _sampled(study, store)
+    findings = cache(partial(compute_results, study, rig, break_away, sampled))
     foresight = study_foresight(study, trials, break_away, store, findings)
     own = sessions[0].path if len(sessions) == 1 else data / "study"
     context = _context(sessions, order, analysed, foresight, others)
@@ -366,6 +380,15 @@ def report_sessions(
     page = write_report(study, order.out or own, context)
     console.table(*summary_table(study))
     return page
+
+
+def _sampled(study: Study, store: ResultStore) -> dict[str, SampledTrials]:
+    """Return how like trials left out samples are, by terrain; found in the store."""
+    trials = {name: result.trials for name, result in study.terrains.items()}
+    tasks = generator_tasks(trials, study.kinds, study.options.fit.seed)
+    found = run_tasks(judge_generator, list(tasks.values()), 1, store=store)
+    pairs = zip(tasks, found, strict=True)
+    return {name: one for name, one in pairs if one is not None}
 
 
 def _context(
