@@ -38,8 +38,8 @@ def mobilisation_table(results: StudyResults) -> ReportTable:
         header=("terrain", *units, "K of an exponential"),
         rows=rows,
         note="Initial stiffness: secant between 15 and 75% of a loading, median. "
-        "Mobilisation way: peak over stiffness, median. Run-out: way from a peak to the "
-        "next loading. Drops: falls of force, with the shape of their Weibull "
+        "Mobilisation way: peak over stiffness, median. Run-out: way from a peak to "
+        "the next loading. Drops: falls of force, with the shape of their Weibull "
         "distribution. Capacity over load: F_t/F_n at the peaks, median. In brackets "
         "the 90% interval for the value of as many other trials of the same ground, "
         "from trials drawn again. K is identifiable where loadings bend.",

@@ -25,7 +25,7 @@ from analysis.report.page_model import BedPhoto, ReportContext
 from analysis.report.what_if import StudyVariant
 from analysis.report.what_if_tables import plain_choice, side_by_side
 from analysis.study.crossval import Prepared
-from analysis.study.jobs import Batch, Shard, run_tasks
+from analysis.study.jobs import Batch, Shard
 from analysis.study.models import (
     GP_SE,
     GP_SE_TRIAL,
@@ -37,9 +37,9 @@ from analysis.study.study import Study, StudyOptions, run_study, run_study_shard
 from analysis.terrains.export import break_away_batch, break_away_of, database_of
 from analysis.terrains.generator_check import (
     SAMPLED_TYPES,
-    SampledTrials,
     generator_tasks,
     judge_generator,
+    sampled_trials,
 )
 from analysis.terrains.identify import identify_study
 from experiments.operator.console import Console
@@ -371,7 +371,7 @@ def report_sessions(
     others = repeat_study(study, analysed.files, order.choices.variants, console, store)
     every = [trial for group in trials.values() for trial in group]
     rig = with_tares([trial.health for trial in every], every)
-    sampled = _sampled(study, store)
+    sampled = sampled_trials(study, 1, store)
     findings = cache(partial(compute_results, study, rig, break_away, sampled))
     foresight = study_foresight(study, trials, break_away, store, findings)
     own = sessions[0].path if len(sessions) == 1 else data / "study"
@@ -380,15 +380,6 @@ def report_sessions(
     page = write_report(study, order.out or own, context)
     console.table(*summary_table(study))
     return page
-
-
-def _sampled(study: Study, store: ResultStore) -> dict[str, SampledTrials]:
-    """Return how like trials left out samples are, by terrain; found in the store."""
-    trials = {name: result.trials for name, result in study.terrains.items()}
-    tasks = generator_tasks(trials, study.kinds, study.options.fit.seed)
-    found = run_tasks(judge_generator, list(tasks.values()), 1, store=store)
-    pairs = zip(tasks, found, strict=True)
-    return {name: one for name, one in pairs if one is not None}
 
 
 def _context(
