@@ -1,6 +1,7 @@
 """Does a sampled ground look like the recorded one? Takes half an hour.
 
 python -m studies.process POOL [--terrains S0,TF] [--sets 5] [--tested 100]
+python -m studies.process POOL --events
 
 POOL is a folder of simulated trials, made where it is missing: on every terrain a point
 foot is pushed in five training sets of ten trials and in a hundred trials that are only
@@ -8,8 +9,8 @@ tested. Seeds are those that nothing was chosen by.
 
 Of every training set a generator is fitted and run along the tested trials, beside
 independent rows of the bands and an Ornstein-Uhlenbeck residual in way and time.
-Printed are energy and variogram score, events, the test of sticks of 20 s, and what of
-the limits is missed.
+Printed are energy and variogram score, events and the test of sticks of 20 s. `--events` fits nothing: it says how often the interval of a value
+of events and mobilisation by one training set holds that by another.
 """
 
 import argparse
@@ -17,6 +18,7 @@ import json
 import sys
 import time
 from collections.abc import Mapping, Sequence
+from itertools import permutations
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +28,7 @@ from threadpoolctl import threadpool_limits
 
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.series import Array, TractionSeries
+from analysis.findings.mobilisation import mobilisation_of
 from analysis.study.new_trial import NewTrialModel
 from analysis.terrains.generator import Draws
 from analysis.terrains.generator_fit import (
@@ -199,8 +202,12 @@ def main() -> int:
     parser.add_argument("--terrains", default=",".join(GROUNDS))
     parser.add_argument("--sets", type=int, default=5)
     parser.add_argument("--tested", type=int, default=100)
+    parser.add_argument("--events", action="store_true")
     args = parser.parse_args()
     terrains = args.terrains.split(",")
+    if args.events:
+        sys.stdout.write("\n".join(held_events(args.pool, terrains, args.sets)) + "\n")
+        return 0
     every: dict[str, list[dict[str, Outcome]]] = {name: [] for name in terrains}
     with threadpool_limits(1):
         tested = {
@@ -216,6 +223,32 @@ def main() -> int:
             (args.pool / "outcomes.json").write_text(json.dumps(every))
     sys.stdout.write("\n".join(summary(every)) + "\n")
     return 0
+
+
+def held_events(pool: Path, terrains: Sequence[str], sets: int) -> list[str]:
+    """Return how often intervals of one training set hold the values of another."""
+    held: dict[str, list[bool]] = {}
+    straight: list[float] = []
+    for terrain in terrains:
+        least = PLATE_DROP if terrain.startswith("T") else STONES_DROP
+        each = [
+            mobilisation_of(load_pool(pool, terrain, FIRST + k, PER_SET), least)
+            for k in range(sets)
+        ]
+        known = [one for one in each if one is not None]
+        straight += [one.straight for one in known]
+        for first, second in permutations(known, 2):
+            for name, interval in first.values.items():
+                value = second.values[name].value
+                is_held = interval.lower <= value <= interval.upper
+                held.setdefault(name, []).append(is_held)
+    lines = [f"{name}: held {np.mean(hits):.0%}" for name, hits in held.items()]
+    every = np.mean([hit for hits in held.values() for hit in hits])
+    return [
+        f"{', '.join(terrains)}: intervals of one set hold another's value",
+        *lines,
+        f"all: {every:.0%}; straight loadings {min(straight):.0%} to {max(straight):.0%}",
+    ]
 
 
 def summary(every: Mapping[str, Sequence[Mapping[str, Outcome]]]) -> list[str]:
