@@ -9,8 +9,9 @@ tested. Seeds are those that nothing was chosen by.
 
 Of every training set a generator is fitted and run along the tested trials, beside
 independent rows of the bands and an Ornstein-Uhlenbeck residual in way and time.
-Printed are energy and variogram score, events and the test of sticks of 20 s. `--events` fits nothing: it says how often the interval of a value
-of events and mobilisation by one training set holds that by another.
+Printed are energy and variogram score, events and the test of sticks of 20 s.
+`--events` fits nothing: it says how often the interval of a value of events and
+mobilisation by one training set holds that by another.
 """
 
 import argparse
@@ -247,7 +248,8 @@ def held_events(pool: Path, terrains: Sequence[str], sets: int) -> list[str]:
     return [
         f"{', '.join(terrains)}: intervals of one set hold another's value",
         *lines,
-        f"all: {every:.0%}; straight loadings {min(straight):.0%} to {max(straight):.0%}",
+        f"all: {every:.0%}",
+        f"straight loadings: {min(straight):.0%} to {max(straight):.0%}",
     ]
 
 
