@@ -28,7 +28,7 @@ from analysis.data.series import Array
 
 FEW = 30  # trials below which the restricted likelihood answers, not the moments
 APART = 0.1  # s between two rows of a trial that are taken
-REMEMBERED = 3.0  # times tau, beyond which two rows share the level only
+REMEMBERED = 4.0  # times tau, beyond which two rows share the level only
 _TAUS = (0.02, 20.0)  # s
 _START_TAU = 0.5  # s
 _STEP = 1e-5  # of a logarithm, over which a slope is taken
