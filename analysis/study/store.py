@@ -55,7 +55,7 @@ Types = Mapping[str, type]
 Function = Callable[..., Any]
 
 _DTYPES = {"float64": "<f8", "int64": "<i8", "bool": "|b1"}
-MOST_BYTES = 256 * 1024**2  # of all results; a fold of a study has about 60 kB
+MOST_BYTES = 256 * 1024**2  # of all results, at least; a fold has about 60 kB
 LARGEST = 16 * 1024**2  # bytes of one result; a larger file is none
 _KEPT = 0.9  # share of the size that is left when results go
 

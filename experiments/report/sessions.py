@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from hashlib import blake2b
 from pathlib import Path
+from shutil import disk_usage
 
 import numpy as np
 
@@ -32,7 +33,7 @@ from analysis.study.models import (
     PAPER_MODELS,
     FitOptions,
 )
-from analysis.study.store import TYPES, ResultStore
+from analysis.study.store import MOST_BYTES, TYPES, ResultStore
 from analysis.study.study import Study, StudyOptions, run_study, run_study_shard
 from analysis.terrains.export import break_away_batch, break_away_of, database_of
 from analysis.terrains.generator_check import (
@@ -64,6 +65,7 @@ from experiments.session.photos import photos_of
 from experiments.session.store import FOLDS, SessionFolder, iso_utc
 from experiments.settings.matrix import MatrixSettings
 
+_SHARE_OF_DISK = 4  # one part in so many of what is free may be results
 EXPORTED = (*PAPER_MODELS, GP_SE_TRIAL)
 
 
@@ -160,10 +162,10 @@ class StudySession:
 
 
 def results_below(data: Path) -> ResultStore:
-    """Return the store of results below a folder of data."""
-    return ResultStore(
-        data / FOLDS, types={**TYPES, **JUDGED_TYPES, **DRAWN_TYPES, **SAMPLED_TYPES}
-    )
+    """Return the store of results below a folder of data; it grows with the disk."""
+    types = {**TYPES, **JUDGED_TYPES, **DRAWN_TYPES, **SAMPLED_TYPES}
+    free = disk_usage(data).free if data.is_dir() else 0
+    return ResultStore(data / FOLDS, max(MOST_BYTES, free // _SHARE_OF_DISK), types)
 
 
 @dataclass(frozen=True, slots=True)
