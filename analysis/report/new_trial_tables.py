@@ -16,7 +16,6 @@ from analysis.study.study import Study
 from analysis.study.terrain_fit import TerrainResult, mean_of
 from analysis.study.trial_components import TrialComponents
 
-_ENOUGH = 10  # trials that the level is stated for
 _LEAST = (
     0.01  # of the residual within a trial: smaller noise is not distinguishable from 0
 )
@@ -84,7 +83,8 @@ def worth_table(study: Study) -> ReportTable:
             _measurement(components),
             f"{components.independent:.0f}",
             f"{components.level_sd(1):.2f}",
-            f"{components.level_sd(_ENOUGH):.2f}",
+            f"{components.level_sd(components.trials):.2f} ({components.trials})",
+            f"{components.level_sd(components.trials + 1):.2f}",
         ]
         for name, result in study.terrains.items()
         if (components := result.components) is not None
@@ -99,14 +99,18 @@ def worth_table(study: Study) -> ReportTable:
             "measurement",
             "independent values per trial",
             "level after one trial [N]",
-            f"after {_ENOUGH} [N]",
+            "after all trials [N]",
+            "after one more [N]",
         ),
         rows=rows,
         note="Standard deviations with 95% bootstrap intervals over trials. Between: "
         "level of each trial. Within: correlated residual along a trial, with its "
         "correlation time. Measurement: uncorrelated between rows. Last columns: "
         "standard error of the terrain's level. A spread between trials that gains "
-        "less than 1.4 in log likelihood is not distinguishable from 0.",
+        "less than 1.4 in log likelihood is not distinguishable from 0. The spread "
+        "between trials is by moments from 30 trials on, else by the restricted "
+        "likelihood; where the two differ by more than twice the standard error, it "
+        "says so.",
         section=ReportSection.BEYOND,
     )
 
@@ -212,7 +216,10 @@ def _below_zero(dissipation: Dissipation) -> str:
 def _between(components: TrialComponents) -> str:
     if not components.is_distinguishable:
         return f"not distinguishable from 0 (gain {components.gain:.1f})"
-    return f"{_with_interval(components, 'between', 'N')} (gain {components.gain:.1f})"
+    shown = f"{_with_interval(components, 'between', 'N')} (gain {components.gain:.1f})"
+    if components.do_differ and components.other is not None:
+        return f"{shown}; the other way gives {components.other:.2f} N"
+    return shown
 
 
 def _measurement(components: TrialComponents) -> str:

@@ -7,6 +7,12 @@ them left out in turn: the hyperparameters stay, its rows are taken out and the 
 factorised again. Another family than the normal one must be better by one standard
 error over the trials and by 0.05 nat. So must a `ShapeMap` on top of the chosen one
 be, by one standard error; every trial is scored by the shape of the others.
+
+The function comes from at most 30 trials, a row of each from stretches of equal length:
+more rows of a process cost the cube of their number, and a trial of which it has a row
+or none shows no level. The level of a trial comes from the residuals of all rows of all
+trials (`analysis.gp.trial_level`), and so does the spread within a trial. Only a level
+in proportion to F_n is left to the likelihood.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,6 +27,7 @@ from analysis.gp.kernels import Kernel
 from analysis.gp.noise import ConstantNoise, LogLinearNoise
 from analysis.gp.refit import refit_gp
 from analysis.gp.regression import GaussianProcess, LeaveOut, fit_gp
+from analysis.gp.trial_level import TrialLevels, TrialResiduals, levels_of
 from analysis.gp.trial_noise import TrialNoise, TrialRows
 from analysis.study.distribution import FEWEST, NewTrialPrediction
 from analysis.study.metrics import clearly_best
@@ -42,6 +49,8 @@ EFFECTS = (LEVEL, RATIO, BOTH)
 
 LEAST_GAIN = 0.05  # nat; stones gain 0.06 to 0.28 by the warp, plates up to 0.04
 _BENDS = (1.0, 3.0, 9.0)  # N, c of the warp
+MOST_TRIALS = 30  # that the function is fitted to
+_STEP = 0.01  # s of motion from one kept sample to the next
 _THIN = 5  # of the rows of a trial left out every fifth is scored
 
 
@@ -61,6 +70,24 @@ class FamilyChoice(NamedTuple):
     clipped: int
 
 
+class LevelSpread(NamedTuple):
+    """How far z of trials differs, by the residuals of all of them.
+
+    Attributes:
+        between: standard deviation of the level of a trial.
+        error: its standard error; None where trials are too short to say.
+        other: the same by the other of the two ways; None where there is none.
+        is_by_moments: moments gave it, else the restricted likelihood.
+        within: variance of rows within a trial over what the process says of them.
+    """
+
+    between: float
+    error: float | None
+    other: float | None
+    is_by_moments: bool
+    within: float
+
+
 @dataclass(frozen=True, slots=True)
 class NewTrialModel:
     """A model of F_t over (F_n, v_t) that predicts a trial it has not seen.
@@ -72,6 +99,7 @@ class NewTrialModel:
         c: of the warp z = c log(y + c) [N]; None for z = y.
         shape: of the distribution, where it was worth one.
         choice: how the family was chosen.
+        spread: how far trials differ; None where the likelihood of the process says it.
     """
 
     process: GaussianProcess
@@ -80,6 +108,7 @@ class NewTrialModel:
     c: float | None
     shape: ShapeMap | None
     choice: FamilyChoice
+    spread: LevelSpread | None = None
 
     @property
     def flags(self) -> tuple[str, ...]:
@@ -106,6 +135,13 @@ class NewTrialModel:
         prediction = _prediction(
             self.process, inputs, mean, variance, self.trials, self.curve, self.c
         )
+        if self.spread is not None:
+            noise = _noise_within(self.process, inputs)
+            prediction = replace(
+                prediction,
+                within=prediction.within + (self.spread.within - 1.0) * noise,
+                between=np.full(mean.shape, self.spread.between**2),
+            )
         return replace(prediction, shape=self.shape)
 
     def describe(self) -> dict[str, Any]:
@@ -116,6 +152,7 @@ class NewTrialModel:
             "c": self.c,
             "shape": None if self.shape is None else self.shape._asdict(),
             "family": self.choice._asdict(),
+            "spread": None if self.spread is None else self.spread._asdict(),
         }
 
 
@@ -152,7 +189,7 @@ class NewTrialFit:
     ) -> None:
         self._training, self._curve, self._effect = training, curve, effect
         self._families = families
-        self._chosen = np.sort(training.chosen)  # rows of a trial stand together
+        self._chosen = spread_rows(training.lengths, training.chosen.size)
         self._rows = training.rows.take(self._chosen)
         self._trial = training.trial_of()
         label = self._trial[self._chosen]
@@ -181,10 +218,30 @@ class NewTrialFit:
             gain,
             int(np.count_nonzero(self._rows.F_t < deepest(chosen.c))),
         )
-        count = len(self._left_out)
+        process, spread = self._with_levels(chosen)
+        count = len(self._training.lengths)
         return NewTrialModel(
-            chosen.process, self._curve, count, chosen.c, shape, choice
+            process, self._curve, count, chosen.c, shape, choice, spread
         )
+
+    def _with_levels(
+        self, candidate: _Candidate
+    ) -> tuple[GaussianProcess, LevelSpread | None]:
+        """Return the process around the mean of all trials, and how these differ."""
+        process, noise = candidate.process, candidate.process.noise
+        if not isinstance(noise, TrialNoise) or noise.has_ratio or not noise.has_level:
+            return process, None
+        rows = self._training.rows
+        residual = self._outputs(np.arange(rows.count), candidate.c)
+        residual -= process.mean(rows.inputs)
+        parts = np.split(residual, np.cumsum(self._training.lengths)[:-1])
+        residuals = TrialResiduals(
+            [(_STEP * np.arange(float(part.size)), part) for part in parts]
+        )
+        levels = levels_of(residuals)
+        usual = float(_noise_within(process, self._rows.inputs).mean())
+        spread = _spread_of(levels, usual)
+        return replace(process, offset=process.offset + levels.mean), spread
 
     def _candidates(self, kernel: Kernel) -> list[_Candidate]:
         outputs = self._outputs(self._chosen, None)
@@ -271,6 +328,51 @@ def family_counts(models: Sequence[NewTrialModel]) -> Mapping[str, int]:
     """Return how many models chose each family."""
     chosen = [model.choice.chosen for model in models]
     return {family: chosen.count(family) for family in FAMILIES}
+
+
+def spread_rows(lengths: Sequence[int], count: int) -> Indices:
+    """Return about `count` rows of at most 30 trials, one from stretches alike.
+
+    Args:
+        lengths: number of rows of every trial, one trial after the other.
+        count: of rows that are wanted.
+    """
+    starts = np.concatenate([[0], np.cumsum(lengths)])
+    wanted = min(len(lengths), MOST_TRIALS)
+    trials = np.round(np.linspace(0, len(lengths) - 1, wanted)).astype(int)
+    each = max(count // wanted, 1)
+    middles = (np.arange(each) + 0.5) / each
+    rows = [starts[k] + np.floor(middles * lengths[k]).astype(int) for k in trials]
+    return np.unique(np.concatenate(rows))
+
+
+def _spread_of(levels: TrialLevels, usual: float) -> LevelSpread:
+    """Return how far trials differ.
+
+    Args:
+        levels: of all trials.
+        usual: variance of rows within a trial by the process.
+    """
+    return LevelSpread(
+        between=levels.between,
+        error=levels.error,
+        other=levels.other,
+        is_by_moments=levels.is_by_moments,
+        within=levels.within**2 / usual,
+    )
+
+
+def _noise_within(process: GaussianProcess, inputs: Array) -> Array:
+    """Return the variance of single rows of a trial by a process, shape (n,)."""
+    theta = process.theta[len(process.kernel.names) :]
+    Z = (inputs - process.centre) / process.scale
+    noise = process.noise
+    within = noise.variance(theta, Z)
+    return (
+        within - noise.trial_variance(theta, Z)
+        if isinstance(noise, TrialNoise)
+        else within
+    )
 
 
 def _prediction(

@@ -42,7 +42,7 @@ from analysis.study.crossval import FoldResult, ModelFold
 from analysis.study.digests import code_digest, value_digest
 from analysis.study.metrics import Score
 from analysis.study.models import GpModel, TustinModel
-from analysis.study.new_trial import FamilyChoice, NewTrialModel
+from analysis.study.new_trial import FamilyChoice, LevelSpread, NewTrialModel
 from analysis.study.noise_selection import NoiseChoice, TailedNoise
 from analysis.study.relatives import RelativesOutcome
 from analysis.study.skew import ShapeMap
@@ -55,7 +55,7 @@ Types = Mapping[str, type]
 Function = Callable[..., Any]
 
 _DTYPES = {"float64": "<f8", "int64": "<i8", "bool": "|b1"}
-MOST_BYTES = 256 * 1024**2  # of all results; a fold of a study has about 60 kB
+MOST_BYTES = 256 * 1024**2  # of all results, at least; a fold has about 60 kB
 LARGEST = 16 * 1024**2  # bytes of one result; a larger file is none
 _KEPT = 0.9  # share of the size that is left when results go
 
@@ -71,6 +71,7 @@ TYPES = KERNELS | {
         GpModel,
         Ground,
         Interval,
+        LevelSpread,
         ModelFold,
         NewTrialModel,
         NoiseChoice,

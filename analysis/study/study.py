@@ -19,7 +19,15 @@ from analysis.data.samples import SampleTable
 from analysis.data.series import TractionSeries
 from analysis.data.terrain_kinds import terrain_incline, terrain_kind
 from analysis.study.crossval import FoldResult, Prepared, plan_folds, run_fold
-from analysis.study.jobs import Batch, Progress, Store, Workers, run_batches
+from analysis.study.jobs import (
+    Batch,
+    Progress,
+    Shard,
+    Store,
+    Workers,
+    run_batches,
+    run_shard,
+)
 from analysis.study.metrics import standard_error
 from analysis.study.models import NEW_TRIAL, FitOptions
 from analysis.study.relatives import (
@@ -145,24 +153,13 @@ def run_study(
     Raises:
         SettingsError: there is no trial at all.
     """
-    _require_trials(trials)
-    prepared = _prepared(trials, options.prepare)
-    targets = _prepared(trials, options.target) if options.target else prepared
-    tasks, notes = plan_folds(prepared, options.fit, targets)
-    further = _further(trials)
-    notes += _notes_on_inputs(further)
-    apart = [] if further else _apart(prepared, options.fit)
-    batches = [
-        *beside(prepared),  # first: they are longer than a fit
-        Batch(run_fold, tasks),
-        Batch(run_relatives, plan_relatives(prepared, grounds_of(trials), options.fit)),
-        Batch(fit_components, apart),
-        Batch(fit_terrain, _wholes(prepared, options)),
-    ]
+    plan = _Plan.of(trials, options, beside)
+    prepared, notes = plan.prepared, list(plan.notes)
     *_, folds, outcomes, fitted, wholes = run_batches(
-        batches, Workers(options.n_jobs, options.scheduler), progress, store
+        plan.batches, Workers(options.n_jobs, options.scheduler), progress, store
     )
-    components = {task.terrain: fit for task, fit in zip(apart, fitted, strict=True)}
+    done = zip(plan.apart, fitted, strict=True)
+    components = {task.terrain: fit for task, fit in done}
     notes += [note for fold in folds for note in fold.notes]
     results = {
         name: _result(trials[name], prepared[name], folds, whole, components.get(name))
@@ -174,6 +171,76 @@ def run_study(
         outcome.terrain: outcome for outcome in outcomes if outcome is not None
     }
     return Study(simulated, options, results, tuple(notes), warnings, relatives)
+
+
+def run_study_shard(
+    trials: Mapping[str, Sequence[TractionSeries]],
+    options: StudyOptions,
+    shard: Shard,
+    store: Store,
+    progress: Progress | None = None,
+    beside: Callable[[Prepared], Sequence[Batch]] = lambda _: (),
+) -> int:
+    """Keep one run's share of what a study is made of; return its number of tasks.
+
+    After all of them `run_study` finds everything in the store, bit for bit as one run
+    would have made it.
+
+    Args:
+        trials: recorded trials by terrain.
+        options: every choice.
+        shard: which share.
+        store: on a folder that all runs see.
+        progress: called with (fits done, fits in all).
+        beside: as for `run_study`.
+
+    Raises:
+        SettingsError: there is no trial at all.
+    """
+    plan = _Plan.of(trials, options, beside)
+    workers = Workers(options.n_jobs, options.scheduler)
+    return run_shard(plan.batches, shard, store, workers, progress)
+
+
+@dataclass(frozen=True, slots=True)
+class _Plan:
+    """What a study has to do.
+
+    Attributes:
+        prepared: the trials.
+        batches: of tasks, the folds and what follows them last.
+        apart: tasks of the variance components.
+        notes: what cannot be done, and why.
+    """
+
+    prepared: dict[str, tuple[PreparedTrial, ...]]
+    batches: tuple[Batch, ...]
+    apart: list[ComponentsTask]
+    notes: list[str]
+
+    @classmethod
+    def of(
+        cls,
+        trials: Mapping[str, Sequence[TractionSeries]],
+        options: StudyOptions,
+        beside: Callable[[Prepared], Sequence[Batch]],
+    ) -> "_Plan":
+        _require_trials(trials)
+        prepared = _prepared(trials, options.prepare)
+        targets = _prepared(trials, options.target) if options.target else prepared
+        tasks, notes = plan_folds(prepared, options.fit, targets)
+        further = _further(trials)
+        notes += _notes_on_inputs(further)
+        apart = [] if further else _apart(prepared, options.fit)
+        relatives = plan_relatives(prepared, grounds_of(trials), options.fit)
+        batches = (
+            *beside(prepared),  # first: they are longer than a fit
+            Batch(run_fold, tasks),
+            Batch(run_relatives, relatives),
+            Batch(fit_components, apart),
+            Batch(fit_terrain, _wholes(prepared, options)),
+        )
+        return cls(prepared, batches, apart, notes)
 
 
 def _result(

@@ -1,9 +1,9 @@
 """Variance components: how trials of a terrain differ, and how rows repeat.
 
-A Gaussian process with three components besides its function is fitted to rows of all
-trials: a level of every trial (between), an Ornstein-Uhlenbeck residual along it
-(within, with its time tau) and independent noise (measurement). Rows come in runs of
-neighbours: single rows lie several tau apart, where residual and noise look alike.
+Around a Gaussian process of rows of at most 30 trials the residuals of all rows of all
+trials have three parts: a level of every trial (between), an Ornstein-Uhlenbeck
+residual along it (within, with its time tau) and independent noise (measurement); see
+`analysis.gp.trial_level`.
 
 Intervals come from trials drawn again with replacement, around the function fitted to
 all of them. With J trials of T seconds the level of a terrain is known to
@@ -18,16 +18,23 @@ import numpy as np
 
 from acquisition.errors import TractionError
 from analysis.data.prepare import PreparedTrial
-from analysis.data.series import Array, Indices
+from analysis.data.series import Array
 from analysis.gp.kernels import SquaredExponential
 from analysis.gp.noise import ConstantNoise
 from analysis.gp.regression import fit_gp
+from analysis.gp.trial_level import (
+    REMEMBERED,
+    LevelSums,
+    RestrictedLikelihood,
+    TrialLevels,
+    TrialResiduals,
+    levels_of,
+)
 from analysis.gp.trial_noise import TrialNoise, TrialRows
 from analysis.study.models import FitOptions
+from analysis.study.new_trial import spread_rows
 from analysis.tustin.identifiability import Interval
 
-RUN = 5  # neighbours that are taken together
-APART = 4  # kept samples from one to the next: nearer ones share the moving average
 LEAST_GAIN = 1.4  # log likelihood that a level must gain: 5 % on the edge of its range
 
 _STREAM = 3_000_000  # apart from folds, terrain fits and tables
@@ -87,6 +94,8 @@ class TrialComponents:
         intervals: 95 % intervals of "between", "within", "tau" and "measurement";
             none where no draws were asked for.
         gain: log likelihood that the level of a trial gains.
+        other: sc [N] by the other of the two ways; None where it says nothing.
+        do_differ: the two ways differ by more than twice the standard error.
     """
 
     trials: int
@@ -97,6 +106,8 @@ class TrialComponents:
     measurement: float
     intervals: dict[str, Interval]
     gain: float
+    other: float | None = None
+    do_differ: bool = False
 
     @property
     def is_distinguishable(self) -> bool:
@@ -121,51 +132,45 @@ def fit_components(task: ComponentsTask) -> TrialComponents | None:
     """
     if len(task.trials) < _FEWEST:
         return None
-    key = (task.options.seed, zlib.crc32(task.terrain.encode()), _STREAM)
-    rng = np.random.default_rng(key)
-    rows = [
-        _runs(t, task.options.gp_points // len(task.trials), rng) for t in task.trials
-    ]
-    label = np.repeat(np.arange(len(rows)), [r.size for r in rows])
-    F_n, v_t, F_t, t = (
-        np.concatenate(
-            [getattr(trial, n)[r] for trial, r in zip(task.trials, rows, strict=True)]
-        )
-        for n in ("F_n", "v_t", "F_t", "t")
+    F_n, v_t, F_t = (
+        np.concatenate([getattr(trial, n) for trial in task.trials])
+        for n in ("F_n", "v_t", "F_t")
     )
-    inputs, trials = np.column_stack([F_n, v_t]), TrialRows(label, t)
+    inputs, lengths = np.column_stack([F_n, v_t]), [t.t.size for t in task.trials]
+    chosen = spread_rows(lengths, task.options.gp_points)
+    label = np.repeat(np.arange(len(lengths)), lengths)[chosen]
     try:
-        whole, without = (
-            fit_gp(inputs, F_t, SquaredExponential(), noise, trials=trials)
-            for noise in (
-                TrialNoise(ConstantNoise(), has_drift=True),
-                TrialNoise(ConstantNoise(), has_level=False, has_drift=True),
-            )
+        process = fit_gp(
+            inputs[chosen],
+            F_t[chosen],
+            SquaredExponential(),
+            TrialNoise(ConstantNoise()),
+            trials=TrialRows(label, np.zeros(label.size)),
         )
     except TractionError:
         return None
-    theta = whole.theta[len(whole.kernel.names) :]
-    residual = F_t - whole.mean(inputs)
-    names = ("measurement", "between", "within", "tau")
-    per_trial, draws = _PerTrial(residual, trials), min(task.options.draws, _DRAWS)
-    intervals = _intervals(per_trial, theta, draws, rng) if draws else []
-    point = dict(zip(names, np.exp(theta).tolist(), strict=True))
-    return TrialComponents(
-        trials=len(rows),
-        seconds=float(np.mean([_motion(trial.t) for trial in task.trials])),
-        **point,
-        intervals=dict(zip(names, intervals, strict=bool(intervals))),
-        gain=max(0.0, whole.lml - without.lml),
+    left = np.split(F_t - process.mean(inputs), np.cumsum(lengths)[:-1])
+    residuals = TrialResiduals(
+        [(trial.t, part) for trial, part in zip(task.trials, left, strict=True)]
     )
-
-
-def _runs(trial: TimedRows, count: int, rng: np.random.Generator) -> Indices:
-    """Return `count` rows of a trial or fewer, in order, in runs of neighbours."""
-    span = RUN * APART
-    starts = np.arange(0, trial.t.size - span + 1, span)
-    wanted = min(max(count // RUN, 1), starts.size)
-    chosen = np.sort(rng.choice(starts, wanted, replace=False)) if wanted else starts
-    return (chosen[:, None] + APART * np.arange(RUN)).ravel()
+    levels = levels_of(residuals)
+    found, likelihood = levels.components, RestrictedLikelihood(residuals)
+    theta = found.theta()
+    draws = min(task.options.draws, _DRAWS)
+    key = (task.options.seed, zlib.crc32(task.terrain.encode()), _STREAM)
+    rng = np.random.default_rng(key)
+    return TrialComponents(
+        trials=len(lengths),
+        seconds=float(np.mean([_motion(trial.t) for trial in task.trials])),
+        between=levels.between,
+        within=found.within,
+        tau=found.tau,
+        measurement=found.measurement,
+        intervals=_intervals(residuals, levels, draws, rng) if draws else {},
+        gain=likelihood.gain(theta),
+        other=levels.other,
+        do_differ=levels.do_differ,
+    )
 
 
 def _motion(t: Array) -> float:
@@ -173,82 +178,29 @@ def _motion(t: Array) -> float:
     return t.size * float(np.diff(t).min()) if t.size > 1 else 0.0
 
 
-class _PerTrial:
-    """The likelihood of residuals, trial by trial: these are independent.
-
-    Shorter trials are padded with rows that add nothing.
-
-    Args:
-        residual: measured minus predicted force [N], shape (n,).
-        trials: which trials the rows come from, and when.
-    """
-
-    def __init__(self, residual: Array, trials: TrialRows) -> None:
-        blocks = trials.blocks()
-        longest = max(rows.stop - rows.start for rows in blocks)
-        shape = (len(blocks), longest)
-        self._r, t, self._is_row = np.zeros(shape), np.zeros(shape), np.zeros(shape)
-        for k, rows in enumerate(blocks):
-            count = rows.stop - rows.start
-            self._r[k, :count], t[k, :count] = residual[rows], trials.t[rows]
-            self._is_row[k, :count] = 1.0
-        self._same = self._is_row[:, :, None] * self._is_row[:, None, :]
-        self._gap = np.abs(t[:, :, None] - t[:, None, :])
-        self.trials = len(blocks)
-
-    def __call__(self, theta: Array) -> tuple[Array, Array]:
-        """Return log likelihood of every trial, (J,), and its slopes, (J, 4).
-
-        Args:
-            theta: logarithms of sn, sc, so and tau.
-        """
-        sn, sc, so, tau = np.exp(theta)
-        drift = so**2 * np.exp(-self._gap / tau) * self._same
-        eye = np.eye(self._r.shape[1])
-        noise = np.where(self._is_row > 0.0, sn**2, 1.0)[:, :, None] * eye
-        C = noise + sc**2 * self._same + drift
-        inverse = np.linalg.inv(C)
-        a = np.einsum("kij,kj->ki", inverse, self._r)
-        size = np.linalg.slogdet(C)[1]
-        W = a[:, :, None] * a[:, None, :] - inverse
-        diagonal = np.einsum("kii->ki", W) * self._is_row
-        slopes = [
-            sn**2 * diagonal.sum(axis=1),
-            sc**2 * (W * self._same).sum(axis=(1, 2)),
-            (W * drift).sum(axis=(1, 2)),
-            0.5 * (W * drift * self._gap).sum(axis=(1, 2)) / tau,
-        ]
-        return -0.5 * ((self._r * a).sum(axis=1) + size), np.stack(slopes, axis=1)
-
-
 def _intervals(
-    per_trial: _PerTrial, theta: Array, draws: int, rng: np.random.Generator
-) -> list[Interval]:
-    """Return 95 % intervals of sn, sc, so and tau from trials drawn again.
+    residuals: TrialResiduals,
+    levels: TrialLevels,
+    draws: int,
+    rng: np.random.Generator,
+) -> dict[str, Interval]:
+    """Return 95 % intervals of all components from trials drawn again.
 
     Args:
-        per_trial: likelihood of every trial's residuals.
-        theta: logarithms of the components of all trials.
+        residuals: of all trials.
+        levels: found from them.
         draws: of the trials with replacement.
         rng: draws them.
     """
-    from scipy.optimize import minimize
-
-    count = per_trial.trials
-    bounds = np.column_stack([theta - 4.0, theta + 2.0])
-
-    def likeliest(weight: Array, start: Array) -> Array:
-        def cost(x: Array) -> tuple[float, Array]:
-            values, slopes = per_trial(x)
-            return -float(weight @ values), -(weight @ slopes)
-
-        options = {"ftol": 1e-7, "maxiter": 60}
-        return minimize(
-            cost, start, jac=True, method="L-BFGS-B", bounds=bounds, options=options
-        ).x
-
-    whole = likeliest(np.ones(count), theta)
-    weights = rng.multinomial(count, np.full(count, 1.0 / count), size=draws)
-    drawn = np.array([likeliest(weight, whole) for weight in weights.astype(float)])
-    ends = np.exp(theta + np.percentile(drawn - whole, _ENDS, axis=0))
-    return [Interval(*pair) for pair in ends.T.tolist()]
+    count, found = residuals.count, levels.components
+    shares = np.full(count, 1.0 / count)
+    weight = rng.multinomial(count, shares, size=draws).astype(float)
+    theta = found.theta()
+    drawn = RestrictedLikelihood(residuals).drawn(theta, weight)
+    low, high = np.exp(np.percentile(drawn, _ENDS, axis=0)).tolist()
+    names = ("measurement", "within", "tau")
+    ends = {n: Interval(*pair) for n, *pair in zip(names, low, high, strict=True)}
+    sums = LevelSums.of(residuals, REMEMBERED * found.tau)
+    moved = np.percentile(sums.drawn(weight) - sums.variance(), _ENDS)
+    around = np.sqrt(np.maximum(levels.between**2 + moved, 0.0)).tolist()
+    return {"between": Interval(*around), **ends}

@@ -1,6 +1,7 @@
 """What a database knows of terrains besides their tables: named parts, as plain values.
 
     of a terrain   break_away   its `BreakAwayModel`
+                   generator    its `Generator`
                    roughness    {window: least feature `resid` of its own windows}
     of all         surfaces     the `SurfaceClassifier`
                    foresight    the `ForesightModel`
@@ -18,9 +19,10 @@ from acquisition.validation import Entries, first_problem
 from analysis.breakaway.model import BreakAwayModel
 from analysis.foresight.model import ForesightModel
 from analysis.terrains.classifier import SurfaceClassifier
+from analysis.terrains.generator import Generator
 
 BREAK_AWAY_PART, ROUGHNESS_PART, SURFACES_PART = "break_away", "roughness", "surfaces"
-FORESIGHT_PART = "foresight"
+FORESIGHT_PART, GENERATOR_PART = "foresight", "generator"
 Parts = Mapping[str, Any]
 _ROUGHNESS = TypeAdapter(Entries[int, Annotated[float, Field(allow_inf_nan=False)]])
 
@@ -54,6 +56,20 @@ def break_away_in(parts: Parts, terrain: str) -> BreakAwayModel:
     return BreakAwayModel.from_dict(parts[BREAK_AWAY_PART])
 
 
+def generator_in(parts: Parts, terrain: str) -> Generator:
+    """Return what samples the traction of a terrain along a motion.
+
+    Raises:
+        SettingsError: it is not known.
+    """
+    if GENERATOR_PART not in parts:
+        raise SettingsError(
+            f"{terrain}: its traction cannot be sampled.",
+            hint="Record four whole trials or more and export them again.",
+        )
+    return Generator.from_dict(parts[GENERATOR_PART])
+
+
 def roughness_in(parts: Parts) -> dict[int, float]:
     """Return the least roughness by window [kept samples], empty where not known."""
     return _ROUGHNESS.validate_python(parts.get(ROUGHNESS_PART, {}))
@@ -78,6 +94,7 @@ def foresight_in(parts: Parts) -> ForesightModel | None:
 
 _READERS = {
     BREAK_AWAY_PART: lambda parts: break_away_in(parts, ""),
+    GENERATOR_PART: lambda parts: generator_in(parts, ""),
     ROUGHNESS_PART: roughness_in,
     SURFACES_PART: surfaces_in,
     FORESIGHT_PART: foresight_in,

@@ -67,10 +67,13 @@ def run(args: argparse.Namespace) -> int:
     require_extra("report")  # before its page is imported
     if args.scheduler:
         require_extra("cluster")
+    from analysis.findings.findings import compute_results
     from analysis.report.page import ReportContext, write_report
     from analysis.report.what_if_tables import plain_choice, side_by_side
+    from analysis.study.jobs import Workers
     from analysis.study.models import FitOptions
     from analysis.study.study import StudyOptions, notes_of_tables, run_study
+    from analysis.terrains.generator_check import sampled_trials
     from experiments.operator.console import Console
     from experiments.report.choices import analysis_choices, repeat_study
     from experiments.report.progress import fitting
@@ -109,6 +112,9 @@ def run(args: argparse.Namespace) -> int:
             "what_if": [plain_choice(c, study, other) for c, other in others]
         },
         with_pdf=args.pdf,
+        results=compute_results(
+            study, sampled=sampled_trials(study, Workers(None, args.scheduler))
+        ),
     )
     page = write_report(study, args.to, context)
     for warning in study.warnings:

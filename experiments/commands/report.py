@@ -12,6 +12,7 @@ from experiments.arguments import (
     add_pdf,
     add_scheduler,
     add_seed,
+    add_shard,
 )
 
 if TYPE_CHECKING:
@@ -43,6 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--all", action="store_true", help="every session with trials")
     add_scheduler(parser)
+    add_shard(parser)
     add_pdf(parser)
     parser.add_argument("--json", action="store_true", help="what was made, as JSON")
     add_allow_missing(parser)
@@ -64,13 +66,14 @@ def run(args: argparse.Namespace) -> int:
 
         if available_cores() > 1:
             prepare_workers(_WORK)  # first, as it imports while this process does
+    from analysis.study.jobs import Shard
     from experiments.operator.console import Console, PageRecorder
     from experiments.report.choices import (
         analysis_choices,
         choose_sessions,
         tell_missing,
     )
-    from experiments.report.sessions import ReportRequest, report_sessions
+    from experiments.report.sessions import ReportRequest, fit_shard, report_sessions
     from experiments.settings.load import load_settings
 
     choices = analysis_choices(args)
@@ -96,6 +99,9 @@ def run(args: argparse.Namespace) -> int:
         with_pdf=args.pdf,
         matrix=matrix,
     )
+    if args.shard:
+        fit_shard(sessions, data, wanted, console, Shard(*args.shard))
+        return 0
     page = report_sessions(sessions, data, wanted, console)
     if args.json:
         names = [session.id for session in sessions]

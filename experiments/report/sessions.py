@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from hashlib import blake2b
 from pathlib import Path
+from shutil import disk_usage
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from acquisition.errors import SessionError, SettingsError, TrialFileError
 from analysis.data.load import load_trial
 from analysis.data.plausibility import summed_up
 from analysis.data.recorded_factors import stated_factors
+from analysis.data.series import TractionSeries
 from analysis.data.terrain_kinds import terrain_kind
 from analysis.findings.findings import compute_results
 from analysis.findings.held_trial import HeldTrial, TrialFiles
@@ -24,16 +26,22 @@ from analysis.report.page_model import BedPhoto, ReportContext
 from analysis.report.what_if import StudyVariant
 from analysis.report.what_if_tables import plain_choice, side_by_side
 from analysis.study.crossval import Prepared
-from analysis.study.jobs import Batch
+from analysis.study.jobs import Batch, Shard
 from analysis.study.models import (
     GP_SE,
     GP_SE_TRIAL,
     PAPER_MODELS,
     FitOptions,
 )
-from analysis.study.store import TYPES, ResultStore
-from analysis.study.study import Study, StudyOptions, run_study
+from analysis.study.store import MOST_BYTES, TYPES, ResultStore
+from analysis.study.study import Study, StudyOptions, run_study, run_study_shard
 from analysis.terrains.export import break_away_batch, break_away_of, database_of
+from analysis.terrains.generator_check import (
+    SAMPLED_TYPES,
+    generator_tasks,
+    judge_generator,
+    sampled_trials,
+)
 from analysis.terrains.identify import identify_study
 from experiments.operator.console import Console
 from experiments.report.cells import (
@@ -57,6 +65,7 @@ from experiments.session.photos import photos_of
 from experiments.session.store import FOLDS, SessionFolder, iso_utc
 from experiments.settings.matrix import MatrixSettings
 
+_SHARE_OF_DISK = 4  # one part in so many of what is free may be results
 EXPORTED = (*PAPER_MODELS, GP_SE_TRIAL)
 
 
@@ -153,8 +162,79 @@ class StudySession:
 
 
 def results_below(data: Path) -> ResultStore:
-    """Return the store of results below a folder of data."""
-    return ResultStore(data / FOLDS, types={**TYPES, **JUDGED_TYPES, **DRAWN_TYPES})
+    """Return the store of results below a folder of data; it grows with the disk."""
+    types = {**TYPES, **JUDGED_TYPES, **DRAWN_TYPES, **SAMPLED_TYPES}
+    free = disk_usage(data).free if data.is_dir() else 0
+    return ResultStore(data / FOLDS, max(MOST_BYTES, free // _SHARE_OF_DISK), types)
+
+
+@dataclass(frozen=True, slots=True)
+class StudyInputs:
+    """What a study of sessions begins with.
+
+    Attributes:
+        trials: the kept trials by terrain, in the matrix's order.
+        truths: how far trials are from their truth files, by path of the trial.
+        left_out: recordings that are not in it, and why.
+        options: every choice.
+        store: results of earlier runs.
+        is_simulated: the trials were simulated.
+    """
+
+    trials: dict[str, list[HeldTrial]]
+    truths: dict[Path, TruthErrors]
+    left_out: list[str]
+    options: StudyOptions
+    store: ResultStore
+    is_simulated: bool
+
+    @classmethod
+    def of(
+        cls,
+        sessions: Sequence[SessionFolder],
+        data: Path,
+        order: ReportRequest,
+        console: Console,
+        fit: FitOptions,
+    ) -> "StudyInputs":
+        """Load the kept trials.
+
+        Raises:
+            SessionError: no session has a kept trial.
+        """
+        trials, truths, left_out = _load_trials(sessions, console)
+        count = sum(len(group) for group in trials.values())
+        if not count:
+            ids = ", ".join(s.id for s in sessions)
+            raise SessionError(f"{ids}: no kept trials to report.")
+        trials = {name: trials[name] for name in order.sorted(trials)}
+        console.say(f"{count} trials on {len(trials)} terrains: fitting ...")
+        travel = min(t.frame.travel for group in trials.values() for t in group)
+        options = StudyOptions(
+            prepare=replace(order.choices.prepare, container_travel=travel),
+            fit=fit,
+            scheduler=order.scheduler,
+        )
+        simulated = sessions[0].is_simulated
+        return cls(trials, truths, left_out, options, results_below(data), simulated)
+
+    @property
+    def series(self) -> dict[str, list[TractionSeries]]:
+        """The trials as they were recorded, by terrain."""
+        return {name: [t.series for t in group] for name, group in self.trials.items()}
+
+    def beside(self, prepared: Prepared) -> list[Batch]:
+        """Return what is fitted beside the models of a study."""
+        kinds = {
+            name: terrain_kind(name, [t.stones for t in group])
+            for name, group in self.series.items()
+        }
+        seed = self.options.fit.seed
+        judged = list(generator_tasks(prepared, kinds, seed).values())
+        return [
+            Batch(judge_generator, judged),
+            break_away_batch(prepared, kinds, seed),
+        ]
 
 
 def study_sessions(
@@ -169,32 +249,46 @@ def study_sessions(
     Raises:
         SessionError: no session has a kept trial.
     """
-    trials, truths, left_out = _load_trials(sessions, console)
-    count = sum(len(group) for group in trials.values())
-    if not count:
-        ids = ", ".join(s.id for s in sessions)
-        raise SessionError(f"{ids}: no kept trials to report.")
-    trials = {name: trials[name] for name in order.sorted(trials)}
-    console.say(f"{count} trials on {len(trials)} terrains: fitting ...")
-    is_simulated = sessions[0].is_simulated
-    travel = min(t.frame.travel for group in trials.values() for t in group)
-    options = StudyOptions(
-        prepare=replace(order.choices.prepare, container_travel=travel),
-        fit=fit,
-        scheduler=order.scheduler,
-    )
-    series = {name: [t.series for t in group] for name, group in trials.items()}
-    kinds = {
-        n: terrain_kind(n, [t.stones for t in group]) for n, group in series.items()
-    }
-    store = results_below(data)
-
-    def beside(prepared: Prepared) -> list[Batch]:
-        return [break_away_batch(prepared, kinds, fit.seed)]
-
+    given = StudyInputs.of(sessions, data, order, console, fit)
     with fitting(console) as progress:
-        study = run_study(series, options, is_simulated, progress, store, beside)
-    return StudySession(study, trials, left_out, truths)
+        study = run_study(
+            given.series,
+            given.options,
+            given.is_simulated,
+            progress,
+            given.store,
+            given.beside,
+        )
+    return StudySession(study, given.trials, given.left_out, given.truths)
+
+
+def fit_shard(
+    sessions: Sequence[SessionFolder],
+    data: Path,
+    order: ReportRequest,
+    console: Console,
+    shard: Shard,
+) -> None:
+    """Load the kept trials and keep one run's share of what their report needs.
+
+    Raises:
+        SessionError: no session has a kept trial.
+    """
+    fit = _fit_options(order)
+    given = StudyInputs.of(sessions, data, order, console, fit)
+    with fitting(console) as progress:
+        count = run_study_shard(
+            given.series, given.options, shard, given.store, progress, given.beside
+        )
+    console.say(
+        f"Shard {shard.number} of {shard.of}: {count} results are kept. When all have "
+        "ended, traction report without --shard finds them."
+    )
+
+
+def _fit_options(order: ReportRequest) -> FitOptions:
+    choices = order.choices
+    return FitOptions(choices.bounds, seed=order.seed, models=choices.models)
 
 
 def require_samples(study: Study) -> None:
@@ -272,16 +366,15 @@ def report_sessions(
     """
     from analysis.report.page import write_report  # exporting needs no page
 
-    choices = order.choices
-    fit = FitOptions(choices.bounds, seed=order.seed, models=choices.models)
-    analysed = study_sessions(sessions, data, order, console, fit)
+    analysed = study_sessions(sessions, data, order, console, _fit_options(order))
     study, trials = analysed.study, analysed.trials
     store = results_below(data)
     break_away = break_away_of(study, store)
-    others = repeat_study(study, analysed.files, choices.variants, console, store)
+    others = repeat_study(study, analysed.files, order.choices.variants, console, store)
     every = [trial for group in trials.values() for trial in group]
     rig = with_tares([trial.health for trial in every], every)
-    findings = cache(partial(compute_results, study, rig, break_away))
+    sampled = sampled_trials(study, 1, store)
+    findings = cache(partial(compute_results, study, rig, break_away, sampled))
     foresight = study_foresight(study, trials, break_away, store, findings)
     own = sessions[0].path if len(sessions) == 1 else data / "study"
     context = _context(sessions, order, analysed, foresight, others)

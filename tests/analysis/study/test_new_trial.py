@@ -116,7 +116,7 @@ def test_a_pooled_fit_of_the_same_trials_is_worse():
 )
 @pytest.mark.parametrize("spread", [normal, skewed])
 def test_every_process_has_the_effect_of_a_trial(name, spread):
-    data = training(trials_of(spread, 6, between=0.8), 100)
+    data = training(trials_of(spread, 6, between=0.8))
     model = ModelFitter(data, FitOptions()).fit(name)
     found = model.predict(np.array([2.0, 6.0]), np.array([0.05, 0.05]))
     assert "log_sc" in model.describe()["theta"]
