@@ -297,7 +297,7 @@ def _load_table(
     ]
 
 
-class _Part(NamedTuple):
+class _TablePart(NamedTuple):
     """The rows of a table that belong to one trial."""
 
     terrain: str
@@ -316,7 +316,7 @@ class _Part(NamedTuple):
         return origin.model_copy(update={"terrain": self.terrain})
 
 
-def _parts(path: Path, table: TrialTable, rate: float | None) -> list[_Part]:
+def _parts(path: Path, table: TrialTable, rate: float | None) -> list[_TablePart]:
     """Return the trials of a table that its words part, in the order of its rows.
 
     Where rows have no time of their own, those of a trial are numbered anew.
@@ -354,7 +354,7 @@ def _parts(path: Path, table: TrialTable, rate: float | None) -> list[_Part]:
             further={name: x[chosen] for name, x in table.further.items()},
             groups={},
         )
-        parts.append(_Part(terrain, trial, part))
+        parts.append(_TablePart(terrain, trial, part))
     return parts
 
 
