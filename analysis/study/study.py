@@ -417,7 +417,12 @@ def _warnings(result: TerrainResult, has_container: bool) -> list[str]:
 
 
 def _ploughing(result: TerrainResult) -> list[str]:
-    """Return that a terrain's traction is not that of friction, at loads that count."""
+    """Return that a terrain's traction is not that of friction, at loads that count.
+
+    Of tables only: on the stones of one's own sessions the report has it in figures.
+    """
+    if not all(trial.is_foreign for trial in result.trials):
+        return []
     F_n, F_t = (
         np.concatenate([getattr(trial, name) for trial in result.trials])
         for name in ("F_n", "F_t")
