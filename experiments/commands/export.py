@@ -107,19 +107,19 @@ def _add_targets(parser: argparse.ArgumentParser) -> None:
         "--resolution",
         type=number_within(0.001, 100, "a length 0.001..100 m, e.g. 0.1"),
         metavar="M",
-        help="side of a cell of the map [m] (0.1)",
+        help="side of a cell of the map in m (0.1)",
     )
     group.add_argument(
         "--required",
         type=number_within(0, 1000, "a force 0..1000 N, e.g. 4"),
         metavar="N",
-        help="traction that slip_risk of the map is for [N] (4)",
+        help="traction in N that slip_risk of the map is for (4)",
     )
     group.add_argument(
         "--load",
         type=number_within(0, 1000, "a force 0..1000 N, e.g. 5"),
         metavar="N",
-        help="normal force of the map [N] (5)",
+        help="normal force of the map in N (5)",
     )
     group.add_argument(
         "--sole-area",

@@ -132,8 +132,9 @@ class AtiDevice:
             )
 
 
-_Force = Annotated[Number, Usual(0.05, 50_000.0, "N")]
-_Torque = Annotated[Number, Usual(0.005, 5_000.0, "N m")]
+_Force = Annotated[Number, Field(ge=1, le=100_000), Usual(0.05, 50_000.0, "N")]
+_Torque = Annotated[Number, Field(ge=0.01, le=10_000), Usual(0.005, 5_000.0, "N m")]
+_Counts = Annotated[Number, Field(gt=0, le=1e9)]
 
 
 class AtiSection(SensorSection):
@@ -145,12 +146,8 @@ class AtiSection(SensorSection):
         default=NETWORK, gt=0, le=10_000_000_000, examples=[NETWORK]
     )
     rate: Whole = Field(default=RATE, ge=500, le=8000, examples=[RATE])
-    counts_per_force: Number | None = Field(
-        default=None, gt=0, le=1e9, examples=[1_000_000.0]
-    )
-    counts_per_torque: Number | None = Field(
-        default=None, gt=0, le=1e9, examples=[1_000_000.0]
-    )
+    counts_per_force: _Counts | None = Field(default=None, examples=[1_000_000.0])
+    counts_per_torque: _Counts | None = Field(default=None, examples=[1_000_000.0])
     ranges: tuple[_Force, _Force, _Force, _Torque, _Torque, _Torque] | None = Field(
         default=None, examples=[[130.0, 130.0, 400.0, 10.0, 10.0, 10.0]]
     )

@@ -97,6 +97,7 @@ def test_few_trials_make_no_generator(trials):
     assert fit_generator(trials[:3], 0, 1.5) is None
 
 
+@pytest.mark.timeout(180)  # it is fitted as often as it is turned down
 def test_a_generator_that_runs_away_is_turned_down(known, trials, monkeypatch):
     import analysis.terrains.generator_fit as fit
 
