@@ -1,7 +1,7 @@
 """The conditions a session was recorded under, compared with those of now."""
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from experiments.session.recorded_conditions import FILE, VERSION, read_conditio
 from experiments.session.store import SessionFolder, list_sessions
 from experiments.settings.matrix import TerrainRow
 from experiments.settings.origins import flatten
-from experiments.settings.rig import RigSettings
+from experiments.settings.rig import FootSection, RigSettings
 from ft_sensor.vendors.registry import SECTIONS
 
 FOOT = "terrain.foot"  # name of a condition
@@ -70,17 +70,21 @@ def sensor_conditions(devices: Mapping[str, str]) -> dict[str, str]:
     }
 
 
-def default_conditions(sensor_kind: str = "") -> dict[str, str]:
+def default_conditions(
+    sensor_kind: str = "", feet: Iterable[str] = ()
+) -> dict[str, str]:
     """Return the conditions of settings that are left out, by name.
 
     A setting that a session of an older version does not have had this value then.
 
     Args:
         sensor_kind: `ft_sensor.kind`, whose section has the sensor's defaults.
+        feet: names of the feet, each of which has a section.
     """
     rig = _defaults(RigSettings)
     if sensor_kind in SECTIONS:
         rig["ft_sensor"] = _defaults(SECTIONS[sensor_kind])
+    rig["feet"] = {name: _defaults(FootSection) for name in feet}
     defaults = {"rig": rig, "terrain": _defaults(TerrainRow)}
     none = dict.fromkeys((_GRAVITY, _FRICTION), _NO_CALIBRATION)
     return {**_texts(defaults), **none}
@@ -92,7 +96,9 @@ def differences(then: Mapping[str, str], now: Mapping[str, str]) -> list[str]:
     A condition that was not written then had its default value. One that is not known
     any more is left out: no setting can bring it back.
     """
-    before = {**default_conditions(now.get("rig.ft_sensor.kind", "")), **then}
+    feet = {n.split(".")[2] for n in now if n.startswith("rig.feet.")}
+    kind = now.get("rig.ft_sensor.kind", "")
+    before = {**default_conditions(kind, feet), **then}
     return [
         f"{name} was {before.get(name, 'not there')}, is {value}"
         for name, value in now.items()

@@ -111,3 +111,12 @@ def test_a_default_of_the_sensor_that_was_changed_since_is_named():
     now = {"rig.ft_sensor.kind": "bota", "rig.ft_sensor.calibration": "other.toml"}
     (text,) = differences({"rig.ft_sensor.kind": "bota"}, now)
     assert "rig.ft_sensor.calibration" in text
+
+
+def test_a_younger_setting_of_a_foot_had_its_default():
+    shape = "rig.feet.round.shape"
+    now = {**NOW, **default_conditions(feet=["round"])}
+    assert now[shape] == "None"
+    assert differences(without(now, shape), now) == []
+    (text,) = differences(without(now, shape), {**now, shape: "point"})
+    assert text == f"{shape} was None, is point"

@@ -157,4 +157,4 @@ def test_an_unknown_kind_names_those_that_are_known(tmp_path):
     config = write_config(tmp_path, rig=('kind = "bota"', 'kind = "optical"'))
     done = traction("check", "--config-only", "--config", config)
     assert done.code == 2
-    assert "'bota', 'robotous', 'optoforce' or 'barrett'" in done.err
+    assert "'bota', 'robotous', 'optoforce', 'ati' or 'barrett'" in done.err
