@@ -60,7 +60,7 @@ MEASURES: Mapping[str, Measure] = {
     "ratio": Measure("F_t/F_n", 0.03, is_log=True),
     "speed": Measure("velocity", 0.05, is_log=True),
     "kept": Measure("kept samples", 0.05, is_log=True),
-    "way": Measure("way", 0.01, is_log=True),
+    "way": Measure("way", 0.05, is_log=True),
     "noise": Measure("change from sample to sample", 0.05, is_log=True),
     "lag": Measure("delay of the force", 1.0, unit="ms"),
 }
