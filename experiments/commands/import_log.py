@@ -163,7 +163,7 @@ def run(args: argparse.Namespace) -> int:
 def _said(estimate: Estimate) -> str:
     """Return an estimate with its spread in one line."""
     value, spread = (
-        ", ".join(f"{x:.4g}" for x in numbers)
+        ", ".join("not known" if math.isnan(x) else f"{x:.4g}" for x in numbers)
         for numbers in (estimate.value, estimate.spread)
     )
     about = f"{estimate.how}: {spread}" if spread else estimate.how
@@ -184,6 +184,8 @@ def request_of(args: argparse.Namespace) -> ImportRequest:
     """Return what is asked for; raises SettingsError."""
     from analysis.imported.importing import ImportRequest
 
+    _refuse_both(args, "along", "heading")
+    _refuse_both(args, "normal", "incline")
     lag = None if args.lag == "auto" else _numbers("--lag", args.lag, 1, ",")[0] * 1e-3
     spans = None if args.trials == "auto" else args.trials.split(",")
     return ImportRequest(
@@ -208,6 +210,17 @@ def request_of(args: argparse.Namespace) -> ImportRequest:
         is_slow=args.slow,
         is_estimated=args.estimated,
     )
+
+
+def _refuse_both(args: argparse.Namespace, vector: str, angle: str) -> None:
+    """Refuse two options that say the same thing."""
+    from acquisition.errors import SettingsError
+
+    if None not in (getattr(args, vector), getattr(args, angle)):
+        raise SettingsError(
+            f"--{vector} and --{angle} give the same direction.",
+            hint="Give one of them. Nothing was read.",
+        )
 
 
 def _tare(text: str | None) -> Tare:
@@ -273,6 +286,11 @@ def _factors(given: list[str]) -> Mapping[str, Value]:
     values: dict[str, Value] = {}
     for text in given:
         name, mark, value = text.partition("=")
+        if name in values:
+            raise SettingsError(
+                f"--factor {name[:60]} is given twice.",
+                hint="Leave one. Nothing was read.",
+            )
         try:
             values[name] = float(value)
         except ValueError:
