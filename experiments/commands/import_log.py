@@ -187,7 +187,7 @@ def request_of(args: argparse.Namespace) -> ImportRequest:
     _refuse_both(args, "along", "heading")
     _refuse_both(args, "normal", "incline")
     lag = None if args.lag == "auto" else _numbers("--lag", args.lag, 1, ",")[0] * 1e-3
-    spans = None if args.trials == "auto" else args.trials.split(",")
+    spans = None if args.trials == "auto" else _trials(args.trials)
     return ImportRequest(
         log=args.log,
         urdf=args.urdf,
@@ -204,7 +204,7 @@ def request_of(args: argparse.Namespace) -> ImportRequest:
         heading_deg=args.heading,
         lag=lag,
         clock=args.clock,
-        trials=spans and [_span("--trials", span) for span in spans],
+        trials=spans,
         terrain=args.terrain,
         factors=_factors(args.factor),
         is_slow=args.slow,
@@ -247,6 +247,23 @@ def _span(option: str, text: str) -> tuple[float, float]:
             f"{option} {text[:60]} is empty.", hint="Give the earlier time first."
         )
     return first, end
+
+
+def _trials(text: str) -> list[tuple[float, float]]:
+    """Return spans that share no time: each row belongs to one trial."""
+    from itertools import pairwise
+
+    from acquisition.errors import SettingsError
+
+    spans = [_span("--trials", span) for span in text.split(",")]
+    for (_, end), (start, last) in pairwise(sorted(spans)):
+        if start < end:
+            raise SettingsError(
+                f"--trials {text[:60]}: two of them share {start:g} to "
+                f"{min(end, last):g} s.",
+                hint="Give spans that do not overlap. Nothing was read.",
+            )
+    return spans
 
 
 def _vector(option: str, text: str | None) -> NDArray[np.float64] | None:

@@ -88,6 +88,7 @@ def test_a_changed_record_of_an_import_is_refused(given, tmp_path):
         (("--along", "0,0,0"), "has no direction"),
         (("--lag", "soon"), "--lag 'soon': expected a number"),
         (("--trials", "1:2,x"), "--trials 'x': expected 2 numbers"),
+        (("--trials", "3:5,4:6"), "two of them share 4 to 5 s"),
         (("--factor", "d50"), "expected NAME=VALUE"),
         (("--factor", "d50=1", "--factor", "d50=2"), "--factor d50 is given twice"),
         (("--along", "1,0,0", "--heading", "90"), "--along and --heading give the"),
