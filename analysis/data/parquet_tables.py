@@ -19,6 +19,7 @@ from analysis.dialects.columns import (
     SIMULATED,
     columns_hint,
     find_column,
+    place_hint,
     plain,
     split_header,
 )
@@ -133,10 +134,8 @@ def _places(
         raise refusal(path, reason, columns_hint(header, columns))
     for name, places in found.items():
         if len(places) > 1:
-            either = " or ".join(f"{name}={place + 1}" for place in places[:4])
             reason = f"column {columns[name]} occurs twice"
-            hint = f"Take one by its place: --columns {either}"
-            raise refusal(path, reason, hint)
+            raise refusal(path, reason, place_hint(name, places))
     return {name: places[0] for name, places in found.items()}
 
 

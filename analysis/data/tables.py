@@ -39,6 +39,7 @@ from analysis.dialects.times import since_first
 DEFAULT_TERRAIN = "table"
 LARGEST_FILE = 24_000_000  # bytes, also of an npz once unpacked; six times in memory
 MOST_TRIALS = 2000
+_LARGEST_INPUT = 1e12  # of its unit; squares of larger ones leave the double numbers
 
 _FORM = "An npz holds arrays TERRAIN/NN of four columns: t, v_t, F_n, F_t."
 _BROKEN_NPZ = (
@@ -94,6 +95,11 @@ def load_tables(
         raise SettingsError(f"{decimal!r} is no decimal mark.", hint='Give "." or ",".')
     if not (rate is None or _is_rate(rate)):
         raise SettingsError(f"{rate!r} is no rate.", hint="Give rows per second [Hz].")
+    if terrain is not None and "terrain" in (columns or {}):
+        raise SettingsError(
+            f"The terrain is {terrain}, and a column of it is named too.",
+            hint="Leave out one: --terrain, or terrain= of --columns.",
+        )
     columns = {n: n for n in (*COLUMNS, *inputs)} | dict(columns or {})
     request = TextRequest(columns, rate, decimal)
     form = _TableForm(request, terrain, stones or {}, units or {}, frozenset(negate))
@@ -183,6 +189,7 @@ class _TableForm:
             found = notes_of(path, table, rows)
             notes = [*table.notes, *filter(None, [epoch]), *found]
         if further := list(table.further.values()):
+            _check_inputs(path, table.further)
             lacking = ~np.isfinite(np.column_stack(further)).all(axis=1)
             if count := int(np.count_nonzero(lacking)):
                 notes.append(f"{count} rows without a value of an input dropped")
@@ -221,6 +228,19 @@ class _TableForm:
         signs = np.array([-1.0 if n in self.negate else 1.0 for n in COLUMNS])
         rows = np.column_stack([t, table.rows[:, 1:]])
         return rows * factors * signs, epoch
+
+
+def _check_inputs(path: Path, further: Mapping[str, Array]) -> None:
+    """Refuse an input that models cannot compute with."""
+    for name, values in further.items():
+        sizes = np.abs(values[np.isfinite(values)])
+        largest = float(sizes.max(initial=0.0))
+        if largest > _LARGEST_INPUT:
+            raise refusal(
+                path,
+                f"column {name} has a value of {largest:g}, beyond {_LARGEST_INPUT:g}",
+                "Leave the cell empty where there is no value, or take a larger unit.",
+            )
 
 
 def _load(path: Path, form: _TableForm) -> list[TractionSeries]:

@@ -66,9 +66,10 @@ def parse_columns(text: str) -> dict[str, str]:
     columns whose words say which rows belong together.
 
     Raises:
-        SettingsError: a part is not NAME=COLUMN, or names no column of the analysis.
+        SettingsError: a part is not NAME=COLUMN, names no column of the analysis, or
+            one that was named before.
     """
-    columns = {name: name for name in COLUMNS}
+    columns: dict[str, str] = {}
     at = 0
     while at < len(text):
         part = _PART.match(text, at)
@@ -78,9 +79,13 @@ def parse_columns(text: str) -> dict[str, str]:
         column = part["bare"] if quoted is None else quoted.replace('""', '"')
         if not column or part["name"] not in {*COLUMNS, *GROUPS}:
             raise _not_named(text, part[0].strip(" ,"))
+        if part["name"] in columns:
+            raise SettingsError(
+                f"--columns {text}: {part['name']} is named twice.", hint="Leave one."
+            )
         columns[part["name"]] = plain(column)
         at = part.end()
-    return columns
+    return {name: name for name in COLUMNS} | columns
 
 
 def _not_named(text: str, part: str) -> SettingsError:
@@ -229,16 +234,39 @@ def columns_hint(header: Sequence[str], wanted: Mapping[str, str]) -> str:
     """Return `--columns ...` for a header that lacks some of the wanted columns.
 
     Columns that go by a usual name are named; the others are left to be filled in.
+    Where inputs alone are lacking, `--inputs` is what names them.
 
     Args:
         header: the names that the table has.
-        wanted: names that were looked for, by column of the analysis.
+        wanted: names that were looked for, by column of the analysis or by input.
     """
     parts: list[str] = []
+    lacking: set[str] = set()
     for name, column in wanted.items():
-        known = [column] if find_column(header, column) else _usual(header, name)
-        parts.append(f"{name}={_quoted(known[0]) if len(known) == 1 else '...'}")
+        is_there = bool(find_column(header, column))
+        if not is_there:
+            lacking.add(name)
+        if name in {*COLUMNS, *GROUPS}:
+            known = [column] if is_there else _usual(header, name)
+            parts.append(f"{name}={_quoted(known[0]) if len(known) == 1 else '...'}")
+    if lacking and not lacking & {*COLUMNS, *GROUPS}:
+        return "Name columns that it has: --inputs v_t,F_n,..."
     return "Name them: --columns " + ",".join(parts)
+
+
+def place_hint(name: str, places: Sequence[int]) -> str:
+    """Return how one of several columns of the same name is taken.
+
+    Args:
+        name: column of the analysis, or an input.
+        places: where the header has it, from 0.
+    """
+    either = [str(place + 1) for place in places[:4]]
+    if name in {*COLUMNS, *GROUPS}:
+        return "Take one by its place: --columns " + " or ".join(
+            f"{name}={place}" for place in either
+        )
+    return f"Take one by its place: {' or '.join(either)} for {name} in --inputs"
 
 
 def _usual(header: Sequence[str], name: str) -> list[str]:

@@ -11,6 +11,7 @@ from analysis.dialects.columns import (
     COLUMNS,
     columns_hint,
     find_column,
+    place_hint,
     split_header,
     unit_of_cell,
 )
@@ -229,12 +230,11 @@ def _refuse_twice(
     """Refuse a header in which a name stands twice."""
     for name, at in found.items():
         if len(at) > 1:
-            either = " or ".join(f"{name}={place + 1}" for place in at[:4])
             raise refused_line(
                 path,
                 line + 1,
                 f"column {columns[name]} occurs twice",
-                f"Take one by its place: --columns {either}",
+                place_hint(name, at),
             )
 
 

@@ -32,6 +32,7 @@ motion, no forecast of a planned one.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from numbers import Integral
 from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
@@ -447,8 +448,15 @@ def _check_motion(F_n: Array, v_t: Array, seed: int, paths: int) -> None:
     if not is_line or not (np.isfinite(F_n).all() and np.isfinite(v_t).all()):
         raise SettingsError(
             f"No motion to sample along: F_n {F_n.shape}, v_t {v_t.shape}.",
-            hint="Give both every 10 ms, finite, in two arrays of the same length.",
+            hint="Give both every 10 ms, two samples or more, finite, in two arrays of "
+            "the same length.",
         )
+    for name, number in (("seed", seed), ("n", paths)):
+        if isinstance(number, bool) or not isinstance(number, Integral):
+            raise SettingsError(
+                f"{name} = {number!r} is no whole number.",
+                hint="Write e.g. seed=1, n=5.",
+            )
     if seed < 0 or paths < 1 or paths * F_n.size > MOST_STEPS:
         raise SettingsError(
             f"{paths} paths of {F_n.size} samples, seed {seed}: they cannot be drawn.",

@@ -147,7 +147,7 @@ def _load(args: argparse.Namespace) -> dict[str, list[TractionSeries]]:
         args.rate,
         negate=parse_names(args.negate) if args.negate else (),
         decimal=args.decimal,
-        inputs=parse_inputs(args.inputs) if args.inputs else (),
+        inputs=() if args.inputs is None else parse_inputs(args.inputs),
     )
 
 

@@ -163,7 +163,7 @@ def run(args: argparse.Namespace) -> int:
 def _said(estimate: Estimate) -> str:
     """Return an estimate with its spread in one line."""
     value, spread = (
-        ", ".join(f"{x:.4g}" for x in numbers)
+        ", ".join("not known" if math.isnan(x) else f"{x:.4g}" for x in numbers)
         for numbers in (estimate.value, estimate.spread)
     )
     about = f"{estimate.how}: {spread}" if spread else estimate.how
@@ -184,8 +184,10 @@ def request_of(args: argparse.Namespace) -> ImportRequest:
     """Return what is asked for; raises SettingsError."""
     from analysis.imported.importing import ImportRequest
 
+    _refuse_both(args, "along", "heading")
+    _refuse_both(args, "normal", "incline")
     lag = None if args.lag == "auto" else _numbers("--lag", args.lag, 1, ",")[0] * 1e-3
-    spans = None if args.trials == "auto" else args.trials.split(",")
+    spans = None if args.trials == "auto" else _trials(args.trials)
     return ImportRequest(
         log=args.log,
         urdf=args.urdf,
@@ -202,12 +204,23 @@ def request_of(args: argparse.Namespace) -> ImportRequest:
         heading_deg=args.heading,
         lag=lag,
         clock=args.clock,
-        trials=spans and [_span("--trials", span) for span in spans],
+        trials=spans,
         terrain=args.terrain,
         factors=_factors(args.factor),
         is_slow=args.slow,
         is_estimated=args.estimated,
     )
+
+
+def _refuse_both(args: argparse.Namespace, vector: str, angle: str) -> None:
+    """Refuse two options that say the same thing."""
+    from acquisition.errors import SettingsError
+
+    if None not in (getattr(args, vector), getattr(args, angle)):
+        raise SettingsError(
+            f"--{vector} and --{angle} give the same direction.",
+            hint="Give one of them. Nothing was read.",
+        )
 
 
 def _tare(text: str | None) -> Tare:
@@ -234,6 +247,23 @@ def _span(option: str, text: str) -> tuple[float, float]:
             f"{option} {text[:60]} is empty.", hint="Give the earlier time first."
         )
     return first, end
+
+
+def _trials(text: str) -> list[tuple[float, float]]:
+    """Return spans that share no time: each row belongs to one trial."""
+    from itertools import pairwise
+
+    from acquisition.errors import SettingsError
+
+    spans = [_span("--trials", span) for span in text.split(",")]
+    for (_, end), (start, last) in pairwise(sorted(spans)):
+        if start < end:
+            raise SettingsError(
+                f"--trials {text[:60]}: two of them share {start:g} to "
+                f"{min(end, last):g} s.",
+                hint="Give spans that do not overlap. Nothing was read.",
+            )
+    return spans
 
 
 def _vector(option: str, text: str | None) -> NDArray[np.float64] | None:
@@ -273,6 +303,11 @@ def _factors(given: list[str]) -> Mapping[str, Value]:
     values: dict[str, Value] = {}
     for text in given:
         name, mark, value = text.partition("=")
+        if name in values:
+            raise SettingsError(
+                f"--factor {name[:60]} is given twice.",
+                hint="Leave one. Nothing was read.",
+            )
         try:
             values[name] = float(value)
         except ValueError:

@@ -128,9 +128,15 @@ def remove_file(path: Path) -> None:
 
 @contextmanager
 def writing(path: Path) -> Generator[None, None, None]:
-    """Turn what a full disk raises into a TrialFileError."""
+    """Turn what a full disk or a name that is taken raises into a TrialFileError."""
     try:
         yield
+    except FileExistsError as error:
+        raise TrialFileError(
+            path,
+            "exists and is never overwritten",
+            hint="Choose another name. Nothing that was kept is lost.",
+        ) from error
     except OSError as error:
         raise TrialFileError(
             path,

@@ -118,6 +118,7 @@ def test_trials_with_other_inputs_are_no_study_together(tmp_path):
         ("v_t,F_n,a,b,c,d,e,f,g", "7 inputs beside them"),
         ("v_t,F_n,angle,angle", "stands twice"),
         ("v_t,F_n,F_t", "is no input"),
+        ("", "v_t and F_n are always inputs"),
         ("v_t,F_n,trial", "is no input"),
         ("v_t,F_n,simulated", "is no input"),
     ],
@@ -129,8 +130,40 @@ def test_a_list_that_is_none_of_inputs_is_refused(text, reason):
 
 def test_a_table_without_the_input_names_what_it_has(tmp_path):
     path = a_table(tmp_path / "runs.csv")
-    with pytest.raises(SettingsError, match="no column skid"):
+    with pytest.raises(SettingsError, match="no column skid") as refused:
         load_tables([path], COLUMNS, rate=1.0, inputs=("skid",))
+    assert refused.value.hint == "Name columns that it has: --inputs v_t,F_n,..."
+
+
+def test_an_input_whose_name_stands_twice_is_taken_by_its_place(tmp_path):
+    path = a_table(tmp_path / "runs.csv")
+    header, _, rows = path.read_text().partition("\n")
+    wide = "\n".join(f"{row},7" for row in rows.split())
+    path.write_text(f"{header},angle\n{wide}\n")
+    with pytest.raises(SettingsError, match="angle occurs twice") as refused:
+        load(path)
+    assert refused.value.hint == "Take one by its place: 6 or 7 for angle in --inputs"
+    trials = load_tables([path], COLUMNS, rate=1.0, inputs=("7",))
+    assert set(trials["a"][0].further["7"]) == {7.0}
+
+
+def test_an_input_that_models_cannot_compute_with_is_refused(tmp_path):
+    path = a_table(tmp_path / "runs.csv")
+    lines = path.read_text().splitlines()
+    lines[7] = lines[7].rpartition(",")[0] + ",1e300"
+    path.write_text("\n".join(lines))
+    with pytest.raises(SettingsError, match=r"column angle has a value of 1e\+300"):
+        load(path)
+
+
+def test_a_terrain_is_given_once(tmp_path):
+    with pytest.raises(SettingsError, match="a column of it is named too"):
+        load(a_table(tmp_path / "runs.csv"), terrain="c")
+
+
+def test_a_column_is_named_once():
+    with pytest.raises(SettingsError, match="trial is named twice"):
+        parse_columns("trial=repeat,trial=wheel")
 
 
 def test_a_row_that_names_no_trial_is_refused_with_its_line(tmp_path):

@@ -44,6 +44,18 @@ def test_the_loop_of_the_controllers_page_bears_the_risk_it_says(folder):
     assert asked[3] == 0.0  # nothing is asked of a foot that is not known
 
 
+def test_the_loop_is_right_in_single_precision_too(tmp_path):
+    folder = write(tmp_path, "c", is_float=True)
+    program = build(folder, block("controller.md", "c"), *FLAGS)
+    rows = "5.0 0.0 0.0\n9.0 0.0 0.0\nnan 0.0 0.0\n"
+    done = subprocess.run(
+        [program], input=rows, capture_output=True, text=True, check=True
+    )
+    asked = [float(line) for line in done.stdout.split()]
+    assert 0.0 < asked[0] < asked[1] <= 6.0
+    assert asked[2] == 0.0
+
+
 def test_the_loop_is_as_short_as_the_page_says():
     code = block("controller.md", "c")
     body = code[code.index("int main") :].splitlines()

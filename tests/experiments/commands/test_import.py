@@ -42,6 +42,8 @@ def test_from_a_bag_to_a_report(given, tmp_path):
     assert done.code == 0, done.err
     assert re.search(r"lag: 1\d ms .*starts and stops", done.out)
     assert "normal: " in done.out
+    assert ", not known)" in done.out
+    assert "nan" not in done.out
     record = json.loads((tables / "import.json").read_text())
     assert record["arguments"]["acts"] == "ground-on-foot"
     assert [topic["read"] for topic in record["topics"]] == [10500, 16800]
@@ -86,7 +88,11 @@ def test_a_changed_record_of_an_import_is_refused(given, tmp_path):
         (("--along", "0,0,0"), "has no direction"),
         (("--lag", "soon"), "--lag 'soon': expected a number"),
         (("--trials", "1:2,x"), "--trials 'x': expected 2 numbers"),
+        (("--trials", "3:5,4:6"), "two of them share 4 to 5 s"),
         (("--factor", "d50"), "expected NAME=VALUE"),
+        (("--factor", "d50=1", "--factor", "d50=2"), "--factor d50 is given twice"),
+        (("--along", "1,0,0", "--heading", "90"), "--along and --heading give the"),
+        (("--normal", "0,0,1", "--incline", "5"), "--normal and --incline give the"),
         (("--wrench", "/none"), "no topic '/none'"),
         (("--acts", "foot-on-ground"), "Give the other --acts"),
     ],

@@ -164,8 +164,9 @@ def test_a_link_is_not_followed_out_of_the_session(data):
 
 def test_a_bundle_is_never_overwritten(data):
     bundled(data)
-    with pytest.raises(TrialFileError, match="exists"):
+    with pytest.raises(TrialFileError, match="exists and is never") as refused:
         bundled(data)
+    assert refused.value.hint.startswith("Choose another name.")
 
 
 def test_a_torn_journal_is_told_as_one(data):

@@ -100,7 +100,7 @@ def test_a_moved_trial_never_replaces_another(tmp_path):
     source, target = tmp_path / "T01.mcap", tmp_path / "T01a.mcap"
     source.write_text("new")
     target.write_text("old")
-    with pytest.raises(TrialFileError, match="File exists"):
+    with pytest.raises(TrialFileError, match="never overwritten"):
         move_file(source, target)
     assert (source.read_text(), target.read_text()) == ("new", "old")
 
@@ -189,7 +189,7 @@ def test_a_new_file_that_does_not_reach_the_disk_is_not_in_the_way(
             write_new_text(path, "a")
     assert not path.exists()
     write_new_text(path, "a")
-    with pytest.raises(TrialFileError, match="cannot be written"):
+    with pytest.raises(TrialFileError, match="never overwritten"):
         write_new_text(path, "b")
     assert path.read_text() == "a"
 
