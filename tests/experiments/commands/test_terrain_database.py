@@ -60,7 +60,7 @@ def test_a_database_is_never_overwritten(exported):
 def test_an_export_is_of_one_kind(options):
     done = traction("export", "S001", *options)
     assert done.code == 2
-    assert "Name one of the two" in done.err
+    assert "Name one of the three" in done.err
 
 
 def test_a_file_that_is_no_database_is_refused(exported, tmp_path):
