@@ -31,7 +31,7 @@ EVERY = 3  # samples of a trial that is judged
 
 
 @dataclass(frozen=True)
-class Outcome:
+class SizeOutcome:
     """One cell of a size that was taken out.
 
     Attributes:
@@ -61,7 +61,7 @@ def cell_of(size: float, incline: float, seed: int, trials: int) -> TerrainRows:
     return TerrainRows(Ground(name, word, incline), tables)
 
 
-def outcomes_of(seed: int, trials: int) -> list[Outcome]:
+def outcomes_of(seed: int, trials: int) -> list[SizeOutcome]:
     """Return what became of every size as it was taken out."""
     cells = {
         (size, incline): cell_of(size, incline, seed, trials)
@@ -69,7 +69,7 @@ def outcomes_of(seed: int, trials: int) -> list[Outcome]:
         for incline in INCLINES
     }
     whole = fit_all_ground(list(cells.values()))
-    found: list[Outcome] = []
+    found: list[SizeOutcome] = []
     for size in SIZES:
         rest = [cell for (other, _), cell in cells.items() if other != size]
         model = fit_all_ground(rest, whole)
@@ -85,11 +85,13 @@ def outcomes_of(seed: int, trials: int) -> list[Outcome]:
                 shares.append(float(inside.mean()))
                 wider.append(float(np.median((high - low) / (near[1] - near[0]))))
             beyond = beyond_recorded(cell.ground, [each.ground for each in rest])
-            found.append(Outcome(size, beyond, tuple(shares), float(np.median(wider))))
+            found.append(
+                SizeOutcome(size, beyond, tuple(shares), float(np.median(wider)))
+            )
     return found
 
 
-def show(title: str, outcomes: Sequence[Outcome]) -> float:
+def show(title: str, outcomes: Sequence[SizeOutcome]) -> float:
     """Print a line about some outcomes; return the mean share inside."""
     shares = np.array([share for each in outcomes for share in each.shares])
     marked = sum("d50" in each.beyond for each in outcomes)
@@ -109,7 +111,7 @@ def main() -> int:
     args = parser.parse_args()
     first, _, last = args.seeds.partition("-")
     seeds = range(int(first), int(last or first) + 1)
-    every: list[Outcome] = []
+    every: list[SizeOutcome] = []
     for seed in seeds:
         outcomes = outcomes_of(seed, args.trials)
         show(f"seed {seed}, between", [o for o in outcomes if not o.is_outside])

@@ -50,7 +50,7 @@ EFFECTS = (LEVEL, RATIO, BOTH)
 LEAST_GAIN = 0.05  # nat; stones gain 0.06 to 0.28 by the warp, plates up to 0.04
 _BENDS = (1.0, 3.0, 9.0)  # N, c of the warp
 MOST_TRIALS = 30  # that the function is fitted to
-_UNSEEN = 2  # rows for each that the function is fitted to, to judge its residuals
+UNSEEN = 2  # rows for each that the function is fitted to, to judge its residuals
 _STEP = 0.01  # s of motion from one kept sample to the next
 _THIN = 5  # of the rows of a trial left out every fifth is scored
 
@@ -233,7 +233,7 @@ class NewTrialFit:
         if not isinstance(noise, TrialNoise) or noise.has_ratio or not noise.has_level:
             return process, None
         rows = self._training.rows
-        if rows.count < _UNSEEN * self._chosen.size:
+        if rows.count < UNSEEN * self._chosen.size:
             return (
                 process,
                 None,

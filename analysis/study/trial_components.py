@@ -32,7 +32,7 @@ from analysis.gp.trial_level import (
 )
 from analysis.gp.trial_noise import TrialNoise, TrialRows
 from analysis.study.models import FitOptions
-from analysis.study.new_trial import spread_rows
+from analysis.study.new_trial import UNSEEN, spread_rows
 from analysis.tustin.identifiability import Interval
 
 LEAST_GAIN = 1.4  # log likelihood that a level must gain: 5 % on the edge of its range
@@ -137,7 +137,8 @@ def fit_components(task: ComponentsTask) -> TrialComponents | None:
         for n in ("F_n", "v_t", "F_t")
     )
     inputs, lengths = np.column_stack([F_n, v_t]), [t.t.size for t in task.trials]
-    chosen = spread_rows(lengths, task.options.gp_points)
+    # residuals of rows that the function is fitted to are too small: most are not
+    chosen = spread_rows(lengths, min(task.options.gp_points, sum(lengths) // UNSEEN))
     label = np.repeat(np.arange(len(lengths)), lengths)[chosen]
     try:
         process = fit_gp(

@@ -1,5 +1,7 @@
 """How trials differ and rows repeat, recovered from drawn trials."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -85,3 +87,17 @@ def test_more_trials_show_the_level_better_by_the_root_of_their_number():
     assert components.independent == pytest.approx(8.0)
     assert components.level_sd(1) == pytest.approx(np.sqrt(0.36 + 1.0 / 8.0))
     assert components.level_sd(9) == pytest.approx(components.level_sd(1) / 3.0)
+
+
+def test_residuals_are_those_of_rows_that_the_function_did_not_see():
+    seen = []
+    for seed in range(12):
+        task = drawn(3, 0.0, 0.0, 0.1, 0.5, seed, draws=0)
+        short = tuple(
+            TimedRows(t.F_n[::40], t.v_t[::40], t.F_t[::40], t.t[::40])
+            for t in task.trials
+        )
+        found = fit_components(replace(task, trials=short))
+        seen.append(found.within**2 + found.measurement**2)
+    # 60 rows: fitted to all of them the function takes a part of their noise, 0.490
+    assert np.sqrt(np.mean(seen)) == pytest.approx(0.5, rel=0.015)
