@@ -34,6 +34,7 @@ TESTS = {
     f"{_LOOP}/cycle.py": (
         f"{_LOOP_TESTS}/test_cycle.py",
         f"{_CONTROL_TESTS}/test_move_in_the_cycle.py",
+        f"{_CONTROL_TESTS}/test_stance_in_the_cycle.py",
     ),
     f"{_LOOP}/states.py": (
         f"{_LOOP_TESTS}/test_states.py",

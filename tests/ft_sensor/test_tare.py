@@ -5,7 +5,12 @@ import pytest
 
 from acquisition.devices import WrenchSample
 from ft_sensor.tare import TareError, take_mean
-from ft_sensor.weighing import WeightCause, weight_change, weight_seen
+from ft_sensor.weighing import (
+    WeightCause,
+    compare_weights,
+    weight_change,
+    weight_seen,
+)
 from tests.ft_sensor.test_payload import attitude, mounted
 
 PERIOD_NS = 1_250_000
@@ -190,6 +195,17 @@ def test_a_light_foot_shows_a_turned_sensor_too(example_tool):
     change = change_of(light, mounted(light, angle=np.radians(20.0)))
     assert change.error < 1.0
     assert change.is_turned
+
+
+def test_a_turn_shows_by_what_the_weight_is_across_the_axis():
+    turned = np.radians(20.0)
+    for across, is_clear in ((0.8, False), (0.95, True)):
+        expected = np.array([[across, 0.0, 9.0]])
+        seen = across * np.array([[np.cos(turned), -np.sin(turned), 9.0 / across]])
+        change = compare_weights(expected, seen)
+        assert change.across == pytest.approx(across)
+        assert change.turned == pytest.approx(turned)
+        assert change.is_turned is is_clear
 
 
 @pytest.mark.parametrize("scale", [0.5, 1.5])

@@ -1,10 +1,13 @@
 import json
+from dataclasses import astuple
 
 import pytest
 
 from acquisition.clock import PERIOD_NS
 from acquisition.control_loop.faults import Action
+from acquisition.control_loop.law import SoleGoal
 from acquisition.control_loop.loop import Tick
+from acquisition.control_loop.proof import ProofGoal, ProofKind
 from acquisition.control_loop.states import ArmState, ControlStatus
 from acquisition.devices import BusCondition
 from acquisition.ipc.commands import CommandKind, CommandQueue, StatusSlot
@@ -34,6 +37,12 @@ class Cycle:
 
     def move_to(self, goal, speed):
         self.goals.append((goal, speed))
+
+    def stand(self, goal):
+        self.goals.append(goal)
+
+    def prove(self, goal):
+        self.goals.append(goal)
 
     def set_bias(self, bias):
         self.biases.append(bias)
@@ -92,6 +101,15 @@ def test_commands_reach_the_cycle_and_are_confirmed(loop):
     assert loop.cycle.biases == [(1.0, 2.0, 3.0, 4.0, 5.0, 6.0)]
     assert loop.cycle.goals == [(GOAL, 0.25)]
     assert StatusSlot(loop.shared.status).read().obeyed == number
+
+
+def test_stances_and_proofs_reach_the_cycle(loop):
+    press = SoleGoal(2.0, 10.0, 0.0, 0.0, 0.1)
+    ramp = ProofGoal(ProofKind.RAMP, 3, 0.5, 2.0)
+    loop.console.post(CommandKind.STAND, values=astuple(press))
+    loop.console.post(CommandKind.PROVE, values=ramp.values)
+    loop.run(0.002)
+    assert loop.cycle.goals == [press, ramp]
 
 
 def test_the_loop_ends_when_it_is_told_to_leave(loop):

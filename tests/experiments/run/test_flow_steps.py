@@ -74,8 +74,10 @@ def test_the_aim_that_was_shown_is_the_trials(tmp_path, monkeypatch):
 
 
 def test_a_pause_holds_the_arm_and_is_in_the_journal(tmp_path):
-    context = make_context(tmp_path, Keys("p", "", " ", " "))
+    keys = Keys("p", "", "x", " ", " ")
+    context = make_context(tmp_path, keys)
     wait_ready(context, FIRST)
+    assert keys.keys == []  # it went on at the first space, not before
     assert context.loop_client.requested == [ArmState.HOLD, ArmState.FLOAT]
     assert names(context)[-2:] == [Event.PAUSED, Event.CONTINUED]
 

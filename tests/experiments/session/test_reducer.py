@@ -320,3 +320,17 @@ def test_a_drift_is_told_to_a_millinewton():
     )
     assert state.drift == (0.123, 0.123, 0.123)
     assert replace(state, tares=1).drift == ()
+
+
+@pytest.mark.parametrize(
+    ("told", "ended"),
+    [
+        ("complete", "complete"),
+        ("quit", "quit"),
+        ("", "unfinished"),
+        (None, "unfinished"),
+    ],
+)
+def test_a_session_ends_for_the_reason_that_was_told(told, ended):
+    end = {"event": Event.ENDED, "reason": told}
+    assert replay([*BEGIN, end]).ended == ended

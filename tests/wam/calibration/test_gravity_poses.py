@@ -299,6 +299,27 @@ def test_a_turn_of_the_wrist_turns_gravity_across_the_sensor(model, space):
     assert np.hypot(*(second - first)[:2]) > 0.6
 
 
+@pytest.mark.parametrize(
+    ("closed", "joint", "angle"),
+    [
+        ([], 6, -1.2),
+        ([(6, -1.2)], 5, 1.0),
+        ([(6, -1.2), (5, 1.0)], 5, -1.0),
+        ([(6, -1.2), (5, 1.0), (5, -1.0)], 6, -0.6),
+    ],
+)
+def test_a_wrist_is_turned_the_first_way_that_is_free(model, closed, joint, angle):
+    class PartlyClosed(FreeSpace):
+        def is_clear(self, model, start, goal):
+            way = goal - start
+            return not any(np.isclose(way[j - 1], by) for j, by in closed)
+
+    upright, tilted = tilted_pair(model, PartlyClosed(FLOOR))
+    turned = np.zeros(7)
+    turned[joint - 1] = angle
+    assert tilted - upright == pytest.approx(turned)
+
+
 def test_a_wrist_that_cannot_turn_anywhere_is_refused(model):
     class Closed(FreeSpace):
         def holds(self, q):

@@ -8,6 +8,7 @@ import pytest
 
 from acquisition.control_loop.faults import Fault, verdict_for
 from acquisition.control_loop.law import SoleGoal
+from acquisition.control_loop.proof import ProofGoal, ProofKind
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import PositionJump
 from tests.acquisition.control_loop.test_cycle import Bench, Law
@@ -155,3 +156,22 @@ def test_a_sole_aside_of_the_centre_line_is_drawn_back(foot_model):
     tau, gravity = law.torque(reading(0.002, q=q))
 
     assert (tau - gravity)[0] < -0.5
+
+
+def test_a_proof_goes_beyond_a_limit_that_counts_again_once_well_inside(bench):
+    """An arm that is laid onto its stops may stand beyond the limits of positions."""
+    at_limit, beyond = np.zeros(7), np.zeros(7)
+    at_limit[0], beyond[0] = 1.95, 2.05
+    bench.law.prove = lambda proof, reading: None
+    bench.run(5)
+    bench.arm.q = at_limit
+    bench.cycle.prove(ProofGoal(ProofKind.RAMP, 1, 0.5, 2.0))
+    bench.run()
+    bench.arm.q = beyond
+    bench.run(5)
+    assert bench.reason == ""
+    bench.arm.q = np.zeros(7)
+    bench.run(5)
+    bench.arm.q = beyond
+    bench.run(5)
+    assert bench.reason == Fault.JOINT_LIMIT

@@ -649,3 +649,11 @@ def test_an_arm_without_an_answer_of_its_puck_is_idle_as_the_module_says():
     cycle(rig, arm, TAU)
     rig.network.silence(2)
     assert arm.idle() is True
+
+
+def test_each_cycle_of_a_dead_bus_counts_once_while_it_is_only_listened_to():
+    rig, arm = started()
+    rig.link.receive = broken
+    for _ in range(3):
+        arm.listen(rig.clock.t_ns)
+    assert arm.counters.link_errors == 3

@@ -99,3 +99,10 @@ def test_nothing_is_asked_for_before_a_start_or_of_silent_pucks():
     assert watch.next_question() is None
     watch.begin([dict.fromkeys(WATCHED)] * 7, (200,) * 7)
     assert watch.next_question() is None
+
+
+def test_what_a_puck_no_longer_says_is_not_asked_after_another_start():
+    watch = PropertyWatch()
+    for count in (7, 6):
+        watch.begin([{"MT": 1370}] * count + [{}] * (7 - count), (200,) * 7)
+    assert {node for node, _ in questions(watch, 7)} == {1, 2, 3, 4, 5, 6}
