@@ -67,7 +67,7 @@ def watch_limits(patch: pytest.MonkeyPatch) -> Largest:
 
     for name in ("_energy", "_speed", "_travel"):
         noting(name)
-    usual = motion._first_beyond
+    usual = motion._first_beyond  # noqa: SLF001 - what the guard compares by
 
     def first_beyond(values, limits):
         pairs = zip(values, limits, strict=True)

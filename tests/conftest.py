@@ -2,13 +2,18 @@
 
 import json
 import signal
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
 
 from tests.stalls import WallClock
+
+if TYPE_CHECKING:
+    from tests.experiments.program import Done
 
 DATA = Path(__file__).parent / "data"
 # A machine that stalls fails no test: how long an example takes is no claim.
@@ -115,3 +120,34 @@ def foot_model(example_tool):
     from wam.model.constants import load_constants
 
     return ArmModel(load_constants(), example_tool)
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """One simulated session of two trials on the flat plate, for all who only look."""
+
+    done: "Done"
+    data: Path
+    folder: Path
+
+
+@pytest.fixture(scope="session")
+def config(tmp_path_factory):
+    """Return a rig.toml with a matrix of short containers beside it."""
+    from tests.experiments.program import write_config
+
+    return write_config(tmp_path_factory.mktemp("config"))
+
+
+@pytest.fixture(scope="session")
+def recorded(tmp_path_factory, config):
+    from tests.experiments.program import only_session, run_short
+
+    data = tmp_path_factory.mktemp("data")
+    done = run_short(config, data, "TF", 2)
+    return Recorded(done, data, only_session(data))
+
+
+@pytest.fixture(scope="session")
+def first_trial(recorded):
+    return recorded.folder / "trials" / "T01.mcap"

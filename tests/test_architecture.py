@@ -18,8 +18,6 @@ PACKAGES = (
     "fakes",
     "traction",
 )
-# Public by their documentation: os, namedtuple, python-can.
-DOCUMENTED = frozenset({"_exit", "_replace", "_asdict", "_recv_internal"})
 
 
 @cache
@@ -92,19 +90,6 @@ def test_a_class_name_means_one_class():
             if isinstance(node, ast.ClassDef):
                 where[node.name].append(module)
     assert {name: w for name, w in where.items() if len(w) > 1} == {}
-
-
-def test_tests_use_only_what_objects_offer():
-    found = []
-    for path in sorted((ROOT / "tests").rglob("*.py")):
-        for node in ast.walk(tree_of(path)):
-            if not isinstance(node, ast.Attribute) or not node.attr.startswith("_"):
-                continue
-            owner = node.value.id if isinstance(node.value, ast.Name) else ""
-            is_public = node.attr.startswith("__") or node.attr in DOCUMENTED
-            if owner not in {"self", "cls"} and not is_public:
-                found.append(f"{path.relative_to(ROOT)}:{node.lineno} {node.attr}")
-    assert found == []
 
 
 def test_every_package_says_what_it_is_for():

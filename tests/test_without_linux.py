@@ -27,6 +27,7 @@ def elsewhere(*arguments, code=0):
     return done.stdout + done.stderr
 
 
+@pytest.mark.slow
 def test_the_package_fits_tables():
     words = [sys.executable, "-c", NOTEBOOK]
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
@@ -45,6 +46,7 @@ def test_tables_are_fitted_and_reported(tmp_path):
     }
 
 
+@pytest.mark.slow
 def test_an_arm_is_refused_with_its_cause(tmp_path):
     asked = ("run", "S0", "--fake", "--processes", "--trials", 1, "--data", tmp_path)
     told = elsewhere(*asked, "--operator-script", "auto", code=3)

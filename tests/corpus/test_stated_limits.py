@@ -226,6 +226,7 @@ def test_a_line_of_a_table_is_shorter_than_65536_characters(tmp_path, length, is
         load_tables([path])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("count", "is_read"), [(2000, True), (2001, False)])
 def test_an_npz_may_hold_2000_trials(tmp_path, count, is_read):
     rows = np.column_stack([np.arange(5.0), np.ones(5), np.ones(5), np.ones(5)])

@@ -133,6 +133,7 @@ def test_without_any_extra_trials_are_recorded_verified_and_exported(tmp_path):
     assert {"T01.csv", "T02.csv"} <= tables
 
 
+@pytest.mark.slow
 def test_a_notebook_fits_without_any_extra_and_names_that_of_a_picture():
     code = f"""
 import sys

@@ -4,10 +4,7 @@ import shutil
 
 import pytest
 
-from tests.experiments.conftest import config, first_trial, recorded
 from tests.experiments.program import traction
-
-__all__ = ["config", "first_trial", "recorded", "workplace"]
 
 
 @pytest.fixture(scope="session")

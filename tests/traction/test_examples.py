@@ -50,6 +50,7 @@ def test_the_example_of_the_readme_runs_as_it_is(tmp_path, monkeypatch, workplac
     assert (tmp_path / "T01.pdf").stat().st_size > 1000
 
 
+@pytest.mark.slow
 def test_the_page_for_policies_runs_as_it_is(tmp_path, monkeypatch, capsys):
     pytest.importorskip("gymnasium")
     page = ROOT / "docs" / "own-policy.md"

@@ -21,6 +21,7 @@ def tables():
     return tr.load_tables(SLICE)
 
 
+@pytest.mark.slow
 def test_the_example_of_the_page_runs_on_a_table(tmp_path, monkeypatch, capsys):
     block = re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.DOTALL)[0]
     (tmp_path / "trials.npz").symlink_to(SLICE)

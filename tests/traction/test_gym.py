@@ -132,6 +132,7 @@ def test_unknown_terrains_and_peaks_are_refused():
         stance_gym.score(steady(1.0, 5.0), "TF", 0)
 
 
+@pytest.mark.slow
 def test_without_gymnasium_the_extra_is_named():
     code = "import sys; sys.modules['gymnasium'] = None; import traction.gym"
     command = [sys.executable, "-c", code]

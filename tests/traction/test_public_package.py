@@ -310,6 +310,7 @@ def test_the_commands_name_a_hidden_package_without_a_traceback(tmp_path):
     assert "hides" in done.stderr
 
 
+@pytest.mark.slow
 def test_other_folders_of_those_names_hide_nothing(tmp_path):
     (tmp_path / "deeper" / "analysis").mkdir(parents=True)
     done = python("-c", "import traction as tr; print(tr.fit.__name__)", cwd=tmp_path)

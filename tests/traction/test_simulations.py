@@ -27,6 +27,7 @@ def files(data):
     return found
 
 
+@pytest.mark.slow
 def test_a_session_has_the_bytes_of_the_command(config, tmp_path, capsys):
     session = tr.simulate("TF", 1, 5, tmp_path / "own", config=config)
     assert len(session) == 1
@@ -56,6 +57,7 @@ def test_what_cannot_be_simulated_is_refused(arguments, config, tmp_path):
     assert not list(tmp_path.rglob("*.mcap"))
 
 
+@pytest.mark.slow
 def test_an_unfinished_session_is_not_touched(config, tmp_path):
     options = ("--trials", 2, "--config", config, "--data", tmp_path)
     script = tmp_path / "keys"

@@ -93,6 +93,7 @@ print(len(made), *(fold.models["tustin"].score.mae for fold in folds))
 """
 
 
+@pytest.mark.slow
 def test_a_corrected_formula_is_fitted_anew(copy, tmp_path):
     table = Path(__file__).parents[2] / "data" / "rehearsal_slice.npz"
 

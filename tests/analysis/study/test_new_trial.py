@@ -192,6 +192,7 @@ def test_every_model_beyond_the_paper_has_a_fitter():
     assert set(NEW_TRIAL) >= {GP_SE_TRIAL, GP_NN_TRIAL, GP_SE_TUSTIN_TRIAL}
 
 
+@pytest.mark.slow
 def test_levels_come_from_residuals_of_rows_that_were_not_fitted():
     trials = trials_of(normal, 6, between=0.5)
     assert NewTrialFit(training(trials, 150), None).fit(SE).spread is not None

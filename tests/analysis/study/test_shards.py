@@ -42,6 +42,7 @@ def test_a_shard_is_one_of_so_many(number):
         Shard(number, 3)
 
 
+@pytest.mark.slow
 def test_shards_of_which_one_was_killed_equal_one_run_bit_for_bit(tmp_path):
     trials = trials_of(4)
     options = StudyOptions(

@@ -97,6 +97,7 @@ def test_few_trials_make_no_generator(trials):
     assert fit_generator(trials[:3], 0, 1.5) is None
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(180)  # it is fitted as often as it is turned down
 def test_a_generator_that_runs_away_is_turned_down(known, trials, monkeypatch):
     import analysis.terrains.generator_fit as fit
@@ -244,6 +245,7 @@ def test_one_expert_is_least_squares():
     assert experts.sd[0] == pytest.approx(0.1, rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_single_expert_is_stored_and_read_again(trials):
     linear = fit_generator_of_size(prepare(trials, 0), 1, 0)
     again = Generator.from_dict(json.loads(json.dumps(linear.to_dict())))

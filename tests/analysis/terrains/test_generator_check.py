@@ -1,6 +1,7 @@
 """Samples of a generator beside trials that were left out, and their table."""
 
 import numpy as np
+import pytest
 
 from analysis.terrains.generator_check import SHOWN, judge_generator
 from analysis.terrains.generator_fit import GeneratorTask, generator_of
@@ -8,6 +9,7 @@ from analysis.terrains.process_rows import ProcessTrial
 from tests.analysis.terrains.test_generator import trial_of
 
 
+@pytest.mark.slow
 def test_every_third_trial_is_left_out_and_sampled():
     task = GeneratorTask(tuple(trial_of(k) for k in range(6)), 0, 1.5)
     found = judge_generator(task)

@@ -88,6 +88,7 @@ def test_an_operator_script_that_is_no_text_is_refused(config, tmp_path):
     assert "cannot be read" in refusal(done)
 
 
+@pytest.mark.slow
 def test_the_real_rig_without_its_bus_is_a_failed_preflight(tmp_path):
     config = write_config(tmp_path, rig=('"socketcan"', '"no-such-adapter"'))
     done = traction("check", "--config", config, "--data", tmp_path)

@@ -89,6 +89,7 @@ def test_nothing_is_begun_beside_a_file_that_is_not_there(tmp_path):
     assert read_commissioning(tmp_path / FAKE_FOLDER) is None
 
 
+@pytest.mark.slow
 def test_a_puck_that_was_replaced_is_noticed_until_two_persons_accept_it(tmp_path):
     config, kept = write_config(tmp_path), tmp_path / FAKE_FOLDER
     options = ("commission", *FIRST[:-1], "C2", "--config", config)

@@ -63,6 +63,7 @@ def test_from_a_bag_to_a_report(given, tmp_path):
     assert "10500" in page
 
 
+@pytest.mark.slow
 def test_an_estimated_wrench_is_marked_to_the_last_page(given, tmp_path):
     done = imported(given, tmp_path / "a", "--estimated")
     assert "estimated by the robot, not measured" in done.out
@@ -71,6 +72,7 @@ def test_an_estimated_wrench_is_marked_to_the_last_page(given, tmp_path):
     assert "The wrench was estimated by the robot" in page
 
 
+@pytest.mark.slow
 def test_a_changed_record_of_an_import_is_refused(given, tmp_path):
     imported(given, tmp_path / "a")
     (tmp_path / "a" / "import.json").write_text('{"format": "other"}')
@@ -117,6 +119,7 @@ def test_a_folder_that_holds_something_is_never_written_to(given, tmp_path):
     assert "is not empty" in done.err
 
 
+@pytest.mark.slow
 def test_a_bag_of_ros_1_is_imported_alike(tmp_path):
     log = write_bag(tmp_path / "log.bag", LOG, "LZ4")
     done = imported((log, write_urdf(tmp_path)), tmp_path / "out")

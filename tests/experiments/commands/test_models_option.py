@@ -10,6 +10,7 @@ from tests.experiments.program import traction
 SLICE = Path(__file__).parents[2] / "data" / "rehearsal_slice.npz"
 
 
+@pytest.mark.slow
 def test_only_the_models_that_are_named_are_fitted_and_shown(tmp_path):
     done = traction("fit", SLICE, "--to", tmp_path / "fit", "--models", "tustin,gp_nn")
     assert done.code == 0, done.err

@@ -53,6 +53,7 @@ def test_damaged_conditions_name_no_foot(data):
     assert last_foot(data, is_simulated=True) is None
 
 
+@pytest.mark.slow
 def test_another_foot_is_confirmed_and_stands_on_the_page(config, data):
     done = run(config, data, "Tf", "last\nlast\n")  # no trial at all
     assert "S001 was recorded with the foot tread; Tf needs the foot bare." in done.out

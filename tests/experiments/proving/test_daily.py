@@ -86,6 +86,7 @@ def day(tool, seed, wrong="", torques=BEFORE, **changed):
     return values | changed
 
 
+@pytest.mark.slow
 def test_no_sound_arm_of_many_is_stopped_on_another_day(tool):
     causes = [daily.judge(day(tool, seed)).cause for seed in range(SOUND)]
     assert causes == [""] * SOUND

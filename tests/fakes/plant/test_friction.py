@@ -121,6 +121,7 @@ def crept(load, tremor):
     return np.abs((motors.angle - early) / TURNS)
 
 
+@pytest.mark.slow
 def test_a_constant_load_below_breakaway_moves_nothing_in_a_minute():
     assert crept(0.8, 0.0).max() < 2e-6
 

@@ -72,6 +72,7 @@ def test_a_slow_hand_is_slower_than_a_fast_one(plant):
     assert ways["slow"] < ways["steady"] < ways["fast"]
 
 
+@pytest.mark.slow
 def test_a_clumsy_hand_touches_the_frame_and_lifts_the_foot(plant):
     plant.terrain = Container(plant.terrain)
     rows = crossing(plant, PACES["clumsy"], 12.0)

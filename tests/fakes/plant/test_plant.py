@@ -141,6 +141,7 @@ SWINGS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("start", SWINGS)
 def test_a_free_swing_keeps_its_energy(start):
     far = np.full(7, 100.0)

@@ -94,6 +94,7 @@ def build(example_tool):
         loop.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pose", range(len(POSES)))
 def test_the_arm_stays_where_it_is_held(build, pose):
     loop = build(POSES[pose])
@@ -111,6 +112,7 @@ def test_the_arm_sags_without_compensation(build):
     assert loop.sole[2] < before[2] - 0.05
 
 
+@pytest.mark.slow
 def test_the_foot_presses_with_the_weight_of_the_virtual_mass(build):
     mass = 0.3
     loop = build(START, friction=0.0, virtual_mass=mass)

@@ -240,6 +240,7 @@ def test_fuzzed_packets_raise_nothing_and_what_is_absurd_is_not_valid():
     assert not any(s.is_valid for s, w in zip(found, wild, strict=True) if w)
 
 
+@pytest.mark.slow
 def test_a_network_that_is_pulled_and_put_back_twenty_times_is_read_again():
     bench = SensorBench("ati")
     ports = []

@@ -78,6 +78,7 @@ def test_two_clocks_never_run_further_apart_than_crystals_do():
     assert abs(ahead - S) <= 500_001
 
 
+@pytest.mark.slow
 def test_a_day_needs_no_more_memory_than_a_minute():
     fit = ClockFit()
     for k in range(86_400 // 10):  # a message every 10 s shows the arithmetic

@@ -104,6 +104,7 @@ def test_a_frame_with_any_byte_changed_is_none(position):
     assert optoforce.decode_frame(bytes(damaged)) is None
 
 
+@pytest.mark.slow
 @given(st.lists(frames, max_size=6), st.integers(1, 60))
 def test_scanner_returns_every_frame_in_any_chunking(sent, chunk):
     found = scanner()

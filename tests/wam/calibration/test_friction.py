@@ -128,6 +128,7 @@ def test_intervals_hold_the_true_coulomb_friction(fit):
     assert (fit.lower_bound < fit.friction.coulomb).all()
 
 
+@pytest.mark.slow
 def test_residuals_that_are_alike_within_a_block_widen_the_interval():
     quiet = rows_of(truth(), 4, noise=1e-4)
     wide, narrow = (
@@ -144,6 +145,7 @@ def test_one_change_of_the_weight_explains_all_motors(fit):
     assert fit.moments.ravel() == pytest.approx(HEAVIER, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_presliding_is_what_gives_way_up_to_the_torque_that_breaks_away():
     rows = rows_of(truth(), 1)
     broken = truth().coulomb * truth().breakaway
@@ -159,6 +161,7 @@ def test_presliding_is_what_gives_way_up_to_the_torque_that_breaks_away():
     assert presliding[6] == 2e-3  # ASSUMED: it gave way on no leg
 
 
+@pytest.mark.slow
 def test_a_friction_of_another_form_is_refused():
     held_out = rows_of(truth(), 2)
     other = [
