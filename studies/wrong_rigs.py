@@ -19,6 +19,7 @@ from acquisition.control_loop.cycle import Cycle, CycleOutputs
 from acquisition.control_loop.law import FootObserver
 from acquisition.control_loop.loop import Loop
 from acquisition.control_loop.states import ArmState
+from acquisition.devices import ArmReading, Vector
 from fakes.clock import SteppedClock
 from fakes.ground.terrain import GroundChoice
 from fakes.plant.model import PlantOptions, Support
@@ -44,6 +45,7 @@ SOON, NEAR, SLOW = 0.130, 0.040, 0.7  # s, m, m/s
 ENOUGH_NEAR, ENOUGH_SLOW = 18, 21
 _MS = 1_000_000
 _PERIOD = 0.002
+Each = Callable[[Vector, Vector, Vector], object]  # q, qd, torques as sent
 LIMITS = guard_limits(
     q_lower=tuple(CONSTANTS.q_lower.tolist()),
     q_upper=tuple(CONSTANTS.q_upper.tolist()),
@@ -202,15 +204,45 @@ def _wiring(rig: FakeRig, wrong: GuardRig) -> Wiring:
     return Wiring(wrong.torque, wrong.counts, home, torn, torn_at)
 
 
-def run(wrong: GuardRig, friction: float, state: ArmState = ArmState.HOLD) -> RunAway:
-    """Return what a wrong rig does when it is activated and nobody holds it."""
+class _WatchedArm(WamArm):
+    """Tells what it read and sent in each cycle."""
+
+    each: Each | None = None
+
+    def read(self, now_ns: int) -> ArmReading:
+        """Read as ever."""
+        self.read_last = super().read(now_ns)
+        return self.read_last
+
+    def send(self, tau: Vector, tau_gravity: Vector) -> Vector:
+        """Send as ever."""
+        sent = super().send(tau, tau_gravity)
+        if self.each is not None:
+            self.each(self.read_last.q, self.read_last.qd, sent)
+        return sent
+
+
+def run(
+    wrong: GuardRig,
+    friction: float,
+    state: ArmState = ArmState.HOLD,
+    each: Each | None = None,
+) -> RunAway:
+    """Return what a wrong rig does when it is activated and nobody holds it.
+
+    Args:
+        wrong: the rig.
+        friction: share of another arm's.
+        state: that is asked for.
+        each: takes positions, velocities and torques as sent, from the activation on.
+    """
     clock = SteppedClock()
     scene = SimulatedScene("S0", GroundChoice("small", "tread"), FRAME, START_Q, 1)
     options = PlantOptions(friction, has_hand=False, down=wrong.down)
     rig = FakeRig(scene, CONSTANTS, TOOL, clock, options)
     clock.attach(rig)
     rig.plant.terrain = None
-    arm = WamArm(CanLink(PythonCanTransport(rig.bus, clock)), clock)
+    arm = _WatchedArm(CanLink(PythonCanTransport(rig.bus, clock)), clock)
     rig.plant.wiring = _wiring(rig, wrong)
     arm.start()
     for node, name, value in wrong.properties:
@@ -230,6 +262,7 @@ def run(wrong: GuardRig, friction: float, state: ArmState = ArmState.HOLD) -> Ru
         loop.run(20)
     rig.plant.support = Support.NONE
     rig.network.pendant("activate")
+    arm.each = each
     seen = _watch(rig, cycle, loop)
     rig.bus.shutdown()
     return replace(seen, rig=wrong.name)
