@@ -383,7 +383,7 @@ LIMITS: Mapping[str, Limit] = {
     "heading": Limit(
         "heading beyond the matrix's",
         "degrees",
-        "Heading typed wrong, the container is turned, or the base is",
+        "Heading typed wrong, or the container or the base is turned",
         low=-3.0,
         high=3.0,
     ),
