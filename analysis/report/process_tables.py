@@ -2,8 +2,9 @@
 
 from analysis.figures.sections import ReportSection
 from analysis.findings.findings import StudyResults
-from analysis.findings.mobilisation import Interval90, Mobilisation
+from analysis.findings.mobilisation import Mobilisation
 from analysis.report.page_model import ReportTable
+from analysis.terrains.loadings import Interval90
 
 _COLUMNS = {  # of the table of events: unit and scale of every value
     "initial stiffness": ("N/m", 1.0, 0),
