@@ -19,7 +19,7 @@ from analysis.data.series import Array
 from analysis.data.terrain_kinds import Value
 from analysis.study.metrics import Prediction
 from analysis.terrains.contact_law import ContactLaw
-from analysis.terrains.generator import SampledTraction
+from analysis.terrains.generator import Generator, SampledTraction
 from analysis.terrains.parts import (
     BREAK_AWAY_PART,
     CONTACT_PART,
@@ -139,7 +139,16 @@ class KnownTerrain:
             SettingsError: it cannot be sampled, or the motion is none.
         """
         loads, speeds = points_of(F_n, v_t)
-        return generator_in(self.parts, self.name).sample(loads, speeds, seed, n)
+        return self.generator.sample(loads, speeds, seed, n)
+
+    @property
+    def generator(self) -> Generator:
+        """What samples its traction along a motion; read anew every time.
+
+        Raises:
+            SettingsError: it cannot be sampled.
+        """
+        return generator_in(self.parts, self.name)
 
     @property
     def contact(self) -> ContactLaw:
