@@ -15,7 +15,6 @@ import subprocess
 import sys
 import tempfile
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,11 +22,7 @@ import numpy as np
 from analysis.exports.folder import target_files
 from analysis.exports.source import ExportOptions, TerrainExport
 from analysis.terrains.database import load, to_text
-from analysis.terrains.generator_fit import EXPERTS, fit_generator_of_size, prepare
-from analysis.terrains.parts import CONTACT_PART, GENERATOR_PART
-from tests.analysis.exports.databases import database
-from tests.analysis.terrains.test_contact_law import law_of
-from tests.analysis.terrains.test_generator import trial_of
+from tests.analysis.exports.stepped import stepped_database
 
 _PROGRAM = """
 #include <stdio.h>
@@ -164,22 +159,6 @@ def measured_in_python(export: TerrainExport, runs: int) -> float:
     return statistics.median(times)
 
 
-def _made(folder: Path) -> Path:
-    """Return the file of two terrains, the first with everything that is stepped."""
-    known = database()
-    trials = prepare([trial_of(seed) for seed in range(6)], 0)
-    parts = {
-        CONTACT_PART: law_of().to_dict(),
-        GENERATOR_PART: fit_generator_of_size(trials, EXPERTS, 0).to_dict(),
-    }
-    first, *others = known.terrains.values()
-    first = replace(first, parts={**first.parts, **parts})
-    terrains = {one.name: one for one in (first, *others)}
-    path = folder / "terrains.json"
-    path.write_text(to_text(replace(known, terrains=terrains)))
-    return path
-
-
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -188,7 +167,10 @@ def main() -> None:
     args = parser.parse_args()
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
-        path = args.terrain_db or _made(folder)
+        path = args.terrain_db
+        if path is None:
+            path = folder / "terrains.json"
+            path.write_text(to_text(stepped_database()))
         digest = hashlib.sha256(path.read_bytes()).hexdigest()
         for is_float in (False, True):
             options = ExportOptions(is_float=is_float)

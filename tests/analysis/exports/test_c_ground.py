@@ -1,7 +1,6 @@
 """The ground in C, stepped: the contact law and the generator are those of Python."""
 
 import subprocess
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,15 +11,11 @@ from analysis.exports.targets.c import HEADER
 from analysis.terrains.contact_law import BEFORE, Draw
 from analysis.terrains.generator import BEFORE as BEFORE_PATH
 from analysis.terrains.generator import Draws
-from analysis.terrains.generator_fit import fit_generator_of_size, prepare
-from analysis.terrains.parts import CONTACT_PART, GENERATOR_PART
 from tests.analysis.exports.compiled import FLAGS, build
-from tests.analysis.exports.databases import DIGEST, database
-from tests.analysis.terrains.test_contact_law import law_of
+from tests.analysis.exports.databases import DIGEST
+from tests.analysis.exports.stepped import LAW, generators, pushes, stepped_database
 from tests.analysis.terrains.test_generator import trial_of
 
-LAW = law_of()
-COUNT = 4000
 CONTACT = """
 #include <stdio.h>
 #include "traction_terrains.h"
@@ -95,26 +90,9 @@ int main(void)
 
 
 @pytest.fixture(scope="module")
-def generators():
-    known = prepare([trial_of(seed) for seed in range(6)], 0)
-    return fit_generator_of_size(known, 6, 0), fit_generator_of_size(known, 1, 0)
-
-
-@pytest.fixture(scope="module")
-def export(generators):
-    known = database()
-    parts = {
-        "S0": {CONTACT_PART: LAW.to_dict(), GENERATOR_PART: generators[0].to_dict()},
-        "TF": {GENERATOR_PART: generators[1].to_dict()},
-    }
-    terrains = {n: replace(t, parts=parts[n]) for n, t in known.terrains.items()}
-    return replace(known, terrains=terrains)
-
-
-@pytest.fixture(scope="module")
-def header(export, tmp_path_factory):
+def header(tmp_path_factory):
     folder = tmp_path_factory.mktemp("ground")
-    made = TerrainExport.of(export, DIGEST, "1.2.3")
+    made = TerrainExport.of(stepped_database(), DIGEST, "1.2.3")
     (folder / HEADER).write_bytes(target_files("c", made)[HEADER])
     return folder
 
@@ -124,20 +102,6 @@ def answered(folder, code, rows, columns, which=0):
     sent = np.ascontiguousarray(rows, dtype="<f8").tobytes()
     done = subprocess.run([program], input=sent, capture_output=True, check=True)
     return np.frombuffer(done.stdout, "<f8").reshape(-1, columns)
-
-
-def pushes():
-    """Return rows of dt, x, v, F_n and draws: loading, letting go, hops, going back."""
-    rng = np.random.default_rng(3)
-    dt = np.full(COUNT, 0.001)
-    v = np.where(rng.random(COUNT // 50) < 0.2, -0.05, rng.uniform(0, 0.1, COUNT // 50))
-    v = np.repeat(v, 50)
-    x = np.cumsum(v * dt)
-    F_n = 4.0 + 3.0 * np.sin(0.01 * np.arange(COUNT))
-    F_n[900:950] = 0.0
-    F_n[2500:2510], dt[2500:2510] = 0.01, 0.2
-    u, z = 1.0 - rng.random((COUNT, 2)), rng.standard_normal((COUNT, 2))
-    return np.column_stack([dt, x, v, F_n, u, z])
 
 
 def test_a_step_of_the_law_is_that_of_python(header):
@@ -167,8 +131,8 @@ def test_a_law_refuses_what_is_not_finite_and_what_it_does_not_know(header):
 
 
 @pytest.mark.parametrize("which", [0, 1])
-def test_a_step_of_the_generator_is_that_of_python(header, generators, which):
-    generator, motion = generators[which], trial_of(20)
+def test_a_step_of_the_generator_is_that_of_python(header, which):
+    generator, motion = generators()[which], trial_of(20)
     draws = Draws.of(5, 1, motion.F_n.size, generator.trials)
     (expected,) = generator.run([(motion.F_n, motion.v_t)], draws)
     F_n, v_t = (
@@ -202,7 +166,7 @@ def splitmix(seed, count):
     return (((z ^ (z >> 31)) >> 12) + 0.5) / 2.0**52
 
 
-def test_draws_are_uniform_normal_and_those_of_the_seed(header, generators):
+def test_draws_are_uniform_normal_and_those_of_the_seed(header):
     from scipy.stats import kstest
 
     u0, u1, z0, z1, level = answered(header, RANDOM, np.empty((0, 1)), 5).T
@@ -214,8 +178,8 @@ def test_draws_are_uniform_normal_and_those_of_the_seed(header, generators):
     for z in (z0, z1):
         assert kstest(z, "norm").pvalue > 1e-3
     assert np.abs(np.corrcoef([u0, u1, z0, z1]) - np.eye(4)).max() < 0.03
-    scaled = level / generators[0].between
-    assert kstest(scaled, "t", (generators[0].freedom,)).pvalue > 1e-3
+    scaled = level / generators()[0].between
+    assert kstest(scaled, "t", (generators()[0].freedom,)).pvalue > 1e-3
 
 
 def test_the_ground_compiles_as_cpp(header):
@@ -223,9 +187,9 @@ def test_the_ground_compiles_as_cpp(header):
     build(header, code, "-std=c++11", "-pedantic", "-Wall", "-Werror", suffix="cc")
 
 
-def test_single_precision_compiles_and_follows(export, tmp_path):
+def test_single_precision_compiles_and_follows(tmp_path):
     made = TerrainExport.of(
-        export, DIGEST, "1.2.3", options=ExportOptions(is_float=True)
+        stepped_database(), DIGEST, "1.2.3", options=ExportOptions(is_float=True)
     )
     (tmp_path / HEADER).write_bytes(target_files("c", made)[HEADER])
     rows = pushes()[:400]
