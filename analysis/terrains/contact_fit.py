@@ -2,11 +2,13 @@
 
 A release is a fall to less than 0.3 of its peak, a partial drop any other. Of them
 
-    b0, b1, s    regression of log peak on log(F_n / 3.5) at releases, b1 ~ N(0.5, 0.5)
+    b0, b1, s    regression of log peak on log(F_n / 3.5), F_n 3.5 N at most, at
+                 releases; b1 ~ N(0.5, 0.5)
     k0, s_k      median and spread (quartiles) of the log secant of loadings
     w, h         of the way from the peak of a release to the next loading: quartiles
     mu, b        F_t on (F_n, v) at v > 0.08 m/s, the lower 60 % of it
-    lam, m       partial drops over the way of jams, and their mean share of the peak
+    lam, m       partial drops over the way of loadings above 1.5 N, and the mean share
+                 of what the peak has above 1.5 N that they take
     v_c          v - dF_t/dt / k on exp((F_t / peak - 1) / 0.14), in loadings above half
                  of their peak
 
@@ -24,8 +26,8 @@ from analysis.data.prepare import PreparedTrial
 from analysis.data.series import Array
 from analysis.terrains.contact_law import (
     CREEP_LOAD,
+    FULL_LOAD,
     RANGES,
-    REFERENCE_LOAD,
     ContactLaw,
     ContactNumbers,
 )
@@ -50,8 +52,8 @@ class _Seen(NamedTuple):
     stiffness: Array  # log secants, shape (n,)
     run_outs: Array  # m
     running: Array  # F_t, F_n, v, shape (n, 3)
-    partial: Array  # shares of the peak
-    way: float  # of jams [m]
+    partial: Array  # shares of what is above 1.5 N
+    way: float  # of loadings above 1.5 N [m]
     creep: Array  # speed less that of the stretch, and creep at v_c = 1, shape (n, 2)
 
 
@@ -111,17 +113,17 @@ def _seen(trial: ProcessTrial) -> _Seen:
     is_deep = found.floors < _RELEASED * found.peaks
     is_release = is_deep & (found.peaks >= _LEAST_PEAK)
     stiffness = found.stiffness[np.isfinite(found.stiffness)]
-    share = 1.0 - found.floors / np.maximum(found.peaks, 1e-9)
+    loads = np.minimum(found.loads / FULL_LOAD, 1.0)
+    above = np.maximum(found.peaks - STONES_DROP, 1e-9)
+    share = np.minimum((found.peaks - found.floors - STONES_DROP) / above, 1.0)
     is_running = trial.v_t > _RUNNING
     running = np.column_stack([trial.F_t, trial.F_n, trial.v_t])[is_running]
-    loadings = [slice(first, last + 1) for first, last in found.rows]
-    forward = STEP * np.maximum(trial.v_t, 0.0)
+    loadings = [slice(begin, peak + 1) for _, begin, peak in found.rows]
+    forward = STEP * np.where(trial.F_t > STONES_DROP, np.maximum(trial.v_t, 0.0), 0.0)
     k = float(np.median(stiffness)) if stiffness.size else np.inf
     creep = [_creep(trial.F_t[rows], trial.v_t[rows], k) for rows in loadings]
     return _Seen(
-        releases=np.log(
-            np.column_stack([found.peaks, found.loads / REFERENCE_LOAD])[is_release]
-        ),
+        releases=np.log(np.column_stack([found.peaks, loads])[is_release]),
         stiffness=np.log(np.maximum(stiffness, 1.0)),
         run_outs=found.run_outs[is_release[: found.run_outs.size]],
         running=running,

@@ -8,17 +8,18 @@ what comes of it. Stones jam under a foot, stretch, give way and let go (Albert 
     at the first touch: a new jam, x_e = x
     free:     x >= x_e         -> jammed, a = x - min(mu f, 1 N) / k where v > 0, else x
               F_t = mu f c(v) + b v,   c(v) = min(max(v / 0.01, -1), 1)
-    jammed:   P  = p max(f, 0.8 N) ^ b1 / 3.5 ^ b1
+    jammed:   P  = p (min(max(f, 0.8), 3.5) / 3.5) ^ b1
               a += v_c exp((min(k (x - a) / P, 1) - 1) / 0.14) dt  where x > a
               F  = k (x - a); where F < -mu f: F = -mu f, a = x + mu f / k
               F > P            -> free: a new jam, x_e = x + run
-              u0 < lam v dt    -> F loses the share u1 ^ (1 / m - 1), a follows
+              F > 1.5 N, u0 < lam v dt -> F -= 1.5 N + (F - 1.5 N) u1 ^ (1 / m - 1)
               F_t = F + 20 v where F > 0, else F
     new jam:  log p = b0 + s z0,  log k = k0 + s_k z1,  run = w (-log u1) ^ (1 / h)
 
 with u0, u1 ~ U(0, 1) and z0, z1 ~ N(0, 1) new at every step; b0, b1, s, k0, s_k, w, h,
 mu, b, lam, m, v_c are the twelve numbers of the law. `step` is a pure function of the
-state and of these draws.
+state and of these draws. More load than 3.5 N is not credited: whoever pushes harder
+along presses harder, too, and trials do not tell what a load alone would bear.
 """
 
 from collections.abc import Mapping
@@ -31,8 +32,9 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from acquisition.errors import SettingsError
 from analysis.terrains.loadings import LEAST_LOAD, Interval90
+from analysis.terrains.process_scores import STONES_DROP
 
-REFERENCE_LOAD = 3.5  # N, at which the capacity of a jam is p
+FULL_LOAD = 3.5  # N, from which the capacity of a jam is p
 DAMPING = 20.0  # N s/m of a jam; not estimated
 CREEP_LOAD = 0.14  # share of the capacity over which creep grows by e
 SKIN_SPEED = 0.01  # m/s from which skin friction is whole
@@ -60,8 +62,8 @@ class ContactNumbers(NamedTuple):
     """The twelve numbers of a law.
 
     Attributes:
-        level: b0, log of the median capacity at F_n = 3.5 N [log N].
-        load: b1, exponent of F_n in the capacity.
+        level: b0, log of the median capacity at F_n >= 3.5 N [log N].
+        load: b1, exponent of F_n in the capacity below that.
         spread: s, sd of the log of the capacity.
         stiffness: k0, log of the median stiffness [log N/m].
         stiffness_spread: s_k, sd of its log.
@@ -69,8 +71,8 @@ class ContactNumbers(NamedTuple):
         run_shape: h, shape of its Weibull distribution.
         mu: skin friction, F_t over F_n of a foot that runs.
         viscosity: b, what F_t gains with v of a foot that runs [N s/m].
-        partial_rate: lam, partial drops over way of a jam [1/m].
-        partial_share: m, mean share that a partial drop takes.
+        partial_rate: lam, partial drops of 1.5 N or more over way of a jam [1/m].
+        partial_share: m, mean share that a partial drop takes of what is above 1.5 N.
         creep: v_c, speed of creep of a jam at its capacity [m/s].
     """
 
@@ -172,15 +174,17 @@ class ContactLaw:
             p, k = self._new(draw)
             run = n.run * (-log(draw.u1)) ** (1.0 / n.run_shape)
             return self._free(v, skin), JamState(False, a, p, k, x + run, 0.0)
-        elif F > 0.0 and draw.u0 < n.partial_rate * v * dt:
-            F *= 1.0 - draw.u1 ** (1.0 / n.partial_share - 1.0)
+        elif F > STONES_DROP and draw.u0 < n.partial_rate * v * dt:
+            left = F - STONES_DROP
+            F = left - left * draw.u1 ** (1.0 / n.partial_share - 1.0)
             a = x - F / k
         force = F + DAMPING * v if F > 0.0 else F
         return force, JamState(True, a, p, k, x_e, 0.0)
 
     def capacity(self, p: float, F_n: float) -> float:
         """Return P, what a jam of capacity `p` [N] bears under F_n [N]."""
-        return p * (max(F_n, LEAST_LOAD) / REFERENCE_LOAD) ** self.numbers.load
+        load = min(max(F_n, LEAST_LOAD), FULL_LOAD)
+        return p * (load / FULL_LOAD) ** self.numbers.load
 
     def _new(self, draw: Draw) -> tuple[float, float]:
         """Return capacity [N] and stiffness [N/m] of a new jam."""

@@ -25,7 +25,7 @@ class Loadings(NamedTuple):
     """Loadings and falls of one trial.
 
     Attributes:
-        rows: first and last sample of every loading, shape (n, 2).
+        rows: of every loading its floor, where it begins and its peak, shape (n, 3).
         stiffness: secant of every loading [N/m]; NaN where its way is too short.
         halves: share of the rise at half of the way of every loading; NaN as well.
         run_outs: way from the peak before to where every loading begins [m].
@@ -64,6 +64,7 @@ def loadings_of(trial: ProcessTrial, least: float) -> Loadings:
     peaks, floors = falls(F, least)
     stiffness: list[float] = []
     halves: list[float] = []
+    begins: list[int] = []
     run_outs: list[float] = []
     for floor, peak, before in zip(floors[:-1], peaks[1:], peaks[:-1], strict=True):
         rise, way = F[floor : peak + 1], x[floor : peak + 1]
@@ -72,6 +73,7 @@ def loadings_of(trial: ProcessTrial, least: float) -> Loadings:
             int(np.argmax(rise >= F[floor] + share * height))
             for share in (*_SECANT, _BEGUN)
         )
+        begins.append(int(floor) + begun)
         run_outs.append(float(way[begun] - x[before]))
         length, gain = float(way[high] - way[low]), float(rise[high] - rise[low])
         if length < _LEAST_WAY:
@@ -83,7 +85,7 @@ def loadings_of(trial: ProcessTrial, least: float) -> Loadings:
         at_half = float(np.interp(middle, way[low : high + 1], rise[low : high + 1]))
         halves.append((at_half - float(rise[low])) / max(gain, 1e-9))
     return Loadings(
-        rows=np.column_stack([floors[:-1], peaks[1:]]),
+        rows=np.column_stack([floors[:-1], np.array(begins, dtype=int), peaks[1:]]),
         stiffness=np.array(stiffness),
         halves=np.array(halves),
         run_outs=np.array(run_outs),

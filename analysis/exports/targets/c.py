@@ -15,6 +15,7 @@ from analysis.terrains import contact_law, generator
 from analysis.terrains.contact_law import ContactNumbers
 from analysis.terrains.generator import Generator
 from analysis.terrains.loadings import LEAST_LOAD
+from analysis.terrains.process_scores import STONES_DROP
 from analysis.terrains.recognition import TAU
 from analysis.terrains.table import Table, TractionEstimates, normal_scores
 
@@ -85,8 +86,9 @@ typedef {real} traction_real;
 #define TRACTION_MOST_EXPERTS {generator.MOST_EXPERTS}
 #define TRACTION_KNOTS {len(generator.KNOTS)}
 #define TRACTION_BEFORE {generator.BEFORE} /* steps of a path before its first sample */
-#define TRACTION_REFERENCE_LOAD {contact_law.REFERENCE_LOAD!r} /* N */
+#define TRACTION_FULL_LOAD {contact_law.FULL_LOAD!r} /* N */
 #define TRACTION_LEAST_LOAD {LEAST_LOAD!r} /* N */
+#define TRACTION_LEAST_DROP {STONES_DROP!r} /* N, of a partial drop */
 #define TRACTION_DAMPING {contact_law.DAMPING!r} /* N s/m of a jam */
 #define TRACTION_CREEP_LOAD {contact_law.CREEP_LOAD!r}
 #define TRACTION_SKIN_SPEED {contact_law.SKIN_SPEED!r} /* m/s */

@@ -23,8 +23,8 @@ typedef struct {
 /* The law of a foot that a simulator moves; its equations stand at
    traction_contact_step. */
 typedef struct {
-    traction_real level; /* log of the capacity at 3.5 N [log N] */
-    traction_real load; /* exponent of F_n in it */
+    traction_real level; /* log of the capacity at 3.5 N or more [log N] */
+    traction_real load; /* exponent of F_n in it below that */
     traction_real spread; /* sd of its log */
     traction_real stiffness; /* log of it [log N/m] */
     traction_real stiffness_spread; /* sd of that */
@@ -33,7 +33,7 @@ typedef struct {
     traction_real mu; /* skin friction */
     traction_real viscosity; /* [N s/m] */
     traction_real partial_rate; /* partial drops over way [1/m] */
-    traction_real partial_share; /* mean share that one takes */
+    traction_real partial_share; /* mean share of what is above 1.5 N that one takes */
     traction_real creep; /* speed at the capacity [m/s] */
 } traction_contact;
 
@@ -41,7 +41,7 @@ typedef struct {
 typedef struct {
     int is_jammed;
     traction_real anchor; /* where the stones are not stretched [m] */
-    traction_real capacity; /* at 3.5 N, of the jam or of the next one [N] */
+    traction_real capacity; /* at 3.5 N or more, of the jam or of the next one [N] */
     traction_real stiffness; /* [N/m] */
     traction_real engage_at; /* where the next jam begins [m] */
     traction_real aloft; /* time in the air [s] */
@@ -456,11 +456,10 @@ static inline traction_real traction_contact_capacity(const traction_contact *la
                                                       traction_real capacity,
                                                       traction_real F_n)
 {
-    traction_real load = F_n > (traction_real)TRACTION_LEAST_LOAD
-                             ? F_n
-                             : (traction_real)TRACTION_LEAST_LOAD;
+    traction_real load = traction_clip(F_n, (traction_real)TRACTION_LEAST_LOAD,
+                                       (traction_real)TRACTION_FULL_LOAD);
     return capacity
-           * traction_power(load / (traction_real)TRACTION_REFERENCE_LOAD, law->load);
+           * traction_power(load / (traction_real)TRACTION_FULL_LOAD, law->load);
 }
 
 static inline void traction_contact_new(const traction_contact *law, traction_jam *jam,
@@ -534,8 +533,10 @@ static inline int traction_contact_step(const traction_contact *law, traction_ja
               + law->run * traction_power(-traction_log(draw->u1), 1 / law->run_shape);
         *F_t = traction_contact_free(law, v, skin);
         return 0;
-    } else if (F > 0 && draw->u0 < law->partial_rate * v * dt) {
-        F *= 1 - traction_power(draw->u1, 1 / law->partial_share - 1);
+    } else if (F > (traction_real)TRACTION_LEAST_DROP
+               && draw->u0 < law->partial_rate * v * dt) {
+        F -= (traction_real)TRACTION_LEAST_DROP;
+        F -= F * traction_power(draw->u1, 1 / law->partial_share - 1);
         jam->anchor = x - F / k;
     }
     *F_t = F > 0 ? F + (traction_real)TRACTION_DAMPING * v : F;

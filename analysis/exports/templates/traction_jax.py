@@ -23,7 +23,8 @@ _HERE = Path(__file__).parent
 
 
 # Of the contact law: capacity, damping, creep, skin friction, the air.
-_REFERENCE_LOAD, _LEAST_LOAD, _DAMPING, _CREEP_LOAD = 3.5, 0.8, 20.0, 0.14
+_FULL_LOAD, _LEAST_LOAD, _LEAST_DROP = 3.5, 0.8, 1.5
+_DAMPING, _CREEP_LOAD = 20.0, 0.14
 _SKIN_SPEED, _TOUCH, _ALOFT, _FIRST_FORCE = 0.01, 0.05, 1.0, 1.0
 _BEFORE = 50  # samples that a path goes before its first one
 
@@ -66,7 +67,7 @@ class Jam(NamedTuple):
     Attributes:
         is_jammed: stones are stretched.
         anchor: where they are not [m].
-        capacity: at 3.5 N, of the jam or of the next one [N].
+        capacity: at 3.5 N or more, of the jam or of the next one [N].
         stiffness: of the same [N/m].
         engage_at: where the next one begins [m].
         aloft: time in the air [s].
@@ -248,7 +249,7 @@ def contact_step(
     skin = mu * F_n
     begun = jnp.where(v > 0.0, x - jnp.minimum(skin, _FIRST_FORCE) / k, x)
     a = jnp.where(jam.is_jammed, jam.anchor, begun)
-    P = p * (jnp.maximum(F_n, _LEAST_LOAD) / _REFERENCE_LOAD) ** load
+    P = p * (jnp.clip(F_n, _LEAST_LOAD, _FULL_LOAD) / _FULL_LOAD) ** load
     stretched = jnp.minimum(k * (x - a) / P, 1.0)
     crept = creep * jnp.exp((stretched - 1.0) / _CREEP_LOAD) * dt
     a = a + jnp.where(x > a, crept, 0.0)
@@ -256,9 +257,10 @@ def contact_step(
     is_back = -skin > F
     is_free = ~jam.is_jammed & (x < x_e)
     is_over = ~is_back & (P < F)
-    is_partial = ~is_back & ~is_over & (F > 0.0) & (u0 < rate * v * dt)
+    is_partial = ~is_over & (F > _LEAST_DROP) & (u0 < rate * v * dt)
     F = jnp.where(is_back, -skin, F)
-    F = jnp.where(is_partial, F * (1.0 - u1 ** (1.0 / share - 1.0)), F)
+    left = (F - _LEAST_DROP) * (1.0 - u1 ** (1.0 / share - 1.0))
+    F = jnp.where(is_partial, left, F)
     a = jnp.where(is_back | is_partial, x - F / k, a)
     free = skin * jnp.clip(v / _SKIN_SPEED, -1.0, 1.0) + viscosity * v
     force = jnp.where(F > 0.0, F + _DAMPING * v, F)

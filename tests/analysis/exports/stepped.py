@@ -12,7 +12,7 @@ from tests.analysis.terrains.test_contact_law import law_of
 from tests.analysis.terrains.test_generator import trial_of
 
 LAW = law_of()
-COUNT = 4000
+COUNT = 12_000
 
 
 @cache

@@ -97,8 +97,9 @@ def test_a_foot_that_is_drawn_loads_a_jam_until_it_lets_go():
 
 def test_a_jam_bears_more_under_load():
     law = law_of(spread=0.0)
-    assert law.capacity(8.0, 7.0) / law.capacity(8.0, 3.5) == pytest.approx(2.0**0.4)
+    assert law.capacity(8.0, 3.5) / law.capacity(8.0, 1.75) == pytest.approx(2.0**0.4)
     assert law.capacity(8.0, 0.1) == law.capacity(8.0, 0.8)
+    assert law.capacity(8.0, 20.0) == law.capacity(8.0, 3.5) == 8.0
 
 
 def test_only_skin_friction_resists_backward_motion():
@@ -128,7 +129,7 @@ def test_a_partial_drop_takes_a_share():
     F_t, _ = law.step(state, DT, x, 0.02, 3.5, Draw(1.01 * chance, 0.5, 0.0, 0.0))
     assert F_t == pytest.approx(4.0 + 0.4)
     F_t, after = law.step(state, DT, x, 0.02, 3.5, Draw(0.99 * chance, 0.5, 0.0, 0.0))
-    left = 4.0 * (1.0 - 0.5**1.5)
+    left = 2.5 * (1.0 - 0.5**1.5)
     assert F_t == pytest.approx(left + 0.4)
     assert after.anchor == pytest.approx(x - left / 1000.0)
     assert after.is_jammed
@@ -168,7 +169,8 @@ def test_the_numbers_of_a_law_are_found_again(fitted):
     assert found.run == pytest.approx(NUMBERS.run, rel=0.35)
     assert found.mu == pytest.approx(NUMBERS.mu, abs=0.15)
     assert found.creep == pytest.approx(NUMBERS.creep, abs=0.008)
-    assert 8.0 < found.partial_rate < NUMBERS.partial_rate  # small drops are not seen
+    assert found.partial_rate == pytest.approx(NUMBERS.partial_rate, rel=0.4)
+    assert found.partial_share == pytest.approx(NUMBERS.partial_share, abs=0.15)
     assert len(found) <= 12
 
 
