@@ -13,7 +13,8 @@ is drawn anew. Both are held against the hundred tested trials of the simulated 
 
 import argparse
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 from typing import NamedTuple
@@ -23,18 +24,66 @@ import numpy as np
 from analysis.data.events import find_slips
 from analysis.data.prepare import PreparedTrial, PrepareOptions, prepare_trial
 from analysis.data.series import Array
+from analysis.stance.interface import StanceRequest, risk_tables
+from analysis.stance.outcomes import StanceTotals, totals
+from analysis.stance.policies import POLICIES
+from analysis.stance.sequence import SoleView, StancePlan
 from analysis.terrains.contact_fit import fit_contact_law
+from analysis.terrains.contact_law import ContactLaw
 from analysis.terrains.process_rows import process_trials
 from analysis.terrains.process_scores import STONES_DROP, events_of, ks_distance
+from fakes.ground.law_ground import LawGround, TractionLaw
 from studies.process import FIRST, PER_SET, TESTED_SEED, load_pool, load_trials
-from tests.fakes.law_ground import CoulombLaw, LawGround, TractionLaw
 from tests.fakes.point_foot import PointFoot
+from tests.fakes.stance_bench import (
+    TRAVEL,
+    StanceBench,
+    learn_break_away,
+    stances,
+    taught,
+)
 
 STONES = ("S0", "S10", "S15", "B0", "B10", "B15")
 DRIVEN_SEED = 4950  # of beds and hands, apart from the tested ones
 TESTED = 100
 _WINDOW = (0.005, 0.2)  # m/s of the coefficient of friction
 _LEAST_LOAD = 0.8  # N of the same
+
+
+STANCE_SEED, BEDS, STANCES, PEAK, RISK = 4970, 10, 25, 6.0, 0.1  # N; share of slips
+
+
+class CoulombLaw:
+    """A constant coefficient of friction, as simulators use it."""
+
+    def __init__(self, mu: float) -> None:
+        self._mu = mu
+
+    def step(self, dt: float, x: float, v: float, F_n: float) -> float:
+        """Return F_t [N]."""
+        del dt, x
+        return self._mu * F_n * min(max(v / 0.01, -1.0), 1.0)
+
+    def capacity(self, F_n: float) -> float:
+        """Return mu F_n [N]."""
+        return self._mu * F_n
+
+
+class KnownBench(StanceBench):
+    """A bed under a foot that knows its terrain, with the traction of a law."""
+
+    def __init__(
+        self, law: ContactLaw | None, terrain: str, seed: int, trial: int
+    ) -> None:
+        super().__init__(terrain, seed, trial)
+        self._known = {terrain: 1.0}
+        if law is not None:
+            self.ground = LawGround(self.ground, law.begin(trial))
+
+    def view(self, shares: Mapping[str, float]) -> SoleView:
+        """Return what the foot feels, and where it knows to be."""
+        del shares
+        return super().view(self._known)
 
 
 class Driven(NamedTuple):
@@ -128,6 +177,30 @@ def compared(made: Driven, true: Driven) -> str:
     return "  ".join(parts)
 
 
+def stood(work: tuple[Path, str]) -> list[tuple[str, StanceTotals, StanceTotals]]:
+    """Return stances on the simulated ground and on a law, by policy.
+
+    What avoid-slip knows of the terrain was learnt on the simulated ground.
+    """
+    pool, terrain = work
+    law = fit_contact_law(load_pool(pool, terrain, FIRST, PER_SET), 0)
+    tables = risk_tables(learn_break_away({terrain: taught(terrain, STANCE_SEED)}))
+    request, rows = StanceRequest(PEAK, RISK), []
+    for name in ("none", "constant-mu", "avoid-slip"):
+        plan = StancePlan(POLICIES[name], request, STANCES, TRAVEL, 0.0, tables)
+        true, made = (
+            totals(
+                stances(terrain, plan, STANCE_SEED, BEDS, None, partial(KnownBench, x)),
+                request,
+            )
+            for x in (None, law)
+        )
+        assert true is not None
+        assert made is not None
+        rows.append((name, true, made))
+    return rows
+
+
 def main() -> int:
     """Print the tables."""
     parser = argparse.ArgumentParser(description="A contact law in the hand's loop.")
@@ -136,9 +209,23 @@ def main() -> int:
     parser.add_argument("--sets", type=int, default=5)
     parser.add_argument("--trials", type=int, default=25)
     parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--stances", action="store_true")
     args = parser.parse_args()
+    names = args.terrains.split(",")
     with get_context("spawn").Pool(args.jobs) as processes:
-        for name in args.terrains.split(","):
+        if args.stances:
+            work = [(args.pool, name) for name in names]
+            for name, rows in zip(names, processes.imap(stood, work), strict=True):
+                for policy, true, made in rows:
+                    sys.stdout.write(
+                        f"{name:4}{policy:12} slips {true.slips:.3f} "
+                        f"({true.low:.2f}-{true.high:.2f}), law {made.slips:.3f} "
+                        f"({made.slips - true.slips:+.3f})  traction "
+                        f"{true.traction:.2f} N, law {made.traction:.2f} N\n"
+                    )
+                sys.stdout.flush()
+            return 0
+        for name in names:
             true = driven(load_trials(args.pool, name, TESTED_SEED, TESTED))
             sys.stdout.write(
                 f"{name}: simulated ground, slips {true.slips:.1f}/m, peak "

@@ -18,22 +18,6 @@ class TractionLaw(Protocol):
         ...
 
 
-class CoulombLaw:
-    """A constant coefficient of friction, as simulators use it."""
-
-    def __init__(self, mu: float) -> None:
-        self._mu = mu
-
-    def step(self, dt: float, x: float, v: float, F_n: float) -> float:
-        """Return F_t [N]."""
-        del dt, x
-        return self._mu * F_n * min(max(v / 0.01, -1.0), 1.0)
-
-    def capacity(self, F_n: float) -> float:
-        """Return mu F_n [N]."""
-        return self._mu * F_n
-
-
 class LawGround:
     """Normal force and surface of a ground, traction of a law."""
 
