@@ -1,20 +1,27 @@
 """Does a foot slip on a contact law as on the ground that it was fitted to?
 
-python -m studies.contact_law POOL [--terrains S0,B15] [--sets 5] [--trials 25]
+python -m studies.contact_law POOL [--terrains S0,B15] [--sets 5] [--trials 20]
+python -m studies.contact_law POOL --no-creep
 python -m studies.contact_law POOL --stances
+python -m studies.contact_law POOL --numbers [--figure FILE]
 
 POOL is the folder of simulated trials of `studies.process`, made where it is missing.
 To every training set of ten trials a law is fitted. The simulated hand then pushes a
 point foot in stepped time over the law, `--trials` times a training set, and over a
 constant coefficient of friction; normal forces are those of the simulated bed, which
 is drawn anew. Both are held against the hundred tested trials of the simulated ground.
-`--stances` runs the stance task on simulated ground and law with the same policies.
+`--no-creep` leaves creep out of the law. `--stances` runs the stance task on simulated
+ground and law with the same policies. `--numbers` says what the laws are made of, and
+how often the interval of a number by one training set holds that by another;
+`--figure` draws a push over each ground.
 """
 
 import argparse
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
+from itertools import permutations
 from multiprocessing import get_context
 from pathlib import Path
 from typing import NamedTuple
@@ -24,12 +31,13 @@ import numpy as np
 from analysis.data.events import find_slips
 from analysis.data.prepare import PreparedTrial, PrepareOptions, prepare_trial
 from analysis.data.series import Array
+from analysis.figures.style import FORCE_LABEL, panel_grid, render, styled
 from analysis.stance.interface import StanceRequest, risk_tables
 from analysis.stance.outcomes import StanceTotals, totals
 from analysis.stance.policies import POLICIES
 from analysis.stance.sequence import SoleView, StancePlan
-from analysis.terrains.contact_fit import fit_contact_law
-from analysis.terrains.contact_law import ContactLaw
+from analysis.terrains.contact_fit import constant_friction, fit_contact_law
+from analysis.terrains.contact_law import ContactLaw, ContactNumbers
 from analysis.terrains.process_rows import process_trials
 from analysis.terrains.process_scores import STONES_DROP, events_of, ks_distance
 from fakes.ground.law_ground import LawGround, TractionLaw
@@ -46,8 +54,6 @@ from tests.fakes.stance_bench import (
 STONES = ("S0", "S10", "S15", "B0", "B10", "B15")
 DRIVEN_SEED = 4950  # of beds and hands, apart from the tested ones
 TESTED = 100
-_WINDOW = (0.005, 0.2)  # m/s of the coefficient of friction
-_LEAST_LOAD = 0.8  # N of the same
 
 
 STANCE_SEED, BEDS, STANCES, PEAK, RISK = 4970, 10, 25, 6.0, 0.1  # N; share of slips
@@ -133,25 +139,31 @@ def pushed(
     return driven(made)
 
 
-def coefficient(trials: Sequence[PreparedTrial]) -> float:
-    """Return the median of F_t over F_n of a foot in motion."""
-    rows = process_trials(trials)
-    F_n, v_t, F_t = (
-        np.concatenate([getattr(t, name) for t in rows])
-        for name in ("F_n", "v_t", "F_t")
-    )
-    is_in = (v_t >= _WINDOW[0]) & (v_t <= _WINDOW[1]) & (F_n >= _LEAST_LOAD)
-    return float(np.median(F_t[is_in] / F_n[is_in]))
+class Pushes(NamedTuple):
+    """What is to be pushed over: the law of a training set."""
+
+    pool: Path
+    terrain: str
+    number: int
+    trials: int
+    has_creep: bool
 
 
-def one(work: tuple[Path, str, int, int]) -> tuple[Driven, Driven]:
-    """Return pushes over the law of a training set, and over constant friction."""
-    pool, terrain, number, trials = work
-    learnt = load_pool(pool, terrain, FIRST + number, PER_SET)
-    law = fit_contact_law(learnt, 0)
+def law_of(pool: Path, terrain: str, number: int) -> ContactLaw:
+    """Return the law of a training set."""
+    law = fit_contact_law(load_pool(pool, terrain, FIRST + number, PER_SET), 0)
     if law is None:
         raise SystemExit(f"{terrain}: no law, too few releases.")
-    mu = coefficient(load_trials(pool, terrain, FIRST + number, PER_SET))
+    return law
+
+
+def one(work: Pushes) -> tuple[Driven, Driven]:
+    """Return pushes over the law of a training set, and over constant friction."""
+    pool, terrain, number, trials, has_creep = work
+    law = law_of(pool, terrain, number)
+    if not has_creep:
+        law = replace(law, numbers=law.numbers._replace(creep=0.0))
+    mu = constant_friction(load_pool(pool, terrain, FIRST + number, PER_SET))
     seed = DRIVEN_SEED + number
     return (
         pushed(terrain, seed, trials, law.begin),
@@ -183,7 +195,7 @@ def stood(work: tuple[Path, str]) -> list[tuple[str, StanceTotals, StanceTotals]
     What avoid-slip knows of the terrain was learnt on the simulated ground.
     """
     pool, terrain = work
-    law = fit_contact_law(load_pool(pool, terrain, FIRST, PER_SET), 0)
+    law = law_of(pool, terrain, 0)
     tables = risk_tables(learn_break_away({terrain: taught(terrain, STANCE_SEED)}))
     request, rows = StanceRequest(PEAK, RISK), []
     for name in ("none", "constant-mu", "avoid-slip"):
@@ -201,17 +213,69 @@ def stood(work: tuple[Path, str]) -> list[tuple[str, StanceTotals, StanceTotals]
     return rows
 
 
+def numbers_of(pool: Path, terrains: Sequence[str], sets: int) -> list[str]:
+    """Return the numbers of laws, and how often intervals hold those of other sets."""
+    held: dict[str, list[bool]] = {}
+    lines = []
+    for terrain in terrains:
+        laws = [law_of(pool, terrain, k) for k in range(sets)]
+        numbers = np.array([list(law.numbers) for law in laws])
+        columns = zip(ContactNumbers._fields, numbers.T, strict=True)
+        shown = [f"{k} {n.mean():.3g} ± {n.std():.2g}" for k, n in columns]
+        lines.append(f"{terrain}: {', '.join(shown)}")
+        for first, second in permutations(laws, 2):
+            for name, (_, lower, upper) in first.intervals.items():
+                is_held = lower <= getattr(second.numbers, name) <= upper
+                held.setdefault(name, []).append(is_held)
+    lines += [f"{name}: held {np.mean(hits):.0%}" for name, hits in held.items()]
+    every = np.mean([hit for hits in held.values() for hit in hits])
+    return [*lines, f"all: {every:.0%}"]
+
+
+def drawn(pool: Path, terrain: str) -> bytes:
+    """Return a picture of the same hand over ground, law and constant friction, PNG."""
+    law = law_of(pool, terrain, 0)
+    mu = constant_friction(load_pool(pool, terrain, FIRST, PER_SET))
+    grounds = {
+        "simulated ground": None,
+        "contact law": law.begin(0),
+        f"constant friction, {mu:.2f}": CoulombLaw(mu),
+    }
+    with styled():
+        figure, axes = panel_grid(3, 1.6, most_columns=1)
+        for ax, (name, one_law) in zip(axes, grounds.items(), strict=True):
+            foot = PointFoot(terrain, DRIVEN_SEED, 0)
+            if one_law is not None:
+                foot.ground = LawGround(foot.ground, one_law)
+            smooth = prepare_trial(foot.run(), PrepareOptions()).smooth
+            ax.plot(smooth.t, smooth.F_t, color="black", lw=0.6)
+            ax.set_title(name, loc="left")
+            ax.set_ylim(-2.0, 24.0)
+            ax.set_xlim(0.0, 12.0)
+        figure.supxlabel("time [s]", fontsize=8)
+        figure.supylabel(FORCE_LABEL, fontsize=8)
+        return render("contact_law", figure, True).png
+
+
 def main() -> int:
     """Print the tables."""
     parser = argparse.ArgumentParser(description="A contact law in the hand's loop.")
     parser.add_argument("pool", type=Path)
     parser.add_argument("--terrains", default=",".join(STONES))
     parser.add_argument("--sets", type=int, default=5)
-    parser.add_argument("--trials", type=int, default=25)
+    parser.add_argument("--trials", type=int, default=20)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--stances", action="store_true")
+    parser.add_argument("--no-creep", action="store_true")
+    parser.add_argument("--numbers", action="store_true")
+    parser.add_argument("--figure", type=Path)
     args = parser.parse_args()
     names = args.terrains.split(",")
+    if args.figure:
+        args.figure.write_bytes(drawn(args.pool, names[0]))
+    if args.numbers:
+        sys.stdout.write("\n".join(numbers_of(args.pool, names, args.sets)) + "\n")
+        return 0
     with get_context("spawn").Pool(args.jobs) as processes:
         if args.stances:
             work = [(args.pool, name) for name in names]
@@ -231,7 +295,10 @@ def main() -> int:
                 f"{name}: simulated ground, slips {true.slips:.1f}/m, peak "
                 f"{true.peak:.1f} N, mean {true.force:.1f} N\n"
             )
-            work = [(args.pool, name, k, args.trials) for k in range(args.sets)]
+            work = [
+                Pushes(args.pool, name, k, args.trials, not args.no_creep)
+                for k in range(args.sets)
+            ]
             for k, (made, constant) in enumerate(processes.imap(one, work), 1):
                 sys.stdout.write(f"  set {k}, law    {compared(made, true)}\n")
                 sys.stdout.write(f"  set {k}, mu     {compared(constant, true)}\n")

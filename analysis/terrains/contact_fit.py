@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from analysis.data.prepare import PreparedTrial
+from analysis.data.samples import SampleTable
 from analysis.data.series import Array
 from analysis.terrains.contact_law import (
     CREEP_LOAD,
@@ -31,8 +32,18 @@ from analysis.terrains.contact_law import (
     ContactLaw,
     ContactNumbers,
 )
-from analysis.terrains.loadings import Interval90, loadings_of, spread_over_trials
-from analysis.terrains.process_rows import STEP, ProcessTrial, process_trials
+from analysis.terrains.loadings import (
+    LEAST_LOAD,
+    Interval90,
+    loadings_of,
+    spread_over_trials,
+)
+from analysis.terrains.process_rows import (
+    STEP,
+    STILL,
+    ProcessTrial,
+    process_trials,
+)
 from analysis.terrains.process_scores import STONES_DROP
 
 _RELEASED = 0.3  # share of the peak
@@ -41,6 +52,7 @@ _PRIOR, _PRIOR_SD = 0.5, 0.5  # of b1
 _MOST_STIFFNESS_SPREAD = 0.6
 _QUARTILES = 1.349  # sd between those of a normal distribution
 _RUNNING, _LOWER = 0.08, 60.0  # m/s; % of F_t
+_FASTEST = 0.2  # m/s of a foot that slides, for constant friction
 _LOADED = 0.5  # share of the peak from which creep counts
 _FEWEST, _FEWEST_RELEASES = 3, 20  # trials; releases of all
 
@@ -106,6 +118,17 @@ def fit_contact_law(trials: Sequence[ProcessTrial], seed: int) -> ContactLaw | N
         for name, row in zip(ContactNumbers._fields, ends.T.tolist(), strict=True)
     }
     return ContactLaw(ContactNumbers(*numbers.tolist()), intervals, len(each), releases)
+
+
+def constant_friction(trials: Sequence[ProcessTrial]) -> float:
+    """Return the median of F_t over F_n of a foot that slides, for comparison.
+
+    Args:
+        trials: of one terrain, in which a foot slides.
+    """
+    rows = SampleTable.joined([trial.rows for trial in trials])
+    is_sliding = (rows.v_t >= STILL) & (rows.v_t <= _FASTEST) & (rows.F_n >= LEAST_LOAD)
+    return float(np.median(rows.F_t[is_sliding] / rows.F_n[is_sliding]))
 
 
 def _seen(trial: ProcessTrial) -> _Seen:
