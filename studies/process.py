@@ -27,7 +27,7 @@ from scipy.optimize import minimize
 from scipy.special import ndtr, ndtri
 from threadpoolctl import threadpool_limits
 
-from analysis.data.prepare import PrepareOptions, prepare_trial
+from analysis.data.prepare import PreparedTrial, PrepareOptions, prepare_trial
 from analysis.data.series import Array, TractionSeries
 from analysis.findings.mobilisation import mobilisation_of
 from analysis.study.new_trial import NewTrialModel
@@ -57,6 +57,13 @@ Outcome = dict[str, float]
 
 
 def load_pool(folder: Path, terrain: str, seed: int, count: int) -> list[ProcessTrial]:
+    """Return trials of a terrain as processes; see `load_trials`."""
+    return list(process_trials(load_trials(folder, terrain, seed, count)))
+
+
+def load_trials(
+    folder: Path, terrain: str, seed: int, count: int
+) -> list[PreparedTrial]:
     """Return trials of a terrain, from the disk or simulated and put there."""
     path = folder / f"{terrain}-{seed}.npz"
     if not path.is_file():
@@ -69,7 +76,7 @@ def load_pool(folder: Path, terrain: str, seed: int, count: int) -> list[Process
         TractionSeries(terrain, f"{seed}-{k}", np.round(x[:, 0], 6), *x[:, 1:].T)
         for k, x in enumerate(tables)
     ]
-    return list(process_trials([prepare_trial(s, PrepareOptions()) for s in series]))
+    return [prepare_trial(s, PrepareOptions()) for s in series]
 
 
 def simulate(terrain: str, seed: int, k: int) -> np.ndarray:

@@ -43,6 +43,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from analysis.terrains.contact_law import ContactLaw
+
 try:
     import gymnasium
 except ImportError as error:
@@ -99,6 +101,7 @@ class StanceEnv(gymnasium.Env["NDArray[np.float32]", "NDArray[np.float32]"]):
         peak: float = 6.0,
         config: Path | None = None,
         render_mode: None = None,
+        law: ContactLaw | None = None,
     ) -> None:
         """Choose the ground and what is asked of the foot.
 
@@ -107,6 +110,8 @@ class StanceEnv(gymnasium.Env["NDArray[np.float32]", "NDArray[np.float32]"]):
             peak: of the force asked for [N], 4 to 10.
             config: rig.toml; None = the settings that are shipped.
             render_mode: None; there is nothing to be seen.
+            law: contact law of a terrain, whose traction takes the place of the
+                simulated one; None = the simulated ground.
 
         Raises:
             SettingsError: there is no such terrain, or the peak is out of its range.
@@ -119,6 +124,7 @@ class StanceEnv(gymnasium.Env["NDArray[np.float32]", "NDArray[np.float32]"]):
         self._rig, self._row = settings.rig, settings.row(terrain)
         self._bed = stance_bed(self._rig, self._row, (0, 0))
         self._foot = StandingFoot(0.0, 1.0)
+        self._law = law
         self._sample: StanceSample | None = None
         self._is_slip = False
 
@@ -128,7 +134,7 @@ class StanceEnv(gymnasium.Env["NDArray[np.float32]", "NDArray[np.float32]"]):
         """Set the foot down on a fresh bed; the same seed gives the same beds."""
         super().reset(seed=seed)
         number = int(self.np_random.integers(2**31))
-        self._bed = bed = stance_bed(self._rig, self._row, (number, 0))
+        self._bed = bed = stance_bed(self._rig, self._row, (number, 0), self._law)
         spot = place_at(float(self.np_random.random()), self._row.travel)
         bed.carry(spot)
         for _ in range(_LONGEST_LOWERING):

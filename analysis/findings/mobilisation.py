@@ -20,16 +20,11 @@ from typing import NamedTuple
 import numpy as np
 
 from analysis.data.series import Array
-from analysis.terrains.process_rows import STEP, ProcessTrial
-from analysis.terrains.process_scores import falls
+from analysis.terrains.loadings import Interval90, loadings_of, spread_over_trials
+from analysis.terrains.process_rows import ProcessTrial
 
-_SECANT = (0.15, 0.75)  # of a rise
-_BEGUN = 0.12  # of a rise at which a run-out ends
-_LEAST_WAY = 0.3e-3  # m of a loading
-_LEAST_LOAD = 0.8  # N
 _STRAIGHT = 0.6  # share of the rise at half of the way, up to which it is a line
 _MOST_STRAIGHT = 0.2  # share of the loadings
-_DRAWS, _SHARE = 200, 0.95  # trials drawn again; one end of a 90 % interval
 _FEWEST = 3  # trials
 
 
@@ -53,14 +48,6 @@ class Mobilised(NamedTuple):
     between: Array
     ratios: Array
     halves: Array
-
-
-class Interval90(NamedTuple):
-    """A value with the ends of its 90 % interval."""
-
-    value: float
-    lower: float
-    upper: float
 
 
 class Mobilisation(NamedTuple):
@@ -90,31 +77,17 @@ def mobilised(trial: ProcessTrial, least: float) -> Mobilised:
         trial: as a process.
         least: fall of force [N] that makes an event.
     """
-    F, x = trial.F_t, STEP * np.cumsum(np.maximum(trial.v_t, 0.0))
-    peaks, floors = falls(F, least)
-    found: list[tuple[float, float, float]] = []
-    run_outs: list[float] = []
-    for floor, peak, before in zip(floors[:-1], peaks[1:], peaks[:-1], strict=True):
-        rise, way = F[floor : peak + 1], x[floor : peak + 1]
-        height = F[peak] - F[floor]
-        low, high, begun = (
-            int(np.argmax(rise >= F[floor] + share * height))
-            for share in (*_SECANT, _BEGUN)
-        )
-        run_outs.append(float(way[begun] - x[before]))
-        length = float(way[high] - way[low])
-        if length < _LEAST_WAY:
-            continue
-        stiffness = float(rise[high] - rise[low]) / length
-        middle = 0.5 * (way[low] + way[high])
-        at_half = float(np.interp(middle, way[low : high + 1], rise[low : high + 1]))
-        half = (at_half - rise[low]) / max(rise[high] - rise[low], 1e-9)
-        found.append((stiffness, float(F[peak]) / stiffness, half))
-    stiffness, ways, halves = np.array(found).reshape(-1, 3).T
-    ratios = F[peaks] / np.maximum(trial.F_n[peaks], _LEAST_LOAD)
-    drops, between = F[peaks] - F[floors], np.diff(x[peaks])
+    found = loadings_of(trial, least)
+    is_known = np.isfinite(found.stiffness)
+    stiffness = found.stiffness[is_known]
     return Mobilised(
-        stiffness, ways, np.array(run_outs), drops, between, ratios, halves
+        stiffness=stiffness,
+        ways=found.peaks[1:][is_known] / stiffness,
+        run_outs=found.run_outs,
+        drops=found.peaks - found.floors,
+        between=found.between,
+        ratios=found.peaks / found.loads,
+        halves=found.halves[is_known],
     )
 
 
@@ -123,33 +96,29 @@ def mobilisation_of(
 ) -> Mobilisation | None:
     """Return what trials of a terrain say; None with fewer than three of them.
 
-    The spread of a value over trials drawn again with replacement is the one of its
-    estimate. Other trials have that spread, too: the interval is the root of two wider.
-
     Args:
         trials: of one terrain.
         least: fall of force [N] that makes an event.
-        seed: of the draws.
+        seed: of the draws of intervals.
     """
-    from scipy.special import stdtrit
-
     each = [mobilised(trial, least) for trial in trials]
     each = [one for one in each if one.stiffness.size and one.between.size]
     if len(each) < _FEWEST:
         return None
-    rng = np.random.default_rng(seed)
-    drawn = rng.integers(len(each), size=(_DRAWS, len(each)))
-    width = np.sqrt(2.0) * float(stdtrit(len(each) - 1, _SHARE))
-    values: dict[str, Interval90] = {}
-    for name, (field, statistic) in _STATISTICS.items():
-        parts = [getattr(one, field) for one in each]
-        value = statistic(np.concatenate(parts))
-        again = [
-            statistic(np.concatenate([parts[k] for k in chosen])) for chosen in drawn
-        ]
-        spread = width * float(np.std(np.log(again)))
-        ends = value * np.exp([-spread, spread])
-        values[name] = Interval90(value, *ends.tolist())
+
+    def logs(some: Sequence[Mobilised]) -> Array:
+        return np.log(
+            [
+                statistic(np.concatenate([getattr(one, field) for one in some]))
+                for field, statistic in _STATISTICS.values()
+            ]
+        )
+
+    centre, reach = logs(each), spread_over_trials(each, logs, seed)
+    ends = np.exp([centre, centre - reach, centre + reach])
+    values = {
+        n: Interval90(*row.tolist()) for n, row in zip(_STATISTICS, ends.T, strict=True)
+    }
     halves = np.concatenate([one.halves for one in each])
     return Mobilisation(len(each), values, float(np.mean(halves <= _STRAIGHT)))
 

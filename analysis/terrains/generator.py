@@ -50,6 +50,7 @@ FEATURES, GATES = 14, 17
 KNOTS = (-0.03, -0.004, 0.0, 0.004, 0.012, 0.03, 0.07, 0.13, 0.22)  # m/s, of the drift
 EDGES = 2.0  # sd from the median to low and high
 MOST_EXPERTS = 16
+BEFORE = 50  # samples that a path goes before its first one
 MOST_STEPS = 30_000_000  # samples of all paths together
 
 _MOST_POINTS = 100  # of an axis of the bands
@@ -59,7 +60,6 @@ _SLOW, _PULL, _SLOW_PULL, _WALL, _FLOOR = 0.008, 0.003, 0.01, 0.1, 0.5
 _FORGOTTEN = 0.2  # of the mean velocity in a step
 _STOOD, _STILL = 0.02, (0.002, 0.004)  # of the mean speed in a step; m/s
 _OF_F = (1, 2, 3, 4, 14, 15)  # numbers of g that depend on F: those of x, then the rest
-_BEFORE = 50  # samples that a path goes before its first one
 
 
 class Experts(NamedTuple):
@@ -175,6 +175,11 @@ class Generator:
         """Number of experts."""
         return len(self.experts.sd)
 
+    @property
+    def freedom(self) -> int:
+        """Degrees of freedom of the spread between trials."""
+        return max(self.trials - 1, FEWEST)
+
     def sample(
         self, F_n: Array, v_t: Array, seed: int, paths: int = 1
     ) -> SampledTraction:
@@ -207,11 +212,11 @@ class Generator:
         """
         begun = []
         for F_n, v_t in motions:
-            rows = np.concatenate([np.zeros(_BEFORE, dtype=int), np.arange(F_n.size)])
+            rows = np.concatenate([np.zeros(BEFORE, dtype=int), np.arange(F_n.size)])
             begun.append(Motion.of(F_n[rows], v_t[rows], self.bands))
         levels = np.split(self.between * draws.level[:, None], len(motions))
         found = self.along(begun, draws)
-        return [F[:, _BEFORE:] + u for F, u in zip(found, levels, strict=True)]
+        return [F[:, BEFORE:] + u for F, u in zip(found, levels, strict=True)]
 
     def along(self, motions: Sequence["Motion"], draws: "Draws") -> list[Array]:
         """Return F along motions, each (n / number of motions, T) from its first on.
@@ -321,7 +326,7 @@ class Draws(NamedTuple):
     @classmethod
     def of(cls, seed: int, paths: int, steps: int, trials: int) -> "Draws":
         """Return the draws of paths of so many samples."""
-        length = steps + _BEFORE
+        length = steps + BEFORE
         uniform, normal = np.empty((paths, length)), np.empty((paths, length))
         level, freedom = np.empty(paths), max(trials - 1, FEWEST)
         for k in range(paths):

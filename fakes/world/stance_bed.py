@@ -7,7 +7,7 @@ stand in for the arm. Forces are those of the ground, without a sensor's errors.
 from typing import Final
 
 from acquisition.control_loop.law import SoleGoal
-from fakes.ground.terrain import GroundChoice, make_terrain
+from fakes.ground.terrain import GroundChoice, Terrain, make_terrain
 from fakes.randomness import trial_generators
 from wam.control.sole_impedance import SoleAxes
 
@@ -46,7 +46,7 @@ class StanceBed:
             number: seed, and trial of that seed.
         """
         random = trial_generators(number[0], terrain, number[1])
-        self.ground = make_terrain(choice, incline, random.ground)
+        self.ground: Terrain = make_terrain(choice, incline, random.ground)
         self.axes = SoleAxes(travel, PERIOD)
         self.x = self.vx = self.vz = 0.0
         self.z = 0.02

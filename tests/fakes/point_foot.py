@@ -10,7 +10,7 @@ import numpy as np
 from analysis.data.prepare import foot_velocity
 from analysis.data.series import TractionSeries
 from fakes.ground.profile import smooth_profile, value_at
-from fakes.ground.terrain import GroundChoice, make_terrain
+from fakes.ground.terrain import GroundChoice, Terrain, make_terrain
 from fakes.plant.push import HandView, Pace, Push
 from fakes.randomness import trial_generators
 from fakes.sensor.errors import FORCE_ERRORS, SensorErrors
@@ -56,7 +56,8 @@ class PointFoot:
         random = trial_generators(seed, terrain, trial)
         incline = math.radians(incline_deg)
         self.terrain, self.trial = terrain, trial
-        self.ground = make_terrain(GroundChoice(stones, foot), incline, random.ground)
+        choice = GroundChoice(stones, foot)
+        self.ground: Terrain = make_terrain(choice, incline, random.ground)
         weight = EFFECTIVE_MASS * 9.81
         self.pull = weight * math.sin(incline)
         self.weight = weight * math.cos(incline)

@@ -5,7 +5,7 @@ the masses stand in for the arm as in `point_foot`. Forces are those of the grou
 without a sensor's errors.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from math import exp, log, nan, radians
 
@@ -162,13 +162,18 @@ def learn_foresight(watched: Sequence[WatchedTrial]) -> ForesightModel:
 
 
 def stances(
-    terrain: str, plan: StancePlan, seed: int, beds: int, model: ForesightModel | None
+    terrain: str,
+    plan: StancePlan,
+    seed: int,
+    beds: int,
+    model: ForesightModel | None,
+    make: Callable[[str, int, int], StanceBench] = StanceBench,
 ) -> list[StanceOutcome]:
     """Return recordings of stances on beds of their own, adapted on and on."""
     made: list[StanceOutcome] = []
     for k in range(beds):
         rng = np.random.default_rng((seed, k, 5))
-        bench = StanceBench(terrain, seed, k)
+        bench = make(terrain, seed, k)
         one = record(bench, replace(plan, phase=float(rng.random())), model)
         made += one.outcomes
         plan = replace(plan, scale=one.scale)

@@ -1,4 +1,4 @@
-"""A C99 header: quantiles, risk while sliding and from rest, belief over terrains."""
+"""A C99 header: quantiles, risks, belief over terrains, contact law and generator."""
 
 from importlib import resources
 
@@ -11,6 +11,11 @@ from analysis.exports.folder import ExportTarget, Files
 from analysis.exports.names import shown
 from analysis.exports.rest import REST_POINTS, rest_distances, rest_risks
 from analysis.exports.source import ExportedTerrain, TerrainExport
+from analysis.terrains import contact_law, generator
+from analysis.terrains.contact_law import ContactNumbers
+from analysis.terrains.generator import Generator
+from analysis.terrains.loadings import LEAST_LOAD
+from analysis.terrains.process_scores import STONES_DROP
 from analysis.terrains.recognition import TAU
 from analysis.terrains.table import Table, TractionEstimates, normal_scores
 
@@ -40,7 +45,7 @@ def _sections(export: TerrainExport) -> list[str]:
 
 
 def _head(export: TerrainExport) -> str:
-    real = "float" if export.options.is_float else "double"
+    real, bits = ("float", 23) if export.options.is_float else ("double", 52)
     shares = export.terrains[0].table.shares
     listed = "\n".join(
         f"   traction_{t.identifier}_..: {shown(t.name)}, {t.known.trials} trials"
@@ -76,6 +81,22 @@ typedef {real} traction_real;
 #define TRACTION_NORMAL_PER_UNIT {(_NORMAL_POINTS - 1) / _NORMAL_END!r}
 #define TRACTION_REST_POINTS {REST_POINTS}
 #define TRACTION_SAMPLES_AS_ONE {TAU!r} /* samples of a belief that count as one */
+#define TRACTION_FEATURES {generator.FEATURES}
+#define TRACTION_GATES {generator.GATES}
+#define TRACTION_MOST_EXPERTS {generator.MOST_EXPERTS}
+#define TRACTION_KNOTS {len(generator.KNOTS)}
+#define TRACTION_BEFORE {generator.BEFORE} /* steps of a path before its first sample */
+#define TRACTION_FULL_LOAD {contact_law.FULL_LOAD!r} /* N */
+#define TRACTION_LEAST_LOAD {LEAST_LOAD!r} /* N */
+#define TRACTION_LEAST_DROP {STONES_DROP!r} /* N, of a partial drop */
+#define TRACTION_DAMPING {contact_law.DAMPING!r} /* N s/m of a jam */
+#define TRACTION_CREEP_LOAD {contact_law.CREEP_LOAD!r}
+#define TRACTION_SKIN_SPEED {contact_law.SKIN_SPEED!r} /* m/s */
+#define TRACTION_TOUCH {contact_law.TOUCH!r} /* N */
+#define TRACTION_ALOFT {contact_law.ALOFT!r} /* s, after which a foot stands anew */
+#define TRACTION_FIRST_FORCE {contact_law.FIRST_FORCE!r} /* N */
+#define TRACTION_UNIFORM_SHIFT {64 - bits}
+#define TRACTION_PER_UNIFORM (1.0 / {2**bits}.0)
 """
 
 
@@ -92,6 +113,7 @@ def _constants(export: TerrainExport) -> str:
             _array("traction_F_n", np.array(table.F_n), is_float),
             _array("traction_v_t", np.array(table.v_t), is_float),
             _array("traction_normal_table", normal, is_float),
+            _array("traction_knots", np.array(generator.KNOTS), is_float),
         ]
     )
 
@@ -110,6 +132,13 @@ def _terrain(terrain: ExportedTerrain, export: TerrainExport) -> str:
     if known.has_from_rest:
         parts.append(_rest(name, known.from_rest, is_float))
         rest = f"&{name}_from_rest"
+    law = sampled = "0"
+    if known.has_contact:
+        parts.append(_contact(name, known.contact.numbers, is_float))
+        law = f"&{name}_contact"
+    if known.has_generator:
+        parts.append(_generator(name, known.generator, is_float))
+        sampled = f"&{name}_generator"
     loads, speeds = len(terrain.table.F_n), len(terrain.table.v_t)
     grid = f"{loads}, {speeds}, traction_F_n, traction_v_t"
     parts.append(
@@ -120,6 +149,8 @@ static const traction_terrain {name}_terrain = {{
     {{{grid}, {name}_moments}},
     {_number(known.rho, is_float)},
     {rest},
+    {law},
+    {sampled},
 }};
 
 static inline int {name}_quantiles(traction_real F_n, traction_real v_t,
@@ -170,6 +201,47 @@ def _rest(name: str, model: BreakAwayModel, is_float: bool) -> str:
         [
             _array(f"{name}_rest_table", rest_risks(model), is_float),
             f"static const traction_rest {name}_from_rest = {{",
+            *(f"    {value}," for value in values),
+            "};\n",
+        ]
+    )
+
+
+def _contact(name: str, numbers: ContactNumbers, is_float: bool) -> str:
+    values = (
+        f"    {_number(value, is_float)}, /* {key} */"
+        for key, value in numbers._asdict().items()
+    )
+    return "\n".join(
+        [f"static const traction_contact {name}_contact = {{", *values, "};\n"]
+    )
+
+
+def _generator(name: str, model: Generator, is_float: bool) -> str:
+    experts, bands = model.experts, model.bands
+    arrays = {
+        "weights": experts.weights,
+        "sd": experts.sd,
+        "gate": experts.gate,
+        "centre": experts.centre,
+        "per_scale": 1.0 / experts.scale,
+        "drift": model.drift,
+        "band_loads": np.array(bands.F_n),
+        "band_speeds": np.array(bands.v_t),
+        "bands": np.array(bands.forces).transpose(1, 2, 0),
+    }
+    axes = f"{name}_sample_band_loads, {name}_sample_band_speeds"
+    values = (
+        str(model.size),
+        str(model.freedom),
+        *(f"{name}_sample_{key}" for key in list(arrays)[:6]),
+        f"{{{len(bands.F_n)}, {len(bands.v_t)}, {axes}, {name}_sample_bands}}",
+        *(_number(x, is_float) for x in (model.between, model.least, model.most)),
+    )
+    return "\n".join(
+        [
+            *(_array(f"{name}_sample_{k}", v, is_float) for k, v in arrays.items()),
+            f"static const traction_generator {name}_generator = {{",
             *(f"    {value}," for value in values),
             "};\n",
         ]

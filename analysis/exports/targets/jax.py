@@ -10,6 +10,7 @@ from analysis.exports.folder import ExportTarget, Files
 from analysis.exports.rest import rest_distances, rest_risks
 from analysis.exports.source import ExportedTerrain, TerrainExport
 from analysis.exports.templates.text import template
+from analysis.terrains.generator import KNOTS, Generator
 from analysis.terrains.table import normal_scores
 
 MODULE, NUMBERS = "traction_jax.py", "terrains.json"
@@ -55,6 +56,31 @@ def _numbers(terrain: ExportedTerrain) -> dict[str, Any]:
         "mu_shares": profile.shares,
         "mu": profile.mu,
         **rest,
+        "contact": [*terrain.known.contact.numbers]
+        if terrain.known.has_contact
+        else [],
+        "sample": _sample(terrain.known.generator)
+        if terrain.known.has_generator
+        else None,
+    }
+
+
+def _sample(generator: Generator) -> dict[str, Any]:
+    """Return the fields of `SampleParams`."""
+    experts, bands = generator.experts, generator.bands
+    return {
+        "weights": experts.weights.tolist(),
+        "sd": experts.sd.tolist(),
+        "gate": experts.gate.tolist(),
+        "centre": experts.centre.tolist(),
+        "scale": experts.scale.tolist(),
+        "knots": KNOTS,
+        "drift": generator.drift.tolist(),
+        "F_n": bands.F_n,
+        "v_t": bands.v_t,
+        "bands": np.array(bands.forces).transpose(1, 2, 0).tolist(),
+        "level": [generator.between, float(generator.freedom)],
+        "ends": [generator.least, generator.most],
     }
 
 
@@ -67,7 +93,9 @@ def _about(export: TerrainExport) -> tuple[str, str, str, str, str, str]:
         f"`quantiles(params, F_n, v_t)`: F_t [N] for shares {shares}.",
         "`risk_sliding(params, F_t, F_n, v_t)`, `risk_rest(params, F_t, F_n)`: "
         "P(slip).",
-        "`sample_mu(params, key, shape)`: coefficients of friction, one an episode.",
+        "`sample_mu(params, key, shape)`: coefficients of friction, one an episode; "
+        "`contact_step(params, jam, dt, x, v, F_n, draw)`: the contact law; "
+        "`sample(params, F_n, v_t, key)`: F_t along a motion of rows every 10 ms.",
         f"Clamped to F_n {table.F_n[0]:g}..{table.F_n[-1]:g} N, v_t "
         f"{table.v_t[0]:g}..{table.v_t[-1]:g} m/s; nothing says that it was. NaN stays "
         "NaN.",

@@ -20,12 +20,82 @@ typedef struct {
     const traction_real *risk;
 } traction_rest;
 
+/* The law of a foot that a simulator moves; its equations stand at
+   traction_contact_step. */
+typedef struct {
+    traction_real level; /* log of the capacity at 3.5 N or more [log N] */
+    traction_real load; /* exponent of F_n in it below that */
+    traction_real spread; /* sd of its log */
+    traction_real stiffness; /* log of it [log N/m] */
+    traction_real stiffness_spread; /* sd of that */
+    traction_real run; /* scale of the run-out [m] */
+    traction_real run_shape; /* of its Weibull distribution */
+    traction_real mu; /* skin friction */
+    traction_real viscosity; /* [N s/m] */
+    traction_real partial_rate; /* partial drops over way [1/m] */
+    traction_real partial_share; /* mean share of what is above 1.5 N that one takes */
+    traction_real creep; /* speed at the capacity [m/s] */
+} traction_contact;
+
+/* What it remembers; begins with traction_contact_begin. */
+typedef struct {
+    int is_jammed;
+    traction_real anchor; /* where the stones are not stretched [m] */
+    traction_real capacity; /* at 3.5 N or more, of the jam or of the next one [N] */
+    traction_real stiffness; /* [N/m] */
+    traction_real engage_at; /* where the next jam begins [m] */
+    traction_real aloft; /* time in the air [s] */
+} traction_jam;
+
+/* Random numbers of one step: two uniform in (0, 1], two normal. */
+typedef struct {
+    traction_real u0;
+    traction_real u1;
+    traction_real z0;
+    traction_real z1;
+} traction_draw;
+
+/* A stream of them, the same for the same seed; count begins with 0. */
+typedef struct {
+    unsigned long long seed;
+    unsigned long long count;
+} traction_random;
+
+/* F_t along a motion; its equations stand at traction_sample_step. */
+typedef struct {
+    int experts;
+    int freedom; /* of the spread between trials */
+    const traction_real *weights; /* experts x TRACTION_FEATURES */
+    const traction_real *sd; /* [N] */
+    const traction_real *gate; /* experts x TRACTION_GATES */
+    const traction_real *centre; /* of the gate's numbers */
+    const traction_real *per_scale; /* the same, 1 over their scale */
+    const traction_real *drift; /* at traction_knots [N] */
+    traction_table bands; /* low, median and high of a new trial [N] */
+    traction_real between; /* spread between trials [N] */
+    traction_real least; /* F [N] */
+    traction_real most;
+} traction_generator;
+
+/* Where a path is; begins with traction_sample_begin. */
+typedef struct {
+    traction_real F; /* F_t less the level of the trial [N] */
+    traction_real D; /* its last increment [N] */
+    traction_real F_n;
+    traction_real v_t;
+    traction_real m; /* median at them [N] */
+    traction_real w; /* recent velocity and recent speed [m/s] */
+    traction_real h;
+} traction_path;
+
 typedef struct {
     const char *name;
     traction_table forces; /* [N], TRACTION_SHARES columns */
     traction_table moments; /* of the recogniser: mean and sd [N] */
     traction_real rho; /* of its residual, from one sample to the next */
-    const traction_rest *rest; /* 0 = not known */
+    const traction_rest *rest; /* 0 = not known, as the following ones */
+    const traction_contact *contact;
+    const traction_generator *generator;
 } traction_terrain;
 
 typedef struct {
@@ -140,17 +210,40 @@ static inline traction_real traction_log(traction_real x)
     return 2 * y * sum + (traction_real)e * (traction_real)0.69314718055994530942;
 }
 
-/* e^x of x <= 0; 0 below -80. */
+/* 1 / k. */
+static const traction_real traction_inverses[15] = {
+    0,
+    (traction_real)(1.0 / 1),
+    (traction_real)(1.0 / 2),
+    (traction_real)(1.0 / 3),
+    (traction_real)(1.0 / 4),
+    (traction_real)(1.0 / 5),
+    (traction_real)(1.0 / 6),
+    (traction_real)(1.0 / 7),
+    (traction_real)(1.0 / 8),
+    (traction_real)(1.0 / 9),
+    (traction_real)(1.0 / 10),
+    (traction_real)(1.0 / 11),
+    (traction_real)(1.0 / 12),
+    (traction_real)(1.0 / 13),
+    (traction_real)(1.0 / 14),
+};
+
+/* e^x of x <= 0; 0 below -80. x = -n log 2 + rest, |rest| <= 0.35, then a series. */
 static inline traction_real traction_exp(traction_real x)
 {
-    traction_real halves = (traction_real)1, sum = (traction_real)1;
-    int k;
+    traction_real halves = (traction_real)1, half = (traction_real)0.5, sum;
+    int k, n;
     if (x < (traction_real)-80)
         return (traction_real)0;
-    for (; x < (traction_real)-0.5; x += (traction_real)0.69314718055994530942)
-        halves *= (traction_real)0.5;
-    for (k = 16; k > 0; k--)
-        sum = 1 + sum * x / (traction_real)k;
+    n = (int)(x * (traction_real)-1.4426950408889634074 + half);
+    x += (traction_real)n * (traction_real)0.693145751953125;
+    x += (traction_real)n * (traction_real)1.42860682030941723212e-6;
+    sum = (traction_real)1;
+    for (k = 14; k > 0; k--)
+        sum = 1 + sum * x * traction_inverses[k];
+    for (; n > 0; n >>= 1, half *= half)
+        halves *= n & 1 ? half : (traction_real)1;
     return halves * sum;
 }
 
@@ -283,4 +376,292 @@ static inline void traction_posterior(const traction_set *set,
     }
     for (i = 0; i < set->count; i++)
         p[i] /= sum;
+}
+
+/* e^x. */
+static inline traction_real traction_exp_any(traction_real x)
+{
+    return x > 0 ? 1 / traction_exp(-x) : traction_exp(x);
+}
+
+/* x^y of x >= 0; 0 of 0. */
+static inline traction_real traction_power(traction_real x, traction_real y)
+{
+    return x > 0 ? traction_exp_any(y * traction_log(x)) : (traction_real)0;
+}
+
+/* Square root of x > 0, by Newton's iteration. */
+static inline traction_real traction_sqrt(traction_real x)
+{
+    traction_real y = traction_power(x, (traction_real)0.5);
+    return (traction_real)0.5 * (y + x / y);
+}
+
+static inline traction_real traction_clip(traction_real x, traction_real least,
+                                          traction_real most)
+{
+    return x < least ? least : x > most ? most : x;
+}
+
+/* The next number of a stream, uniform in (0, 1): number `count` of splitmix64 with
+   `seed` (Steele, Lea and Flood 2014). */
+static inline traction_real traction_uniform(traction_random *random)
+{
+    unsigned long long z;
+    random->count++;
+    z = random->seed + random->count * 0x9e3779b97f4a7c15ULL;
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
+    z ^= z >> 31;
+    return (traction_real)TRACTION_PER_UNIFORM
+           * ((traction_real)(z >> TRACTION_UNIFORM_SHIFT) + (traction_real)0.5);
+}
+
+/* The next two, normal (Marsaglia and Bray 1964). */
+static inline void traction_normals(traction_random *random, traction_real *z0,
+                                    traction_real *z1)
+{
+    traction_real a, b, square;
+    do {
+        a = 2 * traction_uniform(random) - 1;
+        b = 2 * traction_uniform(random) - 1;
+        square = a * a + b * b;
+    } while (square >= 1 || square < (traction_real)1e-30);
+    square = traction_sqrt(-2 * traction_log(square) / square);
+    *z0 = a * square;
+    *z1 = b * square;
+}
+
+/* The random numbers of a step. */
+static inline void traction_draw_next(traction_random *random, traction_draw *draw)
+{
+    draw->u0 = traction_uniform(random);
+    draw->u1 = traction_uniform(random);
+    traction_normals(random, &draw->z0, &draw->z1);
+}
+
+/* Before the first touch. */
+static inline void traction_contact_begin(traction_jam *jam)
+{
+    jam->is_jammed = 0;
+    jam->anchor = (traction_real)0;
+    jam->capacity = (traction_real)1;
+    jam->stiffness = (traction_real)1;
+    jam->engage_at = (traction_real)0;
+    jam->aloft = (traction_real)TRACTION_ALOFT;
+}
+
+/* What a jam of this capacity bears under F_n [N]. */
+static inline traction_real traction_contact_capacity(const traction_contact *law,
+                                                      traction_real capacity,
+                                                      traction_real F_n)
+{
+    traction_real load = traction_clip(F_n, (traction_real)TRACTION_LEAST_LOAD,
+                                       (traction_real)TRACTION_FULL_LOAD);
+    return capacity
+           * traction_power(load / (traction_real)TRACTION_FULL_LOAD, law->load);
+}
+
+static inline void traction_contact_new(const traction_contact *law, traction_jam *jam,
+                                        const traction_draw *draw)
+{
+    jam->capacity = traction_exp_any(law->level + law->spread * draw->z0);
+    jam->stiffness
+        = traction_exp_any(law->stiffness + law->stiffness_spread * draw->z1);
+}
+
+static inline traction_real traction_contact_free(const traction_contact *law,
+                                                  traction_real v, traction_real skin)
+{
+    traction_real share = v / (traction_real)TRACTION_SKIN_SPEED;
+    return skin * traction_clip(share, -1, 1) + law->viscosity * v;
+}
+
+/* Advance a foot at x [m] with v [m/s] under F_n [N] by dt [s]; F_t [N] is against x.
+   A millisecond or less follows a jam. Stones jam, stretch, creep, give way in part
+   and let go. 0, or -1 where an argument is not finite or the law is not known: F_t is
+   0 then, and nothing has changed. */
+static inline int traction_contact_step(const traction_contact *law, traction_jam *jam,
+                                        traction_real dt, traction_real x,
+                                        traction_real v, traction_real F_n,
+                                        const traction_draw *draw, traction_real *F_t)
+{
+    traction_real skin, k, P, F;
+    *F_t = (traction_real)0;
+    if (!law || !traction_is_finite(dt) || !traction_is_finite(x)
+        || !traction_is_finite(v) || !traction_is_finite(F_n))
+        return -1;
+    if (F_n <= (traction_real)TRACTION_TOUCH) {
+        jam->is_jammed = 0;
+        jam->aloft += dt;
+        return 0;
+    }
+    if (jam->aloft >= (traction_real)TRACTION_ALOFT) {
+        traction_contact_new(law, jam, draw);
+        jam->engage_at = x;
+    }
+    jam->aloft = (traction_real)0;
+    skin = law->mu * F_n;
+    k = jam->stiffness;
+    if (!jam->is_jammed) {
+        traction_real first = skin < (traction_real)TRACTION_FIRST_FORCE
+                                  ? skin
+                                  : (traction_real)TRACTION_FIRST_FORCE;
+        if (x < jam->engage_at) {
+            *F_t = traction_contact_free(law, v, skin);
+            return 0;
+        }
+        jam->anchor = v > 0 ? x - first / k : x;
+    }
+    P = traction_contact_capacity(law, jam->capacity, F_n);
+    if (x > jam->anchor) {
+        traction_real load = k * (x - jam->anchor) / P;
+        load = load < 1 ? load : (traction_real)1;
+        jam->anchor += law->creep * dt
+                       * traction_exp((load - 1) / (traction_real)TRACTION_CREEP_LOAD);
+    }
+    F = k * (x - jam->anchor);
+    jam->is_jammed = 1;
+    if (F < -skin) {
+        F = -skin;
+        jam->anchor = x + skin / k;
+    } else if (F > P) {
+        traction_contact_new(law, jam, draw);
+        jam->is_jammed = 0;
+        jam->engage_at
+            = x
+              + law->run * traction_power(-traction_log(draw->u1), 1 / law->run_shape);
+        *F_t = traction_contact_free(law, v, skin);
+        return 0;
+    } else if (F > (traction_real)TRACTION_LEAST_DROP
+               && draw->u0 < law->partial_rate * v * dt) {
+        F -= (traction_real)TRACTION_LEAST_DROP;
+        F -= F * traction_power(draw->u1, 1 / law->partial_share - 1);
+        jam->anchor = x - F / k;
+    }
+    *F_t = F > 0 ? F + (traction_real)TRACTION_DAMPING * v : F;
+    return 0;
+}
+
+static inline traction_real traction_drift(const traction_real *drift, traction_real v)
+{
+    traction_real way;
+    int k;
+    traction_bracket(traction_knots, TRACTION_KNOTS, v, &k, &way);
+    return drift[k] + way * (drift[k + 1] - drift[k]);
+}
+
+/* Begin a path at the median of its first sample. What it begins with is forgotten
+   after TRACTION_BEFORE steps at that sample. */
+static inline int traction_sample_begin(const traction_generator *generator,
+                                        traction_path *path, traction_real F_n,
+                                        traction_real v_t)
+{
+    traction_real bands[3] = {0, 0, 0};
+    int code
+        = generator ? traction_look_up(&generator->bands, 3, F_n, v_t, bands) : -1;
+    path->F = path->m = bands[1];
+    path->D = (traction_real)0;
+    path->F_n = code < 0 ? (traction_real)0 : F_n;
+    path->v_t = path->w = code < 0 ? (traction_real)0 : v_t;
+    path->h = path->v_t < 0 ? -path->v_t : path->v_t;
+    return code;
+}
+
+/* The level of a trial [N], once a path: what F lacks of F_t. */
+static inline traction_real traction_sample_level(const traction_generator *generator,
+                                                  traction_random *random)
+{
+    traction_real level, square = (traction_real)0, z[2];
+    int k;
+    traction_normals(random, &level, z);
+    for (k = 0; k < generator->freedom; k++) {
+        if (k % 2 == 0)
+            traction_normals(random, &z[0], &z[1]);
+        square += z[k % 2] * z[k % 2];
+    }
+    return generator->between * level
+           * traction_sqrt((traction_real)generator->freedom / square);
+}
+
+/* Advance a path by 10 ms to F_n [N] and v_t [m/s], with u uniform and z normal. 0, 1
+   where load or velocity lie outside of what was recorded, -1 where one is not finite
+   or there is no generator: F is the last one then. The equations are those of
+   analysis/terrains/generator.py. */
+static inline int traction_sample_step(const traction_generator *generator,
+                                       traction_path *path, traction_real F_n,
+                                       traction_real v_t, traction_real u,
+                                       traction_real z, traction_real *F)
+{
+    traction_real bands[3], g[TRACTION_GATES], shares[TRACTION_MOST_EXPERTS];
+    traction_real most = (traction_real)0, sum = (traction_real)0, step, fade, new_F;
+    traction_real speed = v_t < 0 ? -v_t : v_t, share, w, load;
+    int i, j, k = 0, code;
+    *F = path->F;
+    code = generator ? traction_look_up(&generator->bands, 3, F_n, v_t, bands) : -1;
+    if (code < 0)
+        return code;
+    w = path->w + (traction_real)0.2 * (v_t - path->w);
+    path->h += (traction_real)0.02 * ((w < 0 ? -w : w) - path->h);
+    fade = traction_clip((path->h - (traction_real)0.002) / (traction_real)0.004, 0, 1);
+    share = traction_clip(speed / (traction_real)0.02, 0, 1);
+    load = F_n > (traction_real)0.8 ? F_n : (traction_real)0.8;
+    g[0] = (traction_real)1;
+    g[1] = path->F;
+    g[2] = path->D;
+    g[3] = path->F * (v_t > 0 ? v_t : (traction_real)0);
+    g[4] = path->F * w;
+    g[5] = F_n;
+    g[6] = F_n - path->F_n;
+    g[7] = v_t > 0 ? v_t : (traction_real)0;
+    g[8] = v_t < 0 ? v_t : (traction_real)0;
+    g[9] = v_t - path->v_t;
+    g[10] = path->v_t;
+    g[11] = w;
+    g[12] = bands[1];
+    g[13] = bands[1] - path->m;
+    g[14] = path->F / load;
+    g[15] = path->F * share;
+    g[16] = share;
+    step = traction_drift(generator->drift, v_t);
+    if (generator->experts > 1) {
+        traction_real scaled[TRACTION_GATES], before = (traction_real)0;
+        scaled[0] = (traction_real)1;
+        for (j = 1; j < TRACTION_GATES; j++)
+            scaled[j] = traction_clip(
+                (g[j] - generator->centre[j]) * generator->per_scale[j], -4, 4);
+        for (i = 0; i < generator->experts; i++) {
+            const traction_real *gate = generator->gate + i * TRACTION_GATES;
+            shares[i] = (traction_real)0;
+            for (j = 0; j < TRACTION_GATES; j++)
+                shares[i] += gate[j] * scaled[j];
+            most = i == 0 || shares[i] > most ? shares[i] : most;
+        }
+        for (i = 0; i < generator->experts; i++) {
+            shares[i] = traction_exp(shares[i] - most);
+            sum += shares[i];
+        }
+        for (i = 0; i < generator->experts - 1; i++) {
+            before += shares[i];
+            k += before <= u * sum;
+        }
+    }
+    for (j = 0; j < TRACTION_FEATURES; j++)
+        step += generator->weights[k * TRACTION_FEATURES + j] * g[j];
+    step += generator->sd[k] * z;
+    new_F = path->F + fade * step;
+    new_F -= (speed < (traction_real)0.008 ? (traction_real)0.01 : (traction_real)0.003)
+             * (new_F - bands[1]);
+    if (new_F < bands[0])
+        new_F -= (traction_real)0.5 * (new_F - bands[0]);
+    if (new_F > bands[2])
+        new_F -= (traction_real)0.1 * (new_F - bands[2]);
+    new_F = traction_clip(new_F, generator->least, generator->most);
+    path->D = new_F - path->F;
+    path->F = *F = new_F;
+    path->F_n = F_n;
+    path->v_t = v_t;
+    path->m = bands[1];
+    path->w = w;
+    return code;
 }

@@ -3,7 +3,17 @@
 import numpy as np
 import pytest
 
-from tests.analysis.exports.databases import database, points
+from analysis.exports.folder import target_files
+from analysis.exports.source import TerrainExport
+from analysis.terrains.contact_law import BEFORE, Draw
+from analysis.terrains.generator import Draws
+from tests.analysis.exports.databases import DIGEST, database, points
+from tests.analysis.exports.stepped import (
+    LAW,
+    generators,
+    pushes,
+    stepped_database,
+)
 from tests.analysis.exports.written import largest_distance, load_module, write
 
 jax = pytest.importorskip("jax")
@@ -92,3 +102,68 @@ def test_mu_is_drawn_with_the_quantiles_of_the_profile(module, terrains, name):
     assert largest_distance(drawn, shares, mu) <= 0.02
     again = module.sample_mu(params, jax.random.key(3), (10_000,))
     assert np.array_equal(drawn, again)
+
+
+# --- the ground, stepped --------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def stepped(module, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("stepped")
+    made = TerrainExport.of(stepped_database(), DIGEST, "1.2.3")
+    (folder / "terrains.json").write_bytes(target_files("jax", made)["terrains.json"])
+    return folder / "terrains.json"
+
+
+def test_steps_of_the_contact_law_are_those_of_python(module, stepped):
+    rows = pushes()[:2000]
+    with jax.enable_x64(True):
+        params = module.load(stepped)["S0"]
+
+        def step(jam, row):
+            force, jam = module.contact_step(params, jam, *row[:4], row[4:])
+            return jam, force
+
+        _, found = jax.lax.scan(step, module.jam_before(), rows)
+        found = np.asarray(found)
+    state, expected = BEFORE, []
+    for row in rows.tolist():
+        F_t, state = LAW.step(state, *row[:4], Draw(*row[4:]))
+        expected.append(F_t)
+    assert np.abs(found - expected).max() <= 1e-9
+
+
+@pytest.mark.parametrize(("name", "which"), [("S0", 0), ("TF", 1)])
+def test_a_path_of_the_generator_is_that_of_python(module, stepped, name, which):
+    from tests.analysis.terrains.test_generator import trial_of
+
+    generator, motion = generators()[which], trial_of(20)
+    draws = Draws.of(5, 1, motion.F_n.size, generator.trials)
+    (expected,) = generator.run([(motion.F_n, motion.v_t)], draws)
+    with jax.enable_x64(True):
+        params = module.load(stepped)[name].sample
+        u, z = (each[0, :-1] for each in (draws.uniform, draws.normal))
+        found = module.sample_path(params, motion.F_n, motion.v_t, u, z)
+        found = np.asarray(found) + generator.between * draws.level[0]
+    assert np.abs(found - expected[0]).max() <= 1e-9
+
+
+def test_a_sample_is_that_of_its_key_and_has_the_level_of_a_trial(module, stepped):
+    params = module.load(stepped)["S0"]
+    F_n, v_t = single(np.full(20, 4.0), np.full(20, 0.02))
+    keys = jax.random.split(jax.random.key(1), 400)
+    paths = jax.vmap(module.sample, (None, None, None, 0))(params, F_n, v_t, keys)
+    again = module.sample(params, F_n, v_t, keys[7])
+    assert np.allclose(paths[7], again, atol=1e-4)
+    assert np.isfinite(np.asarray(paths)).all()
+    assert np.std(np.asarray(paths)[:, 0]) > generators()[0].between
+
+
+def test_a_terrain_without_law_and_generator_answers_nan(module, terrains):
+    params, jam = terrains["TF"], module.jam_before()
+    row = module.draw(jax.random.key(0))
+    force, _ = module.contact_step(params, jam, 0.001, 0.0, 0.1, 4.0, row)
+    assert np.isnan(force)
+    assert np.isnan(
+        module.sample(params, np.ones(5), np.ones(5), jax.random.key(0))
+    ).all()
