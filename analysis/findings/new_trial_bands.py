@@ -78,12 +78,9 @@ def plain_shares(shares: HeldOutShares) -> dict[str, Any]:
 
 def _of_terrain(result: TerrainResult, model: str) -> HeldOutShares | None:
     shares = [
-        fold.models[model]
-        .model.predict(trial.F_n, trial.v_t, trial.further)
-        .cdf(trial.F_t)
-        for fold in result.folds
-        if model in fold.models
-        for trial in [result.trials[fold.fold]]
+        fold.model.predict(trial.F_n, trial.v_t, trial.further).cdf(trial.F_t)
+        for k, fold in result.left_out(model)
+        for trial in [result.trials[k]]
     ]
     if len(shares) < 3:
         return None

@@ -117,6 +117,8 @@ def run(args: argparse.Namespace) -> int:
         ),
     )
     page = write_report(study, args.to, context)
+    for note in study.groups:
+        console.say(note)
     for warning in study.warnings:
         if warning not in told:
             console.say(f"▲ {warning}")

@@ -381,6 +381,8 @@ def report_sessions(
     context = replace(context, rig=rig, results=findings(), store=store)
     page = write_report(study, order.out or own, context)
     console.table(*summary_table(study))
+    for note in study.groups:
+        console.say(note)
     return page
 
 
