@@ -73,9 +73,7 @@ def make_data(folder: Path, terrain: str, trials: int, simulated: int) -> Path:
         made = sorted(seeds.glob("sessions/*/trials/T??.mcap"))
         count = -(-trials // PER_SESSION)
         record = Copies(made, seed=1).record
-        make_sessions(
-            data, count, trials=PER_SESSION, terrain=terrain, record=record
-        )
+        make_sessions(data, count, trials=PER_SESSION, terrain=terrain, record=record)
     return data
 
 

@@ -38,7 +38,7 @@ from analysis.terrains.generator_fit import (
     fit_generator,
     held_drift,
 )
-from analysis.terrains.process_rows import STEP, ProcessTrial, process_trials
+from analysis.terrains.process_rows import STEP, ProcessTrial, every_process_trial
 from analysis.terrains.process_scores import (
     PLATE_DROP,
     STONES_DROP,
@@ -69,7 +69,8 @@ def load_pool(folder: Path, terrain: str, seed: int, count: int) -> list[Process
         TractionSeries(terrain, f"{seed}-{k}", np.round(x[:, 0], 6), *x[:, 1:].T)
         for k, x in enumerate(tables)
     ]
-    return list(process_trials([prepare_trial(s, PrepareOptions()) for s in series]))
+    prepared = [prepare_trial(s, PrepareOptions()) for s in series]
+    return list(every_process_trial(prepared))
 
 
 def simulate(terrain: str, seed: int, k: int) -> np.ndarray:
