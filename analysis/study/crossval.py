@@ -250,13 +250,14 @@ def plan_folds(
     return FoldPlan(trials, targets, usable, options), notes
 
 
-def fold_groups(trials: Sequence[int]) -> list[tuple[int, ...]]:
+def fold_groups(trials: Sequence[int], most: int = MOST_FOLDS) -> list[tuple[int, ...]]:
     """Return which trials each fold of a terrain leaves out.
 
     Args:
-        trials: their numbers; each by itself up to 50 of them.
+        trials: their numbers; each by itself up to `most` of them.
+        most: folds.
     """
-    count = min(len(trials), MOST_FOLDS)
+    count = min(len(trials), most)
     return [tuple(trials[k::count]) for k in range(count)]
 
 
