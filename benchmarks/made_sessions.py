@@ -1,12 +1,14 @@
 """Sessions as they lie on the disk, made in a moment: what `scale` counts.
 
 Journal, session.json and sidecars are what the program writes; the recordings are a few
-kilobytes of noise, for `status` looks at nothing but their checksums.
+kilobytes of noise where nothing else is given, for `status` looks at nothing but their
+checksums.
 """
 
 import hashlib
 import json
 import random
+from collections.abc import Callable
 from pathlib import Path
 
 from experiments.session.data_files import journal_line
@@ -17,7 +19,13 @@ _UTC = "2027-01-15T10:00:00Z"
 
 
 def make_sessions(
-    data: Path, count: int, *, trials: int = 10, size: int = 4096
+    data: Path,
+    count: int,
+    *,
+    trials: int = 10,
+    size: int = 4096,
+    terrain: str | None = None,
+    record: Callable[[Path], None] | None = None,
 ) -> list[Path]:
     """Write complete sessions below `data` and return their folders.
 
@@ -25,19 +33,25 @@ def make_sessions(
         data: a data folder, without sessions.
         count: how many sessions.
         trials: kept trials of each.
-        size: of a recording [bytes].
+        size: of a recording of noise [bytes].
+        terrain: of all of them; None = in turn.
+        record: writes the recording of a trial to a path; None = of noise.
     """
     folders: list[Path] = []
     for number in range(1, count + 1):
-        terrain = TERRAINS[number % len(TERRAINS)]
-        name = f"2027-01-15_S{number:03d}_{terrain}.fake"
-        folders.append(data / "sessions" / name)
-        _make_session(folders[-1], terrain, trials, random.Random(number), size)
+        of = terrain or TERRAINS[number % len(TERRAINS)]
+        folders.append(data / "sessions" / f"2027-01-15_S{number:03d}_{of}.fake")
+        noise = random.Random(number)
+
+        def write_noise(path: Path, noise: random.Random = noise) -> None:
+            path.write_bytes(noise.randbytes(size))
+
+        _make_session(folders[-1], of, trials, record or write_noise)
     return folders
 
 
 def _make_session(
-    folder: Path, terrain: str, trials: int, noise: random.Random, size: int
+    folder: Path, terrain: str, trials: int, record: Callable[[Path], None]
 ) -> None:
     for name in ("trials", "rejected", "faults"):
         (folder / name).mkdir(parents=True)
@@ -46,16 +60,17 @@ def _make_session(
         {"event": Event.ACTIVATED},
     ]
     for number in range(1, trials + 1):
-        recording = noise.randbytes(size)
-        sums = {"sha256": hashlib.sha256(recording).hexdigest(), "size": size}
+        stem = folder / "trials" / f"T{number:02d}"
+        recording = stem.with_suffix(".mcap")
+        record(recording)
+        digest = hashlib.sha256(recording.read_bytes()).hexdigest()
+        sums = {"sha256": digest, "size": recording.stat().st_size}
         trial = {"trial": number, "attempt": 1}
         events += [
             {"event": Event.TRIAL_STARTED, **trial},
             {"event": Event.TRIAL_RECORDED, **trial},
             {"event": Event.TRIAL_KEPT, **trial, **sums},
         ]
-        stem = folder / "trials" / f"T{number:02d}"
-        stem.with_suffix(".mcap").write_bytes(recording)
         sidecar = {"trial": stem.name, "attempt": 1, "verdict": "keep", **sums}
         stem.with_suffix(".json").write_text(json.dumps(sidecar))
     events.append({"event": Event.ENDED, "reason": "complete"})

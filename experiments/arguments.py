@@ -199,6 +199,15 @@ def add_analysis(parser: ArgumentParser) -> None:
     )
 
 
+def add_covariate(parser: ArgumentParser, columns: str) -> None:
+    """Declare which columns are tested; `columns` says which there are."""
+    parser.add_argument(
+        "--covariate",
+        metavar="NAME,..",
+        help=f"say whether columns tell more of F_t than F_n and v_t do: {columns}",
+    )
+
+
 def add_table_form(parser: ArgumentParser) -> None:
     """Declare how tables of other programs are read."""
     group = parser.add_argument_group("tables")

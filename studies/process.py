@@ -38,7 +38,7 @@ from analysis.terrains.generator_fit import (
     fit_generator,
     held_drift,
 )
-from analysis.terrains.process_rows import STEP, ProcessTrial, process_trials
+from analysis.terrains.process_rows import STEP, ProcessTrial, every_process_trial
 from analysis.terrains.process_scores import (
     PLATE_DROP,
     STONES_DROP,
@@ -58,7 +58,7 @@ Outcome = dict[str, float]
 
 def load_pool(folder: Path, terrain: str, seed: int, count: int) -> list[ProcessTrial]:
     """Return trials of a terrain as processes; see `load_trials`."""
-    return list(process_trials(load_trials(folder, terrain, seed, count)))
+    return list(every_process_trial(load_trials(folder, terrain, seed, count)))
 
 
 def load_trials(

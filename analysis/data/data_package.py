@@ -8,8 +8,9 @@ read. The form is Data Package 1.0 of https://specs.frictionlessdata.io; `unit` 
 
 import hashlib
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sized
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path, PurePosixPath
 from typing import Any, Literal
 
@@ -18,12 +19,14 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from acquisition.errors import SettingsError
 from acquisition.files import UnfitFileError, open_regular, read_regular
 from acquisition.validation import Many, first_problem
+from analysis.data.memory import share_of_memory
 from analysis.data.recorded_factors import MOST, checked_factors
 from analysis.data.terrain_kinds import Value
 
 DESCRIPTOR = "datapackage.json"
-_LARGEST = 16_000_000  # bytes of a descriptor; a study of 80 trials has 2 million
-_MOST = 5000  # files
+_LARGEST = 16_000_000  # bytes of a descriptor at least; 80 trials have 2 million
+_PARTS = 48  # of the free memory; a descriptor takes some twenty times its size
+_FILE = 3200  # bytes of a descriptor for each of its files, at least
 _ABSENT = ("", "NaN")  # cells without a value
 _CHANGED = "Copy the file again, or read it alone, outside of its package."
 
@@ -159,7 +162,15 @@ class DataPackage(BaseModel):
     description: str = ""
     created: str = ""
     profile: str = "tabular-data-package"
-    resources: Many[PackageFile] = Field(max_length=_MOST)
+    resources: Many[PackageFile]
+
+    @field_validator("resources", mode="before")
+    @classmethod
+    def _are_not_too_many(cls, files: object) -> object:
+        most = _largest() // _FILE
+        if isinstance(files, Sized) and len(files) > most:
+            raise ValueError(f"{len(files)} files, the most are {most} by free memory")
+        return files
 
     def text(self) -> str:
         """Return it as JSON."""
@@ -251,6 +262,16 @@ def packaged_table(path: Path) -> PackagedTable | None:
     return None
 
 
+@lru_cache(maxsize=2)  # a pattern of a thousand tables asks for it a thousand times
+def _read_once(path: Path, _changed_ns: int, _size: int) -> DataPackage:
+    return DataPackage.model_validate_json(read_regular(path, _largest()))
+
+
+def _largest() -> int:
+    """Return how many bytes a descriptor may have by the memory that is free."""
+    return share_of_memory(_PARTS, _LARGEST)
+
+
 def _check_folders(top: Path, file: Path) -> None:
     for folder in file.parents:
         if folder == top:
@@ -264,7 +285,8 @@ def _check_folders(top: Path, file: Path) -> None:
 
 def _read(path: Path) -> DataPackage:
     try:
-        return DataPackage.model_validate_json(read_regular(path, _LARGEST))
+        found = path.lstat()
+        return _read_once(path, found.st_mtime_ns, found.st_size)
     except UnfitFileError as error:
         raise SettingsError(f"{path}: it {error}.") from error
     except OSError as error:

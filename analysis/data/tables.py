@@ -27,6 +27,7 @@ from analysis.data.data_package import (
     packaged_table,
     packaged_tables,
 )
+from analysis.data.memory import share_of_memory
 from analysis.data.parquet_tables import MAGIC, read_parquet
 from analysis.data.series import Array, TractionSeries
 from analysis.data.table_checks import check_clock, check_order, notes_of
@@ -37,10 +38,13 @@ from analysis.dialects.refusals import refusal
 from analysis.dialects.times import since_first
 
 DEFAULT_TERRAIN = "table"
-LARGEST_FILE = 24_000_000  # bytes, also of an npz once unpacked; six times in memory
-MOST_TRIALS = 2000
+LARGEST_FILE = 24_000_000  # bytes of a table; six times in memory
+LARGEST_RATIO = 100  # of a larger npz unpacked to the same npz packed
+PARTS = 8  # of the free memory, of which an npz or all trials of a CSV may take one
+_TRIAL = 12_000  # bytes that a trial costs in memory at least, however few its rows
 _LARGEST_INPUT = 1e12  # of its unit; squares of larger ones leave the double numbers
 
+_ZIP = b"PK"  # how an npz begins
 _FORM = "An npz holds arrays TERRAIN/NN of four columns: t, v_t, F_n, F_t."
 _BROKEN_NPZ = (
     ValueError,
@@ -248,7 +252,7 @@ def _load(path: Path, form: _TableForm) -> list[TractionSeries]:
         return _load_package(path, form)
     start = _first_bytes(path)
     check_kind(path, start)
-    if start[:2] == b"PK":
+    if start[:2] == _ZIP:
         _refuse_rate(path, form)
         return _load_npz(path, replace(form, terrain=None))
     packaged = packaged_table(path)
@@ -272,7 +276,7 @@ def _first_bytes(path: Path) -> bytes:
         ) from error
     if size == 0:
         raise refusal(path, "the file is empty", "Check that it was copied completely.")
-    _check_size(path, size)
+    _check_size(path, size, _largest_npz() if start[:2] == _ZIP else LARGEST_FILE)
     return start
 
 
@@ -351,11 +355,11 @@ def _parts(path: Path, table: TrialTable, rate: float | None) -> list[_TablePart
         if "" in words:
             where = table.place(words.index(""))
             raise refusal(path, f"{where}: no {name}", "Name it in every row.")
-    if len(places) > MOST_TRIALS:
+    if len(places) > (most := most_trials()):
         raise refusal(
             path,
             f"{len(places)} trials by {' and '.join(table.groups)}, the limit is "
-            f"{MOST_TRIALS}",
+            f"{most} by the memory that is free",
             "Name a column that parts it into fewer.",
         )
     rows_of: dict[tuple[str, ...], list[int]] = {key: [] for key in places}
@@ -406,13 +410,24 @@ def _load_parquet(path: Path, form: _TableForm) -> _ParquetTrial:
     return _ParquetTrial(table, file.origin)
 
 
-def _check_size(path: Path, size: int) -> None:
-    if size > LARGEST_FILE:
+def _check_size(path: Path, size: int, limit: int) -> None:
+    if size > limit:
+        by_memory = " by the memory that is free" if limit > LARGEST_FILE else ""
         raise refusal(
             path,
-            f"{size / 1e6:.0f} MB, the limit is {LARGEST_FILE / 1e6:.0f} MB",
+            f"{size / 1e6:.0f} MB, the limit is {limit / 1e6:.0f} MB{by_memory}",
             "Split it into one file per terrain.",
         )
+
+
+def most_trials() -> int:
+    """Return how many trials the free memory lets a file hold, 2000 or more."""
+    return share_of_memory(PARTS, LARGEST_FILE) // _TRIAL
+
+
+def _largest_npz() -> int:
+    """Return how many bytes an npz may unpack to by the memory that is free."""
+    return share_of_memory(PARTS, LARGEST_FILE)
 
 
 def _load_npz(path: Path, form: _TableForm) -> list[TractionSeries]:
@@ -425,22 +440,28 @@ def _load_npz(path: Path, form: _TableForm) -> list[TractionSeries]:
     try:
         with zipfile.ZipFile(path) as archive:
             members = archive.infolist()
-        _check_members(path, members)
+        _check_members(path, members, path.stat().st_size)
         with np.load(path, allow_pickle=False) as arrays:
             return [_from_array(path, key, arrays[key], form) for key in arrays.files]
     except _BROKEN_NPZ as error:
         raise refusal(path, f"not a readable npz ({error})", _FORM) from error
 
 
-def _check_members(path: Path, members: list[zipfile.ZipInfo]) -> None:
-    _check_size(path, sum(member.file_size for member in members))
+def _check_members(path: Path, members: list[zipfile.ZipInfo], packed: int) -> None:
+    size = sum(member.file_size for member in members)
+    _check_size(path, size, _largest_npz())
+    if size > LARGEST_FILE and size > LARGEST_RATIO * packed:
+        raise refusal(
+            path,
+            f"unpacks to {size / packed:.0f} times its size, the limit is "
+            f"{LARGEST_RATIO} beyond {LARGEST_FILE / 1e6:.0f} MB",
+            "Save it without compression.",
+        )
     strangers = [member.filename for member in members if not _is_trial(member)]
     if strangers or not members:
         raise not_an_npz(path, strangers)
-    if len(members) > MOST_TRIALS:
-        raise refusal(
-            path, f"{len(members)} arrays, the limit is {MOST_TRIALS}", "Split it."
-        )
+    if len(members) > (most := most_trials()):
+        raise refusal(path, f"{len(members)} arrays, the limit is {most}", "Split it.")
 
 
 def _is_trial(member: zipfile.ZipInfo) -> bool:

@@ -121,6 +121,36 @@ def parse_inputs(text: str) -> tuple[str, ...]:
     return further
 
 
+def parse_covariates(text: str, known: Sequence[str] | None = None) -> tuple[str, ...]:
+    """Return the columns of `height,tilt` that are tested.
+
+    Args:
+        text: from the command line.
+        known: names that there are; None = those of any table.
+
+    Raises:
+        SettingsError: there is no such column, a name stands twice or is that of an
+            input, or there are too many.
+    """
+    names = tuple(plain(part).strip() for part in text.split(",") if part.strip())
+    taken = {*COLUMNS, *GROUPS, PREPARED, SIMULATED} & set(names)
+    strangers = [] if known is None else [n for n in names if n not in known]
+    reason = ""
+    if strangers:
+        reason = f"there is no {', '.join(strangers)}"
+    elif len(set(names)) < len(names) or taken:
+        reason = "a name stands twice, or is no further column"
+    elif not 1 <= len(names) <= MOST_INPUTS:
+        reason = f"{len(names)} columns, 1 to {MOST_INPUTS} can be"
+    if reason:
+        what = "a column of every table" if known is None else ", ".join(known)
+        raise SettingsError(
+            f"--covariate {text[:60]}: {reason}.",
+            hint=f"Name {what}, with commas between.",
+        )
+    return names
+
+
 def parse_units(text: str) -> dict[str, str]:
     """Return the units of columns from `v_t=mm/s,F_t=mN`.
 

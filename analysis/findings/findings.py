@@ -46,7 +46,7 @@ from analysis.terrains.contact_fit import fit_contact_law
 from analysis.terrains.contact_law import ContactLaw
 from analysis.terrains.generator_check import SampledTrials
 from analysis.terrains.identify import Identification, identify_study
-from analysis.terrains.process_rows import process_trials
+from analysis.terrains.process_rows import every_process_trial
 from analysis.terrains.process_scores import least_drop
 
 RESIDUAL_MODELS = (TUSTIN, GP_SE)
@@ -154,7 +154,7 @@ def _compute(
 def _mobilised(study: Study) -> dict[str, Mobilisation]:
     found = {
         name: mobilisation_of(
-            process_trials(result.trials),
+            every_process_trial(result.trials),
             least_drop(result.kind),
             study.options.fit.seed,
         )

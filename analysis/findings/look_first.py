@@ -130,7 +130,7 @@ def _measured(result: TerrainResult, number: int) -> dict[str, float]:
     if trial.lag is not None:
         values["lag"] = 1e3 * trial.lag.seconds
     for fold in result.folds:
-        if fold.fold == number and TUSTIN in fold.models:
+        if number in fold.left_out and TUSTIN in fold.models:
             model = fold.models[TUSTIN].model
             rest = trial.F_t - model.mean(trial.F_n, trial.v_t, trial.further)
             values["residual"] = float(rest.mean())

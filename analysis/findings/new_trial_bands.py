@@ -78,12 +78,9 @@ def plain_shares(shares: HeldOutShares) -> dict[str, Any]:
 
 def _of_terrain(result: TerrainResult, model: str) -> HeldOutShares | None:
     shares = [
-        fold.models[model]
-        .model.predict(trial.F_n, trial.v_t, trial.further)
-        .cdf(trial.F_t)
-        for fold in result.folds
-        if model in fold.models
-        for trial in [result.trials[fold.fold]]
+        fold.model.predict(trial.F_n, trial.v_t, trial.further).cdf(trial.F_t)
+        for k, fold in result.left_out(model)
+        for trial in [result.trials[k]]
     ]
     if len(shares) < 3:
         return None
@@ -108,10 +105,7 @@ def oracle_band(shares: Sequence[Array], nominal: float) -> OracleBand:
     from scipy.special import ndtri
 
     scores = [np.abs(ndtri(np.clip(u, _EDGE, 1.0 - _EDGE))) for u in shares]
-    reach = [
-        conformal_reach([*scores[:k], *scores[k + 1 :]], nominal)
-        for k in range(len(scores))
-    ]
+    reach = conformal_reaches(scores, nominal)
     held = np.array([np.mean(s <= r) for s, r in zip(scores, reach, strict=True)])
     usual = float(ndtri(0.5 + 0.5 * nominal))
     error = held.std(ddof=1) / np.sqrt(held.size)
@@ -119,19 +113,31 @@ def oracle_band(shares: Sequence[Array], nominal: float) -> OracleBand:
     return OracleBand(nominal, float(held.mean()), float(error), width)
 
 
-def conformal_reach(scores: Sequence[Array], nominal: float) -> float:
-    """Return the score that a new trial's samples stay below with a share `nominal`.
+def conformal_reaches(scores: Sequence[Array], nominal: float) -> list[float]:
+    """Return for each trial the score that its samples stay below, by the others.
 
-    The trials known share all weight but one part, which stands for the new trial and
-    lies at infinity: the reach is infinite for a share that so few trials cannot show.
+    The others share all weight but one part, which stands for the trial and lies at
+    infinity: the reach is infinite for a share that so few trials cannot show. With
+    G(s) the sum over all trials of the share of their samples up to s, and G_k that of
+    trial k, its reach is the smallest s with G(s) - G_k(s) at least `nominal` times
+    their number. As G_k is at most 1, it lies among few samples.
 
     Args:
-        scores: of the samples of every known trial, larger where they fit less.
-        nominal: share of the new trial's samples.
+        scores: of the samples of every trial, larger where they fit less.
+        nominal: share of the trial's samples.
     """
     values = np.concatenate(scores)
     weight = np.concatenate([np.full(s.size, 1.0 / s.size) for s in scores])
     order = np.argsort(values)
-    reached = np.cumsum(weight[order]) / (len(scores) + 1)
-    index = int(np.searchsorted(reached, nominal - 1e-12))
-    return float(values[order][index]) if index < values.size else float("inf")
+    values, total = values[order], np.cumsum(weight[order])
+    wanted = nominal * len(scores) - 1e-9
+    first, end = np.searchsorted(total, [wanted, wanted + 1.0])
+    near = values[first : end + 1]
+    up_to = total[np.searchsorted(values, near, "right") - 1]
+    found: list[float] = []
+    for own in map(np.sort, scores):
+        others = up_to - np.searchsorted(own, near, "right") / own.size
+        is_reached = others >= wanted
+        reach = float(near[np.argmax(is_reached)]) if is_reached.any() else np.inf
+        found.append(reach)
+    return found

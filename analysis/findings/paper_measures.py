@@ -200,9 +200,10 @@ def _model(fold: FoldResult) -> object:
 def _with_more_rows(
     result: TerrainResult, fold: FoldResult, study: Study
 ) -> tuple[int, float, float] | None:
-    """Return rows, error with few and error with many of them [N] on the own trial."""
+    """Return rows, and errors with few and many of them [N] on what is left out."""
     model, fit = _model(fold), study.options.fit
-    others = [f.fold for f in result.folds if f.fold != fold.fold]
+    every = [k for f in result.folds for k in f.left_out]
+    others = [k for k in sorted(every) if k not in fold.left_out]
     training = SampleTable.of([result.trials[k] for k in others])
     count = min(_MORE * fit.gp_points, training.count)
     if not isinstance(model, GpModel) or count <= len(fold.gp_rows):
@@ -213,7 +214,7 @@ def _with_more_rows(
         unused, count - len(fold.gp_rows), replace=False
     )
     rows = training.take(np.concatenate([np.array(fold.gp_rows, np.intp), added]))
-    tested = SampleTable.of([result.trials[fold.fold]])
+    tested = SampleTable.of([result.trials[k] for k in fold.left_out])
     processes = model.process, model.process.given(rows.inputs, rows.F_t)
     errors = [
         float(np.mean(np.abs(tested.F_t - process.mean(tested.inputs))))

@@ -173,15 +173,15 @@ def residual_band(result: TerrainResult, model: str) -> ResidualBand | None:
 
 def held_out_trials(result: TerrainResult, model: str) -> list[PreparedTrial]:
     """Return the trials that a fold of the model was tested on, in its order."""
-    return [result.trials[fold.fold] for fold in result.folds if model in fold.models]
+    return [result.trials[k] for k, _ in result.left_out(model)]
 
 
 def held_out_residual(result: TerrainResult, model: str) -> Array:
     """Return measured minus predicted F_t [N] of all trials left out, shape (n,)."""
-    trials, folds = held_out_trials(result, model), result.models(model)
     rests = [
         trial.F_t - fold.model.mean(trial.F_n, trial.v_t, trial.further)
-        for trial, fold in zip(trials, folds, strict=True)
+        for k, fold in result.left_out(model)
+        for trial in [result.trials[k]]
     ]
     return np.concatenate([np.zeros(0), *rests])
 

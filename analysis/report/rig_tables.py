@@ -9,6 +9,7 @@ from analysis.figures.sections import ReportSection
 from analysis.findings.findings import StudyResults
 from analysis.findings.rig_health import RigTrial
 from analysis.report.page_model import ReportTable
+from analysis.study.crossval import MOST_FOLDS
 from analysis.study.study import Study
 from analysis.tustin.model import SYMBOLS
 
@@ -163,7 +164,7 @@ def choices(study: Study, *, is_foreign: bool) -> ReportTable:
     rows = [
         *_widths(study),
         ["window", f"{prepare.slowest:g} ≤ v_t ≤ {prepare.fastest:g} m/s"],
-        ["folds", "one whole trial left out at a time"],
+        ["folds", _folds(study)],
         ["Tustin fit", f"least squares on all kept samples; bounds {box}"],
         [
             "GP fit",
@@ -205,6 +206,18 @@ def _widths(study: Study) -> list[list[str]]:
             + rest,
         ],
     ]
+
+
+def _folds(study: Study) -> str:
+    """Return what a fold leaves out, in words."""
+    sizes = [len(f.left_out) for r in study.terrains.values() for f in r.folds]
+    if max(sizes, default=1) == 1:
+        return "one whole trial left out at a time"
+    return (
+        f"one whole trial left out at a time; beyond {MOST_FOLDS} trials of a terrain "
+        f"a group of {min(s for s in sizes if s > 1)} to {max(sizes)} of them, every "
+        f"{MOST_FOLDS}th, each scored by itself"
+    )
 
 
 def _rates(study: Study) -> str:

@@ -1,7 +1,11 @@
 """Leave one trial out: every model is tested on a trial it never saw.
 
 Samples of one trial are correlated over tenths of a second, so a fold is a whole trial.
-The model of fold k of a terrain is also tested on trial k of every other terrain.
+A terrain has at most 50 folds: of more trials each fold leaves out a group, trials k,
+k + 50, k + 100 and so on, and scores them one by one. The function of a model comes
+from 300 rows of the others in either case, and groups of neighbours would leave out
+whole sessions. The model of fold k of a terrain is also tested on trial k of every
+other terrain.
 """
 
 import zlib
@@ -9,6 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import blake2b
+from itertools import accumulate
 from typing import TypeVar, overload
 
 import numpy as np
@@ -16,12 +21,14 @@ import numpy as np
 from acquisition.errors import TractionError
 from analysis.data.prepare import PreparedTrial
 from analysis.data.samples import PooledSamples, SampleTable, TrainingSet
-from analysis.data.series import Indices
-from analysis.study.metrics import Score, mean_absolute_error, score
+from analysis.data.series import Array, Indices
+from analysis.study.metrics import Score, score
 from analysis.study.models import TITLES, FitOptions, FittedModel, ModelFitter
 
 T = TypeVar("T")
 Digests = Mapping[str, Mapping[int, str]]
+MOST_FOLDS = 50  # of a terrain
+_MOST_ROWS = 50_000  # of the training that its error is told of, at most twice as many
 _DERIVED = ("_digests", "_wholes")  # of a plan
 Prepared = Mapping[str, Sequence[PreparedTrial]]
 
@@ -32,21 +39,32 @@ class FoldTask:
 
     Attributes:
         terrain: terrain of the models.
-        fold: number of the trial left out, from 0.
+        left_out: numbers of the trials left out, from 0.
         training: kept samples of the other trials.
         lengths: number of samples of each of them.
-        own: kept samples of the trial left out.
+        own: kept samples of the trials left out, one after the other.
+        own_lengths: number of samples of each of these.
         others: for every other terrain the trials this fold is tested on.
         options: how to fit.
     """
 
     terrain: str
-    fold: int
+    left_out: tuple[int, ...]
     training: SampleTable
     lengths: tuple[int, ...]
     own: SampleTable
+    own_lengths: tuple[int, ...]
     others: Mapping[str, tuple[SampleTable, ...]]
     options: FitOptions
+
+    @property
+    def fold(self) -> int:
+        """Number of the fold: that of the first trial left out."""
+        return self.left_out[0]
+
+    def per_trial(self, values: Array) -> list[Array]:
+        """Return what belongs to the rows of `own`, shape (n,), trial by trial."""
+        return np.split(values, np.cumsum(self.own_lengths)[:-1])
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,15 +73,21 @@ class ModelFold:
 
     Attributes:
         model: the fitted model.
-        score: its errors on the trial left out.
-        train_rmse: root mean square error on all training rows [N].
+        scores: its errors on every trial left out.
+        train_rmse: root mean square error on the training rows [N], of more than
+            100,000 on every n-th.
         cross: mean absolute errors [N] on trials of other terrains.
     """
 
     model: FittedModel
-    score: Score
+    scores: tuple[Score, ...]
     train_rmse: float
     cross: Mapping[str, tuple[float, ...]]
+
+    @property
+    def score(self) -> Score:
+        """Its errors, means over the trials left out."""
+        return Score(*np.mean(self.scores, axis=0).tolist())
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,19 +96,25 @@ class FoldResult:
 
     Attributes:
         terrain: terrain of the models.
-        fold: number of the trial left out, from 0.
+        left_out: numbers of the trials left out, from 0.
         models: results by the name of the model; one that failed is missing.
         gp_rows: training rows that the Gaussian processes were given.
-        constant_mae: error [N] of the training rows' median F_t, for scale.
+        constant_mae: error [N] of the training rows' median F_t, for scale, mean over
+            the trials left out.
         notes: what could not be done, and why.
     """
 
     terrain: str
-    fold: int
+    left_out: tuple[int, ...]
     models: Mapping[str, ModelFold]
     gp_rows: tuple[int, ...]
     constant_mae: float
     notes: tuple[str, ...]
+
+    @property
+    def fold(self) -> int:
+        """Number of the fold, from 0: that of the first trial left out."""
+        return self.left_out[0]
 
 
 class FoldPlan(Sequence[FoldTask]):
@@ -112,7 +142,10 @@ class FoldPlan(Sequence[FoldTask]):
             self._fitted if targets is trials else PooledSamples.of(targets, usable)
         )
         self._folds = [
-            (name, k) for name, folds in usable.items() if len(folds) > 1 for k in folds
+            (name, group)
+            for name, numbers in usable.items()
+            if len(numbers) > 1
+            for group in fold_groups(numbers)
         ]
 
     def __len__(self) -> int:
@@ -127,25 +160,31 @@ class FoldPlan(Sequence[FoldTask]):
         """Return everything that one fold needs."""
         if isinstance(index, slice):
             return [self[k] for k in range(len(self))[index]]
-        terrain, fold = self._folds[index]
-        rest = [self._fitted.trial(terrain, k) for k in self._others(terrain, fold)]
+        terrain, group = self._folds[index]
+        rest = [
+            self._fitted.trial(terrain, k)
+            for k in self._usable[terrain]
+            if k not in group
+        ]
+        own = [self._tested.trial(terrain, k) for k in group]
         return FoldTask(
             terrain=terrain,
-            fold=fold,
+            left_out=group,
             training=SampleTable.joined(rest),
             lengths=tuple(rows.count for rows in rest),
-            own=self._tested.trial(terrain, fold),
-            others=self._paired(terrain, fold, self._tested.trial),
+            own=SampleTable.joined(own),
+            own_lengths=tuple(rows.count for rows in own),
+            others=self._paired(terrain, group, self._tested.trial),
             options=self._options,
         )
 
     def outline(self, index: int) -> tuple[object, ...]:
         """Return what tells a fold from others, digests in the place of samples."""
-        (terrain, fold), (_, tested) = self._folds[index], self._digests
-        paired = self._paired(terrain, fold, lambda name, k: tested[name][k])
-        own = tested[terrain][fold]
+        (terrain, group), (_, tested) = self._folds[index], self._digests
+        paired = self._paired(terrain, group, lambda name, k: tested[name][k])
+        own = [tested[terrain][k] for k in group]
         whole, options = self._wholes[terrain], self._options
-        return ("fold", terrain, fold, whole, own, paired, options)
+        return ("fold", terrain, group, whole, own, paired, options)
 
     def __getstate__(self) -> dict[str, object]:
         """Return what a worker needs."""
@@ -163,18 +202,19 @@ class FoldPlan(Sequence[FoldTask]):
             for terrain, digests in self._digests[0].items()
         }
 
-    def _others(self, terrain: str, fold: int) -> list[int]:
-        return [k for k in self._usable[terrain] if k != fold]
-
     def _paired(
-        self, terrain: str, fold: int, value_of: Callable[[str, int], T]
+        self, terrain: str, group: Sequence[int], value_of: Callable[[str, int], T]
     ) -> dict[str, tuple[T, ...]]:
         """Return `value_of` every trial of another terrain that a fold is tested on."""
         own = self._usable[terrain]
-        return {
-            other: tuple(value_of(other, k) for k in paired_trials(fold, own, tests))
+        met = {
+            other: {k for fold in group for k in paired_trials(fold, own, tests)}
             for other, tests in self._usable.items()
             if other != terrain
+        }
+        return {
+            other: tuple(value_of(other, k) for k in sorted(numbers))
+            for other, numbers in met.items()
         }
 
 
@@ -206,7 +246,34 @@ def plan_folds(
         for terrain, folds in usable.items()
         if len(folds) < 2
     ]
+    notes += notes_on_groups(usable)
     return FoldPlan(trials, targets, usable, options), notes
+
+
+def fold_groups(trials: Sequence[int], most: int = MOST_FOLDS) -> list[tuple[int, ...]]:
+    """Return which trials each fold of a terrain leaves out.
+
+    Args:
+        trials: their numbers; each by itself up to `most` of them.
+        most: folds.
+    """
+    count = min(len(trials), most)
+    return [tuple(trials[k::count]) for k in range(count)]
+
+
+def notes_on_groups(trials: Mapping[str, Sequence[int]]) -> list[str]:
+    """Return where folds leave out groups of trials.
+
+    Args:
+        trials: numbers of those that are left out, by terrain.
+    """
+    return [
+        f"{terrain}: {len(numbers)} trials in {MOST_FOLDS} folds. Each leaves out a "
+        f"group of about {len(numbers) / MOST_FOLDS:.3g} trials and scores them one "
+        f"by one; up to {MOST_FOLDS} trials a fold leaves out one."
+        for terrain, numbers in trials.items()
+        if len(numbers) > MOST_FOLDS
+    ]
 
 
 def run_fold(task: FoldTask) -> FoldResult:
@@ -225,13 +292,13 @@ def run_fold(task: FoldTask) -> FoldResult:
             )
         else:
             models[name] = _examine(model, task)
-    constant = np.full(task.own.count, np.median(task.training.F_t))
+    error = task.per_trial(np.abs(task.own.F_t - np.median(task.training.F_t)))
     return FoldResult(
         terrain=task.terrain,
-        fold=task.fold,
+        left_out=task.left_out,
         models=models,
         gp_rows=tuple(int(k) for k in chosen),
-        constant_mae=mean_absolute_error(task.own.F_t, constant),
+        constant_mae=float(np.mean([part.mean() for part in error])),
         notes=tuple(notes),
     )
 
@@ -280,15 +347,27 @@ def _notes_on_gaps(trials: Prepared, usable: Mapping[str, list[int]]) -> list[st
 def _examine(model: FittedModel, task: FoldTask) -> ModelFold:
     own = task.own
     foreign = [rows for trials in task.others.values() for rows in trials]
-    tested = SampleTable.joined([task.training, *foreign])
+    training = task.training
+    if (step := training.count // _MOST_ROWS) > 1:
+        training = training.take(np.arange(0, training.count, step))
+    tested = SampleTable.joined([training, *foreign])
     # one call for all rows: small ones cost more than they compute
     error = np.abs(model.mean(tested.F_n, tested.v_t, tested.further) - tested.F_t)
-    ends = np.cumsum([task.training.count, *(rows.count for rows in foreign)])
+    ends = np.cumsum([training.count, *(rows.count for rows in foreign)])
     on_training, *on_foreign = np.split(error, ends[:-1])
     maes = iter(float(part.mean()) for part in on_foreign)
+    left_out = [
+        own.part(end - count, end)
+        for count, end in zip(
+            task.own_lengths, accumulate(task.own_lengths), strict=True
+        )
+    ]
     return ModelFold(
         model=model,
-        score=score(own.F_t, model.predict(own.F_n, own.v_t, own.further)),
+        scores=tuple(
+            score(one.F_t, model.predict(one.F_n, one.v_t, one.further))
+            for one in left_out
+        ),
         train_rmse=float(np.sqrt(np.mean(on_training**2))),
         cross={
             terrain: tuple(next(maes) for _ in trials)

@@ -47,7 +47,8 @@ class CsvRow(NamedTuple):
     Attributes:
         terrain: its name.
         model: name of the model.
-        fold: number of the fold, from 1.
+        fold: number of the trial left out, from 1; what a fold of several has in common
+            stands with the first of them.
         quantity: what the value is.
         value: the number.
         unit: its unit.
@@ -95,13 +96,16 @@ def to_csv(study: Study, further: Iterable[CsvRow] = ()) -> str:
     for name, result in study.terrains.items():
         for fold in result.folds:
             for model, outcome in fold.models.items():
-                values = outcome.score._asdict() | {"train_rmse": outcome.train_rmse}
                 units = _OTHER_UNITS | {"train_rmse": "N"}
+                of_fold = {"train_rmse": outcome.train_rmse}
                 if model == TUSTIN:
-                    values, units = values | outcome.model.describe(), units | UNITS
+                    of_fold, units = of_fold | outcome.model.describe(), units | UNITS
+                scores = (one._asdict() for one in outcome.scores)
+                values = [*zip(fold.left_out, scores, strict=True)]
                 writer.writerows(
-                    [_safe(name), model, fold.fold + 1, key, repr(value), units[key]]
-                    for key, value in values.items()
+                    [_safe(name), model, k + 1, key, repr(value), units[key]]
+                    for k, each in [*values, (fold.fold, of_fold)]
+                    for key, value in each.items()
                 )
     writer.writerows(
         [

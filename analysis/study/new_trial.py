@@ -336,6 +336,12 @@ def family_counts(models: Sequence[NewTrialModel]) -> Mapping[str, int]:
     return {family: chosen.count(family) for family in FAMILIES}
 
 
+def spread_trials(count: int) -> Indices:
+    """Return at most 30 of so many trials, spread evenly over their order."""
+    wanted = min(count, MOST_TRIALS)
+    return np.round(np.linspace(0, count - 1, wanted)).astype(int)
+
+
 def spread_rows(lengths: Sequence[int], count: int) -> Indices:
     """Return about `count` rows of at most 30 trials, one from stretches alike.
 
@@ -344,9 +350,8 @@ def spread_rows(lengths: Sequence[int], count: int) -> Indices:
         count: of rows that are wanted.
     """
     starts = np.concatenate([[0], np.cumsum(lengths)])
-    wanted = min(len(lengths), MOST_TRIALS)
-    trials = np.round(np.linspace(0, len(lengths) - 1, wanted)).astype(int)
-    each = max(count // wanted, 1)
+    trials = spread_trials(len(lengths))
+    each = max(count // trials.size, 1)
     middles = (np.arange(each) + 0.5) / each
     rows = [starts[k] + np.floor(middles * lengths[k]).astype(int) for k in trials]
     return np.unique(np.concatenate(rows))

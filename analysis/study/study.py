@@ -18,7 +18,13 @@ from analysis.data.quality import PULLED, PULLED_WARNING
 from analysis.data.samples import SampleTable
 from analysis.data.series import TractionSeries
 from analysis.data.terrain_kinds import terrain_incline, terrain_kind
-from analysis.study.crossval import FoldResult, Prepared, plan_folds, run_fold
+from analysis.study.crossval import (
+    FoldResult,
+    Prepared,
+    notes_on_groups,
+    plan_folds,
+    run_fold,
+)
 from analysis.study.jobs import (
     Batch,
     Progress,
@@ -101,6 +107,16 @@ class Study:
     def kinds(self) -> dict[str, str]:
         """Kind of every terrain, by its name."""
         return {name: result.kind for name, result in self.terrains.items()}
+
+    @property
+    def groups(self) -> list[str]:
+        """Where folds leave out groups of trials, a line for every such terrain."""
+        return notes_on_groups(
+            {
+                name: [k for fold in result.folds for k in fold.left_out]
+                for name, result in self.terrains.items()
+            }
+        )
 
     def cross(self, model: str) -> dict[str, dict[str, float | None]]:
         """Return the mean absolute errors [N]: model's terrain -> tested terrain."""

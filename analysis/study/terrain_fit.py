@@ -99,12 +99,31 @@ class TerrainResult:
         values: list[float | None] = [None] * len(self.trials)
         for fold in self.folds:
             if model in fold.models:
-                values[fold.fold] = measure(fold.models[model])
+                for k in fold.left_out:
+                    values[k] = measure(fold.models[model])
         return values
 
     def scores(self, model: str, key: str) -> list[float | None]:
         """Return the measure `key` of a model on every trial, None where missing."""
-        return self.per_trial(model, lambda fold: getattr(fold.score, key))
+        values: list[float | None] = [None] * len(self.trials)
+        for fold in self.folds:
+            if model in fold.models:
+                pairs = zip(fold.left_out, fold.models[model].scores, strict=True)
+                for k, of_trial in pairs:
+                    values[k] = getattr(of_trial, key)
+        return values
+
+    def left_out(self, model: str) -> list[tuple[int, ModelFold]]:
+        """Return the number of every trial with the model that it was left out of.
+
+        In the order of the folds.
+        """
+        return [
+            (k, fold.models[model])
+            for fold in self.folds
+            if model in fold.models
+            for k in fold.left_out
+        ]
 
     def maes(self, model: str) -> list[float | None]:
         """Return the mean absolute error [N] on every trial, left out in turn."""

@@ -276,9 +276,7 @@ def _held_out(
     result: TerrainResult, model: str
 ) -> list[tuple[PreparedTrial, Predictor]]:
     return [
-        (result.trials[fold.fold], fold.models[model].model.predict)
-        for fold in result.folds
-        if model in fold.models
+        (result.trials[k], fold.model.predict) for k, fold in result.left_out(model)
     ]
 
 
@@ -286,10 +284,9 @@ def _evidence(study: Study, model: str, rho: Mapping[str, float]) -> StudyEviden
     """Return every trial scored by the models of its own number's folds."""
     experts: dict[int, dict[str, Expert]] = {}
     for name, result in study.terrains.items():
-        for fold in result.folds:
-            if model in fold.models:
-                of_fold = experts.setdefault(fold.fold, {})
-                of_fold[name] = Expert(fold.models[model].model.predict, rho[name])
+        for k, fold in result.left_out(model):
+            of_trial = experts.setdefault(k, {})
+            of_trial[name] = Expert(fold.model.predict, rho[name])
     tasks = [
         ScoreTask(trial, k, experts[k])
         for name, result in study.terrains.items()

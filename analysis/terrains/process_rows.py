@@ -13,6 +13,7 @@ import numpy as np
 from analysis.data.prepare import PreparedTrial, is_even, stretches
 from analysis.data.samples import SampleTable
 from analysis.data.series import Array
+from analysis.study.new_trial import spread_trials
 
 STEP = 0.01  # s from one sample to the next
 STILL = 0.005  # m/s below which a foot sticks
@@ -72,6 +73,15 @@ def process_trial(trial: PreparedTrial) -> ProcessTrial | None:
 
 
 def process_trials(trials: Sequence[PreparedTrial]) -> tuple[ProcessTrial, ...]:
+    """Return 30 at most of the trials that can be a process, spread over all.
+
+    What a generator of more costs grows with all of their samples.
+    """
+    found = every_process_trial(trials)
+    return tuple(found[k] for k in spread_trials(len(found)))
+
+
+def every_process_trial(trials: Sequence[PreparedTrial]) -> tuple[ProcessTrial, ...]:
     """Return those of the trials that can be a process."""
     found = (process_trial(trial) for trial in trials)
     return tuple(trial for trial in found if trial is not None)

@@ -65,7 +65,9 @@ def _errors_of(study: Study, model: str) -> _Errors:
                     error
                     for fold in result.models(model)
                     for error in (
-                        (fold.score.mae,) if tested == name else fold.cross[tested]
+                        [one.mae for one in fold.scores]
+                        if tested == name
+                        else fold.cross[tested]
                     )
                 ]
                 for tested in study.terrains
@@ -171,11 +173,7 @@ def _mean_of_folds(result: TerrainResult, measure: str) -> float:
 
 
 def _held_out(result: TerrainResult) -> list[tuple[PreparedTrial, ModelFold]]:
-    return [
-        (result.trials[fold.fold], fold.models[GP_SE])
-        for fold in result.folds
-        if GP_SE in fold.models
-    ]
+    return [(result.trials[k], fold) for k, fold in result.left_out(GP_SE)]
 
 
 def _residual(trial: PreparedTrial, fold: ModelFold) -> Array:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from experiments.arguments import (
     add_analysis,
+    add_covariate,
     add_pdf,
     add_scheduler,
     add_seed,
@@ -53,6 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="inputs of the models: v_t, F_n and further columns of numbers in every "
         "table, e.g. an angle",
     )
+    add_covariate(parser, "columns of every table, and way, since the last drop of F_t")
     add_scheduler(parser)
     add_pdf(parser)
     add_seed(parser)
@@ -62,12 +64,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Fit tables and write the report."""
     from acquisition.clock import SystemClock
+    from acquisition.errors import SettingsError
     from acquisition.extras import require_extra
 
     require_extra("report")  # before its page is imported
     if args.scheduler:
         require_extra("cluster")
+    from analysis.dialects.columns import parse_covariates, parse_inputs
+    from analysis.findings.covariates import WAY
     from analysis.findings.findings import compute_results
+    from analysis.report.covariate_table import covariate_tables
     from analysis.report.page import ReportContext, write_report
     from analysis.report.what_if_tables import plain_choice, side_by_side
     from analysis.study.jobs import Workers
@@ -76,13 +82,22 @@ def run(args: argparse.Namespace) -> int:
     from analysis.terrains.generator_check import sampled_trials
     from experiments.operator.console import Console
     from experiments.report.choices import analysis_choices, repeat_study
+    from experiments.report.covariates import columns_tested
     from experiments.report.progress import fitting
     from experiments.report.sessions import require_samples
     from experiments.session.store import iso_utc
 
     console = Console(color=not args.no_color)
     choices = analysis_choices(args)
-    trials = _load(args)
+    columns = () if args.covariate is None else parse_covariates(args.covariate)
+    inputs = () if args.inputs is None else parse_inputs(args.inputs)
+    if both := ", ".join(name for name in columns if name in inputs):
+        raise SettingsError(
+            f"--covariate and --inputs both name {both}.", hint="Leave one out."
+        )
+    trials = _load(args, inputs)
+    beside = [name for name in columns if name != WAY]
+    tested = _load(args, (*inputs, *beside)) if beside else trials
     for choice in choices.variants:  # refused before anything is fitted
         choice.series(next(iter(trials.values()))[0])
     is_simulated = _is_simulated(trials)
@@ -98,6 +113,7 @@ def run(args: argparse.Namespace) -> int:
         study = run_study(trials, options, is_simulated, progress)
     require_samples(study)
     others = repeat_study(study, trials, choices.variants, console)
+    found = columns_tested(study, tested, columns, console)
     context = ReportContext(
         "Traction from external data",
         f"{count} trials from {len(args.files)} files",
@@ -106,10 +122,12 @@ def run(args: argparse.Namespace) -> int:
         generated_utc=iso_utc(SystemClock().utc_ns()),
         tables=[
             *(side_by_side(choice, study, other) for choice, other in others),
+            *covariate_tables(found),
             *_import_tables(args.files),
         ],
         further_numbers={
-            "what_if": [plain_choice(c, study, other) for c, other in others]
+            "what_if": [plain_choice(c, study, other) for c, other in others],
+            "covariates": [one.numbers() for one in found],
         },
         with_pdf=args.pdf,
         results=compute_results(
@@ -117,6 +135,8 @@ def run(args: argparse.Namespace) -> int:
         ),
     )
     page = write_report(study, args.to, context)
+    for note in study.groups:
+        console.say(note)
     for warning in study.warnings:
         if warning not in told:
             console.say(f"▲ {warning}")
@@ -124,13 +144,14 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _load(args: argparse.Namespace) -> dict[str, list[TractionSeries]]:
-    """Return the trials by terrain; raises SettingsError."""
+def _load(
+    args: argparse.Namespace, inputs: Sequence[str]
+) -> dict[str, list[TractionSeries]]:
+    """Return the trials by terrain, with further columns; raises SettingsError."""
     from analysis.data.tables import load_tables
     from analysis.data.terrain_kinds import parse_stones
     from analysis.dialects.columns import (
         parse_columns,
-        parse_inputs,
         parse_names,
         parse_units,
     )
@@ -147,7 +168,7 @@ def _load(args: argparse.Namespace) -> dict[str, list[TractionSeries]]:
         args.rate,
         negate=parse_names(args.negate) if args.negate else (),
         decimal=args.decimal,
-        inputs=() if args.inputs is None else parse_inputs(args.inputs),
+        inputs=inputs,
     )
 
 

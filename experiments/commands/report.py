@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from experiments.arguments import (
     add_allow_missing,
     add_analysis,
+    add_covariate,
     add_pdf,
     add_scheduler,
     add_seed,
@@ -45,6 +46,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--all", action="store_true", help="every session with trials")
     add_scheduler(parser)
     add_shard(parser)
+    add_covariate(
+        parser, "height (of the sole), way (since the last drop), lateral, tilt, moment"
+    )
     add_pdf(parser)
     parser.add_argument("--json", action="store_true", help="what was made, as JSON")
     add_allow_missing(parser)
@@ -66,6 +70,7 @@ def run(args: argparse.Namespace) -> int:
 
         if available_cores() > 1:
             prepare_workers(_WORK)  # first, as it imports while this process does
+    from analysis.dialects.columns import parse_covariates
     from analysis.study.jobs import Shard
     from experiments.operator.console import Console, PageRecorder
     from experiments.report.choices import (
@@ -73,6 +78,7 @@ def run(args: argparse.Namespace) -> int:
         choose_sessions,
         tell_missing,
     )
+    from experiments.report.covariates import KNOWN
     from experiments.report.sessions import ReportRequest, fit_shard, report_sessions
     from experiments.settings.load import load_settings
 
@@ -96,6 +102,9 @@ def run(args: argparse.Namespace) -> int:
         args.scheduler,
         choices,
         missing,
+        covariates=()
+        if args.covariate is None
+        else parse_covariates(args.covariate, KNOWN),
         with_pdf=args.pdf,
         matrix=matrix,
     )

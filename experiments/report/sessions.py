@@ -16,11 +16,13 @@ from analysis.data.plausibility import summed_up
 from analysis.data.recorded_factors import stated_factors
 from analysis.data.series import TractionSeries
 from analysis.data.terrain_kinds import terrain_kind
+from analysis.findings.covariates import COVARIATE_TYPES, CovariateResult
 from analysis.findings.findings import compute_results
 from analysis.findings.held_trial import HeldTrial, TrialFiles
 from analysis.findings.rig_health import with_tares
 from analysis.foresight.judged import JUDGED_TYPES
 from analysis.foresight.training import fit_foresight
+from analysis.report.covariate_table import covariate_tables
 from analysis.report.drawing import DRAWN_TYPES
 from analysis.report.page_model import BedPhoto, ReportContext
 from analysis.report.what_if import StudyVariant
@@ -52,6 +54,7 @@ from experiments.report.cells import (
 )
 from experiments.report.choices import AnalysisChoices, repeat_study
 from experiments.report.commissioned import uncommissioned
+from experiments.report.covariates import columns_tested, recorded_columns
 from experiments.report.foresight import StudyForesight, study_foresight, watched_trials
 from experiments.report.progress import fitting
 from experiments.report.tables import report_tables, summary_table
@@ -79,6 +82,7 @@ class ReportRequest:
         scheduler: address of a Dask scheduler to fit on; None for this machine.
         choices: of the analysis.
         missing: kept trials that are missing or changed, in words.
+        covariates: names of columns that are tested.
         out: folder of the report; None = that of the session, or `data`/study.
         with_pdf: figures are wanted as PDF, too.
         matrix: whose cells are forecast; None = none.
@@ -89,6 +93,7 @@ class ReportRequest:
     scheduler: str | None = None
     choices: AnalysisChoices = field(default_factory=AnalysisChoices)
     missing: Sequence[str] = ()
+    covariates: Sequence[str] = ()
     out: Path | None = None
     with_pdf: bool = False
     matrix: MatrixSettings | None = None
@@ -163,7 +168,13 @@ class StudySession:
 
 def results_below(data: Path) -> ResultStore:
     """Return the store of results below a folder of data; it grows with the disk."""
-    types = {**TYPES, **JUDGED_TYPES, **DRAWN_TYPES, **SAMPLED_TYPES}
+    types = {
+        **TYPES,
+        **JUDGED_TYPES,
+        **DRAWN_TYPES,
+        **SAMPLED_TYPES,
+        **COVARIATE_TYPES,
+    }
     free = disk_usage(data).free if data.is_dir() else 0
     return ResultStore(data / FOLDS, max(MOST_BYTES, free // _SHARE_OF_DISK), types)
 
@@ -377,10 +388,19 @@ def report_sessions(
     findings = cache(partial(compute_results, study, rig, break_away, sampled))
     foresight = study_foresight(study, trials, break_away, store, findings)
     own = sessions[0].path if len(sessions) == 1 else data / "study"
-    context = _context(sessions, order, analysed, foresight, others)
+    tested = columns_tested(
+        study,
+        recorded_columns(analysed.files, order.covariates),
+        order.covariates,
+        console,
+        store,
+    )
+    context = _context(sessions, order, analysed, foresight, others, tested)
     context = replace(context, rig=rig, results=findings(), store=store)
     page = write_report(study, order.out or own, context)
     console.table(*summary_table(study))
+    for note in study.groups:
+        console.say(note)
     return page
 
 
@@ -390,6 +410,7 @@ def _context(
     analysed: StudySession,
     foresight: StudyForesight,
     others: Sequence[tuple[StudyVariant, Study]],
+    tested: Sequence[CovariateResult],
 ) -> ReportContext:
     """Return what the report shows beyond the study."""
     study, trials = analysed.study, analysed.trials
@@ -417,12 +438,14 @@ def _context(
             *cells_table(study, units),
             *([] if forecast is None else [forecast_table(forecast)]),
             *(side_by_side(choice, study, other) for choice, other in others),
+            *covariate_tables(tested),
             *truth_tables(study, trials, analysed.truths),
             *foresight.tables,
             *report_tables(sessions, trials),
         ],
         further_numbers={
             "what_if": [plain_choice(c, study, other) for c, other in others],
+            "covariates": [one.numbers() for one in tested],
             "foresight": foresight.numbers,
             "left_out": analysed.left_out,
             "matrix": None if forecast is None else plain_forecast(forecast),

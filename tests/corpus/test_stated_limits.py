@@ -17,7 +17,9 @@ from acquisition.trial_file.chunks import RECORD_LIMIT, unpacked_limit
 from acquisition.trial_file.data_files import open_data
 from acquisition.trial_file.reader import MAX_ROWS, TrialReader
 from acquisition.trial_file.salvage import SoundRecords
-from analysis.data.tables import LARGEST_FILE, MOST_TRIALS, load_tables
+from analysis.data import tables
+from analysis.data.memory import share_of_memory
+from analysis.data.tables import LARGEST_FILE, PARTS, load_tables, most_trials
 from analysis.dialects.encoding import LONGEST_LINE
 from analysis.study.store import LARGEST, MOST_BYTES
 from analysis.terrains import database
@@ -46,10 +48,14 @@ STATED = (
     "| journal | 4 MiB | 50 000 lines |",
     "| lock of a session | 4 KiB | |",
     "| 1 MB | 64-bit integers, 20 levels |",
-    "| 24 MB | npz: unpacked; CSV: 65 536 characters a line; 2000 trials |",
+    "| table: CSV, Parquet | 24 MB | CSV: 65 536 characters a line; trials as an npz |",
+    "| table: npz, unpacked | an eighth of the free memory, 24 MB at least | "
+    "beyond 24 MB 100 times its size; a trial for every 12 kB |",
+    "| `datapackage.json` | 1/48 of the free memory, 16 MB at least | "
+    "a file for every 3.2 kB |",
     "| terrain database | 6 MB | 200 terrains, 400 points an axis |",
-    "| 16 MiB | all together 256 MiB: what was used longest ago goes; "
-    "a damaged one is made again |",
+    "| 16 MiB | all together a quarter of the free disk, 256 MiB at least: what was "
+    "used longest ago goes; a damaged one is made again |",
 )
 
 
@@ -59,7 +65,9 @@ def test_the_limits_proved_here_are_those_that_are_stated():
         assert row.strip().endswith(stated)
     assert (MAX_ROWS, MOST_EVENTS, RECORD_LIMIT) == (300_000, 50_000, 16 * MIB)
     assert (LARGEST, MOST_BYTES) == (16 * MIB, 256 * MIB)
-    assert (LARGEST_FILE, LONGEST_LINE, MOST_TRIALS) == (24_000_000, 65_536, 2000)
+    assert (LARGEST_FILE, LONGEST_LINE, PARTS) == (24_000_000, 65_536, 8)
+    free = share_of_memory(1, 0)
+    assert most_trials() == pytest.approx(max(24_000_000, free / 8) / 12_000, rel=0.2)
 
 
 def sparse(path, size):
@@ -228,7 +236,10 @@ def test_a_line_of_a_table_is_shorter_than_65536_characters(tmp_path, length, is
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("count", "is_read"), [(2000, True), (2001, False)])
-def test_an_npz_may_hold_2000_trials(tmp_path, count, is_read):
+def test_an_npz_may_hold_2000_trials_in_little_memory(
+    tmp_path, monkeypatch, count, is_read
+):
+    monkeypatch.setattr(tables, "share_of_memory", lambda _, least: least)
     rows = np.column_stack([np.arange(5.0), np.ones(5), np.ones(5), np.ones(5)])
     path = tmp_path / "trials.npz"
     np.savez(path, **{f"TF/{number}": rows for number in range(count)})

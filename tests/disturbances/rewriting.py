@@ -14,13 +14,22 @@ def rewrite(
     path: Path,
     cycles: Record,
     attachments: Mapping[str, bytes] | None = None,
+    stated: Mapping[str, str] | None = None,
 ) -> Path:
-    """Write `cycles` with the metadata and attachments of another trial."""
+    """Write `cycles` with the metadata and attachments of another trial.
+
+    Args:
+        source: the other trial.
+        path: where to.
+        cycles: of the new one.
+        attachments: in the place of those of the other.
+        stated: metadata of the trial in the place of the other's.
+    """
     reader = TrialReader(source)
     clock = reader.metadata["clock"]
     trial = {k: v for k, v in reader.metadata["trial"].items() if k != "format_version"}
     header = TrialHeader(
-        trial=trial,
+        trial={**trial, **(stated or {})},
         utc_offset_ns=int(clock["utc_offset_ns"]),
         offset_uncertainty_ns=int(clock["offset_uncertainty_ns"]),
         provenance={},

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from acquisition.errors import SettingsError
+from analysis.data import tables
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.samples import PooledSamples, SampleTable
 from analysis.data.series import TractionSeries
@@ -175,7 +176,8 @@ def test_a_row_that_names_no_trial_is_refused_with_its_line(tmp_path):
         load(path)
 
 
-def test_too_many_trials_in_one_table_are_refused(tmp_path):
+def test_too_many_trials_in_one_table_are_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(tables, "share_of_memory", lambda _, least: least)
     path = tmp_path / "runs.csv"
     rows = "\n".join(f"w,{k},0.01,1,1,1" for k in range(2001))
     path.write_text(f"wheel,repeat,v,N,T,angle\n{rows}\n")

@@ -197,6 +197,18 @@ def test_npz_that_unpacks_beyond_the_limit_is_refused_unopened(tmp_path, monkeyp
         load_tables([path])
 
 
+def test_many_trials_in_an_npz_are_read_as_far_as_memory_goes(tmp_path, monkeypatch):
+    path, rng = tmp_path / "a.npz", np.random.default_rng(0)
+    t = 0.002 * np.arange(300_000.0)
+    made = {f"S0/{k}": np.column_stack([t, rng.random((t.size, 3))]) for k in range(3)}
+    np.savez(path, **made)
+    assert path.stat().st_size > 28_000_000
+    assert len(load_tables([path])["S0"]) == 3
+    monkeypatch.setattr(tables, "share_of_memory", lambda _, least: least)
+    with pytest.raises(SettingsError, match="29 MB, the limit is 24 MB"):
+        load_tables([path])
+
+
 @pytest.mark.parametrize("text", ["t", "speed=v", "t=", "=x"])
 def test_columns_that_name_nothing_are_refused(text):
     with pytest.raises(SettingsError, match="does not name a column"):

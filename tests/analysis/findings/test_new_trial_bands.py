@@ -6,7 +6,7 @@ import pytest
 from analysis.figures.curves import caption_new_trial, draw_new_trial
 from analysis.figures.uncertainty import caption_shares, draw_shares
 from analysis.findings.findings import compute_results, plain_findings
-from analysis.findings.new_trial_bands import conformal_reach, oracle_band
+from analysis.findings.new_trial_bands import conformal_reaches, oracle_band
 from analysis.report.new_trial_tables import new_trial_tables
 from analysis.study.fits import to_plain
 from analysis.study.models import GP_SE, GP_SE_TRIAL, FitOptions
@@ -16,23 +16,41 @@ from analysis.study.trial_components import LEAST_GAIN
 pytestmark = pytest.mark.slow  # a whole study
 
 
+def reach_of(others, nominal):
+    """Return the reach of one trial more, however large its own scores are."""
+    return conformal_reaches([np.full(3, 1e6), *others], nominal)[0]
+
+
 def test_a_reach_is_the_quantile_with_one_part_at_infinity():
     scores = [np.array([float(k)]) for k in range(1, 10)]  # nine trials
     # the k-th smallest of nine is reached with a share of k/10
-    assert conformal_reach(scores, 0.5) == 5.0
-    assert conformal_reach(scores, 0.8) == 8.0
-    assert conformal_reach(scores, 0.9) == 9.0
+    assert reach_of(scores, 0.5) == 5.0
+    assert reach_of(scores, 0.8) == 8.0
+    assert reach_of(scores, 0.9) == 9.0
 
 
 def test_nine_trials_cannot_show_95_percent():
     scores = [np.array([float(k)]) for k in range(9)]
-    assert conformal_reach(scores, 0.95) == np.inf
+    assert reach_of(scores, 0.95) == np.inf
 
 
 def test_a_long_trial_weighs_no_more_than_a_short_one():
     short, long = np.full(1, 5.0), np.full(1000, 1.0)
-    assert conformal_reach([short, long, long], 0.5) == 1.0
-    assert conformal_reach([short, long, long], 0.7) == 5.0
+    assert reach_of([short, long, long], 0.5) == 1.0
+    assert reach_of([short, long, long], 0.7) == 5.0
+
+
+@pytest.mark.parametrize("nominal", [0.5, 0.8, 0.9])
+@pytest.mark.parametrize("trials", [2, 7, 40])
+def test_a_reach_is_that_of_all_other_samples_weighed_by_trials(trials, nominal):
+    rng = np.random.default_rng(trials)
+    scores = [np.abs(rng.normal(size=rng.integers(1, 30))) for _ in range(trials)]
+    for k, reach in enumerate(conformal_reaches(scores, nominal)):
+        others = [*scores[:k], *scores[k + 1 :]]
+        at = np.sort(np.concatenate(others))
+        held = np.mean([[np.mean(s <= x) for x in at] for s in others], axis=0)
+        is_reached = held * (trials - 1) / trials >= nominal - 1e-9
+        assert reach == (at[np.argmax(is_reached)] if is_reached.any() else np.inf)
 
 
 @pytest.mark.parametrize(("spread", "low", "high"), [(1.0, 0.9, 1.2), (2.0, 1.7, 2.6)])

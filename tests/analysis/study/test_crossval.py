@@ -14,7 +14,14 @@ from analysis.gp.kernels import SquaredExponential
 from analysis.gp.likelihood import Likelihood
 from analysis.gp.noise import ConstantNoise
 from analysis.gp.search import posterior_search
-from analysis.study.crossval import choose_rows, paired_trials, plan_folds, run_fold
+from analysis.study.crossval import (
+    MOST_FOLDS,
+    choose_rows,
+    fold_groups,
+    paired_trials,
+    plan_folds,
+    run_fold,
+)
 from analysis.study.metrics import mean_absolute_error
 from analysis.study.models import GP_SE, TUSTIN, FitOptions
 from analysis.study.store import task_key
@@ -49,6 +56,45 @@ def test_model_of_fold_k_meets_trial_k_of_the_other_terrains(trials):
     np.testing.assert_array_equal(rows.F_t, trials["TF"][2].F_t)
 
 
+def test_up_to_fifty_trials_are_left_out_one_by_one():
+    assert fold_groups([0, 2, 3]) == [(0,), (2,), (3,)]
+    assert fold_groups(range(50)) == [(k,) for k in range(50)]
+
+
+@pytest.mark.parametrize("count", [51, 99, 100, 1000])
+def test_beyond_fifty_trials_every_one_is_in_one_of_fifty_groups(count):
+    groups = fold_groups(range(count))
+    assert len(groups) == MOST_FOLDS
+    assert sorted(k for group in groups for k in group) == list(range(count))
+    sizes = {len(group) for group in groups}
+    assert max(sizes) - min(sizes) <= 1
+
+
+def test_a_group_is_left_out_together_and_scored_trial_by_trial(trials):
+    many = {
+        "S0": [
+            replace(trials["S0"][k % 3], F_t=trials["S0"][k % 3].F_t + 0.01 * k)
+            for k in range(102)
+        ],
+        "TF": trials["TF"],
+    }
+    tasks, (note,) = plan_folds(many, SMALL_FIT)
+    assert note.startswith("S0: 102 trials in 50 folds")
+    assert len(tasks) == 50 + 3
+    task, result = tasks[1], run_fold(tasks[1])
+    assert task.left_out == result.left_out == (1, 51, 101)
+    assert len(task.lengths) == 99
+    own = [many["S0"][k] for k in task.left_out]
+    assert task.own_lengths == tuple(trial.kept for trial in own)
+    for name in (TUSTIN, GP_SE):
+        fold = result.models[name]
+        for trial, score in zip(own, fold.scores, strict=True):
+            mean = fold.model.mean(trial.F_n, trial.v_t)
+            expected = mean_absolute_error(trial.F_t, mean)
+            assert score.mae == pytest.approx(expected, rel=1e-12)
+        assert fold.score.mae == pytest.approx(np.mean([s.mae for s in fold.scores]))
+
+
 @pytest.mark.parametrize(
     ("models", "tests", "pairs"),
     [
@@ -74,7 +120,7 @@ def test_chosen_rows_are_distinct_and_depend_on_seed_terrain_and_fold(trials):
     assert rows.max() < task.training.count
     np.testing.assert_array_equal(rows, choose_rows(task))
     others = [
-        replace(task, fold=1),
+        replace(task, left_out=(1,)),
         replace(task, terrain="TF"),
         replace(task, options=FitOptions(seed=4)),
     ]

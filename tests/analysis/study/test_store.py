@@ -135,7 +135,10 @@ def test_a_flipped_digit_is_noticed(tmp_path, task, result):
     store = ResultStore(tmp_path)
     store.put(run_fold, task, result)
     (path,) = tmp_path.iterdir()
-    path.write_text(path.read_text().replace('"fold": 0', '"fold": 1'))
+    whole = path.read_text()
+    changed = whole.replace('"left_out": [0]', '"left_out": [1]')
+    assert changed != whole
+    path.write_text(changed)
     assert store.get(run_fold, task) is None
 
 

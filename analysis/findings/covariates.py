@@ -1,0 +1,308 @@
+"""Does a further column tell of F_t what F_n and v_t do not?
+
+Trials are left out in up to ten groups. The others are fitted twice, by the model of a
+new trial over F_n and v_t, and over these and the column; the gain is the difference of
+the log densities of the trials left out, per sample. Its interval is Student's over the
+trials.
+
+A gain alone does not make a column one of the ground. What is pushed by F_t, as the
+tilt of a sole on a compliant arm or the moment about the wrist, repeats it: of its
+changes over 0.2 s within a trial a large share is that of F_t, whatever F_n and v_t do.
+A property of the ground does not follow F_t from one moment to the next.
+"""
+
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from acquisition.errors import TractionError
+from analysis.data.prepare import PreparedTrial
+from analysis.data.samples import SampleTable, TrainingSet
+from analysis.data.series import Array
+from analysis.gp.kernels import SquaredExponential
+from analysis.study.crossval import fold_groups
+from analysis.study.jobs import Store, Workers, run_tasks
+from analysis.study.models import FitOptions
+from analysis.study.new_trial import FAMILIES, LEAST_GAIN, NORMAL, NewTrialFit
+from analysis.terrains.process_scores import falls
+
+WAY = "way"  # since the last drop: from F_t and v_t of any trial
+SPAN = 0.2  # s over which changes are held against those of F_t
+REPEATED = 0.3  # share of the changes that is that of F_t, from which on it repeats it
+FEWEST = 3  # trials
+
+_FOLDS = 10
+_STREAM = 4_000_000  # apart from folds, terrain fits, components
+_LEVEL = 0.975  # one end of a 95 % interval
+_NEAR = 0.3  # of the span, that two rows may be nearer or farther apart
+
+
+@dataclass(frozen=True, slots=True)
+class CovariateRows:
+    """Kept samples of a trial with the columns that are tested.
+
+    Attributes:
+        rows: the samples, with the inputs that all models have.
+        columns: shape (n, k).
+        t: time [s], shape (n,).
+    """
+
+    rows: SampleTable
+    columns: Array
+    t: Array
+
+    @classmethod
+    def of(
+        cls, trial: PreparedTrial, names: Sequence[str], least: float
+    ) -> "CovariateRows":
+        """Return the samples of a trial whose further inputs hold the columns.
+
+        Args:
+            trial: a prepared trial.
+            names: of the columns; `WAY` is computed, inputs of other names are those
+                of all models.
+            least: fall of force [N] that makes a drop.
+        """
+        smooth, kept = trial.smooth, trial.indices
+        inputs = [x[kept] for n, x in smooth.further.items() if n not in names]
+        further = np.column_stack(inputs) if inputs else None
+        columns = [
+            way_since_drop(trial, least) if n == WAY else smooth.further[n][kept]
+            for n in names
+        ]
+        return cls(
+            SampleTable(trial.F_n, trial.v_t, trial.F_t, further),
+            np.column_stack(columns),
+            smooth.t[kept],
+        )
+
+    def with_column(self, k: int | None) -> SampleTable:
+        """Return the samples with one of the columns as an input more, None = none."""
+        if k is None:
+            return self.rows
+        own, column = self.rows.further, self.columns[:, [k]]
+        beside = column if own is None else np.column_stack([own, column])
+        return SampleTable(self.rows.F_n, self.rows.v_t, self.rows.F_t, beside)
+
+
+@dataclass(frozen=True, slots=True)
+class CovariateTask:
+    """Everything one fold of the test needs.
+
+    Attributes:
+        terrain: its name.
+        columns: names of what is tested.
+        trials: those with kept samples.
+        left_out: numbers of those that nothing is fitted to.
+        options: how to fit.
+    """
+
+    terrain: str
+    columns: tuple[str, ...]
+    trials: tuple[CovariateRows, ...]
+    left_out: tuple[int, ...]
+    options: FitOptions
+
+
+class CovariateFold(NamedTuple):
+    """What columns gain in one fold.
+
+    Attributes:
+        gains: log density per sample [nat] of every trial left out, by column.
+    """
+
+    gains: Mapping[str, tuple[float, ...]]
+
+
+COVARIATE_TYPES: Mapping[str, type] = {"CovariateFold": CovariateFold}
+
+
+class CovariateResult(NamedTuple):
+    """What a column tells of F_t on a terrain.
+
+    Attributes:
+        terrain: its name.
+        column: name of the column.
+        trials: number of trials left out.
+        gain: of log density per sample [nat], mean over the trials.
+        lower: end of its 95 % interval,
+        upper: and the other one.
+        repeated: share of its changes over 0.2 s that is that of F_t.
+    """
+
+    terrain: str
+    column: str
+    trials: int
+    gain: float
+    lower: float
+    upper: float
+    repeated: float
+
+    @property
+    def verdict(self) -> str:
+        """What it is, in two words."""
+        if self.repeated >= REPEATED:
+            return "repeats F_t"
+        return "gain" if self.lower > 0.0 and self.gain >= LEAST_GAIN else "no gain"
+
+    @property
+    def sentence(self) -> str:
+        """What it is, for people."""
+        ends = (
+            f"{self.gain:+.2f} nat per sample, {self.lower:+.2f} to {self.upper:+.2f}"
+        )
+        where = f"{self.terrain}: {self.column}: {self.verdict}"
+        if self.repeated >= REPEATED:
+            return (
+                f"{where} ({self.repeated:.0%} of its changes over {SPAN:g} s "
+                f"are those of F_t; {ends})."
+            )
+        return f"{where} ({ends})."
+
+    def numbers(self) -> dict[str, Any]:
+        """Return it as plain values."""
+        return self._asdict() | {"verdict": self.verdict}
+
+
+def covariate_results(
+    trials: Mapping[str, Sequence[CovariateRows]],
+    columns: Sequence[str],
+    options: FitOptions,
+    workers: Workers | int | None = None,
+    store: Store | None = None,
+) -> list[CovariateResult]:
+    """Return what every column tells on every terrain with three trials or more.
+
+    Args:
+        trials: those with kept samples, by terrain.
+        columns: names of theirs.
+        options: how to fit.
+        workers: where.
+        store: results of earlier runs.
+    """
+    tasks = [
+        CovariateTask(name, tuple(columns), tuple(rows), group, options)
+        for name, rows in trials.items()
+        if len(rows) >= FEWEST
+        for group in fold_groups(range(len(rows)), _FOLDS)
+    ]
+    folds = run_tasks(judge_covariates, tasks, workers, store=store)
+    gains: dict[tuple[str, str], list[float]] = {}
+    for task, fold in zip(tasks, folds, strict=True):
+        for column, values in fold.gains.items():
+            gains.setdefault((task.terrain, column), []).extend(values)
+    found: list[CovariateResult] = []
+    for (terrain, column), values in gains.items():
+        share = repeated(trials[terrain], columns.index(column))
+        found.append(_result(terrain, column, values, share))
+    return found
+
+
+def judge_covariates(task: CovariateTask) -> CovariateFold:
+    """Return what columns gain on the trials left out; a pure function of the task.
+
+    A column that no model can be fitted with is missing.
+    """
+    try:
+        without, family = _densities(task, None, FAMILIES)
+    except TractionError:
+        return CovariateFold({})
+    families = tuple(dict.fromkeys((NORMAL, family)))
+    gains: dict[str, tuple[float, ...]] = {}
+    for k, column in enumerate(task.columns):
+        try:
+            found, _ = _densities(task, k, families)
+        except TractionError:
+            continue
+        gains[column] = tuple(b - a for a, b in zip(without, found, strict=True))
+    return CovariateFold(gains)
+
+
+def _densities(
+    task: CovariateTask, column: int | None, families: Sequence[str]
+) -> tuple[list[float], str]:
+    """Return the log density per sample of trials left out, and the family chosen."""
+    tables = [rows.with_column(column) for rows in task.trials]
+    fitted = [rows for k, rows in enumerate(tables) if k not in task.left_out]
+    joined, options = SampleTable.joined(fitted), task.options
+    key = (options.seed, zlib.crc32(task.terrain.encode()), _STREAM + task.left_out[0])
+    count = min(options.gp_points, joined.count)
+    chosen = np.random.default_rng(key).choice(joined.count, count, replace=False)
+    training = TrainingSet(joined, tuple(rows.count for rows in fitted), chosen)
+    kernel = SquaredExponential(joined.inputs.shape[1])
+    fit = NewTrialFit(training, None, options.effect, families)
+    model = fit.fit(kernel)
+    found = [
+        float(
+            model.predict(rows.F_n, rows.v_t, rows.further).log_density(rows.F_t).mean()
+        )
+        for rows in (tables[k] for k in task.left_out)
+    ]
+    return found, model.choice.chosen
+
+
+def _result(
+    terrain: str, column: str, gains: Sequence[float], share: float
+) -> CovariateResult:
+    """Return the gain with Student's interval over the trials."""
+    from scipy.special import stdtrit
+
+    count, mean = len(gains), float(np.mean(gains))
+    spread = float(np.std(gains, ddof=1)) if count > 1 else float("inf")
+    reach = float(stdtrit(max(count - 1, 1), _LEVEL)) * spread / np.sqrt(count)
+    return CovariateResult(
+        terrain, column, count, mean, mean - reach, mean + reach, share
+    )
+
+
+def repeated(trials: Sequence[CovariateRows], column: int) -> float:
+    """Return the share of a column's changes over 0.2 s that is that of F_t.
+
+    Partial R^2 of its changes within trials on those of F_t, beside those of F_n and
+    v_t.
+    """
+    changes = [_changes(rows, column) for rows in trials]
+    every = np.concatenate([np.zeros((0, 4)), *changes])
+    if len(every) <= every.shape[1]:
+        return 0.0
+    known, own = every[:, 1:], every[:, 0]
+    left = [
+        float(np.sum((own - X @ np.linalg.lstsq(X, own, rcond=None)[0]) ** 2))
+        for X in (known[:, :2], known)
+    ]
+    return 1.0 - left[1] / left[0] if left[0] > 0.0 else 0.0
+
+
+def _changes(rows: CovariateRows, column: int) -> Array:
+    """Return changes over 0.2 s of column, F_n, v_t and F_t, shape (m, 4)."""
+    later = np.searchsorted(rows.t, rows.t + SPAN)
+    here = np.flatnonzero(later < rows.t.size)
+    there = later[here]
+    is_near = np.abs(rows.t[there] - rows.t[here] - SPAN) <= _NEAR * SPAN
+    here, there = here[is_near], there[is_near]
+    table = np.column_stack(
+        [rows.columns[:, column], rows.rows.F_n, rows.rows.v_t, rows.rows.F_t]
+    )
+    return table[there] - table[here]
+
+
+def way_since_drop(trial: PreparedTrial, least: float) -> Array:
+    """Return the way since the last drop of force at the kept samples [m], (m,).
+
+    A drop is known once the force has fallen by `least` [N] below its peak; before the
+    first one it is the way since the trial began.
+    """
+    F, v = trial.smooth.F_t, np.maximum(trial.smooth.v_t, 0.0)
+    steps = 0.5 * (v[1:] + v[:-1]) * np.diff(trial.smooth.t)
+    x = np.concatenate([[0.0], np.cumsum(steps)])
+    peaks, floors = falls(F, least)
+    known = [
+        peak + int(np.argmax(F[peak : floor + 1] <= F[peak] - least))
+        for peak, floor in zip(peaks, floors, strict=True)
+    ]
+    last = np.zeros(x.size)
+    last[known] = x[known]
+    return (x - np.maximum.accumulate(last))[trial.indices]

@@ -1,0 +1,63 @@
+"""Columns of trials that are tested beside a study: do they tell more of F_t?"""
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from analysis.data.prepare import prepare_trial
+from analysis.data.recorded_covariates import RECORDED, with_covariates
+from analysis.data.series import TractionSeries
+from analysis.findings.covariates import (
+    WAY,
+    CovariateResult,
+    CovariateRows,
+    covariate_results,
+)
+from analysis.findings.held_trial import TrialFiles
+from analysis.study.jobs import Store, Workers
+from analysis.study.study import Study
+from analysis.terrains.process_scores import least_drop
+from experiments.operator.console import Console
+
+KNOWN = (*RECORDED, WAY)  # of recordings
+
+
+def columns_tested(
+    study: Study,
+    trials: Mapping[str, Iterable[TractionSeries]],
+    columns: Sequence[str],
+    console: Console,
+    store: Store | None = None,
+) -> list[CovariateResult]:
+    """Return what columns tell on every terrain, and say so.
+
+    Args:
+        study: of the trials; the test is made with its choices.
+        trials: by terrain, with the columns among their further inputs.
+        columns: their names.
+        console: is told.
+        store: results of earlier runs.
+    """
+    if not columns:
+        return []
+    console.say(f"Does F_t follow from {', '.join(columns)}? fitting ...")
+    options = study.options
+    rows: dict[str, list[CovariateRows]] = {}
+    for name, group in trials.items():
+        least = least_drop(study.kinds[name])
+        prepared = (prepare_trial(series, options.prepare) for series in group)
+        rows[name] = [CovariateRows.of(t, columns, least) for t in prepared if t.kept]
+    workers = Workers(options.n_jobs, options.scheduler)
+    results = covariate_results(rows, columns, options.fit, workers, store)
+    for result in results:
+        console.say(result.sentence)
+    return results
+
+
+def recorded_columns(
+    files: Mapping[str, TrialFiles], columns: Sequence[str]
+) -> dict[str, Iterable[TractionSeries]]:
+    """Return recorded trials with columns, read again one by one."""
+    asked = [name for name in columns if name in RECORDED]
+    return {
+        name: (with_covariates(trial, asked) for trial in group)
+        for name, group in files.items()
+    }

@@ -1,0 +1,33 @@
+"""What a file may take of the memory that is free."""
+
+import pytest
+
+from analysis.data import memory
+from analysis.data.memory import share_of_memory
+
+
+@pytest.fixture
+def computer(tmp_path, monkeypatch):
+    """Return a folder that states what is free, and what a group may take."""
+    monkeypatch.setattr(memory, "_MEMORY", tmp_path / "meminfo")
+    monkeypatch.setattr(memory, "_GROUP", tmp_path)
+    (tmp_path / "meminfo").write_text("MemTotal: 9 kB\nMemAvailable: 8000 kB\n")
+    return tmp_path
+
+
+def test_it_is_a_part_of_what_is_free_and_no_less_than_the_least(computer):
+    assert share_of_memory(8, 10) == 1_024_000
+    assert share_of_memory(8, 2_000_000) == 2_000_000
+
+
+@pytest.mark.parametrize(("most", "part"), [("3000000", 250_000), ("max", 1_024_000)])
+def test_a_group_of_processes_may_have_less(computer, most, part):
+    (computer / "memory.max").write_text(most)
+    (computer / "memory.current").write_text("1000000")
+    assert share_of_memory(8, 10) == part
+
+
+@pytest.mark.parametrize("text", ["", "MemAvailable:", "MemAvailable: many kB"])
+def test_without_a_statement_it_is_the_least(computer, text):
+    (computer / "meminfo").write_text(text)
+    assert share_of_memory(8, 10) == 10
