@@ -166,7 +166,7 @@ class ConsoleLoop:
         return prompt not in _WORLD_ACTS and waited_ns >= _SETTLED_NS
 
     def _act(self) -> None:
-        """Let the simulated world go on: it has something to do, or a key was pressed."""
+        """Let the simulated world go on: there is something to do, or a key."""
         self._acted_ns, self._rests = self.rig.clock.now_ns(), 0
 
     def _advance(
