@@ -26,7 +26,8 @@ from analysis.study.models import TUSTIN
 from analysis.study.study import Study
 from analysis.study.terrain_fit import TerrainResult
 
-LIMIT = 6.5  # scales from the median of the terrain's trials
+_HAND = 0.15  # a hand differs by so much, or its double, from push to push [log]
+LIMIT = 6.0  # scales from the median of the terrain's trials
 _FEWEST = 4  # trials of a terrain that are compared
 _PRIOR = 5.0  # trials that the scale of all terrains counts as
 _TO_SD = 1.4826  # of a median absolute deviation of normal values
@@ -61,12 +62,12 @@ class Measure:
 
 MEASURES: Mapping[str, Measure] = {
     "residual": Measure("F_t of the same load and velocity", 0.1, unit="N"),
-    "load": Measure("normal force", 0.05, is_log=True),
+    "load": Measure("normal force", _HAND, is_log=True),
     "ratio": Measure("F_t/F_n", 0.03, is_log=True),
-    "speed": Measure("velocity", 0.05, is_log=True),
-    "kept": Measure("kept samples", 0.05, is_log=True),
+    "speed": Measure("velocity", _HAND, is_log=True),
+    "kept": Measure("kept samples", _HAND, is_log=True),
     "way": Measure("way", 0.05, is_log=True),
-    "noise": Measure("change from sample to sample", 0.05, is_log=True),
+    "noise": Measure("change from sample to sample", _HAND, is_log=True),
     "lag": Measure("delay of the force", 1.0, unit="ms"),
     "rest_t": Measure("F_t of the foot that stands", 0.2, unit="N"),
     "rest_n": Measure("F_n of the foot that stands", 0.2, unit="N"),
