@@ -172,7 +172,21 @@ def read_shared(path: Path) -> Any:  # noqa: ANN401
     """Return the value of a `shared_file`; its arrays are mapped, not read."""
     from joblib import load
 
+    _allow_files()
     return load(path, mmap_mode="r")
+
+
+def _allow_files() -> None:
+    """Let this process open as many files as the system grants it.
+
+    Every array that is mapped takes one: a study of two sessions more than the 1024
+    that most systems begin with.
+    """
+    with suppress(ImportError, OSError, ValueError):
+        import resource  # only Unix has it
+
+        _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
 
 
 def _begin(ends: Connection) -> None:

@@ -62,15 +62,29 @@ class AvailableForce:
     is_extrapolated: bool
 
 
+def check_finite(**values: float) -> None:
+    """Refuse a value that nothing can be asked for.
+
+    Raises:
+        SettingsError: one is not a finite number.
+    """
+    for name, value in values.items():
+        try:
+            is_finite = math.isfinite(value)
+        except (TypeError, OverflowError):  # a word, a column, a number without end
+            is_finite = False
+        if not is_finite:
+            raise SettingsError(f"{name} = {value!r:.40} is not a finite number.")
+
+
 def check_query(**forces: float) -> None:
     """Refuse forces that no push can have.
 
     Raises:
         SettingsError: a value is negative or no finite number.
     """
+    check_finite(**forces)
     for name, force in forces.items():
-        if not math.isfinite(force):
-            raise SettingsError(f"{name} = {force} is not a finite number.")
         if force < 0.0:
             raise SettingsError(
                 f"{name} = {force:g} N is negative.", hint="Give a force of 0 or more."

@@ -211,12 +211,18 @@ def _is_swapped(trial: PreparedTrial) -> bool:
     It stands there with its weight, and nobody pushes it yet.
     """
     smooth = trial.smooth
-    moving = np.flatnonzero(np.abs(smooth.v_t) > 2.0 * SLOWEST)
-    end = int(moving[0]) if moving.size else 0
-    if end < 2 or smooth.t[end] - smooth.t[0] < _REST:
+    end = standing_rows(smooth)
+    if not end:
         return False
     load, along = float(np.median(smooth.F_n[:end])), float(np.median(smooth.F_t[:end]))
     return along > max(PRESSED, 2.0 * abs(load))
+
+
+def standing_rows(smooth: Smoothed) -> int:
+    """Return how many rows a foot stands before it first moves; 0 where too short."""
+    moving = np.flatnonzero(np.abs(smooth.v_t) > 2.0 * SLOWEST)
+    end = int(moving[0]) if moving.size else 0
+    return end if end >= 2 and smooth.t[end] - smooth.t[0] >= _REST else 0
 
 
 def _normal(load: Array) -> Iterator[Doubt]:

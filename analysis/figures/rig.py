@@ -18,6 +18,8 @@ from analysis.figures.style import (
 from analysis.findings.findings import StudyResults
 from analysis.findings.rig_health import PERIOD_EDGES, SKEW_EDGES, RigTrial
 
+_NAMED = 8  # sessions that have their name below a figure
+
 
 def draw_timing(results: StudyResults) -> Figure | None:
     """Return histograms of the period and of the age of the force samples."""
@@ -97,6 +99,72 @@ def caption_rig(results: StudyResults) -> str:
     )
 
 
+def draw_drift(results: StudyResults) -> Figure | None:
+    """Return tares and load of every trial, session by session in their order."""
+    sessions = _by_session(results.rig)
+    if len(sessions) < 2:
+        return None
+    figure = new_figure(3.6)
+    above, below = figure.subplots(2, 1, sharex=True)
+    for axis, (letter, mark) in enumerate(zip("xyz", "os^", strict=True)):
+        x, y = _along_sessions(sessions, lambda trial, k=axis: trial.tare[k])
+        above.plot(x, y, mark, ms=2.8, label=f"${letter}$")
+    above.set_ylabel("tare [N]")
+    above.legend(ncols=3)
+    x, y = _along_sessions(sessions, lambda trial: trial.load_bias)
+    below.plot(x, y, "o", ms=2.8)
+    below.axhline(0.0, color="#808080", lw=0.6)
+    below.set_ylabel("$F_n$ above the set load [N]")
+    step = -(-len(sessions) // _NAMED)
+    below.set_xticks(range(0, len(sessions), step), list(sessions)[::step])
+    below.set_xlabel("session in their order, trials from left to right")
+    return figure
+
+
+def caption_drift(results: StudyResults) -> str:
+    """State how far tares and load went from the first to the last session."""
+    sessions = list(_by_session(results.rig).values())
+    first, last = (
+        np.median([trial.tare for trial in sessions[k]], axis=0) for k in (0, -1)
+    )
+    moved = ", ".join(f"{value:+.2f}" for value in (last - first).tolist())
+    words = f"From the first to the last session the tare went by {moved} N (x, y, z)"
+    loads = [
+        [trial.load_bias for trial in sessions[k] if trial.load_bias is not None]
+        for k in (0, -1)
+    ]
+    if all(loads):
+        change = float(np.median(loads[1]) - np.median(loads[0]))
+        words += f" and the load by {change:+.2f} N"
+    return (
+        f"{words} (medians of a session). A tare that goes on and on is a sensor that "
+        "is overloaded or warms up; a load that goes away from the set one is gravity "
+        "or friction to calibrate again: traction check says how old they are."
+    )
+
+
+def _by_session(rig: Sequence[RigTrial]) -> dict[str, list[RigTrial]]:
+    """Return the trials by their sessions, both in the order of their beginning."""
+    sessions: dict[str, list[RigTrial]] = {}
+    for trial in sorted(rig, key=lambda each: (each.started_utc, each.name)):
+        sessions.setdefault(trial.session, []).append(trial)
+    return sessions
+
+
+def _along_sessions(
+    sessions: Mapping[str, Sequence[RigTrial]],
+    measure: Callable[[RigTrial], float | None],
+) -> tuple[list[float], list[float]]:
+    """Return places along the sessions, counted from 0, and what was measured there."""
+    pairs = [
+        (position + 0.8 * ((k + 0.5) / len(trials) - 0.5), value)
+        for position, trials in enumerate(sessions.values())
+        for k, trial in enumerate(trials)
+        if (value := measure(trial)) is not None
+    ]
+    return [x for x, _ in pairs], [y for _, y in pairs]
+
+
 def _draw_by_trial(
     ax: Axes,
     rig: Sequence[RigTrial],
@@ -142,6 +210,15 @@ FIGURES = (
         "of the locked joint, warmest puck or motor, load above what was set.",
         draw_rig,
         caption_rig,
+        ReportSection.HEALTH,
+    ),
+    FigureSpec(
+        "drift",
+        "Drift of tare and load over the sessions",
+        "Two panels with one dot per trial, session after session: the tare along the "
+        "sensor's three axes, and the load above what was set.",
+        draw_drift,
+        caption_drift,
         ReportSection.HEALTH,
     ),
 )

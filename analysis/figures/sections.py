@@ -53,4 +53,5 @@ PAGE_ORDER = (
     "stick_slip",
     "timing",
     "rig",
+    "drift",
 )

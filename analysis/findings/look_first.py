@@ -7,10 +7,10 @@ terrains together, as ten trials alone tell their spread badly:
 
     z = (x - median) / sqrt((n s^2 + n0 s0^2) / (n + n0))
 
-A trial is named beyond `LIMIT`, or where its motion and forces cannot be right. Of 20
-simulated studies (`python -m studies.look_first`) the spoilt trial was among the first
-three in 15, and in two a sound one was named: the common scale hides an offset on a
-terrain of small spread, and forces 30 ms late do not show on plates.
+A trial is named beyond `LIMIT`, or where its motion and forces cannot be right. What a
+foot shows that stands, before anybody pushes, tells most of the sensor: stones and
+hands differ from trial to trial, its weight and the noise do not. Forces that are some
+milliseconds late do not show on plates.
 """
 
 import math
@@ -19,18 +19,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.data.plausibility import doubts_of
+from analysis.data.plausibility import doubts_of, standing_rows
+from analysis.data.prepare import Smoothed
 from analysis.data.series import Array
 from analysis.study.models import TUSTIN
 from analysis.study.study import Study
 from analysis.study.terrain_fit import TerrainResult
 
+_HAND = 0.15  # a hand differs by so much, or its double, from push to push [log]
 LIMIT = 6.0  # scales from the median of the terrain's trials
 _FEWEST = 4  # trials of a terrain that are compared
 _PRIOR = 5.0  # trials that the scale of all terrains counts as
 _TO_SD = 1.4826  # of a median absolute deviation of normal values
 _SMOOTH = "friction"  # a doubt that smooth ground raises; the ratio is compared
 _TOLD = 3  # measures in one reason
+_STANDING = 0.5  # s at the start in which the foot stands and nobody pushes yet
+_FEWEST_ROWS = 50  # of them
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,13 +62,17 @@ class Measure:
 
 MEASURES: Mapping[str, Measure] = {
     "residual": Measure("F_t of the same load and velocity", 0.1, unit="N"),
-    "load": Measure("normal force", 0.1, unit="N"),
+    "load": Measure("normal force", _HAND, is_log=True),
     "ratio": Measure("F_t/F_n", 0.03, is_log=True),
-    "speed": Measure("velocity", 0.05, is_log=True),
-    "kept": Measure("kept samples", 0.05, is_log=True),
+    "speed": Measure("velocity", _HAND, is_log=True),
+    "kept": Measure("kept samples", _HAND, is_log=True),
     "way": Measure("way", 0.05, is_log=True),
-    "noise": Measure("change from sample to sample", 0.05, is_log=True),
+    "noise": Measure("change from sample to sample", _HAND, is_log=True),
     "lag": Measure("delay of the force", 1.0, unit="ms"),
+    "rest_t": Measure("F_t of the foot that stands", 0.2, unit="N"),
+    "rest_n": Measure("F_n of the foot that stands", 0.2, unit="N"),
+    "rest_noise_t": Measure("noise of F_t at rest", 0.05, is_log=True),
+    "rest_noise_n": Measure("noise of F_n at rest", 0.05, is_log=True),
 }
 
 
@@ -118,23 +126,46 @@ def _measured(result: TerrainResult, number: int) -> dict[str, float]:
     if not trial.kept:
         return {}
     values = {
-        "load": float(trial.F_n.mean()),
         "speed": float(np.log(trial.v_t.mean())),
         "kept": math.log(trial.kept),
-        "noise": float(np.log(np.abs(np.diff(trial.smooth.F_t)).mean() + 1e-9)),
+        "noise": _noise(trial.smooth.F_t),
     }
     if trial.travel > 0.0:
         values["way"] = math.log(trial.travel)
-    if values["load"] > 0.0 and (force := float(trial.F_t.mean())) > 0.0:
-        values["ratio"] = math.log(force / values["load"])
+    load, force = float(trial.F_n.mean()), float(trial.F_t.mean())
+    if load > 0.0:
+        values["load"] = math.log(load)
+        if force > 0.0:
+            values["ratio"] = math.log(force / load)
     if trial.lag is not None:
         values["lag"] = 1e3 * trial.lag.seconds
+    values |= _standing(trial.smooth)
     for fold in result.folds:
         if number in fold.left_out and TUSTIN in fold.models:
             model = fold.models[TUSTIN].model
             rest = trial.F_t - model.mean(trial.F_n, trial.v_t, trial.further)
             values["residual"] = float(rest.mean())
     return values
+
+
+def _standing(smooth: Smoothed) -> dict[str, float]:
+    """Return what the sensor shows of a foot that stands and nobody pushes yet."""
+    until = smooth.t[0] + _STANDING
+    end = min(standing_rows(smooth), int(np.searchsorted(smooth.t, until)))
+    if end < _FEWEST_ROWS:
+        return {}
+    F_t, F_n = smooth.F_t[:end], smooth.F_n[:end]
+    return {
+        "rest_t": float(np.median(F_t)),
+        "rest_n": float(np.median(F_n)),
+        "rest_noise_t": _noise(F_t),
+        "rest_noise_n": _noise(F_n),
+    }
+
+
+def _noise(force: Array) -> float:
+    """Return the logarithm of the change from sample to sample."""
+    return float(np.log(np.abs(np.diff(force)).mean() + 1e-9))
 
 
 def _deviations(values: Sequence[Mapping[str, float]], name: str) -> Array:

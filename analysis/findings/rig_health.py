@@ -66,6 +66,7 @@ class RigTrial:
     Attributes:
         terrain: its terrain.
         name: session and trial.
+        started_utc: when it began, ISO 8601; empty where that was not kept.
         cycles: recorded.
         missed: cycles that the loop could not begin in time.
         periods: cycles by length [PERIOD_EDGES], shape (bins,);
@@ -100,6 +101,7 @@ class RigTrial:
 
     terrain: str
     name: str
+    started_utc: str
     cycles: int
     missed: int
     periods: Array
@@ -122,6 +124,11 @@ class RigTrial:
     drag: float | None
     rest_open: float | None
     lateral: float | None
+
+    @property
+    def session(self) -> str:
+        """Name of its session."""
+        return self.name.partition("/")[0]
 
     def numbers(self) -> dict[str, Any]:
         """Return everything but the histograms as plain values."""
@@ -172,6 +179,7 @@ def health_of(trial: RecordedTrial) -> RigTrial:
     return RigTrial(
         terrain=trial.terrain,
         name=trial.name,
+        started_utc=trial.metadata["trial"].get("started_utc", ""),
         cycles=trial.t.size,
         missed=int(trial.metadata["result"]["cycles_missed"]),
         periods=np.histogram(gaps, PERIOD_EDGES)[0].astype(np.float64),

@@ -31,6 +31,7 @@ from analysis.imported.channels import (
 )
 from analysis.imported.estimates import (
     LONGEST_LAG,
+    SURE,
     Bools,
     Estimate,
     Lag,
@@ -73,6 +74,7 @@ _ON_GROUND = 0.001  # m above its lowest place at which a foot is not free
 _FORGOTTEN = 1.0  # N that a tared sensor may read in the air
 _TURN_TOLD = 2.0  # degrees of turn under load from which an unknown weight is named
 _LITTLE = 0.1  # kg
+_USUAL_LAG = 0.03  # s of a sensor's filter and its driver
 _OWN = "traction_msgs/Cycle"
 _CHECK_OPTIONS = "check --sensor, --acts, --tare, --along and the URDF"
 
@@ -502,22 +504,16 @@ class _Import:
     def _lag(self, axes: Array, force: Array) -> tuple[float, Estimate]:
         """Return how late the wrench is; given, found, or 0 where it is not known."""
         given = self._request.lag
+        if given is not None and abs(given) > LONGEST_LAG:
+            raise SettingsError(
+                f"A lag of {given * 1e3:.0f} ms is none (limit "
+                f"{LONGEST_LAG * 1e3:.0f}).",
+                hint="Set the clocks of both computers.",
+            )
+        lag = self._shown_lag(axes, force)
         if given is not None:
-            if abs(given) > LONGEST_LAG:
-                raise SettingsError(
-                    f"A lag of {given * 1e3:.0f} ms is none (limit "
-                    f"{LONGEST_LAG * 1e3:.0f}).",
-                    hint="Set the clocks of both computers.",
-                )
+            self._doubt_lag(given, lag)
             return given, Estimate("lag", (given * 1e3,), "ms", (), "given")
-        sound = np.isfinite(force).all(axis=1)
-        t = self._motion.t
-        width = rows_averaged(self._motion.step)
-        v_t, F_t, F_n = traction(axes, self._path.velocity, force).T
-        F_t, F_n = (
-            moving_average(np.interp(t, t[sound], F[sound]), width) for F in (F_t, F_n)
-        )
-        lag = find_lag(t, v_t, F_n, F_t)
         if lag is None:
             self._warnings.append(
                 "the lag between joints and wrench is not known and taken as 0: too "
@@ -525,6 +521,31 @@ class _Import:
             )
             return 0.0, Estimate("lag", (0.0,), "ms", (), "not found, taken as 0")
         return lag.seconds, _lag_estimate(lag)
+
+    def _doubt_lag(self, given: float, shown: Lag | None) -> None:
+        """Warn of a lag that is not that of the motion, or longer than usual."""
+        if shown is not None:
+            if not shown.low - SURE <= given <= shown.high + SURE:
+                self._warnings.append(
+                    f"a lag of {given * 1e3:.0f} ms was given; starts and stops show "
+                    f"{shown.low * 1e3:.0f} to {shown.high * 1e3:.0f} ms"
+                )
+        elif abs(given) > _USUAL_LAG:
+            self._warnings.append(
+                f"a lag of {given * 1e3:.0f} ms was given; no start or stop shows it, "
+                f"and one over {_USUAL_LAG * 1e3:.0f} ms is rare"
+            )
+
+    def _shown_lag(self, axes: Array, force: Array) -> Lag | None:
+        """Return the lag that starts and stops show; None where they do not."""
+        sound = np.isfinite(force).all(axis=1)
+        t = self._motion.t
+        width = rows_averaged(self._motion.step)
+        v_t, F_t, F_n = traction(axes, self._path.velocity, force).T
+        F_t, F_n = (
+            moving_average(np.interp(t, t[sound], F[sound]), width) for F in (F_t, F_n)
+        )
+        return find_lag(t, v_t, F_n, F_t)
 
     def _say_of_weight(self, mass: float, strokes: Sequence[tuple[int, int]]) -> None:
         """Name a weight that is not known and turns with the sensor."""

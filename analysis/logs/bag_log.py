@@ -16,6 +16,7 @@ from analysis.logs.log_file import (
     MOST_TOPICS,
     LogMessage,
     LogTopic,
+    OneFile,
     checked_definition,
     checked_name,
     damaged,
@@ -30,10 +31,9 @@ _NS = 1_000_000_000
 _Header = dict[bytes, bytes]
 
 
-class BagLog:
+class BagLog(OneFile):
     """Implements `analysis.logs.log_file.LogFile`."""
 
-    is_simulated = False  # this format has no metadata that could say so
     format = "ROS 1 bag"
 
     def __init__(self, path: Path) -> None:
@@ -42,10 +42,7 @@ class BagLog:
         Raises:
             SettingsError: a name or a definition is too long, or there are too many.
         """
-        self.path = path
-        self.topics: dict[str, LogTopic] = {}
-        self.losses: list[str] = []
-        self.unread: dict[str, str] = {}
+        super().__init__(path)
         self._connections: dict[int, str] = {}
         for _ in self._records(set()):
             pass

@@ -77,6 +77,22 @@ class LogFile(Protocol):
         ...
 
 
+class OneFile:
+    """What every reader of one file begins with; see `LogFile`."""
+
+    def __init__(self, path: Path) -> None:
+        """Nothing of it is known yet.
+
+        Args:
+            path: the file.
+        """
+        self.path = path
+        self.topics: dict[str, LogTopic] = {}
+        self.losses: list[str] = []
+        self.unread: dict[str, str] = {}
+        self.is_simulated = False  # some formats have no metadata that could say so
+
+
 def damaged(path: Path, what: str, hint: str = "") -> SettingsError:
     """Return a refusal of a log."""
     return SettingsError(

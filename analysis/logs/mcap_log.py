@@ -17,6 +17,7 @@ from analysis.logs.log_file import (
     MOST_TOPICS,
     LogMessage,
     LogTopic,
+    OneFile,
     Serialization,
     checked_definition,
     checked_name,
@@ -34,7 +35,7 @@ _SERIALIZATIONS: dict[str, Serialization] = {"cdr": "cdr", "ros1": "ros1"}
 _ENCODINGS = ("ros2msg", "ros1msg")
 
 
-class McapLog:
+class McapLog(OneFile):
     """Implements `analysis.logs.log_file.LogFile`."""
 
     format = "MCAP"
@@ -45,11 +46,7 @@ class McapLog:
         Raises:
             SettingsError: a name or a definition is too long, or there are too many.
         """
-        self.path = path
-        self.topics: dict[str, LogTopic] = {}
-        self.losses: list[str] = []
-        self.unread: dict[str, str] = {}
-        self.is_simulated = False
+        super().__init__(path)
         for _ in self._records(is_whole=False):
             pass
 

@@ -14,6 +14,7 @@ from analysis.logs.log_file import (
     MOST_TOPICS,
     LogMessage,
     LogTopic,
+    OneFile,
     checked_definition,
     checked_name,
     damaged,
@@ -31,10 +32,9 @@ _DEFINITIONS = "message_definitions"
 _CACHE_KB = 16_000
 
 
-class SqliteLog:
+class SqliteLog(OneFile):
     """Implements `analysis.logs.log_file.LogFile`."""
 
-    is_simulated = False  # this format has no metadata that could say so
     format = "rosbag2, SQLite"
 
     def __init__(self, path: Path) -> None:
@@ -43,10 +43,7 @@ class SqliteLog:
         Raises:
             SettingsError: it is no log of rosbag2, or damaged.
         """
-        self.path = path
-        self.losses: list[str] = []
-        self.unread: dict[str, str] = {}
-        self.topics: dict[str, LogTopic] = {}
+        super().__init__(path)
         self._numbers: dict[int, str] = {}
         with self._opened() as database:
             tables = {

@@ -102,7 +102,8 @@ def _database(
     foresight: ForesightModel,
 ) -> str:
     """Return the terrain database of a study, with foresight."""
-    models = tuple(m for m in (GP_SE, GP_SE_TRIAL) if m in study.options.fit.models)
+    asked = study.options.fit.models
+    models = tuple(m for m in (GP_SE, GP_SE_TRIAL) if m in asked) or asked
     fit = replace(study.options.fit, models=models, draws=0)
     return database_of(
         replace(study, options=replace(study.options, fit=fit)),

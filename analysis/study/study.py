@@ -57,6 +57,7 @@ from analysis.study.trial_components import (
     fit_components,
 )
 
+_NAMED = 10  # trials in one warning
 _LOADED = 5.0  # N: below it F_t/F_n says little, whatever the ground
 _PLOUGHING = 1.5  # of F_t/F_n in the upper quarter; stones of one layer stay below
 
@@ -400,6 +401,11 @@ def _all_warnings(
     ]
 
 
+def _listed(numbers: Sequence[int]) -> str:
+    more = len(numbers) - _NAMED
+    return ", ".join(map(str, numbers[:_NAMED])) + (f" and {more} more" * (more > 0))
+
+
 def _warnings(result: TerrainResult, has_container: bool) -> list[str]:
     warnings = []
     if result.pulled_share > PULLED_WARNING:
@@ -414,7 +420,7 @@ def _warnings(result: TerrainResult, has_container: bool) -> list[str]:
             f"{result.terrain}: too short to count - under {MINIMUM_KEPT} kept samples"
             f"{', or the container not crossed' if has_container else ''} - in "
             f"{len(short)} of {len(result.trials)} trials, analysed nevertheless "
-            f"(trial {', '.join(map(str, short))})."
+            f"(trial {_listed(short)})."
         )
     dropped = sum(t.dropped_rows for t in result.trials if not t.is_foreign)
     if dropped:

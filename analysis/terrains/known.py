@@ -4,7 +4,6 @@
 believes it.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from numbers import Real
@@ -13,7 +12,7 @@ from typing import Any, overload
 from numpy.typing import ArrayLike
 
 from acquisition.errors import SettingsError
-from analysis.breakaway.answers import BreakAwayRisk
+from analysis.breakaway.answers import BreakAwayRisk, check_finite
 from analysis.breakaway.model import BreakAwayModel
 from analysis.data.series import Array
 from analysis.data.terrain_kinds import Value
@@ -102,7 +101,7 @@ class KnownTerrain:
         table = self._table(model)
         if isinstance(F_n, Real) and isinstance(v_t, Real):
             load, speed = float(F_n), float(v_t)
-            _check_finite(F_n=load, v_t=speed)
+            check_finite(F_n=load, v_t=speed)
             forces = table.at(load, speed)
             return TractionEstimate(table.shares, forces, not table.covers(load, speed))
         loads, speeds = points_of(F_n, v_t)
@@ -194,7 +193,7 @@ class KnownTerrain:
         Raises:
             SettingsError: a value is not a finite number.
         """
-        _check_finite(required=required, F_n=F_n, v_t=v_t)
+        check_finite(required=required, F_n=F_n, v_t=v_t)
         table = self._table("")
         risk = self.predict(F_n, v_t).probability_below(required)
         is_covered = table.covers(F_n, max(v_t, table.v_t[0]))
@@ -208,17 +207,6 @@ class KnownTerrain:
                 hint=f"Models: {', '.join(self.tables)}.",
             )
         return table
-
-
-def _check_finite(**values: float) -> None:
-    """Refuse a value that no table can be asked for.
-
-    Raises:
-        SettingsError: one is not a finite number.
-    """
-    for name, value in values.items():
-        if not math.isfinite(value):
-            raise SettingsError(f"{name} = {value} is not a finite number.")
 
 
 @dataclass(frozen=True, slots=True)

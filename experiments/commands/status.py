@@ -79,7 +79,7 @@ def run(args: argparse.Namespace) -> int:
         kinds = {line.is_simulated for line in lines if line.sessions} or {False}
         steps = enough_lines(seen, rows, where)
         for kind in sorted(kinds):
-            steps += next_steps(args.data, seen, matrix, is_simulated=kind)
+            steps += next_steps(args.data, seen, matrix, where, is_simulated=kind)
         notes = table_notes(args.data, known, terrains, where, lines)
         return StatusTable(lines, notes, steps, find_deviations(seen, where))
 

@@ -44,8 +44,8 @@ _DRIVEN = frozenset({ArmState.FLOAT, ArmState.HOLD, ArmState.DAMP, ArmState.GUID
 LAY_DOWN_SECONDS = 60.0  # the arm waits so long for a hand before it goes idle
 # At these simulated time decides what comes next, not a key.
 _WORLD_ACTS = frozenset({Prompt.RECORDING, Prompt.MOVING, Prompt.LIFT, Prompt.UNDO})
-_SETTLED_NS = 5_000_000_000  # at any other, it has come to rest within this
-_REST_TICKS = 25  # of the wall to one of a world at rest
+_SETTLED_NS = 2_000_000_000  # at any other, it is at rest so long after the hand
+_REST_TICKS = 50  # of the wall to one of a world at rest
 _SLOW = 0.95  # of real time; below it the screen says so
 _ON_STAND = 0.1  # rad
 _STANDS = 0.3  # s, in which an arm that holds has come to rest
@@ -82,7 +82,7 @@ class ConsoleLoop:
     _shown_ns: int = field(default=0, init=False)
     _prompt: tuple[Prompt, int, int] | None = field(default=None, init=False)
     _prompt_ns: int = field(default=0, init=False)  # when `_prompt` began
-    _acted_ns: int = field(default=0, init=False)  # newest key, or start of `_prompt`
+    _acted_ns: int = field(default=0, init=False)  # newest key, move, prompt
     _rests: int = field(default=0, init=False)  # ticks since
     _rested_ns: int = field(default=0, init=False)  # in which simulated time stood
     _is_stopped: bool = field(default=False, init=False)
@@ -144,14 +144,11 @@ class ConsoleLoop:
         """Let 20 ms pass, or let them pass on the wall only.
 
         A person may read a prompt for minutes. What the simulated world does at it is
-        done after some seconds; from then on its time goes at a small share of real
-        time, which costs as little and runs into no limit.
+        done soon after its hand is; from then on its time goes at a small share of
+        real time, which costs as little and runs into no limit.
         """
-        if self._prompt is None or prompt is not self._prompt[0]:
-            self._act()
-        pace, waited_ns = self.rig.pace, self.rig.clock.now_ns() - self._acted_ns
-        is_done = prompt not in _WORLD_ACTS and waited_ns >= _SETTLED_NS
-        if pace is not None and is_done and is_person(self.operator):
+        pace = self.rig.pace
+        if pace is not None and is_person(self.operator) and self._rests_at(prompt):
             self._rests += 1
             if self._rests % _REST_TICKS:
                 pace.rest(TICK)
@@ -159,8 +156,17 @@ class ConsoleLoop:
                 return
         self.loop_client.advance(TICK)
 
+    def _rests_at(self, prompt: Prompt) -> bool:
+        """Return whether the simulated world has nothing left to do at `prompt`."""
+        simulation = self.rig.simulation
+        is_led = simulation is not None and not simulation.is_hand_done
+        if self._prompt is None or prompt is not self._prompt[0] or is_led:
+            self._act()
+        waited_ns = self.rig.clock.now_ns() - self._acted_ns
+        return prompt not in _WORLD_ACTS and waited_ns >= _SETTLED_NS
+
     def _act(self) -> None:
-        """Let the simulated world go on: a prompt begins, or a key was pressed."""
+        """Let the simulated world go on: there is something to do, or a key."""
         self._acted_ns, self._rests = self.rig.clock.now_ns(), 0
 
     def _advance(

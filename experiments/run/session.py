@@ -48,6 +48,7 @@ from experiments.settings.matrix import TerrainRow
 from experiments.status_table.session_summaries import glance_sessions
 from experiments.status_table.summary_cache import matrix_of
 from experiments.status_table.upcoming import next_steps
+from experiments.status_table.where import Where
 from experiments.trial.files import SessionMetadata, collect_metadata
 
 
@@ -291,7 +292,9 @@ def _print_next(request: SessionRequest, journal: Journal, code: int) -> None:
     matrix = matrix_of(request.settings.matrix)
     try:
         seen = glance_sessions(request.data)
-        steps = next_steps(request.data, seen, matrix, is_simulated=is_simulated)
+        steps = next_steps(
+            request.data, seen, matrix, Where(), is_simulated=is_simulated
+        )
     except TractionError as error:  # of another session; this one is complete
         steps = [f"▲ The next terrain is unknown: {error.message}"]
     for step in steps:

@@ -31,10 +31,19 @@ def next_steps(
     data: Path,
     seen: Sequence[SeenSession],
     matrix: StatusMatrix,
+    where: Where,
     *,
     is_simulated: bool,
 ) -> list[str]:
-    """Return what others have open, what is to be resumed, which terrain comes next."""
+    """Return what others have open, what is to be resumed, which terrain comes next.
+
+    Args:
+        data: the data folder.
+        seen: all sessions in it.
+        matrix: the terrains and their order.
+        where: of the order only terrains with these values are told; it is made of all.
+        is_simulated: of which kind of session.
+    """
     own = [s for s in seen if s.summary.problem is None]
     own = [s for s in own if s.folder.is_simulated is is_simulated]
     steps = [text for text in map(_opened, own) if text]
@@ -45,7 +54,8 @@ def next_steps(
             number = session.folder.id
             steps.append(f"{text} To go on: traction resume {number}{option}")
     done = [s.folder.terrain for s in own if not s.summary.is_of_stances]
-    order = suggest_order(matrix, done)
+    asked = {row.name for row in matrix.rows if where.matches(facts_of_row(row))}
+    order = [name for name in suggest_order(matrix, done) if name in asked]
     if order:
         steps.append(f"{_ORDERS[matrix.order]}: {_listed(order)}")
     return steps

@@ -42,7 +42,7 @@ def test_nothing_stands_out_among_trials_that_are_alike():
     ("change", "words"),
     [
         (lambda s: replace(s, F_t=s.F_t + 2.0), "F_t of the same load and velocity +2"),
-        (lambda s: replace(s, F_n=s.F_n + 4.0), "normal force +"),
+        (lambda s: replace(s, F_n=s.F_n + 4.0), "F_t/F_n 0."),
         (lambda s: replace(s, v_t=0.3 * s.v_t), "velocity 0."),
         (
             lambda s: replace(
@@ -62,6 +62,42 @@ def test_a_trial_with_something_wrong_is_the_first_and_says_what(change, words):
     assert any(words in reason for reason in odd[0].reasons), odd[0].reasons
     (table,) = look_first_tables(run_study({"X": trials}, OPTIONS, simulated=True))
     assert table.rows[0][1] == "4"
+
+
+def stood(series):
+    """Return a push before which the foot stands on its weight alone, at 125 Hz.
+
+    Such a rate is too low for the lag of a force.
+    """
+    rng = np.random.default_rng(int(series.name[1:]))
+    t = np.arange(series.t.size + 500) / 125.0
+    load, force = (
+        np.concatenate([weight + rng.normal(0.0, 0.3, 500), values])
+        for weight, values in ((2.9, series.F_n), (0.0, series.F_t))
+    )
+    v_t = np.concatenate([np.zeros(500), series.v_t])
+    return replace(series, t=t, v_t=v_t, F_n=load, F_t=force)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda s: replace(s, F_t=s.F_t + 3.0), "F_t of the foot that stands +3"),
+        (lambda s: replace(s, F_n=s.F_n + 3.0), "F_n of the foot that stands +3"),
+        (
+            lambda s: replace(
+                s, F_n=s.F_n + np.random.default_rng(1).normal(0.0, 3.0, s.t.size)
+            ),
+            "noise of F_n at rest 8",
+        ),
+    ],
+)
+def test_a_wrong_sensor_is_seen_at_a_foot_that_stands_on_any_ground(change, words):
+    trials = [stood(push(k, mu=0.4 + 0.1 * k)) for k in range(10)]
+    assert found(trials) == []
+    trials[3] = change(trials[3])
+    assert found(trials)[0].number == 4
+    assert any(words in reason for reason in found(trials)[0].reasons)
 
 
 def test_three_trials_are_too_few_to_compare():

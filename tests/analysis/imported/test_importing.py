@@ -81,10 +81,26 @@ def test_the_lag_is_found_within_the_interval_that_is_stated(imported, lag):
     assert low <= lag * 1e3 <= high
 
 
-def test_a_lag_of_a_smooth_push_is_not_claimed(imported):
+def smooth():
+    """Return a recording without starts and stops that show a lag."""
     rubbing = Rubbing()
     rubbing.speed = lambda t: 0.03 * np.sin(np.pi * np.clip(t - 3.5, 0, 7) / 7) ** 2
-    found = imported(rubbing, mass=0.3)
+    return rubbing
+
+
+@pytest.mark.parametrize(
+    ("rubbing", "words"),
+    [(Rubbing(), "starts and stops show"), (smooth(), "over 30 ms is rare")],
+)
+def test_a_lag_that_is_given_is_held_against_the_motion(imported, rubbing, words):
+    far = imported(rubbing, mass=0.3, lag=0.09).warnings
+    assert any("a lag of 90 ms was given" in text and words in text for text in far)
+    near = imported(rubbing, mass=0.3, lag=rubbing.lag).warnings
+    assert not any("lag of" in text for text in near)
+
+
+def test_a_lag_of_a_smooth_push_is_not_claimed(imported):
+    found = imported(smooth(), mass=0.3)
     assert figure(found, "lag")[0] == 0.0
     assert any("is not known and taken as 0" in text for text in found.warnings)
 

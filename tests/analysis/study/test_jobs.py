@@ -1,5 +1,6 @@
 import os
 import signal
+import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -120,6 +121,24 @@ def test_tasks_of_one_body_of_data_are_known_by_their_numbers(n_jobs):
 def test_workers_map_the_data_that_tasks_share():
     *_, last = run_tasks(total, Sums(np.arange(50_000.0)), 2)
     assert last == (10.0, "memmap")
+
+
+MANY = """
+import resource
+import numpy as np
+from acquisition.worker_processes import read_shared, shared_file
+_, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+resource.setrlimit(resource.RLIMIT_NOFILE, (64, most))
+with shared_file([np.full(3, float(k)) for k in range(200)]) as file:
+    print(sum(array.sum() for array in read_shared(file)))
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of open files")
+def test_more_arrays_are_mapped_than_files_may_be_open_at_first():
+    words = [sys.executable, "-c", MANY]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert done.stdout.strip() == "59700.0", done.stderr
 
 
 def itself(values):
