@@ -46,7 +46,7 @@ from analysis.terrains.contact_fit import fit_contact_law
 from analysis.terrains.contact_law import ContactLaw
 from analysis.terrains.generator_check import SampledTrials
 from analysis.terrains.identify import Identification, identify_study
-from analysis.terrains.process_rows import every_process_trial
+from analysis.terrains.process_rows import every_process_trial, process_trials
 from analysis.terrains.process_scores import least_drop
 
 RESIDUAL_MODELS = (TUSTIN, GP_SE)
