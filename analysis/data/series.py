@@ -38,6 +38,7 @@ class TractionSeries:
         factors: what else is known of the terrain and the foot, by name; None = does
             not apply.
         logs: numbers among the factors that are compared by their logarithm.
+        units: of numbers among the factors, by name.
         stamped_lag: how much older than the velocity the forces are by their own time
             stamps [s]; 0 where they have none.
         is_prepared: the rows are samples kept by an earlier preparation: smoothed,
@@ -64,6 +65,7 @@ class TractionSeries:
     incline_deg: float | None = None
     factors: Mapping[str, Value] = field(default_factory=dict[str, Value])
     logs: frozenset[str] = frozenset()
+    units: Mapping[str, str] = field(default_factory=dict[str, str])
     stamped_lag: float = 0.0
     is_prepared: bool = False
     is_simulated: bool = False

@@ -1,6 +1,6 @@
 """Traction by the factors of an experiment."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -72,7 +72,8 @@ def draw_factors(results: StudyResults) -> Figure | None:
             alpha=0.7,
             label=None if label is None else plain(label),
         )
-    _label(ax, names[0], firsts, places)
+    units = {n: unit for r in terrains for n, unit in r.units.items()}
+    _label(ax, names[0], {INCLINE: "°"} | units, firsts, places)
     if names[1:]:
         ax.legend(fontsize=6.5, loc="best")
     return figure
@@ -110,10 +111,15 @@ def _places(values: Sequence[Value]) -> dict[Value, float]:
 
 
 def _label(
-    ax: Axes, name: str, values: Sequence[Value], places: dict[Value, float]
+    ax: Axes,
+    name: str,
+    units: Mapping[str, str],
+    values: Sequence[Value],
+    places: dict[Value, float],
 ) -> None:
     ax.set_xticks(list(places.values()), [plain(value_text(v)) for v in values])
-    ax.set_xlabel(plain(name))
+    unit = units.get(name, "")
+    ax.set_xlabel(plain(f"{name} [{unit}]" if unit else name))
     ax.set_ylabel("$F_t / F_n$")
 
 

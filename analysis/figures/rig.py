@@ -117,7 +117,7 @@ def draw_drift(results: StudyResults) -> Figure | None:
     below.set_ylabel("$F_n$ above the set load [N]")
     step = -(-len(sessions) // _NAMED)
     below.set_xticks(range(0, len(sessions), step), list(sessions)[::step])
-    below.set_xlabel("session in their order, trials from left to right")
+    below.set_xlabel("sessions in their order, trials from left to right")
     return figure
 
 

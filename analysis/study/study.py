@@ -279,6 +279,7 @@ def _result(
         components=components,
         incline_deg=terrain_incline(terrain, [s.incline_deg for s in recorded]),
         factors=factors_of(recorded),
+        units={n: unit for series in recorded for n, unit in series.units.items()},
     )
 
 

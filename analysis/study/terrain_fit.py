@@ -68,6 +68,7 @@ class TerrainResult:
             fewer than three of them.
         incline_deg: along the push, positive downhill [degrees]; None where unknown.
         factors: what else its recordings state alike, by name.
+        units: of numbers among them, by name.
     """
 
     terrain: str
@@ -79,6 +80,7 @@ class TerrainResult:
     components: TrialComponents | None = None
     incline_deg: float | None = None
     factors: Mapping[str, Value] = field(default_factory=dict[str, Value])
+    units: Mapping[str, str] = field(default_factory=dict[str, str])
 
     @property
     def is_papers(self) -> bool:

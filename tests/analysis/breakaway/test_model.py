@@ -125,7 +125,7 @@ def test_no_force_at_all_never_slips():
     assert WEIBULL.slip_risk(0.0, 4.0).risk == 0.0
 
 
-BAD = (math.nan, math.inf, -math.inf, -0.1)
+BAD = (math.nan, math.inf, -math.inf, -0.1, "a", None, [4.0], 10**400)
 
 
 @pytest.mark.parametrize("known", MODELS)
@@ -140,7 +140,7 @@ def test_a_force_that_is_none_is_refused(known, bad):
             call()
 
 
-@pytest.mark.parametrize("bad", [*BAD, 0.0, 1.0, 1.5])
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -0.1, 0.0, 1.0, 1.5])
 def test_a_share_that_is_no_risk_is_refused(bad):
     with pytest.raises(SettingsError, match="between 0 and 1"):
         WEIBULL.available(4.0, bad)

@@ -21,6 +21,7 @@ def results_of(**terrains):
             terrain=name,
             incline_deg=incline,
             factors=factors,
+            units={"d50": "mm"},
             trials=[trial(ratio) for ratio in ratios],
             kept=len(ratios),
         )
@@ -53,7 +54,8 @@ def test_the_first_two_factors_that_vary_are_shown(second, names):
     assert shown_factors(results.study) == names
     (ax,) = draw_factors(results).axes
     assert sum(len(line.get_ydata()) for line in ax.lines) == 3
-    assert ax.get_xlabel().startswith(names[0].split("_")[0])
+    unit = {"d50": " [mm]", "incline_deg": " [°]"}.get(names[0], "")
+    assert ax.get_xlabel() == f"{names[0]}{unit}"
 
 
 def test_a_number_stands_at_itself_and_what_does_not_apply_last():

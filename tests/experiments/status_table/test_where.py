@@ -6,7 +6,11 @@ import pytest
 
 from acquisition.errors import SettingsError
 from experiments.status_table.summary_cache import StatusMatrix, StatusRow
-from experiments.status_table.upcoming import factor_columns, suggest_order
+from experiments.status_table.upcoming import (
+    factor_columns,
+    next_steps,
+    suggest_order,
+)
 from experiments.status_table.where import parse_where
 
 FACTS = {"d50": 19.0, "moisture": "wet", "load": None, "incline_deg": -10.0}
@@ -60,6 +64,14 @@ def matrix(order, blocks=1, **details):
         for wet in ("dry", "wet")
     )
     return StatusMatrix(rows, order, **details)
+
+
+def test_only_what_was_asked_for_is_suggested(tmp_path):
+    where = parse_where("moisture=wet,d50<19", ("d50", "moisture"))
+    (line,) = next_steps(tmp_path, [], matrix("rows"), where, is_simulated=False)
+    assert line == "Next, as the rows stand: t10w b10w r10w"
+    none = parse_where("d50>99", ("d50", "moisture"))
+    assert next_steps(tmp_path, [], matrix("rows"), none, is_simulated=False) == []
 
 
 def test_rows_come_as_they_stand():
