@@ -6,10 +6,10 @@ Folds are those of a report, with all its models. Workers are processes on this 
 with one thread each. Windows of one and of two workers take turns; both are warm. The
 schedule for 8 and 64 workers is that of a list scheduler over the times of the same
 folds on one worker, drawn with replacement until there are 80 of each of 8 terrains.
-Folds are handed out in the groups of `guided_sizes`, one group after the other, as long
-as was measured of folds without a model. The trials reach the workers by Dask's tree:
-whoever has them gives them to two others, one after the other, as long as was measured
-of one worker.
+Folds are handed out in the groups of `guided_sizes`, one group after the other, each as
+long as one of many that do nothing was measured to take. The trials reach the workers
+by Dask's tree: whoever has them gives them to two others, one after the other, as long
+as was measured of one worker.
 """
 
 import argparse
@@ -37,6 +37,7 @@ FOLDS = 640  # 80 trials of each of 8 terrains
 LARGER = (8, 64)  # workers of the schedules
 _GOAL = 1.8  # times that two workers are faster than one
 _ROUNDS = 3
+_IDLE = 300  # groups that do nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +50,7 @@ class ClusterCosts:
         ratio: of one worker's time and two's in one round, median of the rounds.
         light: until the same folds without a model are back from one warm worker [s].
         sending: until one warm worker has the trials [s].
+        beyond: what handing out a group and taking its results costs [s].
     """
 
     tasks: tuple[float, ...]
@@ -56,18 +58,13 @@ class ClusterCosts:
     ratio: float
     light: float
     sending: float
+    beyond: float
 
     @property
     def work(self) -> list[float]:
         """Times of the folds on a worker [s]."""
         slower = max(self.alone - self.light, 0.0) / sum(self.tasks)
         return [slower * work for work in self.tasks]
-
-    @property
-    def beyond(self) -> float:
-        """What the scheduler needs for a group of tasks [s]."""
-        groups = len(guided_sizes(len(self.tasks), 1))
-        return max(self.light - self.sending, 0.0) / groups
 
 
 def plan(*models: str) -> FoldPlan:
@@ -114,6 +111,16 @@ def handed(folds: FoldPlan, address: str) -> float:
         return time.perf_counter() - before
 
 
+def idle_group(address: str) -> float:
+    """Return how long a group of tasks takes that does nothing, one of many [s]."""
+    from distributed import Client
+
+    with Client(address, set_as_default=False) as client:
+        before = time.perf_counter()
+        client.gather([client.submit(list, (), pure=False) for _ in range(_IDLE)])
+        return (time.perf_counter() - before) / _IDLE
+
+
 def measured(rounds: int = _ROUNDS) -> ClusterCosts:
     """Return what one and two workers take."""
     folds, light = plan(*REPORTED), plan()
@@ -127,10 +134,11 @@ def measured(rounds: int = _ROUNDS) -> ClusterCosts:
             spent(folds, address)  # workers import what they need
         empty = min(spent(light, one) for _ in range(rounds))
         sending = min(handed(light, one) for _ in range(rounds))
+        beyond = min(idle_group(one) for _ in range(rounds))
         pairs = [(spent(folds, one), spent(folds, two)) for _ in range(rounds)]
     alone = statistics.median(a for a, _ in pairs)
     ratio = statistics.median(a / b for a, b in pairs)
-    return ClusterCosts(tuple(own), alone, ratio, empty, sending)
+    return ClusterCosts(tuple(own), alone, ratio, empty, sending, beyond)
 
 
 def makespan(
@@ -179,7 +187,7 @@ def rows() -> list[BenchRow]:
                 f"Dask: {workers} workers busy, {FOLDS} folds, schedule",
                 100.0 * efficiency(costs, workers),
                 "%",
-                note=f"{1e3 * costs.beyond:.0f} ms a group beyond its work, "
+                note=f"{1e3 * costs.beyond:.1f} ms a group beyond its work, "
                 f"{1e3 * costs.sending:.0f} ms to give a worker the trials",
             )
             for workers in LARGER
