@@ -106,8 +106,8 @@ def handed(folds: FoldPlan, address: str) -> float:
 
     with Client(address, set_as_default=False) as client:
         before = time.perf_counter()
-        (held,) = client.scatter([folds], broadcast=True, hash=False)
-        client.submit(len, held, pure=False).result()
+        there: Any = client.scatter([folds], broadcast=True, hash=False)
+        client.submit(len, there[0], pure=False).result()
         return time.perf_counter() - before
 
 
