@@ -6,18 +6,21 @@ Folds are those of a report, with all its models. Workers are processes on this 
 with one thread each. Windows of one and of two workers take turns; both are warm. The
 schedule for 8 and 64 workers is that of a list scheduler over the times of the same
 folds on one worker, drawn with replacement until there are 80 of each of 8 terrains.
-Tasks are handed out one after the other and the trials reach one worker after the
-other, both as long as was measured of folds without a model: less than a cluster does
-at once.
+Folds are handed out in the groups of `guided_sizes`, one group after the other, each as
+long as one of many that do nothing was measured to take. The trials reach the workers
+by Dask's tree: whoever has them gives them to two others, one after the other, as long
+as was measured of one worker.
 """
 
 import argparse
 import heapq
+import math
 import statistics
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -25,7 +28,7 @@ import numpy as np
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.tables import load_tables
 from analysis.study.crossval import FoldPlan, plan_folds, run_fold
-from analysis.study.jobs import Workers, run_tasks
+from analysis.study.jobs import Workers, guided_sizes, run_tasks
 from analysis.study.models import REPORTED, FitOptions
 from benchmarks.rows import BenchRow
 from benchmarks.study_race import SLICE
@@ -34,6 +37,7 @@ FOLDS = 640  # 80 trials of each of 8 terrains
 LARGER = (8, 64)  # workers of the schedules
 _GOAL = 1.8  # times that two workers are faster than one
 _ROUNDS = 3
+_IDLE = 300  # groups that do nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,24 +48,23 @@ class ClusterCosts:
         tasks: processor time of every fold [s].
         alone: with one worker [s], median of the rounds.
         ratio: of one worker's time and two's in one round, median of the rounds.
-        sending: until the same folds without a model are back from one warm worker [s].
+        light: until the same folds without a model are back from one warm worker [s].
+        sending: until one warm worker has the trials [s].
+        beyond: what handing out a group and taking its results costs [s].
     """
 
     tasks: tuple[float, ...]
     alone: float
     ratio: float
+    light: float
     sending: float
+    beyond: float
 
     @property
     def work(self) -> list[float]:
         """Times of the folds on a worker [s]."""
-        slower = max(self.alone - self.sending, 0.0) / sum(self.tasks)
+        slower = max(self.alone - self.light, 0.0) / sum(self.tasks)
         return [slower * work for work in self.tasks]
-
-    @property
-    def beyond(self) -> float:
-        """What the scheduler needs for a task [s]."""
-        return self.sending / len(self.tasks)
 
 
 def plan(*models: str) -> FoldPlan:
@@ -97,6 +100,27 @@ def spent(folds: FoldPlan, address: str) -> float:
     return time.perf_counter() - before
 
 
+def handed(folds: FoldPlan, address: str) -> float:
+    """Return how long it takes until a worker has what all folds are made from [s]."""
+    from distributed import Client
+
+    with Client(address, set_as_default=False) as client:
+        before = time.perf_counter()
+        there: Any = client.scatter([folds], broadcast=True, hash=False)
+        client.submit(len, there[0], pure=False).result()
+        return time.perf_counter() - before
+
+
+def idle_group(address: str) -> float:
+    """Return how long a group of tasks takes that does nothing, one of many [s]."""
+    from distributed import Client
+
+    with Client(address, set_as_default=False) as client:
+        before = time.perf_counter()
+        client.gather([client.submit(list, (), pure=False) for _ in range(_IDLE)])
+        return (time.perf_counter() - before) / _IDLE
+
+
 def measured(rounds: int = _ROUNDS) -> ClusterCosts:
     """Return what one and two workers take."""
     folds, light = plan(*REPORTED), plan()
@@ -108,11 +132,13 @@ def measured(rounds: int = _ROUNDS) -> ClusterCosts:
     with cluster(1) as one, cluster(2) as two:
         for address in (one, two):
             spent(folds, address)  # workers import what they need
-        sending = min(spent(light, one) for _ in range(rounds))
+        empty = min(spent(light, one) for _ in range(rounds))
+        sending = min(handed(light, one) for _ in range(rounds))
+        beyond = min(idle_group(one) for _ in range(rounds))
         pairs = [(spent(folds, one), spent(folds, two)) for _ in range(rounds)]
     alone = statistics.median(a for a, _ in pairs)
     ratio = statistics.median(a / b for a, b in pairs)
-    return ClusterCosts(tuple(own), alone, ratio, sending)
+    return ClusterCosts(tuple(own), alone, ratio, empty, sending, beyond)
 
 
 def makespan(
@@ -123,15 +149,17 @@ def makespan(
     Args:
         tasks: work of each [s], in the order in which they are handed out.
         workers: number of workers.
-        beyond: what the scheduler needs to hand out one task [s], one after the other.
-        sending: until a worker has the trials [s], one after the other.
+        beyond: what the scheduler needs to hand out a group [s], one after the other.
+        sending: from one that has the trials to the next one [s].
     """
-    free = [sending * (k + 1) for k in range(workers)]
+    rounds = (math.ceil(math.log(k + 1, 3) - 1e-9) for k in range(workers))
+    free = [sending * (1 + 2 * r) for r in rounds]
     heapq.heapify(free)
-    handed = 0.0
-    for work in tasks:
-        handed += beyond
-        heapq.heappush(free, max(heapq.heappop(free), handed) + work)
+    given, left = 0.0, iter(tasks)
+    for size in guided_sizes(len(tasks), workers):
+        given += beyond
+        work = sum(islice(left, size))
+        heapq.heappush(free, max(heapq.heappop(free), given) + work)
     return max(free)
 
 
@@ -159,7 +187,7 @@ def rows() -> list[BenchRow]:
                 f"Dask: {workers} workers busy, {FOLDS} folds, schedule",
                 100.0 * efficiency(costs, workers),
                 "%",
-                note=f"{1e3 * costs.beyond:.0f} ms a task beyond its work, "
+                note=f"{1e3 * costs.beyond:.1f} ms a group beyond its work, "
                 f"{1e3 * costs.sending:.0f} ms to give a worker the trials",
             )
             for workers in LARGER

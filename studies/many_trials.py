@@ -25,7 +25,7 @@ from tests.disturbances.rewriting import rewrite
 PER_SESSION = 10
 LEVEL, NOISE = 0.1, 0.05  # share of the wrench; N and N m
 CUT = 500  # cycles, at most
-EVERY = 0.5  # s
+EVERY = 2.0  # s
 GB = 1e9
 
 

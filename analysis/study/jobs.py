@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from ipaddress import ip_address
+from itertools import islice
 from pathlib import Path
 from typing import Any, Protocol, TypeVar, runtime_checkable
 from urllib.parse import urlsplit
@@ -27,6 +28,8 @@ Progress = Callable[[int, int], None]
 _FEW = 3  # tasks that cost less than starting workers
 _FITTING = ("analysis.study.terrain_fit", "analysis.study.store")  # imports of workers
 _PATIENCE = 10.0  # s to reach a scheduler
+# Dask warns of calls of 10 MB and more; the trials of a terrain may be larger
+_LARGE_TASKS = {"distributed.admin.large-graph-warning-threshold": "1GB"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -321,26 +324,49 @@ def _on_cluster(
 ) -> Iterator[Any]:
     """Yield (index, result) from the Dask scheduler at `address`.
 
-    Tasks that are shared go to every worker once.
+    Tasks that are shared go to every worker once, from one to the next; what is asked
+    for then is their numbers, several at a time as long as many are left.
     """
     try:
-        from distributed import KilledWorker
+        from dask.config import set as configured
+        from distributed import KilledWorker, as_completed
     except ImportError as error:
         raise MissingLibraryError("distributed", "cluster") from error
-    from joblib import Parallel, delayed, parallel_config
 
     shared = _shared(batches)
-    calls = _calls(batches, left, _taken, shared)
-    with _client(address) as client:
-        scattered = list(shared.values()) or None
-        with parallel_config("dask", client=client, scatter=scattered):
-            parallel: Any = Parallel(return_as="generator_unordered")
-            try:
-                yield from parallel(
-                    delayed(call)(*arguments) for call, *arguments in calls
-                )
-            except KilledWorker as error:
-                raise WorkerLostError from error
+    with _client(address) as client, configured(_LARGE_TASKS):
+        held = {
+            k: client.scatter([tasks], broadcast=True, hash=False)[0]
+            for k, tasks in shared.items()
+        }
+        calls = iter(_calls(batches, left, _taken, held))
+        sizes = guided_sizes(len(left), sum(client.nthreads().values()))
+        asked = [
+            client.submit(_in_turn, list(islice(calls, size)), pure=False)
+            for size in sizes
+        ]
+        try:
+            for _, results in as_completed(asked, loop=client.loop, with_results=True):
+                yield from results
+        except KilledWorker as error:
+            raise WorkerLostError from error
+
+
+def guided_sizes(count: int, workers: int) -> list[int]:
+    """Return in how many tasks at a time so many are handed out.
+
+    Half of an equal share as long as many are left, one by one at the end: few calls,
+    and no worker waits long for another (Polychronopoulos and Kuck 1987).
+    """
+    sizes: list[int] = []
+    while count:
+        sizes.append(max(1, count // (2 * max(workers, 1))))
+        count -= sizes[-1]
+    return sizes
+
+
+def _in_turn(calls: Sequence[Any]) -> list[tuple[TaskIndex, Any]]:
+    return [call(*arguments) for call, *arguments in calls]
 
 
 def _taken(

@@ -5,6 +5,8 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any
 
+import numpy as np
+
 from analysis.breakaway.model import BreakAwayModel
 from analysis.data.terrain_kinds import groups_of
 from analysis.findings.held_trial import HeldTrial
@@ -17,13 +19,15 @@ from analysis.study.jobs import Store, run_tasks
 from analysis.study.study import Study
 from experiments.report.tables import foresight_tables
 
+MOST_WATCHED = 50  # trials of a terrain: what is watched of one has megabytes
+
 
 @dataclass(frozen=True, slots=True)
 class StudyForesight:
     """What a study teaches foresight.
 
     Attributes:
-        model: learnt from all trials; None where they are too few.
+        model: learnt from 50 trials of a terrain at most; None where they are too few.
         tables: what it is worth.
         numbers: the same as plain values.
         curves: what a figure shows of it; None where there were too few trials.
@@ -51,10 +55,11 @@ def study_foresight(
         store: outcomes of earlier reports.
         meanwhile: called here, once or more, while other processes learn.
     """
-    task = plan_judged(trials, study.kinds, break_away)
+    few = _spread(trials)
+    task = plan_judged(few, study.kinds, break_away)
     judged = judged_foresight(
         task,
-        lambda: watched_trials(study, trials),
+        lambda: watched_trials(study, few),
         store,
         study.options.n_jobs,
         meanwhile,
@@ -74,16 +79,27 @@ def study_foresight(
 def watched_trials(
     study: Study, trials: Mapping[str, Sequence[HeldTrial]]
 ) -> list[WatchedTrial]:
-    """Return the trials of a study, read anew and watched.
+    """Return the trials of a study, 50 of a terrain at most, read anew and watched.
 
     Raises:
         TrialFileError: a file is not a sound trial any more.
     """
-    surface = groups_of(study.kinds)["surface"]
-    tasks = [
-        WatchTask(t.path, surface[n]) for n, group in trials.items() for t in group
-    ]
+    surface, few = groups_of(study.kinds)["surface"], _spread(trials)
+    tasks = [WatchTask(t.path, surface[n]) for n, group in few.items() for t in group]
     return run_tasks(watch_file, tasks, study.options.n_jobs)
+
+
+def _spread(
+    trials: Mapping[str, Sequence[HeldTrial]],
+) -> dict[str, list[HeldTrial]]:
+    """Return at most 50 trials of every terrain, spread evenly over all of them."""
+    return {
+        name: [
+            group[round(k)]
+            for k in np.linspace(0, len(group) - 1, min(len(group), MOST_WATCHED))
+        ]
+        for name, group in trials.items()
+    }
 
 
 def judged_foresight(

@@ -1,5 +1,11 @@
 """Shards of a study: runs that know nothing of each other, by one store."""
 
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -9,6 +15,43 @@ from analysis.study.jobs import Batch, Shard, run_batches, run_shard
 from analysis.study.models import GP_SE_TRIAL, TUSTIN, FitOptions
 from analysis.study.store import ResultStore, encode
 from analysis.study.study import StudyOptions, run_study, run_study_shard
+
+ROOT = Path(__file__).parents[3]
+SHARDS, KILLED = 8, (3, 6)
+FEW = StudyOptions(fit=FitOptions(gp_points=60, models=(TUSTIN, GP_SE_TRIAL), draws=2))
+# One run of an array job: says when a result is kept, and then takes the next one.
+JOB = """import sys
+from dataclasses import replace
+from pathlib import Path
+from analysis.study.jobs import Shard
+from analysis.study.store import ResultStore
+from analysis.study.study import run_study_shard
+from tests.analysis.study.test_shards import FEW, SHARDS, trials_of
+
+def told(done, total):
+    print(done, total, flush=True)
+    sys.stdin.readline()
+
+run_study_shard(
+    trials_of(16),
+    replace(FEW, n_jobs=1),
+    Shard(int(sys.argv[1]), SHARDS),
+    ResultStore(Path(sys.argv[2])),
+    told,
+)
+"""
+
+
+def started(number, folder):
+    """Return a process that does one shard and waits after every result."""
+    return subprocess.Popen(
+        [sys.executable, "-c", JOB, str(number), str(folder)],
+        cwd=ROOT,
+        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
 
 
 def trials_of(count):
@@ -70,3 +113,27 @@ def test_shards_of_which_one_was_killed_equal_one_run_bit_for_bit(tmp_path):
 
 def test_without_a_store_batches_are_done_as_before():
     assert run_batches([Batch(doubled, [1, 2])], 1) == [[2, 4]]
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_processes_killed_in_the_middle_and_started_again_lose_nothing(tmp_path):
+    shared, alone = tmp_path / "shards", tmp_path / "one"
+    for number in range(1, SHARDS + 1):
+        with started(number, shared) as job:
+            if number in KILLED:
+                done, total = map(int, job.stdout.readline().split())
+                assert done < total
+                job.send_signal(signal.SIGKILL)
+            else:
+                job.communicate("\n" * 20)
+        assert job.returncode == (-signal.SIGKILL if number in KILLED else 0)
+    left = {path.name: path.read_bytes() for path in shared.glob("*.json")}
+    for number in KILLED:
+        with started(number, shared) as job:
+            job.communicate("\n" * 20)
+        assert job.returncode == 0
+    run_study(trials_of(16), FEW, True, store=ResultStore(alone))
+    together = {path.name: path.read_bytes() for path in shared.glob("*.json")}
+    assert left.items() < together.items()
+    assert together == {path.name: path.read_bytes() for path in alone.glob("*.json")}
