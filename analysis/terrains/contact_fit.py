@@ -55,6 +55,7 @@ _RUNNING, _LOWER = 0.08, 60.0  # m/s; % of F_t
 _FASTEST = 0.2  # m/s of a foot that slides, for constant friction
 _LOADED = 0.5  # share of the peak from which creep counts
 _FEWEST, _FEWEST_RELEASES = 3, 20  # trials; releases of all
+_LEAST_SEEN = 3  # releases, loadings, .. of a trial that counts
 
 
 class _Seen(NamedTuple):
@@ -67,6 +68,18 @@ class _Seen(NamedTuple):
     partial: Array  # shares of what is above 1.5 N
     way: float  # of loadings above 1.5 N [m]
     creep: Array  # speed less that of the stretch, and creep at v_c = 1, shape (n, 2)
+
+    @property
+    def is_telling(self) -> bool:
+        """Whether it alone would give every number: draws may have nothing else."""
+        columns = (
+            self.releases,
+            self.stiffness,
+            self.run_outs,
+            self.running,
+            self.creep,
+        )
+        return min(map(len, columns)) >= _LEAST_SEEN
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +118,8 @@ def fit_contact_law(trials: Sequence[ProcessTrial], seed: int) -> ContactLaw | N
         trials: of one terrain.
         seed: of the draws of intervals.
     """
-    each = [_seen(trial) for trial in trials]
+    seen = (_seen(trial) for trial in trials)
+    each = [one for one in seen if one.is_telling]
     releases = sum(len(one.releases) for one in each)
     if len(each) < _FEWEST or releases < _FEWEST_RELEASES:
         return None
@@ -158,7 +172,7 @@ def _seen(trial: ProcessTrial) -> _Seen:
 
 def _creep(F: Array, v: Array, k: float) -> Array:
     """Return speed beyond that of a stretch of stiffness k, and creep at v_c = 1."""
-    if F.size < 3:
+    if F.size < 3 or F[-1] <= 0.0:
         return np.empty((0, 2))
     load = F / F[-1]
     excess = v - np.gradient(F, STEP) / k

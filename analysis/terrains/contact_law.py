@@ -25,6 +25,7 @@ along presses harder, too, and trials do not tell what a load alone would bear.
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import exp, log
+from numbers import Integral
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -205,7 +206,7 @@ class ContactLaw:
         Raises:
             SettingsError: it is none.
         """
-        if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
+        if isinstance(seed, bool) or not isinstance(seed, Integral) or seed < 0:
             raise SettingsError(
                 f"seed = {seed!r} is no whole number of 0 or more.",
                 hint="Write e.g. seed=1.",

@@ -322,9 +322,17 @@ def _about(export: TerrainExport) -> tuple[str, str, str, str, str, str]:
         f"Measured: F_n {loads[0]:g}..{loads[-1]:g} N, v_t {speeds[0]:g}.."
         f"{speeds[-1]:g} m/s. Codes: 0 inside, 1 clamped, -1 not finite.",
         "`traction_evidence(&set, &belief, F_n, v_t, F_t)` every 10 ms of sliding, "
-        "`traction_posterior` for the terrains.",
+        "`traction_posterior` for the terrains. Stepped: `traction_contact_step`, of "
+        f"{_having(export, 'has_contact')}; `traction_sample_step`, of "
+        f"{_having(export, 'has_generator')}.",
         "cc -std=c99 -pedantic -Wall -Wextra -Werror -ffreestanding -O2 -c yours.c",
     )
+
+
+def _having(export: TerrainExport, what: str) -> str:
+    """Return the names of the terrains that have a part, for people."""
+    names = [shown(t.name) for t in export.terrains if getattr(t.known, what)]
+    return ", ".join(names) or "none"
 
 
 TARGET = ExportTarget("Terrains for a controller in C or C++", _files, _about)

@@ -186,6 +186,13 @@ def test_a_ground_that_does_not_let_go_has_no_law(trials):
     assert fit_contact_law(trials[:2], 0) is None
 
 
+def test_trials_that_show_nothing_are_left_out(trials, fitted):
+    calm = ProcessTrial(np.full(600, 4.0), np.full(600, 0.04), np.full(600, 3.0))
+    below = ProcessTrial(trials[0].F_n, trials[0].v_t, trials[0].F_t - 30.0)
+    law = fit_contact_law([calm, *trials, below], 0)
+    assert law == fitted
+
+
 # --- in a database --------------------------------------------------------------------
 
 
