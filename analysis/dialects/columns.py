@@ -264,7 +264,7 @@ def columns_hint(header: Sequence[str], wanted: Mapping[str, str]) -> str:
     """Return `--columns ...` for a header that lacks some of the wanted columns.
 
     Columns that go by a usual name are named; the others are left to be filled in.
-    Where inputs alone are lacking, `--inputs` is what names them.
+    Where inputs or covariates alone are lacking, their options are what names them.
 
     Args:
         header: the names that the table has.
@@ -280,7 +280,7 @@ def columns_hint(header: Sequence[str], wanted: Mapping[str, str]) -> str:
             known = [column] if is_there else _usual(header, name)
             parts.append(f"{name}={_quoted(known[0]) if len(known) == 1 else '...'}")
     if lacking and not lacking & {*COLUMNS, *GROUPS}:
-        return "Name columns that it has: --inputs v_t,F_n,..."
+        return "Name columns that it has: --inputs v_t,F_n,... or --covariate NAME"
     return "Name them: --columns " + ",".join(parts)
 
 

@@ -133,7 +133,9 @@ def test_a_table_without_the_input_names_what_it_has(tmp_path):
     path = a_table(tmp_path / "runs.csv")
     with pytest.raises(SettingsError, match="no column skid") as refused:
         load_tables([path], COLUMNS, rate=1.0, inputs=("skid",))
-    assert refused.value.hint == "Name columns that it has: --inputs v_t,F_n,..."
+    assert refused.value.hint == (
+        "Name columns that it has: --inputs v_t,F_n,... or --covariate NAME"
+    )
 
 
 def test_an_input_whose_name_stands_twice_is_taken_by_its_place(tmp_path):
