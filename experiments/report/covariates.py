@@ -6,6 +6,7 @@ from analysis.data.prepare import prepare_trial
 from analysis.data.recorded_covariates import RECORDED, with_covariates
 from analysis.data.series import TractionSeries
 from analysis.findings.covariates import (
+    FEWEST,
     WAY,
     CovariateResult,
     CovariateRows,
@@ -15,7 +16,7 @@ from analysis.findings.held_trial import TrialFiles
 from analysis.study.jobs import Store, Workers
 from analysis.study.study import Study
 from analysis.terrains.process_scores import least_drop
-from experiments.operator.console import Console
+from experiments.operator.console import WARNING, Console
 
 KNOWN = (*RECORDED, WAY)  # of recordings
 
@@ -49,6 +50,15 @@ def columns_tested(
     results = covariate_results(rows, columns, options.fit, workers, store)
     for result in results:
         console.say(result.sentence)
+    told = {(result.terrain, result.column) for result in results}
+    for name, group in rows.items():
+        if lacking := [c for c in columns if (name, c) not in told]:
+            why = (
+                f"{len(group)} trials with samples, it takes {FEWEST}"
+                if len(group) < FEWEST
+                else "no model could be fitted with it"
+            )
+            console.say(f"{WARNING} {name}: {', '.join(lacking)}: not tested ({why}).")
     return results
 
 
