@@ -25,6 +25,7 @@ NO_LINK = _flags("NOFOLLOW")  # at the last name of a path
 UNFOLLOWED = NO_LINK | _flags("NONBLOCK", "CLOEXEC", "NOCTTY", "BINARY")
 FOLDER = _flags("RDONLY", "DIRECTORY", "CLOEXEC")
 _NEW = _flags("WRONLY", "CREAT", "EXCL", "CLOEXEC", "BINARY")
+_PIECE = 1 << 20  # bytes that are read at once
 
 
 class UnfitFileError(ValueError):
@@ -72,11 +73,16 @@ def read_regular(path: Path, most: int, *, is_link_followed: bool = False) -> by
         UnfitFileError: it is not a regular file, or larger.
         OSError: it is missing, a link, or cannot be read.
     """
+    parts: list[bytes] = []
+    left = most + 1
     with open_regular(path, is_link_followed=is_link_followed) as file:
-        content = file.read(most + 1)
-    if len(content) > most:
+        # Piece by piece: a read takes the memory that it is asked for, not the file's.
+        while left > 0 and (part := file.read(min(left, _PIECE))):
+            parts.append(part)
+            left -= len(part)
+    if left <= 0:
         raise UnfitFileError(f"is larger than {most / 1e6:.0f} MB")
-    return content
+    return b"".join(parts)
 
 
 @contextmanager

@@ -4,14 +4,15 @@ import contextlib
 from pathlib import Path
 
 _MEMORY = Path("/proc/meminfo")
+_OWN = Path("/proc/self/statm")  # begins with the pages of this process
 _GROUP = Path("/sys/fs/cgroup")  # of a container, or of a job of a cluster
 
 
 def share_of_memory(part: int, least: int) -> int:
     """Return one part in `part` of the memory that is free [bytes], at least `least`.
 
-    Free is what the kernel calls available, or what the group of this process has left
-    where that is less.
+    Free is what the kernel calls available, or what this process or its group may still
+    take where that is less.
     """
     return max(least, _free() // part)
 
@@ -27,4 +28,11 @@ def _free() -> int:
             int((_GROUP / f"memory.{name}").read_text()) for name in ("max", "current")
         )
         found.append(max(most - used, 0))
+    with contextlib.suppress(ImportError, OSError, ValueError, IndexError):
+        import resource  # only Unix has it
+
+        most, _ = resource.getrlimit(resource.RLIMIT_AS)
+        if most != resource.RLIM_INFINITY:
+            used = int(_OWN.read_text().split()[0]) * resource.getpagesize()
+            found.append(max(most - used, 0))
     return min(found, default=0)

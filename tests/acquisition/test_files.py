@@ -1,5 +1,6 @@
 import errno
 import os
+import tracemalloc
 from pathlib import Path
 
 import pytest
@@ -37,6 +38,17 @@ def test_a_file_may_have_as_many_bytes_as_stated_and_no_more(tmp_path):
     assert len(read_regular(tmp_path / "file", 10)) == 10
     with pytest.raises(UnfitFileError, match="larger"):
         read_regular(tmp_path / "file", 9)
+
+
+def test_a_file_takes_its_own_size_of_memory_however_much_it_may_have(tmp_path):
+    content = bytes(range(256)) * 12_000  # three pieces
+    (tmp_path / "file").write_bytes(content)
+    tracemalloc.start()
+    try:
+        assert read_regular(tmp_path / "file", 1 << 40) == content
+        assert tracemalloc.get_traced_memory()[1] < 4 * len(content)
+    finally:
+        tracemalloc.stop()
 
 
 def test_a_new_file_replaces_none(tmp_path):

@@ -1,5 +1,8 @@
 """What a file may take of the memory that is free."""
 
+import subprocess
+import sys
+
 import pytest
 
 from analysis.data import memory
@@ -31,3 +34,19 @@ def test_a_group_of_processes_may_have_less(computer, most, part):
 def test_without_a_statement_it_is_the_least(computer, text):
     (computer / "meminfo").write_text(text)
     assert share_of_memory(8, 10) == 10
+
+
+def test_a_process_may_have_less():
+    """In a process of its own: its limit would stay."""
+    program = (
+        "import resource\n"
+        "from analysis.data.memory import share_of_memory\n"
+        "before = share_of_memory(1, 10)\n"
+        "resource.setrlimit(resource.RLIMIT_AS, (2_000_000_000, 2_000_000_000))\n"
+        "print(before, share_of_memory(1, 10))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    before, after = map(int, done.stdout.split())
+    assert 1_000_000 < after < min(before, 2_000_000_000)
