@@ -66,7 +66,7 @@ class MotionLimits:
     damp_travel: float = 0.10
     still_time: float = 0.4
     still_speed: float = 0.03
-    float_energy: float = 1.1
+    float_energy: float = 0.9
     guide_energy: float = 1.0
 
 

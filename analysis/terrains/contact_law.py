@@ -32,6 +32,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from acquisition.errors import SettingsError
+from analysis.breakaway.answers import check_finite
 from analysis.terrains.loadings import LEAST_LOAD, Interval90
 from analysis.terrains.process_scores import STONES_DROP
 
@@ -262,7 +263,11 @@ class SteppedContact:
             x: place of the foot along the push [m].
             v: its velocity [m/s].
             F_n: normal force [N], 0 in the air.
+
+        Raises:
+            SettingsError: one is not a finite number; the contact is as it was.
         """
+        check_finite(dt=dt, x=x, v=v, F_n=F_n)
         if not self._draws:
             u = 1.0 - self._rng.random((_BLOCK, 2))  # never 0
             z = self._rng.standard_normal((_BLOCK, 2))

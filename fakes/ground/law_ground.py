@@ -3,7 +3,7 @@
 from typing import Protocol
 
 from fakes.ground.contact import Contact, Motion
-from fakes.ground.terrain import Terrain
+from fakes.ground.terrain import BesideGround, Terrain
 
 
 class TractionLaw(Protocol):
@@ -18,24 +18,12 @@ class TractionLaw(Protocol):
         ...
 
 
-class LawGround:
+class LawGround(BesideGround):
     """Normal force and surface of a ground, traction of a law."""
 
     def __init__(self, ground: Terrain, law: TractionLaw) -> None:
-        self.ground, self.law = ground, law
-
-    @property
-    def stiffness(self) -> float:
-        """Normal stiffness [N/m]."""
-        return self.ground.stiffness
-
-    def surface(self, x: float) -> float:
-        """Return the height of the undisturbed ground at `x` [m]."""
-        return self.ground.surface(x)
-
-    def truth(self) -> dict[str, float]:
-        """Return the parameters in force [SI]."""
-        return self.ground.truth()
+        super().__init__(ground)
+        self.law = law
 
     def capacity(self, x: float, F_n: float) -> float:
         """Return the traction at which a foot slips now [N]."""

@@ -199,15 +199,8 @@ def make_terrain(
     return StoneBed(choice.bed(), incline, rng)
 
 
-FREE = 0.045  # from the centre line until the sole's edge meets a plank [m]
-_RIM = 0.04  # height of the planks above the plane [m]
-_PLANK_K = 5000.0  # N/m
-_PLANK_B = 2.0 * 0.4 * math.sqrt(_PLANK_K * DAMPING_MASS)  # N s/m
-_PLANK_MU = 0.3  # of a foot that slips along them
-
-
-class Container:
-    """A ground between two planks; both push, neither pulls."""
+class BesideGround:
+    """A ground and something beside it: what is not changed is the ground's."""
 
     def __init__(self, ground: Terrain) -> None:
         self.ground = ground
@@ -228,6 +221,17 @@ class Container:
     def capacity(self, x: float, F_n: float) -> float:
         """Return the traction at which a foot at `x` [m] under `F_n` slips now [N]."""
         return self.ground.capacity(x, F_n)
+
+
+FREE = 0.045  # from the centre line until the sole's edge meets a plank [m]
+_RIM = 0.04  # height of the planks above the plane [m]
+_PLANK_K = 5000.0  # N/m
+_PLANK_B = 2.0 * 0.4 * math.sqrt(_PLANK_K * DAMPING_MASS)  # N s/m
+_PLANK_MU = 0.3  # of a foot that slips along them
+
+
+class Container(BesideGround):
+    """A ground between two planks; both push, neither pulls."""
 
     def step(self, dt: float, motion: Motion) -> Contact:
         """Advance the ground by `dt` [s]; return what it and the planks do."""

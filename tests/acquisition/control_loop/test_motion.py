@@ -68,7 +68,7 @@ TABLE = [
     (DAMP, 60, {"energy": 0.02}, {"energy": 0.02 + E}, Fault.DAMP_MOTION),
     (DAMP, 12, {"energy": 0.10}, {"energy": 0.10 + E}, Fault.DAMP_MOTION),
     (DAMP, 2, {"energy": 9.0}, {"sole": (0.101, 0, 0)}, Fault.DAMP_MOTION),
-    (FLOAT, 9, {"energy": 1.1}, {"energy": 1.1 + E}, Fault.KINETIC_ENERGY),
+    (FLOAT, 9, {"energy": 0.9}, {"energy": 0.9 + E}, Fault.KINETIC_ENERGY),
     (GUIDE, 9, {"energy": 1.0}, {"energy": 1.0 + E}, Fault.KINETIC_ENERGY),
 ]
 

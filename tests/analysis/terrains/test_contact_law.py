@@ -1,6 +1,7 @@
 """A contact law: its steps, its fit, and what is kept of it in a database."""
 
 import json
+import math
 from dataclasses import replace
 from math import exp, log
 
@@ -158,6 +159,19 @@ def test_the_same_seed_gives_the_same_forces():
 
 
 # --- the fit --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("wrong", [0, 1, 2, 3])
+@pytest.mark.parametrize("value", [math.nan, math.inf, "fast"])
+def test_what_is_no_number_is_refused_and_changes_nothing(wrong, value):
+    contact = law_of().begin(1)
+    contact.step(DT, 0.01, 0.1, 4.0)
+    before = contact.state
+    motion = [DT, 0.02, 0.1, 4.0]
+    motion[wrong] = value
+    with pytest.raises(SettingsError, match="finite"):
+        contact.step(*motion)
+    assert contact.state == before
 
 
 def test_the_numbers_of_a_law_are_found_again(fitted):
