@@ -67,27 +67,42 @@ def settings_with_bus_sensor() -> Settings:
     return dataclasses.replace(settings, rig=rig)
 
 
-def alternate(rig: Rig, windows: int, seconds: float, program: Path) -> RawRecord:
-    """Run the loop and the C programs in turn on the same core, `windows` times."""
-    backend, found = rig.backend, RawRecord()
-    core, _ = choose_cores()
-    assert isinstance(backend, MultiProcessBackend)
-    assert core is not None
+def alternate(windows: int, seconds: float, core: int, program: Path) -> RawRecord:
+    """Run the loop and the C programs in turn on `core`, `windows` times.
+
+    Each window has a rig of its own: the frames of the C program are another master's.
+    """
+    settings, found = settings_with_bus_sensor(), RawRecord()
     for _ in range(windows):
-        processes = {**backend.processes(), "console": os.getpid()}
-        kept: list[Times] = []
-        timings = backend.loop_client.timings()
-        backend.loop_client.on_tick.append(lambda: kept.append(columns(timings.read())))  # noqa: B023
-        found.reports.append(run_bench(rig, processes, seconds))
-        backend.loop_client.on_tick.pop()
-        found.loops.append(Window(np.concatenate(kept)))
-        backend.loop_client.idle()
-        backend.end_loop()
-        found.wakes.append(in_c(program, core, seconds / 2))
-        found.exchanges.append(in_c(program, core, seconds, backend.bus_path))
-        backend.begin()
-        backend.loop_client.advance(0.2)
+        rig = build_rig(
+            settings, settings.matrix.terrains[0], FakeOptions("processes", seed=1)
+        )
+        with closing(rig.backend):
+            start_devices(rig)
+            measure(rig, found, seconds, core, program)
     return found
+
+
+def measure(
+    rig: Rig, found: RawRecord, seconds: float, core: int, program: Path
+) -> None:
+    """Run the loop of `rig` and then the C programs; add to `found` what was seen."""
+    backend = rig.backend
+    assert isinstance(backend, MultiProcessBackend)
+    processes = {**backend.processes(), "console": os.getpid()}
+    kept: list[Times] = []
+    timings = backend.loop_client.timings()
+    backend.loop_client.on_tick.append(lambda: kept.append(columns(timings.read())))
+    report = run_bench(rig, processes, seconds)
+    if not report.is_powered:
+        sys.exit(f"The arm was not held to the end of a window: {report.fault}")
+    backend.loop_client.on_tick.pop()
+    found.reports.append(report)
+    found.loops.append(Window(np.concatenate(kept)))
+    backend.loop_client.idle()
+    backend.end_loop()
+    found.wakes.append(in_c(program, core, seconds / 2))
+    found.exchanges.append(in_c(program, core, seconds, backend.bus_path))
 
 
 def columns(timings: Record) -> Times:
@@ -108,21 +123,20 @@ def main() -> None:
         sys.exit("Two processors are needed.")
     with tempfile.TemporaryDirectory() as name:
         witness, exchange = compiled(Path(name))
-        settings = settings_with_bus_sensor()
-        row = settings.matrix.terrains[0]
-        rig = build_rig(settings, row, FakeOptions("processes", seed=1))
-        length = str(args.seconds * 3 + 60)
+        length = str(args.seconds * 3 + 20 * args.windows + 60)
         seen = Path(name) / "stalls"
-        with closing(rig.backend), seen.open("w") as lines:
+        with seen.open("w") as lines:
             watching = [
                 subprocess.Popen([witness, str(c), length], stdout=lines)
                 for c in (core, other)
             ]
-            start_devices(rig)
-            found = alternate(rig, args.windows, args.seconds / args.windows, exchange)
-            for process in watching:
-                process.terminate()
-                process.wait()
+            seconds = args.seconds / args.windows
+            try:
+                found = alternate(args.windows, seconds, core, exchange)
+            finally:
+                for process in watching:
+                    process.terminate()
+                    process.wait()
         text = seen.read_text().split("\n")[:-1]
         stalls = np.array([line.split() for line in text], int).reshape(-1, 2)
     rows = table(found, stalls)

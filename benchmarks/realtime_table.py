@@ -186,7 +186,7 @@ def miss_rows(found: RawRecord, stalls: Times) -> list[Row]:
 def use_rows(found: RawRecord) -> list[Row]:
     """Return the lines on processors, memory and the recorder."""
     loop, recorder = found.cpu("control"), found.cpu("recorder")
-    faults = sum(use_of(r, "control").page_faults for r in found.reports[1:])
+    faults = sum(use_of(r, "control").page_faults for r in found.reports)
     lost = sum(report.lost for report in found.reports)
     return [
         Row(

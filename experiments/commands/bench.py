@@ -31,8 +31,8 @@ def run(args: argparse.Namespace) -> int:
     import os
     from contextlib import closing
 
-    from acquisition.errors import SettingsError
-    from experiments.operator.console import Console
+    from acquisition.errors import PreflightError, SettingsError
+    from experiments.operator.console import WARNING, Console
     from experiments.preflight.connecting import connect_rig
     from experiments.preflight.preflight import start_devices
     from experiments.rig.processes import MultiProcessBackend
@@ -56,11 +56,13 @@ def run(args: argparse.Namespace) -> int:
             console.problem(text)
         processes = {**backend.processes(), "console": os.getpid()}
         report = run_bench(rig, processes, args.seconds)
+    if report.fault:
+        console.problem(f"{WARNING} {report.fault}")
     if args.json:
         console.say(json.dumps(report.as_dict(), indent=2))
     else:
         _print(report, args.seconds, console)
-    return 0
+    return PreflightError.exit_code if report.fault and not report.is_powered else 0
 
 
 def _print(report: BenchReport, seconds: float, console: Console) -> None:

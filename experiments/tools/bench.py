@@ -18,6 +18,7 @@ from acquisition.errors import PreflightError
 from acquisition.sample import Record
 from acquisition.trial_file.header import TrialHeader
 from acquisition.trial_file.reader import TrialReader
+from experiments.messages import FaultContext, fault_text
 from experiments.trial.files import TIME_LIMIT
 
 if TYPE_CHECKING:
@@ -52,7 +53,8 @@ class BenchReport:
     Attributes:
         loop: quantiles of the loop's times.
         processes: what each process used.
-        is_powered: the control law ran; otherwise the arm was idle.
+        is_powered: the control law ran, to the end; otherwise the arm was idle.
+        fault: what the guard said while it was measured, as a message; "" = nothing.
         recorded: cycles in the recorded files.
         lost: cycles the recorder lost.
         largest_backlog: cycles that waited for the recorder at most.
@@ -61,6 +63,7 @@ class BenchReport:
     loop: LoopReport
     processes: tuple[ProcessUse, ...]
     is_powered: bool
+    fault: str
     recorded: int
     lost: int
     largest_backlog: int
@@ -104,6 +107,8 @@ def run_bench(rig: Rig, processes: dict[str, int], seconds: float) -> BenchRepor
     report = loop_report(collected.take())
     if report is None:
         raise PreflightError("No cycle ran.", hint="Try again; then: traction check.")
+    verdict = loop_client.status.verdict
+    fault = "" if verdict is None else fault_text(verdict, FaultContext(prompt=None))
     uses = tuple(
         _use(name, (before[name], middle[name], after[name]), passed)
         for name in processes
@@ -111,7 +116,8 @@ def run_bench(rig: Rig, processes: dict[str, int], seconds: float) -> BenchRepor
     return BenchReport(
         loop=report,
         processes=uses,
-        is_powered=is_powered,
+        is_powered=is_powered and loop_client.status.safety is SafetyMode.ACTIVE,
+        fault=fault,
         recorded=trials.recorded,
         lost=trials.lost,
         largest_backlog=trials.largest_backlog,
