@@ -54,6 +54,7 @@ BEFORE = 50  # samples that a path goes before its first one
 MOST_STEPS = 30_000_000  # samples of all paths together
 
 _MOST_POINTS = 100  # of an axis of the bands
+_BLOCK = 256  # samples that are laid out for all paths at a time
 _LEAST_LOAD, _FULL = 0.8, 0.02  # N and m/s of the gate
 _CLIPPED = 4.0
 _SLOW, _PULL, _SLOW_PULL, _WALL, _FLOOR = 0.008, 0.003, 0.01, 0.1, 0.5
@@ -225,39 +226,40 @@ class Generator:
             motions: of any length.
             draws: of n paths, a group of the same size for every motion.
         """
-        experts, count = self.experts, draws.uniform.shape[0] // len(motions)
+        count = draws.uniform.shape[0] // len(motions)
         longest = max(motion.m.size for motion in motions)
         parts = [_Prepared.of(self, motion, longest) for motion in motions]
-        steps, at = _Prepared.joined(parts), np.repeat(np.arange(len(motions)), count)
-        of_F = list(_OF_F)
-        W, b = experts.gate[:, of_F].T, experts.weights[:, of_F[:4]].T
-        centre, scale = experts.centre[of_F], experts.scale[of_F]
-        F = steps.m[at, 0]
-        D, found = np.zeros(F.size), np.empty((F.size, longest))
-        found[:, 0] = F
-        for i in range(1, longest):
-            factors, logits = steps.factors[at, i], steps.logits[at, i]
-            of_F = (F, D, *(F[:, None] * factors).T)
-            for number, w, c, s in zip(of_F, W, centre, scale, strict=True):
-                scaled = np.minimum(np.maximum((number - c) / s, -_CLIPPED), _CLIPPED)
-                logits = logits + scaled[:, None] * w
-            shares = np.exp(logits - logits.max(axis=1, keepdims=True))
-            shares = np.cumsum(shares, axis=1)
-            wanted = draws.uniform[:, i - 1] * shares[:, -1]
-            k = (shares <= wanted[:, None]).sum(axis=1)
-            step = steps.mean[at, i, k] + experts.sd[k] * draws.normal[:, i - 1]
-            for number, slope in zip(of_F, b, strict=False):
-                step = step + number * slope[k]
-            new, m = F + steps.fade[at, i] * step, steps.m[at, i]
-            new = new - steps.pull[at, i] * (new - m)
-            new = new - _FLOOR * np.minimum(new - steps.low[at, i], 0.0)
-            new = new - _WALL * np.maximum(new - steps.high[at, i], 0.0)
-            new = np.minimum(np.maximum(new, self.least), self.most)
-            F, D = new, new - F
-            found[:, i] = F
-        each = np.split(found, len(motions))
+        steps = _Prepared.joined(parts)
+        gate, uniform, normal = _Gate.of(self.experts), draws.uniform.T, draws.normal.T
+        found = np.empty((longest, draws.uniform.shape[0]))
+        each = np.arange(draws.uniform.shape[0])
+        F = found[0] = np.repeat(steps.m[0], count)
+        of_F = np.zeros((len(_OF_F), F.size))  # F, D and what F is multiplied with
+        for begin in range(1, longest, _BLOCK):
+            block = steps.block(begin, count)
+            for i in range(begin, min(begin + _BLOCK, longest)):
+                row = i - begin
+                of_F[0] = F
+                np.multiply(F, block.factors[row], out=of_F[2:])
+                if gate is None:
+                    step = block.mean[row, 0] + self.experts.sd[0] * normal[i - 1]
+                    slopes = self.experts.weights[0, _OF_F[:4], None]
+                else:
+                    k = gate.choose(of_F, block.logits[row], uniform[i - 1])
+                    step = block.mean[row, k, each]
+                    step = step + gate.sd[k] * normal[i - 1]
+                    slopes = gate.slopes[:, k]
+                step = step + np.add.reduce(of_F[:4] * slopes)
+                new, m = F + block.fade[row] * step, block.m[row]
+                new = new - block.pull[row] * (new - m)
+                new = new - _FLOOR * np.minimum(new - block.low[row], 0.0)
+                new = new - _WALL * np.maximum(new - block.high[row], 0.0)
+                new = np.minimum(np.maximum(new, self.least), self.most)
+                of_F[1] = new - F
+                F = found[i] = new
+        runs = np.split(found.T, len(motions))
         return [
-            part[:, : motion.m.size] for part, motion in zip(each, motions, strict=True)
+            run[:, : motion.m.size] for run, motion in zip(runs, motions, strict=True)
         ]
 
 
@@ -346,6 +348,8 @@ class Motion:
         low: force [N] that is reached but for -2 sd.
         m: median force [N].
         high: force [N] that is not reached but for +2 sd.
+        factors: what F is multiplied with: v+, w, 1 / max(f, 0.8) and s, shape (T, 4).
+        fade: a: 1 in motion, 0 when the foot has stood still for long.
     """
 
     F_n: Array
@@ -353,11 +357,20 @@ class Motion:
     low: Array
     m: Array
     high: Array
+    factors: Array
+    fade: Array
 
     @classmethod
     def of(cls, F_n: Array, v_t: Array, bands: Table) -> "Motion":
         """Return a motion with its bands."""
-        return cls(F_n, v_t, *bands.over(F_n, v_t))
+        w = _running_mean(v_t, _FORGOTTEN)
+        over_load = 1.0 / np.maximum(F_n, _LEAST_LOAD)
+        share = np.minimum(np.abs(v_t) / _FULL, 1.0)
+        factors = np.column_stack([np.maximum(v_t, 0.0), w, over_load, share])
+        recent = _running_mean(np.abs(w), _STOOD)
+        fade = np.clip((recent - _STILL[0]) / _STILL[1], 0.0, 1.0)
+        low, m, high = bands.over(F_n, v_t)
+        return cls(F_n, v_t, low, m, high, factors, fade)
 
     def features(self, F: Array, D: Array) -> Array:
         """Return x of every sample but the first, shape (T - 1, 14).
@@ -378,20 +391,6 @@ class Motion:
         F, share = x[:, 1, None], self.factors[1:, 3:]
         return np.column_stack([x, F * self.factors[1:, 2:], share])
 
-    @property
-    def factors(self) -> Array:
-        """What F is multiplied with: v+, w, 1 / max(f, 0.8) and s, shape (T, 4)."""
-        w = _running_mean(self.v_t, _FORGOTTEN)
-        over_load = 1.0 / np.maximum(self.F_n, _LEAST_LOAD)
-        share = np.minimum(np.abs(self.v_t) / _FULL, 1.0)
-        return np.column_stack([np.maximum(self.v_t, 0.0), w, over_load, share])
-
-    @property
-    def fade(self) -> Array:
-        """Return a: 1 in motion, 0 when the foot has stood still for long, (T,)."""
-        recent = _running_mean(np.abs(self.factors[:, 1]), _STOOD)
-        return np.clip((recent - _STILL[0]) / _STILL[1], 0.0, 1.0)
-
 
 def _running_mean(values: Array, share: float) -> Array:
     """Return the mean of what came before, of which a share is forgotten, (T,)."""
@@ -410,8 +409,56 @@ def scaled_gates(gates: Array, experts: Experts) -> Array:
     return scaled
 
 
+class _Gate(NamedTuple):
+    """What chooses among several experts, by those numbers of g that depend on F.
+
+    Attributes:
+        weights: of those numbers, shape (6, K, 1).
+        centre: of them, shape (6, 1).
+        scale: of them, shape (6, 1).
+        slopes: of x that depends on F, shape (4, K).
+        sd: of the experts [N], shape (K,).
+    """
+
+    weights: Array
+    centre: Array
+    scale: Array
+    slopes: Array
+    sd: Array
+
+    @classmethod
+    def of(cls, experts: Experts) -> "_Gate | None":
+        """Return the gate; None for a single expert, which is not chosen."""
+        if len(experts.sd) == 1:
+            return None
+        of_F = list(_OF_F)
+        return cls(
+            experts.gate[:, of_F].T[:, :, None],
+            experts.centre[of_F, None],
+            experts.scale[of_F, None],
+            experts.weights[:, of_F[:4]].T.copy(),
+            experts.sd,
+        )
+
+    def choose(self, of_F: Array, logits: Array, uniform: Array) -> NDArray[np.intp]:
+        """Return the expert of every path, shape (n,).
+
+        Args:
+            of_F: numbers of g that depend on F, shape (6, n).
+            logits: what the others give, shape (K, n).
+            uniform: the draws, shape (n,).
+        """
+        scaled = (of_F - self.centre) / self.scale
+        scaled = np.minimum(np.maximum(scaled, -_CLIPPED), _CLIPPED)
+        # summed number by number: a product of matrices depends on how many paths
+        logits = logits + np.add.reduce(scaled[:, None] * self.weights)
+        shares = np.exp(logits - np.maximum.reduce(logits))
+        shares = np.add.accumulate(shares)
+        return np.add.reduce(shares <= uniform * shares[-1], dtype=np.intp)
+
+
 class _Prepared(NamedTuple):
-    """What of the steps does not depend on F, by motion, sample and expert."""
+    """What of the steps does not depend on F: by sample, number or expert, motion."""
 
     m: Array
     low: Array
@@ -442,10 +489,15 @@ class _Prepared(NamedTuple):
             *(np.pad(c, ((0, missing),) + ((0, 0),) * (c.ndim - 1)) for c in columns)
         )
 
+    def block(self, begin: int, count: int) -> "_Prepared":
+        """Return some samples from `begin` on, every motion repeated for its paths."""
+        rows = slice(begin, begin + _BLOCK)
+        return _Prepared(*(np.repeat(c[rows], count, axis=-1) for c in self))
+
     @classmethod
     def joined(cls, parts: Sequence["_Prepared"]) -> "_Prepared":
-        """Return all of them, with the number of the motion first."""
-        return cls(*(np.stack(column) for column in zip(*parts, strict=True)))
+        """Return all of them, with the number of the motion last."""
+        return cls(*(np.stack(column, axis=-1) for column in zip(*parts, strict=True)))
 
 
 def _check_motion(F_n: Array, v_t: Array, seed: int, paths: int) -> None:
