@@ -33,6 +33,7 @@ _PROMISING = 5.0  # log likelihood that a move may be below the best top it leav
 _NEIGHBOURS = 0.5  # in theta: of two tops that are nearer, one is enough to begin with
 _LOSING = 5.0  # log likelihood below the best top at which another will not become it
 _UNUSED = 4.0  # logarithm of a length or bias beyond which it makes no difference
+_NOISE_SCALE = 0.2  # of a logarithm of the noise, which every row tells, to a length's
 _AT_BOUND = 1e-3  # in theta: a hyperparameter as near to a bound lies on it
 
 
@@ -124,6 +125,8 @@ class Search:
         self._bounds = np.vstack(
             [self._kernel.bounds(self._sd_y, sd_x), self._noise.bounds(self._sd_y)]
         )
+        parts = self._kernel.names, self._noise.names
+        self._scale = np.repeat([1.0, _NOISE_SCALE], [len(names) for names in parts])
         self._began: list[Array] = []
         self._reached: list[Climbed] = []
 
@@ -135,7 +138,9 @@ class Search:
     def climb(self, start: Array) -> None:
         """Climb from a start to its top, or beside one that is known."""
         self._began.append(start)
-        reached = climb(self._posterior, start, self._bounds, self._is_known)
+        reached = climb(
+            self._posterior, start, self._bounds, self._is_known, scale=self._scale
+        )
         self._reached.append(reached)
 
     def move(self) -> None:

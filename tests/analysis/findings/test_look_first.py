@@ -83,12 +83,17 @@ def stood(series):
     ("change", "words"),
     [
         (lambda s: replace(s, F_t=s.F_t + 3.0), "F_t of the foot that stands +3"),
-        (lambda s: replace(s, F_n=s.F_n + 3.0), "F_n of the foot that stands +3"),
-        (
+        pytest.param(
+            lambda s: replace(s, F_n=s.F_n + 3.0),
+            "F_n of the foot that stands +3",
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
             lambda s: replace(
                 s, F_n=s.F_n + np.random.default_rng(1).normal(0.0, 3.0, s.t.size)
             ),
             "noise of F_n at rest 8",
+            marks=pytest.mark.slow,
         ),
     ],
 )

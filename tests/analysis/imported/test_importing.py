@@ -88,6 +88,7 @@ def smooth():
     return rubbing
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("rubbing", "words"),
     [(Rubbing(), "starts and stops show"), (smooth(), "over 30 ms is rare")],
@@ -112,6 +113,7 @@ def test_the_other_sign_is_refused_with_the_remedy(imported):
         imported(Rubbing(), sensor="upright", mass=0.0)
 
 
+@pytest.mark.slow
 def test_a_sensor_that_reads_the_reaction_is_read_with_the_other_word(imported):
     rubbing = Rubbing(sign=-1.0)
     found = imported(rubbing, acts="foot-on-ground", mass=0.3)
@@ -139,6 +141,7 @@ def test_a_forgotten_tare_is_refused(imported):
         imported(Rubbing(), tare=(5.0, 6.0))
 
 
+@pytest.mark.slow
 def test_a_tare_may_be_six_numbers_or_another_log(imported, tmp_path):
     rubbing = Rubbing()
     found = imported(rubbing, tare=np.array(rubbing.bias), mass=0.3)
@@ -158,6 +161,7 @@ def test_a_tare_that_drifts_is_stated_with_its_spread(imported):
     assert figure(found, "tare")[1][0] > 0.05
 
 
+@pytest.mark.slow
 def test_without_stamps_the_receipt_counts_and_is_named(imported):
     found = imported(Rubbing(stamps=False), mass=0.3)
     assert found.wrench.clock.by == "receipt"
@@ -171,6 +175,7 @@ def test_two_clocks_are_refused_with_the_hours_between(imported):
         imported(Rubbing(clock_offset=-18_000.0))
 
 
+@pytest.mark.slow
 def test_slow_joints_are_refused_unless_means_are_wanted(imported):
     rubbing = Rubbing(joint_rate=40.0)
     with pytest.raises(SettingsError, match="too slow for slips"):
@@ -180,6 +185,7 @@ def test_slow_joints_are_refused_unless_means_are_wanted(imported):
     )
 
 
+@pytest.mark.slow
 def test_velocities_that_are_filtered_are_named_and_not_used(imported):
     found = imported(Rubbing(with_velocity=True, velocity_late=0.012), mass=0.3)
     assert any("12 ms late" in text for text in found.warnings)
@@ -187,6 +193,7 @@ def test_velocities_that_are_filtered_are_named_and_not_used(imported):
     assert errors(found.trials[0], Rubbing())[0] < 1e-3
 
 
+@pytest.mark.slow
 def test_another_frame_in_the_header_is_named(imported):
     found = imported(Rubbing(frame_id="tool0"), mass=0.3)
     assert any("frame 'tool0'; 'gauge' is used" in text for text in found.warnings)

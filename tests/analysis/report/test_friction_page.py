@@ -122,6 +122,7 @@ def html(model):
     return friction_html(page(model, now, earlier, truth=example()))
 
 
+@pytest.mark.slow
 def test_the_page_needs_no_other_file(html):
     assert "data:image/png;base64," in html
     assert not re.findall(r'(?:src|href)="(?!data:|#)', html)
@@ -129,9 +130,11 @@ def test_the_page_needs_no_other_file(html):
     assert len(html) < 250_000
 
 
+@pytest.mark.slow
 def test_the_page_says_of_which_arm_it_is(html):
     assert 'class="kind simulated">SIMULATED<' in html
 
 
+@pytest.mark.slow
 def test_what_has_changed_stands_before_the_numbers(html):
     assert html.index("Friction of joint 1") < html.index("break-away")

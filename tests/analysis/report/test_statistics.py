@@ -50,6 +50,7 @@ def test_coverage_carries_its_standard_error_over_the_trials(small_study):
     assert text == f"{np.mean(shares):.1%} ± {standard_error(shares):.1%}"
 
 
+@pytest.mark.slow
 def test_independent_samples_are_samples_over_the_correlation_time(small_study):
     results = compute_results(small_study)
     band = results.residuals["S0"][GP_SE]

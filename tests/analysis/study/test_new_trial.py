@@ -71,6 +71,7 @@ def test_a_normal_force_gets_no_shape_on_top():
     assert NewTrialFit(training(trials_of(normal, 8)), None).fit(SE).shape is None
 
 
+@pytest.mark.slow
 def test_forces_with_heavy_tails_and_skew_get_a_shape():
     def odd(rng, F_n):
         return 0.5 * np.sinh(1.2 * np.arcsinh(rng.normal(size=F_n.size)) * 1.5 + 0.6)
@@ -82,6 +83,7 @@ def test_forces_with_heavy_tails_and_skew_get_a_shape():
     assert model.choice.shape_gain > 0.02
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spread", [normal, skewed])
 def test_bands_hold_for_trials_that_differ(spread):
     trials = trials_of(spread, 9, between=1.0, seed=3)
@@ -111,6 +113,7 @@ def test_a_pooled_fit_of_the_same_trials_is_worse():
     assert np.mean(gains) > 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", [GP_SE_TRIAL, GP_NN_TRIAL, GP_SE_TUSTIN_TRIAL, GP_NN_TUSTIN_TRIAL]
 )

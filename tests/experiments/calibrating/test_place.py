@@ -35,6 +35,7 @@ def taught(tmp_path_factory):
     return folder, done
 
 
+@pytest.mark.slow
 def test_both_ends_give_the_place(taught):
     folder, done = taught
     found = TaughtPlace.parse((folder / "place_bay.fake.toml").read_text())
@@ -46,6 +47,7 @@ def test_both_ends_give_the_place(taught):
     assert "[places.bay] taught" in done.out
 
 
+@pytest.mark.slow
 def test_a_taught_place_is_where_a_cell_stands(taught, tmp_path):
     folder, _ = taught
     shipped = load_settings(None).rig_text

@@ -114,8 +114,8 @@ def test_a_puck_that_was_replaced_is_noticed_until_two_persons_accept_it(tmp_pat
     ("wrong", "words"),
     [
         ("puck-6-hot", "puck 6 has 58 °C, an idle one has 10 to 50"),
-        ("otemp-120", "OTEMP of puck 2 is 120"),
-        ("", ""),
+        pytest.param("otemp-120", "OTEMP of puck 2 is 120", marks=pytest.mark.slow),
+        pytest.param("", "", marks=pytest.mark.slow),
     ],
 )
 def test_what_is_unusual_is_said_and_passes(tmp_path, wrong, words):

@@ -102,7 +102,9 @@ def test_no_sound_arm_of_many_is_stopped_on_another_day(tool):
         ("zero-7-off-90deg", "weight of the foot"),
     ],
 )
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize(
+    "seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3))]
+)
 def test_an_arm_that_changed_is_named(tool, seed, wrong, words):
     assert daily.judge(day(tool, seed, wrong)).cause.startswith(words)
 

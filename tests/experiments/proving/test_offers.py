@@ -42,12 +42,14 @@ def one(offers, words):
     return text
 
 
+@pytest.mark.slow
 def test_a_foot_of_another_mass_is_offered_with_its_mass(tool):
     text = one(offered(tool, 1, "foot-half"), "feet.tread.mass = ")
     true = HeldArm(tool, 1, "foot-half").true_tool.foot.mass
     assert numbers(text, "mass = ")[0] == pytest.approx(true, rel=0.06)
 
 
+@pytest.mark.slow
 def test_another_sole_is_offered_with_its_place(tool):
     text = one(offered(tool, 1, "sole-20mm-lower"), "feet.tread.sole = ")
     true = HeldArm(tool, 1, "sole-20mm-lower").true_tool.sole
@@ -63,6 +65,7 @@ def test_a_turned_sensor_is_offered_with_its_angle(tool):
     assert numbers(text, "angle_deg = ")[0] == pytest.approx(angle, abs=2.5)
 
 
+@pytest.mark.slow
 def test_a_zero_that_is_off_is_offered_to_be_set_again(tool):
     text = one(offered(tool, 1, "zero-2-off-10deg"), "At home joint 2 tells")
     off = np.degrees(HeldArm(tool, 1, "zero-2-off-10deg").departure.zeros[1])
@@ -72,11 +75,13 @@ def test_a_zero_that_is_off_is_offered_to_be_set_again(tool):
     assert "traction zero" in text
 
 
+@pytest.mark.slow
 def test_a_tilted_base_is_told_though_rig_toml_has_no_value_for_it(tool):
     offers = offered(tool, 1, "base-tilted-5deg")
     assert "Level the base" in one(offers, "The base about")
 
 
+@pytest.mark.slow
 def test_a_scale_that_is_off_is_told(tool):
     text = one(offered(tool, 1, "sensor-scale-110"), "of a known weight")
     assert numbers(text, "shows ")[0] == pytest.approx(1.1, abs=0.03)

@@ -85,6 +85,7 @@ def test_a_clumsy_hand_touches_the_frame_and_lifts_the_foot(plant):
     assert x[-1] > 0.34  # and goes on
 
 
+@pytest.mark.slow
 def test_a_steady_hand_neither_touches_the_frame_nor_lifts(plant):
     plant.terrain = Container(plant.terrain)
     rows = crossing(plant, PACES["steady"], 8.0)
@@ -118,6 +119,7 @@ def test_a_stuck_hand_presses_harder_up_to_its_strongest():
     assert 36.0 < force[-2000:].mean() < 46.0
 
 
+@pytest.mark.slow
 def test_a_hand_that_rests_pushes_no_more(plant):
     x = crossing(plant, Pace(), 2.5)[:, 0]
     assert x[-1] - x[-250] > 0.005  # it was pushing: 10 mm/s and more

@@ -65,6 +65,7 @@ def serve(tmp_path):
         arm.__exit__(None, None, None)
 
 
+@pytest.mark.slow
 def test_four_joints_arrive_under_the_programs_own_control(serve):
     arm = serve()
     arm.activate()
@@ -74,6 +75,7 @@ def test_four_joints_arrive_under_the_programs_own_control(serve):
     arm.client.finish()
 
 
+@pytest.mark.slow
 def test_a_person_who_carries_the_foot_is_in_the_way(serve):
     arm = serve(tool=TOOL, has_hand=True)
     arm.activate()
