@@ -125,10 +125,10 @@ class AllGroundModel:
         """
         scores: tuple[list[Array], list[Array]] = ([], [])
         for rows in known:
-            scores[rows.ground.is_plate].extend(
-                self.predict(rows.ground, t.inputs).normal_score(t.F_t)
-                for t in rows.trials
-            )
+            every = SampleTable.joined(rows.trials)
+            found = self.predict(rows.ground, every.inputs).normal_score(every.F_t)
+            ends = np.cumsum([table.count for table in rows.trials])[:-1]
+            scores[rows.ground.is_plate].extend(np.split(found, ends))
         (stones, _), (plates, _) = (choose_shape(parts) for parts in scores)
         return replace(self, shapes=(stones, plates))
 

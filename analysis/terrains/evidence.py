@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from analysis.data.prepare import PreparedTrial
 from analysis.data.series import Array
@@ -59,8 +60,10 @@ class TrialEvidence:
     def strains(self, terrain: str, size: int, *, overlap: bool = False) -> Array:
         """Return the mean strain of windows under a terrain's model, shape (n,)."""
         column = self.scores.strain[:, self.scores.terrains.index(terrain)]
-        windows = windows_of(column.size, size, overlap=overlap)
-        return np.array([column[rows].mean() for rows in windows])
+        begins = [w.start for w in windows_of(column.size, size, overlap=overlap)]
+        if not begins:
+            return np.zeros(0)
+        return sliding_window_view(column, size)[begins].mean(axis=1)
 
 
 @dataclass(frozen=True, slots=True)
