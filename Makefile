@@ -7,6 +7,9 @@ STAMP := $(VENV)/.installed
 DOCS := $(VENV)/.docs
 WHEEL := build/wheel
 
+# many short programs are started: compiled once, whatever the shell asks for
+export PYTHONDONTWRITEBYTECODE :=
+
 .PHONY: demo test docs wheel lock lab lab-page lint types contracts crate-validator sbom release man clean
 
 $(STAMP): pyproject.toml constraints.txt
