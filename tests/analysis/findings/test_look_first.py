@@ -27,14 +27,14 @@ def push(number, mu=0.8):
     return TractionSeries("X", f"T{number + 1:02d}", t, v, load, force)
 
 
-def found(trials):
-    return look_first(run_study({"X": trials}, OPTIONS, simulated=True))
+def studied(trials):
+    return run_study({"X": trials}, OPTIONS, simulated=True)
 
 
 def test_nothing_stands_out_among_trials_that_are_alike():
     trials = [push(k) for k in range(10)]
-    assert found(trials) == []
-    study = run_study({"X": trials}, OPTIONS, simulated=True)
+    study = studied(trials)
+    assert look_first(study) == []
     assert look_first_tables(study) == []
 
 
@@ -56,11 +56,12 @@ def test_nothing_stands_out_among_trials_that_are_alike():
 def test_a_trial_with_something_wrong_is_the_first_and_says_what(change, words):
     trials = [push(k) for k in range(10)]
     trials[3] = change(trials[3])
-    odd = found(trials)
+    study = studied(trials)
+    odd = look_first(study)
     assert (odd[0].terrain, odd[0].number, odd[0].name) == ("X", 4, "T04")
     assert odd[0].score > LIMIT
     assert any(words in reason for reason in odd[0].reasons), odd[0].reasons
-    (table,) = look_first_tables(run_study({"X": trials}, OPTIONS, simulated=True))
+    (table,) = look_first_tables(study)
     assert table.rows[0][1] == "4"
 
 
@@ -99,13 +100,13 @@ def stood(series):
 )
 def test_a_wrong_sensor_is_seen_at_a_foot_that_stands_on_any_ground(change, words):
     trials = [stood(push(k, mu=0.4 + 0.1 * k)) for k in range(10)]
-    assert found(trials) == []
+    assert look_first(studied(trials)) == []
     trials[3] = change(trials[3])
-    assert found(trials)[0].number == 4
-    assert any(words in reason for reason in found(trials)[0].reasons)
+    assert look_first(studied(trials))[0].number == 4
+    assert any(words in reason for reason in look_first(studied(trials))[0].reasons)
 
 
 def test_three_trials_are_too_few_to_compare():
     trials = [push(k) for k in range(3)]
     trials[1] = replace(trials[1], F_t=trials[1].F_t + 5.0)
-    assert found(trials) == []
+    assert look_first(studied(trials)) == []

@@ -100,6 +100,7 @@ def test_a_lag_that_is_given_is_held_against_the_motion(imported, rubbing, words
     assert not any("lag of" in text for text in near)
 
 
+@pytest.mark.slow
 def test_a_lag_of_a_smooth_push_is_not_claimed(imported):
     found = imported(smooth(), mass=0.3)
     assert figure(found, "lag")[0] == 0.0
@@ -120,6 +121,7 @@ def test_a_sensor_that_reads_the_reaction_is_read_with_the_other_word(imported):
     assert (errors(found.trials[0], rubbing)[1:] < 0.05).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("axes", "said"),
     [((1, 0, 2), "moments are -1.0 times"), ((2, 1, 0), "F_t exceeds F_n")],
@@ -168,6 +170,7 @@ def test_without_stamps_the_receipt_counts_and_is_named(imported):
     assert any("times of receipt" in text for text in found.warnings)
 
 
+@pytest.mark.slow
 def test_two_clocks_are_refused_with_the_hours_between(imported):
     with pytest.raises(
         SettingsError, match="18000 s apart by their stamps: two clocks"

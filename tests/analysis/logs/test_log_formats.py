@@ -119,7 +119,9 @@ def test_a_view_in_the_place_of_a_table_is_not_read(tmp_path):
         read(path)
 
 
-@pytest.mark.parametrize("compression", ["zstd", "lz4", "bz2"])
+@pytest.mark.parametrize(
+    "compression", ["zstd", "lz4", pytest.param("bz2", marks=pytest.mark.slow)]
+)
 def test_a_bomb_is_refused_and_not_unpacked(compression):
     import bz2
 

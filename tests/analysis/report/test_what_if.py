@@ -82,6 +82,7 @@ def test_other_training_samples_are_tested_on_the_same_ones(make_series, moving,
         )
 
 
+@pytest.mark.slow
 def test_a_study_under_another_smoothing_is_held_against_the_same_samples(
     make_series, moving
 ):
@@ -123,6 +124,7 @@ def both(make_series, moving):
     return choice, before, run_study(trials, choice.options(options), simulated=True)
 
 
+@pytest.mark.slow
 def test_both_studies_stand_side_by_side(both):
     choice, before, after = both
     table = side_by_side(choice, before, after)

@@ -28,6 +28,7 @@ def faults():
     return resource.getrusage(resource.RUSAGE_SELF).ru_minflt
 
 
+@pytest.mark.slow
 def test_the_first_task_of_a_process_has_one_thread_too():
     done = subprocess.run(
         [sys.executable, "-c", _FIRST_TASK], capture_output=True, text=True, check=True

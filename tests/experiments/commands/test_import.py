@@ -36,6 +36,7 @@ def test_a_list_shows_topics_rates_frames_and_links(given):
     assert "joints that move: slide_x, slide_y, slide_z, wrist" in done.out
 
 
+@pytest.mark.slow
 def test_from_a_bag_to_a_report(given, tmp_path):
     tables = tmp_path / "gravel"
     done = imported(given, tables, "--terrain", "gravel", "--factor", "d50=19")

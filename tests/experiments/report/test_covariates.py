@@ -21,6 +21,7 @@ def tables(tmp_path):
     return paths
 
 
+@pytest.mark.slow
 def test_a_column_that_cannot_be_tested_is_said_with_the_cause(tables, tmp_path):
     to = ("--to", tmp_path / "fit", "--models", "tustin", "--covariate", "temp")
     done = traction("fit", *tables, *to)
