@@ -183,6 +183,8 @@ def test_a_foot_counts_as_lifted_three_centimetres_above_the_plane(
         ((-0.009, 0, 0, 0, 0, 0), True),
         ((0, 0.011, 0, 0, 0, 0), False),
         ((0, 0, -0.011, 0, 0, 0), False),
+        ((0.01, 0, 0, 0, 0, 0), False),
+        ((0, 0, -0.01, 0, 0, 0), False),
         ((0, 0, 0, 1.0, 0, 0), True),
     ],
 )
