@@ -127,6 +127,7 @@ TESTS = {
     "experiments/session/reducer.py": ("tests/experiments/session/test_reducer.py",),
     "experiments/session/kept_files.py": (
         "tests/experiments/session/test_witnesses.py",
+        "tests/experiments/trial/test_next_push.py",
     ),
     "experiments/report/checksums.py": _PUBLISHED,
     "experiments/report/witnesses.py": _PUBLISHED,
@@ -155,6 +156,7 @@ _BODIES = (
     "('the foot', (7, *_capsule(0.045, 0.0, end, x, y)))]"
 )
 _UNREAD = "overwritten before it is read"
+_MARK = "a mark of one way; it is only held against that of the other and 0"
 _EIGHTH = "there is no eighth motor that would read it"
 _TILTS = "_TILTS = ((5, -1.2), (4, 1.0), (4, -1.0), (5, -0.6))"
 EQUIVALENT: dict[tuple[str, str], str] = {
@@ -255,6 +257,11 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         "if count > 1 else 1.0",
     ): _BELOW,
     (
+        "ft_sensor/tare.py",
+        "grace = lasted / count / 2 if count else 0.0 -> "
+        "grace = lasted / count / 2 if count else 1.0",
+    ): _BELOW,
+    (
         f"{_CONTROL}/friction_compensation.py",
         "self._load_torques = [0.0] * 7 -> self._load_torques = [0.0] * 8",
     ): _UNREAD,
@@ -328,7 +335,17 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         f"{_CONTROL}/friction_compensation.py",
         "way = 1 if z > _BENT else -1 if z < -_BENT else 0 -> "
         "way = 1 if z > _BENT else -2 if z < -_BENT else 0",
-    ): "a mark of the other way; nothing reckons with it",
+    ): _MARK,
+    (
+        f"{_CONTROL}/friction_compensation.py",
+        "way = 1 if z > _BENT else -1 if z < -_BENT else 0 -> "
+        "way = 2 if z > _BENT else -1 if z < -_BENT else 0",
+    ): _MARK,
+    (
+        f"{_CONTROL}/friction_compensation.py",
+        "way = 1 if z > _BENT else -1 if z < -_BENT else 0 -> "
+        "way = 1 if z >= _BENT else -1 if z < -_BENT else 0",
+    ): _AT_REST,
     (
         f"{_CONTROL}/position_control.py",
         "if t <= 0.0: -> if t < 0.0:",
