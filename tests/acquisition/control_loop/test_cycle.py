@@ -322,6 +322,12 @@ def test_idle_does_not_wait_for_a_complete_reading(bench):
     assert bench.arm.idled == 1
 
 
+def test_a_counter_of_the_sensor_that_is_wider_than_its_field_wraps(bench):
+    for counter, recorded in ((2**32 - 1, 2**32 - 1), (2**32 + 5, 5)):
+        bench.sensor.queue.append(bench.wrench(5.0, counter=counter))
+        assert bench.run(force=None)["ft_counter"] == recorded
+
+
 def test_a_stale_force_repeats_the_last_value_and_clears_the_bit(bench):
     fresh = bench.run(force=5.0)
     stale = bench.run(4, force=None)
@@ -404,6 +410,19 @@ def test_a_simulated_arm_is_flagged(bench):
     assert not has(bench.run(), Flag.SIMULATED)
     bench.cycle = bench.make(Flag.SIMULATED)
     assert has(bench.run(), Flag.SIMULATED)
+
+
+@pytest.mark.parametrize("mode", SafetyMode)
+def test_a_sample_has_no_flags_but_its_own_unless_they_are_asked_for(bench, mode):
+    bench.arm.mode = mode
+    usual = bench.run()["flags"]
+    outputs = CycleOutputs(
+        lambda payload: bench.records.append(bytes(payload)), bench.wrenches.extend
+    )
+    bench.cycle = Cycle(
+        bench.arm, bench.sensor, bench.law, bench.observer, LIMITS, outputs
+    )
+    assert bench.run()["flags"] == usual
 
 
 def test_a_verdict_changes_the_torque_in_the_same_cycle(bench):
