@@ -475,6 +475,16 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         "elif t < ramp: -> elif t <= ramp:",
     ): _AT_REST,
     (
+        f"{_CONTROL}/position_control.py",
+        "if length * self.acceleration < self.speed ** 2: -> "
+        "if length * self.acceleration <= self.speed ** 2:",
+    ): _AT_REST,
+    (
+        f"{_CONTROL}/position_control.py",
+        "if error * rate > 0.0 and (not -_SLOW <= rate <= _SLOW): -> "
+        "if error * rate >= 0.0 and (not -_SLOW <= rate <= _SLOW):",
+    ): "a spring that is not stretched pulls nothing, at every speed",
+    (
         "wam/calibration/free_space.py",
         "reach, width = (constants.d[2], abs(constants.a[2])) -> "
         "reach, width = (constants.d[2], abs(constants.a[3]))",
