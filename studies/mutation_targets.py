@@ -49,6 +49,7 @@ TESTS = {
         f"{_LOOP_TESTS}/test_torque_limiter.py",
         f"{_LOOP_TESTS}/test_guard.py",
     ),
+    f"{_LOOP}/proof.py": (f"{_CONTROL_TESTS}/test_proof.py",),
     "acquisition/ipc/loop_server.py": ("tests/acquisition/ipc/test_loop_server.py",),
     f"{_FILE}/salvage.py": _SALVAGED,
     f"{_FILE}/recover.py": _SALVAGED,
@@ -70,6 +71,7 @@ TESTS = {
     f"{_CONTROL}/friction_compensation.py": (
         f"{_CONTROL_TESTS}/test_friction_compensation.py",
     ),
+    f"{_CONTROL}/proof.py": (f"{_CONTROL_TESTS}/test_proof.py",),
     f"{_CONTROL}/sole_impedance.py": (f"{_CONTROL_TESTS}/test_sole_impedance.py",),
     f"{_CONTROL}/soft_walls.py": (f"{_CONTROL_TESTS}/test_soft_walls.py",),
     f"{_DRIVER}/transmission.py": (f"{_DRIVER_TESTS}/test_transmission.py",),
