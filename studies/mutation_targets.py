@@ -477,6 +477,15 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         "elif t < ramp: -> elif t <= ramp:",
     ): _AT_REST,
     (
+        f"{_CONTROL}/proof.py",
+        "height = min(seconds / up, 1.0) if down <= 0.0 else 1.0 - down / up -> "
+        "height = min(seconds / up, 1.0) if down < 0.0 else 1.0 - down / up",
+    ): _AT_REST,
+    (
+        f"{_CONTROL}/proof.py",
+        "limit = low if way < low else high -> limit = low if way <= low else high",
+    ): "a joint at the end of its way has been let pass before",
+    (
         f"{_CONTROL}/position_control.py",
         "if length * self.acceleration < self.speed ** 2: -> "
         "if length * self.acceleration <= self.speed ** 2:",

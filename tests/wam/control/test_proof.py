@@ -166,6 +166,25 @@ def test_a_ramp_ends_where_its_joint_has_reached_its_aim(sense, joint):
     assert proof.torque(reading(3000), WEIGHT).any()
 
 
+@pytest.mark.parametrize("sense", [-1.0, 1.0])
+def test_a_joint_at_its_aim_has_moved(sense):
+    assert CONSTANTS.home[0] == 0.0
+    proof = Proof(ProofGoal(ProofKind.RAMP, 1, sense), CONSTANTS, reading())
+    assert not proof.torque(reading(500, j1=sense * 0.008), WEIGHT).any()
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_joint_may_be_at_the_end_of_its_way(side):
+    proof = Proof(ProofGoal(ProofKind.REST), CONSTANTS, reading())
+    assert excess(proof, reading(j1=side * 0.008)) is None
+
+
+def test_a_ramp_to_no_torque_pushes_nothing():
+    proof = Proof(ProofGoal(ProofKind.RAMP, 2), CONSTANTS, reading())
+    for way in (-0.02, 0.0, 0.02):
+        assert not proof.torque(reading(500, j2=way), WEIGHT).any()
+
+
 @pytest.mark.parametrize(("ms", "height"), LIFTED_AT)
 @pytest.mark.parametrize("sense", [-1.0, 1.0])
 def test_a_lift_goes_up_80_mrad_at_50_mrad_a_second_waits_and_comes_back(
@@ -254,6 +273,13 @@ def test_seventy_millijoules_end_a_proof():
 def test_what_is_no_proof_is_refused(goal):
     with pytest.raises(ValueError, match=r"no joint|is no proof"):
         Proof(goal, CONSTANTS, reading())
+
+
+def test_a_goal_says_what_is_given_in_four_numbers():
+    """With no joint and no torque, in a second, where nothing else is said."""
+    wanted = [(float(number), 0.0, 0.0, 1.0) for number in range(4)]
+    kinds = (ProofKind.REST, ProofKind.RAMP, ProofKind.LIFT, ProofKind.GRAVITY)
+    assert [ProofGoal(kind).values for kind in kinds] == wanted
 
 
 def test_a_goal_survives_its_way_through_the_commands():
