@@ -8,6 +8,7 @@ from ft_sensor.tare import TareError, take_mean
 from ft_sensor.weighing import (
     LARGEST_TURN,
     WeightCause,
+    WeightChange,
     compare_weights,
     weight_change,
     weight_seen,
@@ -58,6 +59,11 @@ def test_spread_is_between_the_extreme_window_means():
     assert measure(samples(steps)).spread == pytest.approx(0.3)
 
 
+def test_the_last_window_of_a_second_counts_by_itself():
+    steps = np.repeat([0.0, 0.0, 0.0, 0.0, 0.4], 160)
+    assert measure(samples(steps)).spread == pytest.approx(0.4)
+
+
 def test_touching_is_refused_in_numbers():
     touch = np.repeat([0.0, 0.0, 3.2, 0.0, 0.0], 160)
     with pytest.raises(TareError) as refused:
@@ -88,6 +94,21 @@ def test_one_second_is_enough():
 def test_less_than_a_second_is_refused(count):
     with pytest.raises(TareError, match="too few"):
         measure(samples(noise(count)))
+
+
+@pytest.mark.parametrize(("short_ns", "is_enough"), [(0, True), (1, False)])
+def test_half_a_period_less_than_a_second_is_enough(short_ns, is_enough):
+    """Twelve samples stand for 0.96 s, and 0.04 s of grace."""
+    slow = [
+        replace(sample, t_ns=k * 80_000_000)
+        for k, sample in enumerate(samples([4.0] * 12))
+    ]
+    slow[-1] = replace(slow[-1], t_ns=slow[-1].t_ns - short_ns)
+    if is_enough:
+        assert take_mean(slow, 0.5, 12.5).samples == 12
+        return
+    with pytest.raises(TareError, match=r"12 F/T samples over 0\.96 s are too few"):
+        take_mean(slow, 0.5, 12.5)
 
 
 def test_one_second_of_jittering_arrivals_is_enough():
@@ -268,6 +289,34 @@ def test_what_leaves_more_than_half_of_the_error_explains_nothing(more, cause):
     change = compare_weights(np.array([[0, 0, 9.0]]), np.array([[1.0, 0, 9.0 + more]]))
     assert change.cause is cause
     assert change.error == pytest.approx(np.hypot(1.0, more))
+
+
+def test_what_leaves_just_half_of_the_error_explains_it():
+    """Twice the weight in three poses, and 1 N aside along four axes."""
+    expected = np.array([[0, 0, 2.0]] * 3)
+    seen = np.array([[1.0, 1.0, 4.0], [1.0, 1.0, 4.0], [0, 0, 4.0]])
+    change = compare_weights(expected, seen)
+    assert (change.scale, change.cause) == (2.0, WeightCause.MASS)
+
+
+def test_a_turn_has_to_be_larger_than_a_sound_one_and_to_show():
+    turned = WeightChange(9.0, float(LARGEST_TURN), 1.0, 9.0, WeightCause.TURNED)
+    assert not turned.is_turned
+    assert replace(turned, turned=-1.0001 * LARGEST_TURN).is_turned
+    across = replace(turned, turned=np.pi / 2, across=0.3)
+    assert not across.is_turned
+    assert replace(across, across=0.3001).is_turned
+
+
+def test_a_foot_that_hardly_weighs_has_its_mass_told():
+    change = compare_weights(np.array([[0, 0, 0.5]]), np.array([[0, 0, 0.75]]))
+    assert change.scale == pytest.approx(1.5)
+    assert change.cause is WeightCause.MASS
+
+
+def test_a_sensor_that_shows_nothing_shows_no_mass_and_not_the_other_sign():
+    change = compare_weights(np.array([[1.0, 2.0, 3.0]]), np.zeros((1, 3)))
+    assert (change.scale, change.cause) == (0.0, WeightCause.MASS)
 
 
 def test_where_no_weight_is_expected_no_mass_is_told():

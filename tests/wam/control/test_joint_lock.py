@@ -160,6 +160,7 @@ def test_other_gains_are_used():
 def test_the_lock_reaches_as_far_as_its_torque_goes():
     assert LockGains().reach == pytest.approx(0.065)
     assert LockGains(kp=8.0, limit=0.5).reach == 0.0625
+    assert LockGains(kp=0.5).reach == pytest.approx(2.6)
     assert LockGains(kp=0.0).reach == float("inf")
 
 
