@@ -465,6 +465,11 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     ): _TUNED,
     (
         f"{_RUN}/tare.py",
+        "residual = residual_force(tared, known) if known is not None else 0.0 -> "
+        "residual = residual_force(tared, known) if known is not None else 1.0",
+    ): "of an unknown bias it is not looked at",
+    (
+        f"{_RUN}/tare.py",
         "while still < STILL_SECONDS: -> while still <= STILL_SECONDS:",
     ): "a sum of ticks of 0.02 s is never 0.3 s to the last bit",
     (

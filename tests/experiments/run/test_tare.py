@@ -1,5 +1,6 @@
 """The tare between two trials, and what it may not hide."""
 
+import json
 from types import SimpleNamespace
 
 import numpy as np
@@ -163,6 +164,24 @@ def test_the_foot_is_guided_until_it_is_still_and_then_held(tmp_path):
     assert context.loop_client.advanced == pytest.approx(0.3 + 1.02, abs=0.03)
 
 
+def test_a_tare_is_written_to_the_trial_before_it_and_the_next_one_is_not(tmp_path):
+    context = lifted(tmp_path)
+    sidecar = context.metadata.folder.trials / "T01.json"
+    sidecar.parent.mkdir(exist_ok=True)
+    sidecar.write_text(json.dumps({"attempt": 1, "verdict": "keep"}))
+    context.state.last_recorded = TrialName(1, 1)
+    take_tare(context, TrialName(2, 1))
+    written = json.loads(sidecar.read_text())
+    assert written["verdict"] == "keep"
+    assert written["next_tare"] == {
+        "t_ns": context.rig.tared_ns,
+        "bias": context.rig.tared.bias.tolist(),
+    }
+    take_tare(context, TrialName(2, 1))
+    assert context.rig.tared_ns > written["next_tare"]["t_ns"]
+    assert json.loads(sidecar.read_text()) == written
+
+
 def test_the_operator_is_asked_to_lift_all_the_time(tmp_path):
     context = lifted(tmp_path)
     take_tare(context, TrialName(3, 2))
@@ -289,6 +308,8 @@ def test_the_last_tare_is_written_like_the_others(tmp_path, capsys):
     (event,) = events(context, Event.TARED)
     assert event["trial_number"] == 0
     assert "No tare at the end" not in capsys.readouterr().out
+    asked = {(s.prompt, s.trial, s.attempt) for s in context.operator.states}
+    assert asked == {(Prompt.LIFT, 0, 1)}
 
 
 def test_the_last_tare_may_be_left_out(tmp_path, capsys):
