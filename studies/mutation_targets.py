@@ -48,6 +48,7 @@ TESTS = {
     f"{_LOOP}/limits.py": (
         f"{_LOOP_TESTS}/test_torque_limiter.py",
         f"{_LOOP_TESTS}/test_guard.py",
+        f"{_LOOP_TESTS}/test_contact.py",
     ),
     f"{_LOOP}/proof.py": (f"{_CONTROL_TESTS}/test_proof.py",),
     "acquisition/ipc/loop_server.py": ("tests/acquisition/ipc/test_loop_server.py",),
@@ -157,15 +158,21 @@ _BODIES = (
     "('the wrist', (6, coal.Sphere(0.065), _at(0.0, 0.0, 0.0))), "
     "('the foot', (7, *_capsule(0.045, 0.0, end, x, y)))]"
 )
+_SHORTCUT = "a look that saves the loop; its rows say the same of every number"
 _UNREAD = "overwritten before it is read"
 _MARK = "a mark of one way; it is only held against that of the other and 0"
+_LIMP = "only the stiffness 0 of joint 7 is below either, and its limit is 0"
 _EIGHTH = "there is no eighth motor that would read it"
 _TILTS = "_TILTS = ((5, -1.2), (4, 1.0), (4, -1.0), (5, -0.6))"
 EQUIVALENT: dict[tuple[str, str], str] = {
     (
         f"{_LOOP}/guard.py",
         "if are_within(values, limits): -> pass",
-    ): "a look that saves the loop; its rows say the same of every number",
+    ): _SHORTCUT,
+    (
+        f"{_LOOP}/limits.py",
+        "if is_gentle and are_within(values, limits): -> pass",
+    ): _SHORTCUT,
     (
         f"{_FILE}/salvage.py",
         "latest = (self.last_ns if self.last_ns > 0 else start_ns) + _LONGEST_NS -> "
@@ -360,7 +367,12 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         f"{_CONTROL}/position_control.py",
         "self._reach = TORQUE_LIMIT / np.maximum(self.stiffness, 1.0) -> "
         "self._reach = TORQUE_LIMIT / np.maximum(self.stiffness, 2.0)",
-    ): "only the stiffness 0 of joint 7 is below either, and its limit is 0",
+    ): _LIMP,
+    (
+        f"{_CONTROL}/position_control.py",
+        "error = spring / np.maximum(self.stiffness, 1.0) -> "
+        "error = spring / np.maximum(self.stiffness, 2.0)",
+    ): _LIMP,
     (
         f"{_CONTROL}/soft_walls.py",
         "inward = 1.0 if depth > 0.0 else -1.0 -> "

@@ -88,10 +88,15 @@ def test_what_a_turned_joint_gets_stays_while_it_rests():
     assert np.allclose(resting, moving, atol=1e-12)
 
 
-@pytest.mark.parametrize("share", [-0.1, LARGEST_SHARE + 0.01, float("nan")])
+@pytest.mark.parametrize("share", [-0.01, 0.81, float("nan")])
 def test_shares_that_could_move_the_arm_are_refused(share):
-    with pytest.raises(ValueError, match="share"):
+    with pytest.raises(ValueError, match=r"share .* is outside 0\.\.0\.8"):
         FrictionCompensation(CONSTANTS, KNOWN, share)
+
+
+def test_a_share_of_nothing_takes_nothing_off():
+    compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.0)
+    assert not after(compensation, turning(1, 0.3)).any()
 
 
 def test_what_is_badly_known_is_compensated_less():
