@@ -170,6 +170,10 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         "if are_within(values, limits): -> pass",
     ): _SHORTCUT,
     (
+        f"{_LOOP}/motion.py",
+        "if are_within(values, limits): -> pass",
+    ): _SHORTCUT,
+    (
         f"{_LOOP}/limits.py",
         "if is_gentle and are_within(values, limits): -> pass",
     ): _SHORTCUT,
