@@ -170,6 +170,17 @@ def test_a_foot_that_moves_less_than_two_millimetres_stands(axis, way, fault):
     assert follow(begun + later)[0].fault is fault
 
 
+@pytest.mark.parametrize("cycles", [100, 300])
+def test_a_force_on_a_foot_that_moves_does_not_grow_at_all(cycles):
+    """However little may grow."""
+    limits, state = replace(LIMITS, contact_growth=0.1), ContactState()
+    for cycle in range(cycles):
+        seen = load(20.0 + 0.2 * cycle, sole=(0.003 * cycle, 0.0, 0.0))
+        now_ns = START_NS + cycle * PERIOD_NS
+        state, verdict = check_contact(limits, state, now_ns, seen, is_recording=True)
+        assert verdict is OK
+
+
 def test_a_force_that_lets_go_counts_50_milliseconds_after_it_came_back():
     """Of ten points, the ninth or the last is of a moment with less force."""
     early = steps(10.0, *[60.0] * 7, 30.0, *[60.0] * 5)
