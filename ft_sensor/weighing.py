@@ -69,7 +69,7 @@ def compare_weights(expected: Floats, seen: Floats) -> WeightChange:
     turned = expected @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     size = float((expected * expected).sum())
     scale = float((expected * seen).sum()) / size if size > 0.0 else 1.0
-    by_scale = WeightCause.MASS if scale > 0.0 else WeightCause.SIGN
+    by_scale = WeightCause.SIGN if scale < 0.0 else WeightCause.MASS
     left = {
         by_scale: float(np.linalg.norm(seen - scale * expected)),
         WeightCause.TURNED: float(np.linalg.norm(seen - turned)),

@@ -48,7 +48,9 @@ TESTS = {
     f"{_LOOP}/limits.py": (
         f"{_LOOP_TESTS}/test_torque_limiter.py",
         f"{_LOOP_TESTS}/test_guard.py",
+        f"{_LOOP_TESTS}/test_contact.py",
     ),
+    f"{_LOOP}/proof.py": (f"{_CONTROL_TESTS}/test_proof.py",),
     "acquisition/ipc/loop_server.py": ("tests/acquisition/ipc/test_loop_server.py",),
     f"{_FILE}/salvage.py": _SALVAGED,
     f"{_FILE}/recover.py": _SALVAGED,
@@ -70,6 +72,7 @@ TESTS = {
     f"{_CONTROL}/friction_compensation.py": (
         f"{_CONTROL_TESTS}/test_friction_compensation.py",
     ),
+    f"{_CONTROL}/proof.py": (f"{_CONTROL_TESTS}/test_proof.py",),
     f"{_CONTROL}/sole_impedance.py": (f"{_CONTROL_TESTS}/test_sole_impedance.py",),
     f"{_CONTROL}/soft_walls.py": (f"{_CONTROL_TESTS}/test_soft_walls.py",),
     f"{_DRIVER}/transmission.py": (f"{_DRIVER_TESTS}/test_transmission.py",),
@@ -127,6 +130,7 @@ TESTS = {
     "experiments/session/reducer.py": ("tests/experiments/session/test_reducer.py",),
     "experiments/session/kept_files.py": (
         "tests/experiments/session/test_witnesses.py",
+        "tests/experiments/trial/test_next_push.py",
     ),
     "experiments/report/checksums.py": _PUBLISHED,
     "experiments/report/witnesses.py": _PUBLISHED,
@@ -154,14 +158,25 @@ _BODIES = (
     "('the wrist', (6, coal.Sphere(0.065), _at(0.0, 0.0, 0.0))), "
     "('the foot', (7, *_capsule(0.045, 0.0, end, x, y)))]"
 )
+_SHORTCUT = "a look that saves the loop; its rows say the same of every number"
 _UNREAD = "overwritten before it is read"
+_MARK = "a mark of one way; it is only held against that of the other and 0"
+_LIMP = "only the stiffness 0 of joint 7 is below either, and its limit is 0"
 _EIGHTH = "there is no eighth motor that would read it"
 _TILTS = "_TILTS = ((5, -1.2), (4, 1.0), (4, -1.0), (5, -0.6))"
 EQUIVALENT: dict[tuple[str, str], str] = {
     (
         f"{_LOOP}/guard.py",
         "if are_within(values, limits): -> pass",
-    ): "a look that saves the loop; its rows say the same of every number",
+    ): _SHORTCUT,
+    (
+        f"{_LOOP}/motion.py",
+        "if are_within(values, limits): -> pass",
+    ): _SHORTCUT,
+    (
+        f"{_LOOP}/limits.py",
+        "if is_gentle and are_within(values, limits): -> pass",
+    ): _SHORTCUT,
     (
         f"{_FILE}/salvage.py",
         "latest = (self.last_ns if self.last_ns > 0 else start_ns) + _LONGEST_NS -> "
@@ -255,6 +270,11 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         "if count > 1 else 1.0",
     ): _BELOW,
     (
+        "ft_sensor/tare.py",
+        "grace = lasted / count / 2 if count else 0.0 -> "
+        "grace = lasted / count / 2 if count else 1.0",
+    ): _BELOW,
+    (
         f"{_CONTROL}/friction_compensation.py",
         "self._load_torques = [0.0] * 7 -> self._load_torques = [0.0] * 8",
     ): _UNREAD,
@@ -328,7 +348,17 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         f"{_CONTROL}/friction_compensation.py",
         "way = 1 if z > _BENT else -1 if z < -_BENT else 0 -> "
         "way = 1 if z > _BENT else -2 if z < -_BENT else 0",
-    ): "a mark of the other way; nothing reckons with it",
+    ): _MARK,
+    (
+        f"{_CONTROL}/friction_compensation.py",
+        "way = 1 if z > _BENT else -1 if z < -_BENT else 0 -> "
+        "way = 2 if z > _BENT else -1 if z < -_BENT else 0",
+    ): _MARK,
+    (
+        f"{_CONTROL}/friction_compensation.py",
+        "way = 1 if z > _BENT else -1 if z < -_BENT else 0 -> "
+        "way = 1 if z >= _BENT else -1 if z < -_BENT else 0",
+    ): _AT_REST,
     (
         f"{_CONTROL}/position_control.py",
         "if t <= 0.0: -> if t < 0.0:",
@@ -341,7 +371,12 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         f"{_CONTROL}/position_control.py",
         "self._reach = TORQUE_LIMIT / np.maximum(self.stiffness, 1.0) -> "
         "self._reach = TORQUE_LIMIT / np.maximum(self.stiffness, 2.0)",
-    ): "only the stiffness 0 of joint 7 is below either, and its limit is 0",
+    ): _LIMP,
+    (
+        f"{_CONTROL}/position_control.py",
+        "error = spring / np.maximum(self.stiffness, 1.0) -> "
+        "error = spring / np.maximum(self.stiffness, 2.0)",
+    ): _LIMP,
     (
         f"{_CONTROL}/soft_walls.py",
         "inward = 1.0 if depth > 0.0 else -1.0 -> "
@@ -446,6 +481,11 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     ): _TUNED,
     (
         f"{_RUN}/tare.py",
+        "residual = residual_force(tared, known) if known is not None else 0.0 -> "
+        "residual = residual_force(tared, known) if known is not None else 1.0",
+    ): "of an unknown bias it is not looked at",
+    (
+        f"{_RUN}/tare.py",
         "while still < STILL_SECONDS: -> while still <= STILL_SECONDS:",
     ): "a sum of ticks of 0.02 s is never 0.3 s to the last bit",
     (
@@ -457,6 +497,25 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         f"{_CONTROL}/position_control.py",
         "elif t < ramp: -> elif t <= ramp:",
     ): _AT_REST,
+    (
+        f"{_CONTROL}/proof.py",
+        "height = min(seconds / up, 1.0) if down <= 0.0 else 1.0 - down / up -> "
+        "height = min(seconds / up, 1.0) if down < 0.0 else 1.0 - down / up",
+    ): _AT_REST,
+    (
+        f"{_CONTROL}/proof.py",
+        "limit = low if way < low else high -> limit = low if way <= low else high",
+    ): "a joint at the end of its way has been let pass before",
+    (
+        f"{_CONTROL}/position_control.py",
+        "if length * self.acceleration < self.speed ** 2: -> "
+        "if length * self.acceleration <= self.speed ** 2:",
+    ): _AT_REST,
+    (
+        f"{_CONTROL}/position_control.py",
+        "if error * rate > 0.0 and (not -_SLOW <= rate <= _SLOW): -> "
+        "if error * rate >= 0.0 and (not -_SLOW <= rate <= _SLOW):",
+    ): "a spring that is not stretched pulls nothing, at every speed",
     (
         "wam/calibration/free_space.py",
         "reach, width = (constants.d[2], abs(constants.a[2])) -> "

@@ -6,7 +6,9 @@ import pytest
 from acquisition.devices import WrenchSample
 from ft_sensor.tare import TareError, take_mean
 from ft_sensor.weighing import (
+    LARGEST_TURN,
     WeightCause,
+    WeightChange,
     compare_weights,
     weight_change,
     weight_seen,
@@ -57,6 +59,11 @@ def test_spread_is_between_the_extreme_window_means():
     assert measure(samples(steps)).spread == pytest.approx(0.3)
 
 
+def test_the_last_window_of_a_second_counts_by_itself():
+    steps = np.repeat([0.0, 0.0, 0.0, 0.0, 0.4], 160)
+    assert measure(samples(steps)).spread == pytest.approx(0.4)
+
+
 def test_touching_is_refused_in_numbers():
     touch = np.repeat([0.0, 0.0, 3.2, 0.0, 0.0], 160)
     with pytest.raises(TareError) as refused:
@@ -87,6 +94,21 @@ def test_one_second_is_enough():
 def test_less_than_a_second_is_refused(count):
     with pytest.raises(TareError, match="too few"):
         measure(samples(noise(count)))
+
+
+@pytest.mark.parametrize(("short_ns", "is_enough"), [(0, True), (1, False)])
+def test_half_a_period_less_than_a_second_is_enough(short_ns, is_enough):
+    """Twelve samples stand for 0.96 s, and 0.04 s of grace."""
+    slow = [
+        replace(sample, t_ns=k * 80_000_000)
+        for k, sample in enumerate(samples([4.0] * 12))
+    ]
+    slow[-1] = replace(slow[-1], t_ns=slow[-1].t_ns - short_ns)
+    if is_enough:
+        assert take_mean(slow, 0.5, 12.5).samples == 12
+        return
+    with pytest.raises(TareError, match=r"12 F/T samples over 0\.96 s are too few"):
+        take_mean(slow, 0.5, 12.5)
 
 
 def test_one_second_of_jittering_arrivals_is_enough():
@@ -151,6 +173,31 @@ def test_the_spread_is_that_of_the_force_and_not_of_the_moment():
     assert measure(turned).spread == 0.0
 
 
+@pytest.mark.parametrize("axis", range(3))
+def test_each_component_of_the_force_may_vary_by_as_little_as_the_others(axis):
+    steps = np.repeat([0.0, 0.6, 0.0, 0.0, 0.0], 160)
+    moved = [
+        replace(sample, wrench=(*np.eye(3)[axis] * step, 0.0, 0.0, 0.0))
+        for sample, step in zip(samples(steps), steps, strict=True)
+    ]
+    with pytest.raises(TareError, match=r"varied 0\.6 N") as refused:
+        measure(moved)
+    assert refused.value.spread == pytest.approx(0.6)
+
+
+@pytest.mark.parametrize(("promised", "is_enough"), [(400, True), (401, False)])
+def test_a_sensor_that_promises_less_may_send_less(promised, is_enough):
+    slow = [
+        replace(sample, t_ns=k * 5_000_000)
+        for k, sample in enumerate(samples(noise(400)))
+    ]
+    if is_enough:
+        assert take_mean(slow, 0.5, promised).samples == 400
+        return
+    with pytest.raises(TareError, match="Only 40 F/T samples in one"):
+        take_mean(slow, 0.5, promised)
+
+
 POSES = (attitude(0.1, 0.2, 0.3), attitude(0.1, -1.0, 0.3))
 
 
@@ -206,6 +253,84 @@ def test_a_turn_shows_by_what_the_weight_is_across_the_axis():
         assert change.across == pytest.approx(across)
         assert change.turned == pytest.approx(turned)
         assert change.is_turned is is_clear
+
+
+@pytest.mark.parametrize(
+    "expected",
+    [(9.0, 0, 0), (0, 9.0, 0), (3.0, 0, 9.0), (0, 3.0, 9.0), (5.0, 6.0, 7.0)],
+)
+@pytest.mark.parametrize("degrees", [-15.0, 15.0])
+def test_a_weight_that_turned_about_z_is_a_turn_wherever_it_pointed(expected, degrees):
+    """And leaves nothing to explain, in no component of the force."""
+    x, y, z = expected
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    seen = np.array([[c * x + s * y, c * y - s * x, z]])
+    change = compare_weights(np.array([expected], dtype=float), seen)
+    assert np.degrees(change.turned) == pytest.approx(degrees)
+    assert (change.cause, change.is_turned) == (WeightCause.TURNED, True)
+
+
+@pytest.mark.parametrize(("degrees", "is_turned"), [(11.9, False), (12.1, True)])
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_twelve_degrees_are_what_a_sound_sensor_may_show(side, degrees, is_turned):
+    turn = side * np.radians(degrees)
+    seen = 9.0 * np.array([[np.cos(turn), -np.sin(turn), 0.0]])
+    change = compare_weights(np.array([[9.0, 0.0, 0.0]]), seen)
+    assert change.turned == pytest.approx(turn)
+    assert change.is_turned == is_turned
+    assert np.degrees(LARGEST_TURN) == pytest.approx(12.0)
+
+
+@pytest.mark.parametrize(
+    ("more", "cause"), [(1.66, WeightCause.UNKNOWN), (1.80, WeightCause.MASS)]
+)
+def test_what_leaves_more_than_half_of_the_error_explains_nothing(more, cause):
+    """1 N across the axis that no other mass of a foot above the sensor makes."""
+    change = compare_weights(np.array([[0, 0, 9.0]]), np.array([[1.0, 0, 9.0 + more]]))
+    assert change.cause is cause
+    assert change.error == pytest.approx(np.hypot(1.0, more))
+
+
+def test_what_leaves_just_half_of_the_error_explains_it():
+    """Twice the weight in three poses, and 1 N aside along four axes."""
+    expected = np.array([[0, 0, 2.0]] * 3)
+    seen = np.array([[1.0, 1.0, 4.0], [1.0, 1.0, 4.0], [0, 0, 4.0]])
+    change = compare_weights(expected, seen)
+    assert (change.scale, change.cause) == (2.0, WeightCause.MASS)
+
+
+def test_a_turn_has_to_be_larger_than_a_sound_one_and_to_show():
+    turned = WeightChange(9.0, float(LARGEST_TURN), 1.0, 9.0, WeightCause.TURNED)
+    assert not turned.is_turned
+    assert replace(turned, turned=-1.0001 * LARGEST_TURN).is_turned
+    across = replace(turned, turned=np.pi / 2, across=0.3)
+    assert not across.is_turned
+    assert replace(across, across=0.3001).is_turned
+
+
+def test_a_foot_that_hardly_weighs_has_its_mass_told():
+    change = compare_weights(np.array([[0, 0, 0.5]]), np.array([[0, 0, 0.75]]))
+    assert change.scale == pytest.approx(1.5)
+    assert change.cause is WeightCause.MASS
+
+
+def test_a_sensor_that_shows_nothing_shows_no_mass_and_not_the_other_sign():
+    change = compare_weights(np.array([[1.0, 2.0, 3.0]]), np.zeros((1, 3)))
+    assert (change.scale, change.cause) == (0.0, WeightCause.MASS)
+
+
+def test_where_no_weight_is_expected_no_mass_is_told():
+    change = compare_weights(np.zeros((1, 3)), np.array([[1.0, 2.0, -3.0]]))
+    assert (change.scale, change.across) == (1.0, 0.0)
+    assert (change.cause, change.is_turned) == (WeightCause.UNKNOWN, False)
+
+
+def test_of_several_poses_the_worst_counts():
+    expected = np.array([[3.0, 4.0, 9.0], [6.0, 8.0, 2.0], [0.0, 1.0, 5.0]])
+    off = np.array([[0.0, 0.1, 0.0], [0.2, -0.3, 0.6], [0.0, 0.0, -0.5]])
+    change = compare_weights(expected, expected + off)
+    assert change.error == pytest.approx(0.7)
+    assert change.across == pytest.approx(10.0)
 
 
 @pytest.mark.parametrize("scale", [0.5, 1.5])

@@ -134,6 +134,64 @@ def test_a_force_that_grows_while_the_foot_stands_ends_a_trial():
     assert verdict.detail == ForceGrowth(pytest.approx(41.0, abs=5.0), 40.0)
 
 
+def steps(*forces):
+    """Return the loads of forces that stay for 50 ms each, then change at once."""
+    return [load(force) for force in forces for _ in range(25)]
+
+
+def test_half_a_second_is_looked_at_from_its_tenth_point_on():
+    """Of the points, 50 ms apart, the tenth comes after 450 ms."""
+    verdict, cycle = follow(steps(10.0, *[60.0] * 12))
+    assert (verdict.fault, cycle * 2) == (Fault.CONTACT_GROWTH, 450)
+    assert verdict.detail == ForceGrowth(50.0, 40.0)
+
+
+def test_a_force_grows_against_what_it_was_half_a_second_ago():
+    """At 500 ms the first point still counts, and is forgotten at the next."""
+    verdict, cycle = follow(steps(10.0, *[30.0] * 8, *[60.0] * 5))
+    assert (verdict.fault, cycle * 2) == (Fault.CONTACT_GROWTH, 500)
+    assert follow(steps(10.0, *[30.0] * 9, *[60.0] * 5))[0] is OK
+
+
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize(
+    ("way", "fault"),
+    [
+        (-0.0019, Fault.CONTACT_GROWTH),
+        (0.0019, Fault.CONTACT_GROWTH),
+        (-0.0021, None),
+        (0.0021, None),
+    ],
+)
+def test_a_foot_that_moves_less_than_two_millimetres_stands(axis, way, fault):
+    begun, grown = steps(10.0), steps(*[60.0] * 12)
+    moved = tuple(np.array(HERE) + way * np.eye(3)[axis])
+    later = [seen._replace(sole=moved) for seen in grown]
+    assert follow(begun + later)[0].fault is fault
+
+
+@pytest.mark.parametrize("cycles", [100, 300])
+def test_a_force_on_a_foot_that_moves_does_not_grow_at_all(cycles):
+    """However little may grow."""
+    limits, state = replace(LIMITS, contact_growth=0.1), ContactState()
+    for cycle in range(cycles):
+        seen = load(20.0 + 0.2 * cycle, sole=(0.003 * cycle, 0.0, 0.0))
+        now_ns = START_NS + cycle * PERIOD_NS
+        state, verdict = check_contact(limits, state, now_ns, seen, is_recording=True)
+        assert verdict is OK
+
+
+def test_a_force_that_lets_go_counts_50_milliseconds_after_it_came_back():
+    """Of ten points, the ninth or the last is of a moment with less force."""
+    early = steps(10.0, *[60.0] * 7, 30.0, *[60.0] * 5)
+    verdict, cycle = follow(early)
+    assert (verdict.fault, cycle * 2) == (Fault.CONTACT_GROWTH, 500)
+    assert follow(steps(10.0, *[60.0] * 8, 30.0, *[60.0] * 5))[0] is OK
+    for_one_cycle = steps(10.0, *[60.0] * 14)
+    for_one_cycle[9 * 25] = load(30.0)
+    assert follow(for_one_cycle)[0] is OK
+
+
 def test_a_force_that_grows_slowly_or_with_motion_is_a_push():
     assert follow(ramp(60.0, 1.4))[0] is OK
     assert follow(ramp(95.0, 0.9, speed=0.01))[0] is OK

@@ -5,6 +5,7 @@ import pytest
 
 from acquisition.clock import PERIOD_NS
 from acquisition.control_loop.cycle import Cycle, CycleOutputs
+from acquisition.control_loop.details import MotionExcess
 from acquisition.control_loop.faults import (
     CircuitCauses,
     Fault,
@@ -322,6 +323,12 @@ def test_idle_does_not_wait_for_a_complete_reading(bench):
     assert bench.arm.idled == 1
 
 
+def test_a_counter_of_the_sensor_that_is_wider_than_its_field_wraps(bench):
+    for counter, recorded in ((2**32 - 1, 2**32 - 1), (2**32 + 5, 5)):
+        bench.sensor.queue.append(bench.wrench(5.0, counter=counter))
+        assert bench.run(force=None)["ft_counter"] == recorded
+
+
 def test_a_stale_force_repeats_the_last_value_and_clears_the_bit(bench):
     fresh = bench.run(force=5.0)
     stale = bench.run(4, force=None)
@@ -404,6 +411,19 @@ def test_a_simulated_arm_is_flagged(bench):
     assert not has(bench.run(), Flag.SIMULATED)
     bench.cycle = bench.make(Flag.SIMULATED)
     assert has(bench.run(), Flag.SIMULATED)
+
+
+@pytest.mark.parametrize("mode", SafetyMode)
+def test_a_sample_has_no_flags_but_its_own_unless_they_are_asked_for(bench, mode):
+    bench.arm.mode = mode
+    usual = bench.run()["flags"]
+    outputs = CycleOutputs(
+        lambda payload: bench.records.append(bytes(payload)), bench.wrenches.extend
+    )
+    bench.cycle = Cycle(
+        bench.arm, bench.sensor, bench.law, bench.observer, LIMITS, outputs
+    )
+    assert bench.run()["flags"] == usual
 
 
 def test_a_verdict_changes_the_torque_in_the_same_cycle(bench):
@@ -802,3 +822,51 @@ def test_a_fault_of_the_same_severity_does_not_replace_the_first(bench):
     bench.enter(ArmState.HOLD)
     bench.run(2)
     assert bench.reason == "foot-speed"  # it was there all the time
+
+
+class ProvingLaw(Law):
+    """Is in a proof; keeps whether the motors were said to have power."""
+
+    def __init__(self):
+        super().__init__()
+        self.excess = None
+        self.powered = []
+
+    def is_proving(self):
+        return True
+
+    def proof_excess(self, reading, energy, *, is_powered):
+        self.powered.append(is_powered)
+        return self.excess
+
+
+@pytest.fixture
+def proving():
+    bench = Bench()
+    bench.law = ProvingLaw()
+    bench.cycle = bench.make()
+    bench.enter(ArmState.HOLD)
+    return bench
+
+
+def test_a_proof_goes_on_while_the_arm_does_what_it_should(proving):
+    proving.run(3)
+    assert (proving.state, proving.reason) == (ArmState.HOLD, "")
+    assert proving.law.powered[-1]
+    proving.arm.mode = SafetyMode.IDLE
+    proving.run()
+    assert not proving.law.powered[-1]
+
+
+def test_what_a_proof_should_not_do_ends_it_in_idle(proving):
+    proving.law.excess = MotionExcess("the way of joint 4", 0.03, 0.025, "rad")
+    proving.run()
+    assert (proving.state, proving.reason) == (ArmState.IDLE, Fault.PROOF_MOTION)
+    assert proving.cycle.status.verdict.detail == proving.law.excess
+
+
+def test_what_the_guard_says_of_a_proof_goes_before_and_ends_it_in_idle(proving):
+    proving.law.excess = MotionExcess("the way of joint 4", 0.03, 0.025, "rad")
+    proving.arm.missing = 5
+    proving.run()
+    assert (proving.state, proving.reason) == (ArmState.IDLE, Fault.CAN_SILENCE)

@@ -331,6 +331,14 @@ def test_late_cycles_are_forgotten_after_a_second():
     assert late_cycles(times)[1].fault == Fault.LOOP_LATE
 
 
+def test_a_late_cycle_counts_for_a_second_to_the_nanosecond():
+    """The oldest is forgotten, the next one is a second old."""
+    times = [*range(0, 110 * MS, 10 * MS), S + 10 * MS]
+    assert late_cycles(times)[1].detail == LateCycles(11, 10)
+    times[-1] += 1
+    assert late_cycles(times)[1] is OK
+
+
 def test_a_punctual_cycle_does_not_repeat_the_verdict():
     state, _ = late_cycles(range(0, 110 * MS, 10 * MS))
     _, verdict = check(LIMITS, state, seen(host_ns=112 * MS))
@@ -366,6 +374,31 @@ def test_a_motor_that_stands_still_while_the_sole_goes_on_ends_the_session():
     assert (verdict.fault, verdict.action) == (Fault.MOTOR_STILL, Action.IDLE)
     assert verdict.detail == StillMotor(4, pytest.approx(20.1), pytest.approx(20.0))
     assert verdict.ends_session
+
+
+def test_the_sole_may_go_as_far_as_the_limit():
+    assert led([(100, 0.0), (100, 0.02)])[1] is OK
+    assert led([(100, 0.0), (100, -0.02)])[1] is OK
+
+
+@pytest.mark.parametrize("motor", range(1, 8))
+def test_motors_2_to_6_may_stand_for_six_centimetres_each(motor):
+    """Motors 1 and 7 are judged never."""
+    verdicts: list[Any] = []
+    for way in (0.06, 0.061):
+        state = ARMED
+        for counts, x in ((0, 0.0), (100, way)):
+            turned = [counts] * 7
+            turned[motor - 1] = 0
+            now = seen(counts=turned, sole=(0.0, x, 0.0))
+            state, verdict = check(LIMITS, state, now)
+        verdicts.append(verdict)
+    assert verdicts[0] is OK
+    if motor in {1, 7}:
+        assert verdicts[1] is OK
+    else:
+        detail = StillMotor(motor, pytest.approx(61.0), pytest.approx(60.0))
+        assert verdicts[1].detail == detail
 
 
 @pytest.mark.parametrize("counts", [99, 101])

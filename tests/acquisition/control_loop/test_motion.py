@@ -125,6 +125,56 @@ def test_hold_counts_its_way_from_where_it_began():
     assert judge(begin, hold, motion(LATER + 9, HOLD, sole=(0.45, 0.0, 0.0))) is OK
 
 
+BEFORE = [
+    # state, ms since power and state, what is judged from the next moment on
+    (HOLD, 500, {"foot_speed": 0.46}),
+    (HOLD, 500, {"energy": 0.21}),
+    (HOLD, 500, {"sole": (0.0, 0.13, 0.0)}),
+    (DAMP, 398, {"foot_speed": 0.031}),
+    (DAMP, 58, {"qd": fast(6, 4.01)}),
+    (DAMP, 58, {"energy": 0.03}),
+]
+
+
+@pytest.mark.parametrize(("state", "at", "seen"), BEFORE)
+def test_each_limit_of_motion_has_its_time(state, at, seen):
+    """The activation's ends, those of damping begin."""
+    assert judge(motion(0, state), motion(at, state, **seen)) is OK
+
+
+def test_a_damped_arm_is_given_eight_milliseconds_before_it_may_win_no_energy():
+    come = [motion(0, FLOAT), motion(LATER, DAMP, energy=1.0)]
+    least = motion(LATER + 4, DAMP, energy=0.2)
+    again = {"energy": 0.46}
+    assert judge(*come, least, motion(LATER + 6, DAMP, **again)) is OK
+    at = judge(*come, least, motion(LATER + 8, DAMP, **again))
+    assert (at.fault, at.detail.limit) == (Fault.DAMP_MOTION, pytest.approx(0.45))
+    assert judge(*come, least, motion(LATER + 8, DAMP, energy=0.44)) is OK
+
+
+@pytest.mark.parametrize("joint", range(1, 8))
+@pytest.mark.parametrize("way", [-1.0, 1.0])
+def test_joints_that_stood_when_power_came_are_judged_at_once(joint, way):
+    """What comes into hold in motion is given 150 ms."""
+    at_limit, beyond = (
+        {"qd": fast(joint, way * (LIMITS.hold_speed[joint - 1] + more))}
+        for more in (0.0, E)
+    )
+    begin = motion(0, HOLD)
+    assert judge(begin, motion(2, HOLD, **at_limit)) is OK
+    assert judge(begin, motion(2, HOLD, **beyond)).fault is Fault.HOLD_MOTION
+    come = [motion(0, FLOAT), motion(LATER, HOLD, **beyond)]
+    assert judge(*come, motion(LATER + 148, HOLD, **beyond)) is OK
+    late = judge(*come, motion(LATER + 150, HOLD, **beyond))
+    assert late.detail.quantity == f"the speed of joint {joint}"
+
+
+def test_an_arm_that_comes_into_hold_wins_no_more_than_what_holds_may_have():
+    come = [motion(0, FLOAT), motion(LATER, HOLD, energy=0.6)]
+    won = judge(*come, motion(LATER + 148, HOLD, energy=0.96))
+    assert (won.fault, won.detail.limit) == (Fault.HOLD_MOTION, pytest.approx(0.95))
+
+
 def test_power_that_came_long_ago_is_no_activation():
     begin = motion(0, HOLD)
     again = motion(LATER, HOLD, foot_speed=0.5)
@@ -139,5 +189,6 @@ def test_energy_that_filtered_speeds_show_late_is_what_the_arm_came_with():
     before = motion(LATER, ArmState.HOLD)
     early = [before, motion(LATER + 2, ArmState.DAMP, energy=0.10)]
     late = motion(LATER + 100, ArmState.DAMP, energy=0.12)
-    assert judge(*early, motion(LATER + 10, ArmState.DAMP, energy=0.30), late) is OK
+    for at in (LATER + 10, LATER + 12):  # 8 and 10 ms after damping was asked for
+        assert judge(*early, motion(at, ArmState.DAMP, energy=0.30), late) is OK
     assert judge(*early, motion(LATER + 14, ArmState.DAMP, energy=0.30), late) is not OK

@@ -50,5 +50,14 @@ def test_the_largest_change_of_every_joint_is_its_share_of_the_limit():
 
 
 def test_a_change_just_beyond_the_step_is_held_back():
-    wanted = 1.5 * STEP
-    assert bounded_torque(wanted, np.zeros(7), LIMITS) == pytest.approx(STEP)
+    for more in (1.5, 1.001):
+        for sign in (1.0, -1.0):
+            given = bounded_torque(sign * more * STEP, np.zeros(7), LIMITS)
+            assert given == pytest.approx(sign * STEP)
+
+
+@pytest.mark.parametrize("joint", range(7))
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_torque_just_beyond_its_limit_is_cut_to_it(joint, sign):
+    most = sign * np.eye(7)[joint] * LIMITS
+    assert bounded_torque(1.001 * most, most, LIMITS).tolist() == most.tolist()

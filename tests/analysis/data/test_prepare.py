@@ -87,6 +87,16 @@ def test_a_trial_counts_with_250_samples_and_nine_tenths_of_the_container(
     assert trial.is_countable is is_countable
 
 
+def test_nine_tenths_of_the_container_to_the_last_bit_are_enough(make_series):
+    series = make_series(np.full(2000, 0.1))
+    way = prepare_trial(series, PrepareOptions()).travel
+    near = way / 0.9
+    container = next(c for c in np.nextafter(near, [near, 0, 1]) if 0.9 * c == way)
+    for wanted, is_countable in ((container, True), (container * (1 + 1e-9), False)):
+        options = PrepareOptions(container_travel=float(wanted))
+        assert prepare_trial(series, options).is_countable is is_countable
+
+
 @pytest.mark.parametrize(
     "choice",
     [

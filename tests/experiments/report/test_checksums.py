@@ -1,5 +1,8 @@
 """A folder held against its list of checksums."""
 
+import os
+import shutil
+
 import pytest
 
 from acquisition.errors import TrialFileError
@@ -77,6 +80,32 @@ def test_a_folder_of_too_many_files_is_refused(folder, monkeypatch):
     assert changed_files(folder) == []
     (folder / "new.txt").touch()
     with pytest.raises(TrialFileError, match="holds more than 3 files"):
+        changed_files(folder)
+
+
+def test_more_than_a_hundred_thousand_files_are_refused(folder):
+    """Names of few files: what they hold is not looked at any more."""
+    many = folder / "many"
+    many.mkdir()
+    few = [folder / f"{number}.txt" for number in range(4)]
+    for path in few:
+        path.touch()
+    try:
+        for number in range(100_001):
+            os.link(few[number % 4], f"{many}/{number}")
+        with pytest.raises(TrialFileError, match="holds more than 100000 files"):
+            changed_files(folder)
+    finally:
+        shutil.rmtree(many)
+
+
+@pytest.mark.parametrize(
+    ("size", "problem"),
+    [(16_000_000, "line 3 is not a checksum"), (16_000_001, "is larger than")],
+)
+def test_a_list_is_read_up_to_sixteen_megabytes(folder, size, problem):
+    os.truncate(folder / SUMS, size)
+    with pytest.raises(TrialFileError, match=problem):
         changed_files(folder)
 
 

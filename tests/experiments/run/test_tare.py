@@ -1,5 +1,6 @@
 """The tare between two trials, and what it may not hide."""
 
+import json
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,7 +14,9 @@ from acquisition.ipc.ring_buffer import RingBuffer
 from acquisition.ipc.shared_sensor import WRENCH_DTYPE, pack_wrench
 from acquisition.sample import Sample
 from experiments.fault_injection.plan import FaultTrigger
+from experiments.operator.console import GOOD
 from experiments.operator.prompts import Prompt
+from experiments.rig.build import build_tool
 from experiments.run.stop import StopRequestedError
 from experiments.run.tare import (
     known_bias,
@@ -24,10 +27,14 @@ from experiments.run.tare import (
 )
 from experiments.session.sidecar import TrialName
 from experiments.session.states import Event
+from experiments.settings.load import load_settings
 from ft_sensor.calibration.fit import SensorFit
 from ft_sensor.calibration.sensor_file import SensorCalibration, sensor_to_toml
 from ft_sensor.payload import Payload
 from tests.experiments.run.bench import Keys, StubClient, make_context
+from wam.control.position_control import JointMove, move_reference
+from wam.model.arm_model import ArmModel
+from wam.model.constants import load_constants
 
 BIAS = np.array([0.5, -1.0, 2.0, 0.01, 0.02, 0.03])
 
@@ -157,6 +164,24 @@ def test_the_foot_is_guided_until_it_is_still_and_then_held(tmp_path):
     assert context.loop_client.advanced == pytest.approx(0.3 + 1.02, abs=0.03)
 
 
+def test_a_tare_is_written_to_the_trial_before_it_and_the_next_one_is_not(tmp_path):
+    context = lifted(tmp_path)
+    sidecar = context.metadata.folder.trials / "T01.json"
+    sidecar.parent.mkdir(exist_ok=True)
+    sidecar.write_text(json.dumps({"attempt": 1, "verdict": "keep"}))
+    context.state.last_recorded = TrialName(1, 1)
+    take_tare(context, TrialName(2, 1))
+    written = json.loads(sidecar.read_text())
+    assert written["verdict"] == "keep"
+    assert written["next_tare"] == {
+        "t_ns": context.rig.tared_ns,
+        "bias": context.rig.tared.bias.tolist(),
+    }
+    take_tare(context, TrialName(2, 1))
+    assert context.rig.tared_ns > written["next_tare"]["t_ns"]
+    assert json.loads(sidecar.read_text()) == written
+
+
 def test_the_operator_is_asked_to_lift_all_the_time(tmp_path):
     context = lifted(tmp_path)
     take_tare(context, TrialName(3, 2))
@@ -183,6 +208,8 @@ def test_a_foot_counts_as_lifted_three_centimetres_above_the_plane(
         ((-0.009, 0, 0, 0, 0, 0), True),
         ((0, 0.011, 0, 0, 0, 0), False),
         ((0, 0, -0.011, 0, 0, 0), False),
+        ((0.01, 0, 0, 0, 0, 0), False),
+        ((0, 0, -0.01, 0, 0, 0), False),
         ((0, 0, 0, 1.0, 0, 0), True),
     ],
 )
@@ -244,6 +271,17 @@ def test_a_tare_that_hides_a_force_of_the_foot_is_refused(tmp_path, limit, is_ta
     assert context.loop_client.bias is None
 
 
+@pytest.mark.parametrize(("limit", "is_taken"), [(0.5, True), (0.499, False)])
+def test_a_tare_may_hide_as_much_as_the_limit(tmp_path, limit, is_taken):
+    context = lifted(tmp_path, residual=limit)
+    context.loop_client.force = lambda s: 0.5
+    if is_taken:
+        take_tare(context, TrialName(1, 1))
+        return
+    with pytest.raises(PreflightError, match="residual"):
+        take_tare(context, TrialName(1, 1))
+
+
 def test_the_residual_is_measured_against_the_calibration_of_this_foot(tmp_path):
     context = lifted(tmp_path, residual=0.1, calibrations=calibration("tread"))
     context.loop_client.force = lambda s: float(BIAS[0])
@@ -270,6 +308,8 @@ def test_the_last_tare_is_written_like_the_others(tmp_path, capsys):
     (event,) = events(context, Event.TARED)
     assert event["trial_number"] == 0
     assert "No tare at the end" not in capsys.readouterr().out
+    asked = {(s.prompt, s.trial, s.attempt) for s in context.operator.states}
+    assert asked == {(Prompt.LIFT, 0, 1)}
 
 
 def test_the_last_tare_may_be_left_out(tmp_path, capsys):
@@ -318,6 +358,116 @@ def test_the_journal_has_the_bias_to_a_tenth_of_a_millinewton(tmp_path):
     assert event["bias"][0] != round(event["bias"][0], 3)
     assert event["spread"] == pytest.approx(0.1, abs=0.02)
     assert event["spread"] == round(event["spread"], 3)
+
+
+class TurnedWrist(LiftedFoot):
+    """An arm that goes where it is sent, with a sensor that weighs its foot.
+
+    Attributes:
+        seen: what the sensor shows in a pose of the joints [N], shape (3,).
+    """
+
+    def __init__(self, clock, start, seen):
+        super().__init__(clock)
+        self.move, self.begun_ns = JointMove(start, start), 0
+        self.seen = seen
+
+    @property
+    def position(self):
+        return move_reference(self.move, (self.clock.now_ns() - self.begun_ns) * 1e-9)[
+            0
+        ]
+
+    def move_to(self, goal, speed):
+        self.move = JointMove(self.position, np.array(goal), speed)
+        self.begun_ns = self.clock.now_ns()
+
+    def _stream(self):
+        now, force = self.clock.now_ns(), self.seen(self.position)
+        for t_ns in range(now - 20_000_000, now, 2_000_000):
+            sample = WrenchSample(t_ns, 0, (*force, 0.0, 0.0, 0.0), 0, True, 0)
+            self.buffer.write(pack_wrench(sample))
+
+    def latest(self):
+        sample = Sample()
+        sample.position[:] = self.position
+        sample.data["host_ns"] = self.clock.now_ns()
+        return sample.data
+
+    def last(self, seconds):
+        return np.concatenate([self.latest(), self.latest()])
+
+
+class Bystander(Keys):
+    """An operator who confirms what is asked for, and waits where nothing is."""
+
+    def answer(self, state):
+        self.states.append(state)
+        return " " if state.prompt in {Prompt.CLEAR, Prompt.SUPPORT} else ""
+
+
+def wrist(tmp_path, carried, seen, residual=1.0):
+    """Return a context whose arm can turn its wrist, with a calibrated sensor."""
+    context = make_context(tmp_path, Bystander())
+    shipped, rig = load_settings(None), context.rig
+    limits = shipped.rig.limits.model_copy(update={"residual": residual})
+    rig.settings = SimpleNamespace(
+        calibrations=calibration("tread"),
+        matrix=shipped.matrix,
+        rig=shipped.rig.model_copy(update={"limits": limits}),
+    )
+    rig.row = next(row for row in shipped.matrix.terrains if row.foot == "tread")
+    rig.model = ArmModel(load_constants(), build_tool(shipped.rig, "tread"))
+    rig.payload = carried
+    start = np.array(rig.row.start_q)
+    rig.backend.loop_client = TurnedWrist(
+        rig.clock, start, lambda q: seen(rig.model.plate_pose(q)[1])
+    )
+    return context
+
+
+def weighed(carried, degrees=0.0):
+    """Return what a sensor shows that was turned about z since it was calibrated."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    turned = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    return lambda rotation: BIAS[:3] + turned @ carried.weight(rotation)[:3]
+
+
+def test_a_mounting_whose_weight_turns_with_the_wrist_is_said_to_be_verified(
+    tmp_path, capsys
+):
+    carried = payload(0.45)
+    context = wrist(tmp_path, carried, weighed(carried))
+    prove_mounting(context)
+    said = capsys.readouterr().out
+    assert f"{GOOD} mounting verified: 0.0 N off (limit 1.0)" in said
+    assert said.index("clear the space") < said.index("mounting verified")
+    assert said.rstrip().endswith("Take the arm again. [space]")
+    start = np.array(context.rig.row.start_q)
+    assert context.loop_client.position == pytest.approx(start)
+
+
+@pytest.mark.parametrize(("limit", "is_verified"), [(0.5, True), (0.499, False)])
+def test_a_weight_may_be_off_by_the_limit_and_no_more(tmp_path, limit, is_verified):
+    """Of a foot without weight the sensor shows half a newton in the second pose."""
+
+    def seen(rotation):
+        is_tilted = rotation[2, 2] > 0.7
+        return np.array([0.5 * is_tilted, 0.0, 0.0])
+
+    context = wrist(tmp_path, payload(0.0), seen, residual=limit)
+    if is_verified:
+        prove_mounting(context)
+        return
+    with pytest.raises(PreflightError, match=r"0\.5 N"):
+        prove_mounting(context)
+
+
+def test_a_light_foot_on_a_turned_sensor_is_refused_within_the_limit(tmp_path):
+    carried = payload(0.2)
+    prove_mounting(wrist(tmp_path / "a", carried, weighed(carried, 8.0)))
+    with pytest.raises(PreflightError, match=r"turned by -?30 degrees"):
+        prove_mounting(wrist(tmp_path / "b", carried, weighed(carried, 30.0), 5.0))
 
 
 def test_a_real_sensor_of_unknown_bias_is_tared_without_a_residual(tmp_path, capsys):

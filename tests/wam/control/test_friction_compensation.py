@@ -88,10 +88,15 @@ def test_what_a_turned_joint_gets_stays_while_it_rests():
     assert np.allclose(resting, moving, atol=1e-12)
 
 
-@pytest.mark.parametrize("share", [-0.1, LARGEST_SHARE + 0.01, float("nan")])
+@pytest.mark.parametrize("share", [-0.01, 0.81, float("nan")])
 def test_shares_that_could_move_the_arm_are_refused(share):
-    with pytest.raises(ValueError, match="share"):
+    with pytest.raises(ValueError, match=r"share .* is outside 0\.\.0\.8"):
         FrictionCompensation(CONSTANTS, KNOWN, share)
+
+
+def test_a_share_of_nothing_takes_nothing_off():
+    compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.0)
+    assert not after(compensation, turning(1, 0.3)).any()
 
 
 def test_what_is_badly_known_is_compensated_less():
@@ -187,6 +192,24 @@ def test_leaving_float_lets_it_fade_within_a_tenth_of_a_second(foot_model, state
     steps = np.abs(np.diff([pushed, *faded], axis=0)).max()
     assert steps <= 0.03 * pushed.max() + 1e-9
     assert np.abs(faded[-1]).max() < 1e-9
+
+
+@pytest.mark.parametrize("way", [-1.0, 1.0])
+def test_what_fades_in_a_hold_leaves_it_its_share_of_the_limit(foot_model, way):
+    """Joint 1, which bears no weight: nine tenths of 1 N m, less than is pushed."""
+    walls = Walls(
+        tuple(CONSTANTS.q_lower), tuple(CONSTANTS.q_upper), (1.0,) * 7, (0.0,) * 7
+    )
+    compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.7)
+    law = FootController(foot_model, 0.0, walls=SoftWalls(walls), friction=compensation)
+    law.enter(ArmState.FLOAT, reading(0, NOTHING))
+    path = turning(0, way * 0.3)
+    for number, angles in enumerate(path):
+        tau, gravity = law.torque(reading(number, angles))
+    assert way * (tau - gravity)[0] > 1.0
+    law.enter(ArmState.HOLD, reading(200, path[-1]))
+    tau, gravity = law.torque(reading(200, path[-1]))
+    assert way * tau[0] == pytest.approx(0.9)
 
 
 def test_joint_7_is_left_to_its_lock(foot_model):

@@ -157,6 +157,30 @@ def test_other_gains_are_used():
     assert lock.torque(-1.0, 0.0, FULL) == 0.5
 
 
+def test_the_lock_reaches_as_far_as_its_torque_goes():
+    assert LockGains().reach == pytest.approx(0.065)
+    assert LockGains(kp=8.0, limit=0.5).reach == 0.0625
+    assert LockGains(kp=0.5).reach == pytest.approx(2.6)
+    assert LockGains(kp=0.0).reach == float("inf")
+
+
+def test_a_lock_without_a_spring_brakes_and_has_nothing_that_is_drawn_along():
+    lock = JointLock(LockGains(kp=0.0))
+    lock.engage(0.4, START)
+    lock.follow(2.0, FULL)
+    assert lock.reference(FULL + S) == 0.4
+    assert lock.torque(2.0, 1.0, FULL) == pytest.approx(-0.2)
+
+
+@pytest.mark.parametrize(("q7", "reference"), [(-0.0625, 0.3), (-0.0627, -0.0002)])
+def test_a_reference_goes_on_up_to_the_largest_torque_and_stops_there(q7, reference):
+    lock = JointLock(LockGains(kp=8.0, limit=0.5))
+    lock.engage(0.0, START)
+    lock.move(1.0, FULL)
+    lock.follow(q7, FULL)
+    assert lock.reference(FULL + S) == pytest.approx(reference)
+
+
 def test_the_lock_comes_to_rest_on_the_example_foot():
     """A push of 0.2 N m for 0.2 s, one cycle of delay, quantised to a count."""
     lock, inertia, count, dt = JointLock(), 1.0e-3 + 0.32e-3, 102.7e-6, 0.002

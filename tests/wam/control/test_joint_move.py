@@ -117,6 +117,23 @@ def test_joint_7_turns_at_its_top_speed_once_its_lock_has_let_go(way):
     assert np.sign(move_reference(move, 1.0)[1][6]) == np.sign(way)
 
 
+@pytest.mark.parametrize("way", [-0.4, 0.4])
+def test_joint_7_is_at_its_top_speed_within_a_twelfth_of_a_second(way):
+    goal = np.zeros(7)
+    goal[6] = way
+    side = np.sign(way)
+    for after, turned, rate in (
+        (-1 / 24, 0.0, 0.0),
+        (1 / 24, 0.5 / 96, 0.25),
+        (1 / 12, 0.5 / 24, 0.5),
+        (0.4, 0.2 - 0.5 / 24, 0.5),
+        (0.8 + 1 / 24, 0.4 - 0.5 / 96, 0.25),
+        (0.8 + 1 / 12, 0.4, 0.0),
+    ):
+        q, qd = move_reference(JointMove(np.zeros(7), goal), 0.5 + after)
+        assert (q[6], qd[6]) == pytest.approx((side * turned, side * rate))
+
+
 def test_a_move_without_a_turn_of_joint_7_leaves_it_where_it_is():
     goal = np.zeros(7)
     goal[3] = 1.0

@@ -11,6 +11,8 @@ CONSTANTS = load_constants()
 STEP = np.full(7, 0.004)  # rad that a move goes on
 REST = [1000, -2000, 3000, 0, 50, 60, 70]
 J2MP = np.array(CONSTANTS.j2mp)
+MOVES = np.array([4.4, 9.0, 4.5, 3.5, 0.7, 0.7, 0.16])  # N m, each joint for certain
+GOES_ON = np.array([1.0, 0.5, 0.5, 0.5, 2.0, 2.0, 3.0]) * 1e-3  # rad meanwhile
 
 
 def reading(counts, fresh=0x7F):
@@ -36,7 +38,7 @@ def turned(motor):
 
 def pull(share):
     """Return torques of all joints that give each motor its share of breakaway."""
-    bounds = np.abs(np.linalg.inv(J2MP).T) @ BREAKAWAY
+    bounds = np.abs(np.linalg.inv(J2MP).T) @ MOVES
     return J2MP.T @ (share * bounds)
 
 
@@ -68,6 +70,27 @@ def test_a_motor_that_the_move_leaves_alone_may_stand(motor):
     assert look(turned(motor), way=moved_one(other)) == 0
 
 
+@pytest.mark.parametrize("motor", range(1, 8))
+@pytest.mark.parametrize("way", [-1.0, 1.0])
+def test_a_move_goes_on_by_a_milliradian_or_so_before_a_motor_is_named(motor, way):
+    """By as much as both joints of a differential are given, for its motors."""
+    most = (np.abs(J2MP) @ GOES_ON)[motor - 1]
+    for share, named in ((0.99, 0), (1.01, motor)):
+        angle = way * share * most * np.eye(7)[motor - 1]
+        assert look(turned(motor), way=np.linalg.solve(J2MP, angle)) == named
+
+
+def test_a_motor_that_turns_now_and_then_is_looked_at_from_where_it_was_last():
+    watch, moved = MotorWatch(CONSTANTS), moved_one(1)
+    most = np.abs(J2MP)[0] @ GOES_ON / 0.3  # share of that way
+    counts = list(REST)
+    for number in range(5):
+        seen = reading([counts[0] + 2 * number, *turned(1)[1:]])
+        assert watch.stuck_motor(0.9 * number * most * moved, pull(2.0), seen) == 0
+    assert watch.stuck_motor(4.6 * 0.9 * most * moved, pull(2.0), seen) == 0
+    assert watch.stuck_motor(5.2 * 0.9 * most * moved, pull(2.0), seen) == 1
+
+
 def test_a_flicker_of_one_count_is_no_turn_and_two_are_one():
     counts = turned(4)
     for flicker, stuck in ((-1, 4), (1, 4), (-2, 0), (2, 0)):
@@ -87,5 +110,6 @@ def test_a_new_move_begins_anew():
 
 
 def test_what_moves_a_joint_is_well_above_its_dry_friction():
+    assert BREAKAWAY.tolist() == MOVES.tolist()
     assert (1.3 * CONSTANTS.coulomb < BREAKAWAY).all()
     assert (2.0 * CONSTANTS.coulomb + 5.0 > BREAKAWAY).all()

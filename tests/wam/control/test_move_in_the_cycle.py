@@ -8,7 +8,7 @@ from acquisition.control_loop.states import ArmState
 from tests.acquisition.control_loop.test_cycle import Bench, Law
 from tests.wam.control.test_controller import DOWN, reading
 from wam.control.controller import FootController
-from wam.control.position_control import JointMove
+from wam.control.position_control import BREAKAWAY, JointMove
 from wam.control.soft_walls import SoftWalls, Walls
 
 GOAL = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7)
@@ -110,6 +110,57 @@ def test_an_arm_on_its_way_gets_its_weight_alone(foot_model):
         q, qd = way.at(share * duration)
         tau, gravity = law.torque(reading(share * duration, q=q, qd=qd))
         assert tau[:6] == pytest.approx(gravity[:6], abs=1e-3)
+
+
+STRETCHED = np.array([0.0, 1.2, 0.0, 0.5, 0.0, 0.0, 0.2])
+
+
+@pytest.mark.parametrize("way", [-0.4, 0.4])
+def test_a_weight_alone_turns_no_motor_in_vain(foot_model, way):
+    """Where the move wants the arm nothing pulls it but its weight, which is borne."""
+    law = FootController(foot_model, 0.0)
+    law.enter(ArmState.HOLD, reading(0.0, q=STRETCHED))
+    goal = STRETCHED.copy()
+    goal[1] += way
+    duration = law.move_to(goal, 0.5, reading(0.0, q=STRETCHED))
+    for share in (0.0, 0.3, 0.5, 0.9):
+        q, qd = JointMove(STRETCHED, goal, 0.5).at(share * duration)
+        _, gravity = law.torque(reading(share * duration, q=q, qd=qd))
+        assert abs(gravity[1]) > BREAKAWAY[1]  # it would move the joint
+        assert law.stuck_motor() == 0
+
+
+@pytest.mark.parametrize("way", [-0.4, 0.4])
+def test_a_joint_that_a_move_pulls_at_beyond_its_weight_is_noticed(foot_model, way):
+    """Up and down, as soon as the pull moves it whatever the friction."""
+    law = FootController(foot_model, 0.0)
+    law.enter(ArmState.HOLD, reading(0.0, q=STRETCHED))
+    goal = STRETCHED.copy()
+    goal[1] += way
+    law.move_to(goal, 0.5, reading(0.0, q=STRETCHED))
+    bound = np.abs(np.linalg.inv(foot_model.constants.j2mp).T) @ BREAKAWAY
+    for seconds in np.arange(0.0, 0.4, 0.002):
+        tau, gravity = law.torque(reading(seconds, q=STRETCHED))
+        pulls = np.abs(np.linalg.solve(foot_model.constants.j2mp.T, tau - gravity))
+        assert (law.stuck_motor() in {2, 3}) == (pulls > bound)[1:3].any()
+    assert law.stuck_motor() in {2, 3}
+
+
+def test_a_move_names_no_motor_for_what_an_earlier_one_wanted(foot_model):
+    """It begins with the torque of a hold that somebody pushes against."""
+    law = FootController(foot_model, 0.0)
+    law.enter(ArmState.HOLD, reading(0.0))
+    goal = DOWN.copy()
+    goal[3] += 0.4
+    law.move_to(goal, 0.5, reading(0.0))
+    law.torque(reading(0.0))
+    law.enter(ArmState.HOLD, reading(9.0, q=goal))
+    pushed = reading(10.0, q=goal - 0.1 * np.eye(7)[3])
+    tau, gravity = law.torque(pushed)
+    assert tau[3] - gravity[3] > BREAKAWAY[3]
+    law.move_to(goal, 0.5, pushed)
+    law.torque(pushed)
+    assert law.stuck_motor() == 0
 
 
 @pytest.mark.parametrize("stop", ["q_lower", "q_upper"])
