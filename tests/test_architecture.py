@@ -36,6 +36,11 @@ def tree_of(path: Path) -> ast.Module:
     return ast.parse(path.read_text(), str(path))
 
 
+@cache
+def nodes_of(path: Path) -> list[ast.AST]:
+    return list(ast.walk(tree_of(path)))
+
+
 def package_of(module: str) -> str:
     is_package = sources()[module].name == "__init__.py"
     return module if is_package else module.rpartition(".")[0]
@@ -43,7 +48,7 @@ def package_of(module: str) -> str:
 
 def imported(module: str) -> Iterator[str]:
     """Yield the project's own modules that `module` imports."""
-    for node in ast.walk(tree_of(sources()[module])):
+    for node in nodes_of(sources()[module]):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names if alias.name in sources())
         elif isinstance(node, ast.ImportFrom) and node.module in sources():
@@ -86,7 +91,7 @@ def test_packages_import_each_other_without_cycles():
 def test_a_class_name_means_one_class():
     where = defaultdict(list)
     for module, path in sources().items():
-        for node in ast.walk(tree_of(path)):
+        for node in nodes_of(path):
             if isinstance(node, ast.ClassDef):
                 where[node.name].append(module)
     assert {name: w for name, w in where.items() if len(w) > 1} == {}
@@ -106,7 +111,7 @@ def test_docstrings_describe_only_names_that_exist():
     stale = [
         f"{module}.{node.name}: {name}"
         for module, path in sources().items()
-        for node in ast.walk(tree_of(path))
+        for node in nodes_of(path)
         if isinstance(node, ast.ClassDef | ast.FunctionDef)
         for name in sorted(lines_about(node) - defined_names(node))
     ]

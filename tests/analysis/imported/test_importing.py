@@ -158,6 +158,7 @@ def test_a_tare_may_be_six_numbers_or_another_log(imported, tmp_path):
         imported(rubbing, tare=other, mass=0.3)
 
 
+@pytest.mark.slow
 def test_a_tare_that_drifts_is_stated_with_its_spread(imported):
     found = imported(Rubbing(bias_drift=0.02), mass=0.3)
     assert figure(found, "tare")[1][0] > 0.05
@@ -222,6 +223,7 @@ def test_what_cannot_be_is_refused_with_a_way_out(imported, options, why):
     assert error.value.hint
 
 
+@pytest.mark.slow
 def test_heading_and_incline_give_the_same_as_the_way(imported):
     rubbing = Rubbing(slope=0.1, heading=0.7)
     found = imported(
