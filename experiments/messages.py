@@ -143,7 +143,7 @@ _WEIGHT_WORDS = {
     ),
     WeightCause.SIGN: (
         "as if the sensor had the other sign",
-        "Is ft_sensor.sign {sign:+.0f} right (+1 reads the load, -1 the reaction)?",
+        "Is ft_sensor.sign {sign:+z.0f} right (+1 reads the load, -1 the reaction)?",
         "traction calibrate sensor",
     ),
     WeightCause.TURNED: (

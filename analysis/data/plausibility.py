@@ -287,7 +287,7 @@ def _way(recorded: RecordedTrial, moving: NDArray[np.bool_]) -> Iterator[Doubt]:
         if abs(angle) > limit and beside > UNEVEN:
             yield Doubt(
                 name,
-                f"the sole's way is {angle:+.1f} degrees off the container's "
+                f"the sole's way is {angle:+z.1f} degrees off the container's "
                 f"{name} (limit {limit:g})",
                 f"{what} entered wrong",
                 "traction calibrate terrain",

@@ -127,7 +127,7 @@ def caption_drift(results: StudyResults) -> str:
     first, last = (
         np.median([trial.tare for trial in sessions[k]], axis=0) for k in (0, -1)
     )
-    moved = ", ".join(f"{value:+.2f}" for value in (last - first).tolist())
+    moved = ", ".join(f"{value:+z.2f}" for value in (last - first).tolist())
     words = f"From the first to the last session the tare went by {moved} N (x, y, z)"
     loads = [
         [trial.load_bias for trial in sessions[k] if trial.load_bias is not None]
@@ -135,7 +135,7 @@ def caption_drift(results: StudyResults) -> str:
     ]
     if all(loads):
         change = float(np.median(loads[1]) - np.median(loads[0]))
-        words += f" and the load by {change:+.2f} N"
+        words += f" and the load by {change:+z.2f} N"
     return (
         f"{words} (medians of a session). A tare that goes on and on is a sensor that "
         "is overloaded or warms up; a load that goes away from the set one is gravity "

@@ -127,7 +127,7 @@ def draw_trends(results: StudyResults) -> Figure | None:
 def caption_trends(results: StudyResults) -> str:
     """State which terrains change from the first trial to the last."""
     changing = [
-        f"{name} ({trend.slope:+.3f} ± {trend.slope_error:.3f} N per trial)"
+        f"{name} ({trend.slope:+z.3f} ± {trend.slope_error:.3f} N per trial)"
         for name, trends in results.trends.items()
         if (trend := trends[MEAN_FORCE]).is_significant
     ]
@@ -217,7 +217,8 @@ def _draw_trend(ax: Axes, trend: Trend) -> None:
         return
     ends = np.array([trend.trials.min(), trend.trials.max()])
     ax.plot(ends, trend.start + trend.slope * ends, "--", color="#D55E00", lw=1.3)
-    text = f"{trend.slope:+.3f} ± {trend.slope_error:.3f} N per trial".replace("-", "−")
+    text = f"{trend.slope:+z.3f} ± {trend.slope_error:.3f} N per trial"
+    text = text.replace("-", "−")
     ax.text(
         0.03,
         0.97,

@@ -198,7 +198,7 @@ def draw_residuals(results: StudyResults) -> Figure | None:
 def caption_residuals(results: StudyResults) -> str:
     """State bias and spread of the residuals."""
     values = [
-        f"{name} {bands[GP_SE].bias:+.2f} ± {bands[GP_SE].sd:.2f} N"
+        f"{name} {bands[GP_SE].bias:+z.2f} ± {bands[GP_SE].sd:.2f} N"
         for name, bands in results.residuals.items()
         if GP_SE in bands
     ]

@@ -152,7 +152,8 @@ class CovariateResult(NamedTuple):
     def sentence(self) -> str:
         """What it is, for people."""
         ends = (
-            f"{self.gain:+.2f} nat per sample, {self.lower:+.2f} to {self.upper:+.2f}"
+            f"{self.gain:+z.2f} nat per sample, "
+            f"{self.lower:+z.2f} to {self.upper:+z.2f}"
         )
         where = f"{self.terrain}: {self.column}: {self.verdict}"
         if self.repeated >= REPEATED:

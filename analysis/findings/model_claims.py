@@ -78,7 +78,7 @@ def _alike(results: Sequence[TerrainResult]) -> ClaimResult | None:
     mean = mean_of([pair.difference for pair in present]) or 0.0
     text = (
         f"Worst of the five over best: at most {gap:+.0%} on a terrain. GP (SE) minus "
-        f"Tustin {mean:+.3f} N on average; GP better beyond chance on "
+        f"Tustin {mean:+z.3f} N on average; GP better beyond chance on "
         f"{beyond_chance(present, -1, 'terrains')}, Tustin on "
         f"{count_significant(present, 1)}."
     )
@@ -98,7 +98,7 @@ def kernels_on_stones(evidence: PaperEvidence) -> ClaimResult | None:
         mean_of([p.difference for p in present]),
     )
     text = (
-        f"NN minus SE {mean:+.3f} N on average over the stones; NN better beyond "
+        f"NN minus SE {mean:+z.3f} N on average over the stones; NN better beyond "
         f"chance on {beyond_chance(present, -1, 'terrains')}."
     )
     return ClaimResult(text, graded(better > 0), {"NN - SE [N]": mean or 0.0})

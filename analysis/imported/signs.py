@@ -57,8 +57,8 @@ def side_warnings(values: Array, lateral: Array) -> list[str]:
         return []
     angle = float(np.degrees(np.arctan2(aside, along)))
     return [
-        f"{aside:+.1f} N across the way, {along:.1f} N along it: are axes exchanged, "
-        f"or is the sensor turned by {angle:+.0f} degrees about the normal? Check "
+        f"{aside:+z.1f} N across the way, {along:.1f} N along it: are axes exchanged, "
+        f"or is the sensor turned by {angle:+z.0f} degrees about the normal? Check "
         "--sensor, the URDF and --along"
     ]
 
@@ -110,7 +110,8 @@ def way_warnings(way: Array, axes: Array) -> list[str]:
         beside = length * np.tan(np.radians(abs(angle)))
         if abs(angle) > limit and beside > UNEVEN:
             found.append(
-                f"the foot's way is {angle:+.1f} degrees off {option} (limit {limit:g})"
+                f"the foot's way is {angle:+z.1f} degrees off {option} "
+                f"(limit {limit:g})"
             )
     return found
 

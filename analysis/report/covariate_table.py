@@ -16,7 +16,7 @@ def covariate_tables(results: Sequence[CovariateResult]) -> list[ReportTable]:
             one.terrain,
             one.column,
             one.verdict,
-            f"{one.gain:+.3f} ({one.lower:+.3f} to {one.upper:+.3f})",
+            f"{one.gain:+z.3f} ({one.lower:+z.3f} to {one.upper:+z.3f})",
             f"{one.repeated:.0%}",
             str(one.trials),
         ]

@@ -221,7 +221,7 @@ def _loads(page: FrictionPage) -> ReportTable:
         ends = [reaches[0], reaches[-1]]
         ranges = [
             " to ".join(f"{end.rest:.2f}" for end in ends),
-            " to ".join(f"{end.shift:+.2f}" for end in ends),
+            " to ".join(f"{end.shift:+z.2f}" for end in ends),
             " to ".join(f"{end.push:.2f}" for end in ends),
         ]
         kilograms = (masses.down, masses.half, masses.tenth)

@@ -206,7 +206,7 @@ def paired_cell(paired: PairedComparison | None, adjusted: float | None = None) 
         return "–"
     error = "" if paired.standard_error is None else f" ± {paired.standard_error:.3f}"
     together = "" if adjusted is None else f", Holm {adjusted:.2g}"
-    return f"{paired.difference:+.3f}{error} (p {paired.p:.2g}{together})"
+    return f"{paired.difference:+z.3f}{error} (p {paired.p:.2g}{together})"
 
 
 def _holm_note(pairs: Sequence[PairedComparison | None]) -> str:
@@ -284,7 +284,7 @@ def slope_cell(trend: Trend) -> str:
     """Return a slope with its standard error as text, – where there is none."""
     if trend.slope is None or trend.slope_error is None:
         return "–"
-    return f"{trend.slope:+.3f} ± {trend.slope_error:.3f}"
+    return f"{trend.slope:+z.3f} ± {trend.slope_error:.3f}"
 
 
 _MEASURES = (("mae", "N"), ("nlpd", "nat"))

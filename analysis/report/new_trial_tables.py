@@ -50,7 +50,7 @@ def family_table(study: Study) -> ReportTable:
                 str(sum(model.shape is not None for model in models)),
                 str(sum(model.choice.clipped for model in models)),
                 "–" if mean is None else f"{mean:.3f}",
-                "–" if paired is None else f"{-paired.difference:+.3f}",
+                "–" if paired is None else f"{-paired.difference:+z.3f}",
             ]
         )
     return ReportTable(

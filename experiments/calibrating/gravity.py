@@ -119,7 +119,7 @@ class GravityGuide:
 
     def _say_zeros(self, zeros: ZeroErrors) -> None:
         joints = [
-            f"joint {joint} {error:+.1f} ± {deviation:.1f}"
+            f"joint {joint} {error:+z.1f} ± {deviation:.1f}"
             for joint, error, deviation in zip(
                 zeros.joints,
                 np.degrees(zeros.errors),

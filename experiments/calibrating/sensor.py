@@ -119,7 +119,7 @@ class SensorGuide:
         assert tool is not None
         if fit.sign != tool.sensor_sign:
             self._console.say(
-                f"▲ rig.toml says sign {tool.sensor_sign:+.0f}: the sensor has the "
+                f"▲ rig.toml says sign {tool.sensor_sign:+z.0f}: the sensor has the "
                 "other one. Its calibration goes before rig.toml."
             )
         elif turned := turn_words(tool.sensor_angle, fit.angle):
@@ -135,7 +135,7 @@ class SensorGuide:
         say(f"mass {fit.mass:.3f} kg, centre {com} mm in the sensor frame")
         say(
             f"mounted at {np.degrees(fit.angle):.1f} degrees about z7, sign "
-            f"{fit.sign:+.0f}, bias {bias} N"
+            f"{fit.sign:+z.0f}, bias {bias} N"
         )
         say(
             f"residual {fit.residual:.3f} N, {fit.torque_residual:.4f} N m rms; the "

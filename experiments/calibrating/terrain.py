@@ -108,7 +108,7 @@ class TerrainGuide:
         say(
             f"incline {np.degrees(frame.incline):.2f} degrees (matrix "
             f"{row.incline_deg:g}), heading {np.degrees(frame.heading):.2f} (matrix "
-            f"{row.heading_deg:g}), across {np.degrees(fit.roll):+.2f}"
+            f"{row.heading_deg:g}), across {np.degrees(fit.roll):+z.2f}"
         )
         say(f"far end {x:.3f}, {y:.3f}, {z:.3f} m, travel {frame.travel:.3f} m")
         say(f"{points} points, {1e3 * fit.residual:.1f} mm rms off the plane")

@@ -18,6 +18,7 @@ EXAMPLES = """\
 
 _LEFT_OUT = 6  # exit code
 _MOST_TOLD = 5  # malformed lines
+_UNDER = " " * 12  # what a line of a bundle goes on with
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -97,7 +98,7 @@ def _tell_bundle(args: argparse.Namespace) -> int:
         )
     console = Console(color=not args.no_color)
     for line in story(read_bundle(args.bundle)):
-        console.say(line)
+        console.say(line, indent=_UNDER)
     return 0
 
 

@@ -102,7 +102,7 @@ def _place_text(
     )
     console_loop.console.say(
         f"far end {x:.3f}, {y:.3f}, {z:.3f} m, travel {taught.travel:.3f} m, heading "
-        f"{angles[0]:.1f} degrees, incline {angles[1]:+.1f} degrees (to about 1; "
+        f"{angles[0]:.1f} degrees, incline {angles[1]:+z.1f} degrees (to about 1; "
         f"traction calibrate terrain is exact); touches within "
         f"{taught.spread_mm:.1f} mm"
     )

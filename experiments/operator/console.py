@@ -60,13 +60,17 @@ class Console:
             if isinstance(stream, io.TextIOWrapper):
                 stream.reconfigure(errors="replace")  # a sign is worth no crash
 
-    def say(self, text: str = "") -> None:
+    def say(self, text: str = "", *, indent: str = "") -> None:
         """Print one line; a closed pipe or terminal is remembered, never raised.
+
+        Args:
+            text: to be printed, broken at the width of a terminal.
+            indent: what the lines after a break begin with.
 
         Raises:
             OutputError: the disk is full, and nothing has to go on.
         """
-        self._say(text, "")
+        self._say(text, indent)
 
     def _say(self, text: str, indent: str) -> None:
         if self.is_lost:
@@ -197,7 +201,7 @@ class PageRecorder(Console):
     def table(self, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
         """Keep nothing of a table."""
 
-    def say(self, text: str = "") -> None:
+    def say(self, text: str = "", *, indent: str = "") -> None:
         """Print nothing: the page is for a program."""
 
 

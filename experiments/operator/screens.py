@@ -263,7 +263,7 @@ def end_lines(view: EndView) -> list[str]:
     ]
     if view.drift:
         axes = "  ".join(
-            f"{axis} {value:+.2f}"
+            f"{axis} {value:+z.2f}"
             for axis, value in zip(("fx", "fy", "fz"), view.drift, strict=True)
         )
         lines.append(f"Force drifted between first and last tare [N]: {axes}")

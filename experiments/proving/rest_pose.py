@@ -58,7 +58,7 @@ def lay_down(scene: Scene) -> None:
     q = rest_pose(scene.rig.model.constants)
     scene.ask(
         "Lay the arm into its rest pose: home, and joint 6 turned onto its stop at "
-        f"{q[5]:+.2f} rad. Take the hands off it. [space] when it lies there."
+        f"{q[5]:+z.2f} rad. Take the hands off it. [space] when it lies there."
     )
     if scene.simulation is not None:
         scene.simulation.pose(q.tolist(), _CARRIED)
@@ -289,7 +289,7 @@ def _proofs(scene: Scene, goals: Sequence[ProofGoal], seconds: float) -> Values:
 def _words(goal: ProofGoal) -> str:
     if goal.kind is ProofKind.GRAVITY:
         return "compensation grows"
-    return f"joint {goal.joint}, up to {goal.torque:+.1f} N m"
+    return f"joint {goal.joint}, up to {goal.torque:+z.1f} N m"
 
 
 def _signed(i: int, sense: float) -> str:

@@ -55,7 +55,7 @@ def cells_table(
             result.terrain,
             value_text(result.factors.get(FOOT, "?")),
             kind_title(result.kind),
-            "?" if result.incline_deg is None else f"{result.incline_deg:+.1f}",
+            "?" if result.incline_deg is None else f"{result.incline_deg:+z.1f}",
             *(
                 value_text(result.factors[n]) if n in result.factors else "?"
                 for n in names
