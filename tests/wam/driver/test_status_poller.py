@@ -11,6 +11,7 @@ from tests.fakes.stepped import Rig
 from wam.bus.frames import encode_set
 from wam.driver.arm import WamArm
 from wam.driver.health import PuckHealth, complaints, health_metadata, temperature_range
+from wam.driver.pendant import NO_PENDANT
 from wam.driver.settings import ArmSettings
 from wam.driver.status_poller import StatusPoller
 
@@ -318,3 +319,11 @@ def test_the_pendant_of_a_start_is_known_before_the_first_question():
     again = WamArm(bench.rig.link, bench.rig.clock)
     again.start()
     assert again.safety_warnings() == ("voltage",)
+
+
+def test_a_start_doubts_nothing_of_before_and_excuses_what_is_unclear_now():
+    poller = StatusPoller(Bus(), ArmSettings())
+    poller.is_lowering, poller.contradicted_by = True, 2
+    poller.begin(NO_PENDANT)
+    assert (poller.is_lowering, poller.contradicted_by) == (False, 0)
+    assert poller.excused == NO_PENDANT.unclear != ()
