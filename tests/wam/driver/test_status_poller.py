@@ -8,7 +8,8 @@ import pytest
 from acquisition.devices import SafetyMode
 from fakes.pucks.options import NetworkOptions
 from tests.fakes.stepped import Rig
-from wam.bus.frames import encode_set
+from wam.bus.frames import encode_reply, encode_set, property_reply_id
+from wam.bus.properties import PuckMode
 from wam.driver.arm import WamArm
 from wam.driver.health import PuckHealth, complaints, health_metadata, temperature_range
 from wam.driver.pendant import NO_PENDANT
@@ -327,3 +328,22 @@ def test_a_start_doubts_nothing_of_before_and_excuses_what_is_unclear_now():
     poller.begin(NO_PENDANT)
     assert (poller.is_lowering, poller.contradicted_by) == (False, 0)
     assert poller.excused == NO_PENDANT.unclear != ()
+
+
+@pytest.mark.parametrize(
+    ("node", "said", "mode", "contradicted_by"),
+    [
+        (2, PuckMode.IDLE, SafetyMode.IDLE, 0),
+        (2, PuckMode.TORQUE, SafetyMode.UNKNOWN, 2),
+        (3, PuckMode.IDLE, SafetyMode.UNKNOWN, 2),
+        (10, SafetyMode.IDLE, SafetyMode.UNKNOWN, 2),
+        (9, SafetyMode.ACTIVE, SafetyMode.UNKNOWN, 2),  # nobody of the arm
+    ],
+)
+def test_only_the_puck_that_contradicted_the_module_ends_the_doubt(
+    node, said, mode, contradicted_by
+):
+    poller = StatusPoller(Bus(), ArmSettings())
+    poller.contradicted_by = 2
+    poller.on_frame(property_reply_id(node), encode_reply(8, said, is_wide=False))
+    assert (poller.mode, poller.contradicted_by) == (mode, contradicted_by)
