@@ -78,6 +78,7 @@ TESTS = {
     f"{_DRIVER}/transmission.py": (f"{_DRIVER_TESTS}/test_transmission.py",),
     f"{_DRIVER}/status_poller.py": (
         f"{_DRIVER_TESTS}/test_status_poller.py",
+        f"{_DRIVER_TESTS}/test_property_watch.py",
         f"{_DRIVER_TESTS}/test_arm.py",
     ),
     f"{_DRIVER}/joint_estimator.py": (
@@ -94,10 +95,12 @@ TESTS = {
     f"{_DRIVER}/puck_properties.py": (f"{_DRIVER_TESTS}/test_puck_properties.py",),
     f"{_DRIVER}/startup.py": (
         f"{_DRIVER_TESTS}/test_startup.py",
+        f"{_DRIVER_TESTS}/test_puck_properties.py",
         f"{_DRIVER_TESTS}/test_generations.py",
         f"{_DRIVER_TESTS}/test_lenient_start.py",
         f"{_DRIVER_TESTS}/test_safety_limits.py",
     ),
+    f"{_DRIVER}/survey.py": (f"{_DRIVER_TESTS}/test_survey.py",),
     f"{_DRIVER}/home.py": (
         f"{_DRIVER_TESTS}/test_home_check.py",
         "tests/experiments/preflight/test_zero_check.py",
@@ -177,6 +180,14 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         f"{_LOOP}/limits.py",
         "if is_gentle and are_within(values, limits): -> pass",
     ): _SHORTCUT,
+    (
+        f"{_CONTROL}/soft_walls.py",
+        "if not may_arm and are_between(self._lower, q, self._upper): -> pass",
+    ): _SHORTCUT,
+    (
+        f"{_LOOP}/contact.py",
+        "if since_ns == state.since_ns and points is state.points: -> pass",
+    ): "an equal state, made anew in every cycle",
     (
         f"{_FILE}/salvage.py",
         "latest = (self.last_ns if self.last_ns > 0 else start_ns) + _LONGEST_NS -> "
@@ -461,6 +472,12 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     ): "the last axis of two is the second",
     ("wam/calibration/poses.py", "_CANDIDATES = 1000 -> _CANDIDATES = 2000"): _TUNED,
     ("wam/calibration/poses.py", "_SEED = 7 -> _SEED = 8"): _TUNED,
+    (
+        "wam/calibration/poses.py",
+        "drawn = np.array(UPRIGHT) + REACH * rng.uniform(-1.0, 1.0, (_CANDIDATES, 7)) "
+        "-> "
+        "drawn = np.array(UPRIGHT) - REACH * rng.uniform(-1.0, 1.0, (_CANDIDATES, 7))",
+    ): _TUNED,
     **{
         ("wam/calibration/poses.py", f"{_TILTS} -> {other}"): _TUNED
         for other in (

@@ -11,6 +11,7 @@ from acquisition.control_loop.states import ArmState
 
 MS = 1_000_000
 S = 1_000_000_000
+START_NS = 10 * S  # no clock of a host begins when the arm gets power
 LIMITS = MotionLimits()
 SPEEDS = (1.5, 1.5, 2.0, 2.5, 4.0, 4.0, 4.0)
 E = 1e-9
@@ -25,7 +26,7 @@ def motion(at_ms, state, **changes):
         "sole": (0.0, 0.0, 0.0),
         "qd": STILL,
     }
-    return DrivenMotion(at_ms * MS, state, **(fields | changes))
+    return DrivenMotion(START_NS + at_ms * MS, state, **(fields | changes))
 
 
 def judge(*cycles):

@@ -10,6 +10,7 @@ from analysis.data.prepare import (
     foot_velocity,
     moving_average,
     prepare_trial,
+    stretches,
 )
 from analysis.data.series import TractionSeries
 
@@ -50,6 +51,11 @@ def test_velocity_is_missing_across_four_missing_samples():
     velocity = foot_velocity(t, np.outer(t, [1.0, 1.0]))
     missing = np.flatnonzero(np.isnan(velocity).all(axis=1))
     assert missing.tolist() == [7, 8]
+
+
+@pytest.mark.parametrize(("step", "found"), [(10, [(0, 8)]), (11, [(0, 4), (4, 8)])])
+def test_a_step_of_more_than_ten_usual_ones_is_a_gap_of_the_record(step, found):
+    assert stretches(np.cumsum([0.0, 1, 1, 1, step, 1, 1, 1])) == found
 
 
 def test_both_ends_of_the_window_are_kept(make_series):

@@ -63,13 +63,15 @@ def test_quit_twice_ends_at_once(tmp_path):
 
 def test_the_aim_that_was_shown_is_the_trials(tmp_path, monkeypatch):
     aim = object()
-    told = SimpleNamespace(text="slowly", enough="", aim=aim)
+    told = SimpleNamespace(text="slowly", enough="20 of 20", aim=aim)
     monkeypatch.setattr(ready, "next_push", lambda folder, row: told)
     context = make_context(tmp_path, Keys())
-    assert ready_view(context).suggestion == "slowly"
+    view = ready_view(context)
+    assert (view.suggestion, view.enough) == ("slowly", "20 of 20")
     assert context.state.aim is aim
     context = replace(context, stance=object())  # a stance is not pushed by a person
-    assert ready_view(context).suggestion == ""
+    view = ready_view(context)
+    assert (view.suggestion, view.enough) == ("", "")
     assert context.state.aim is None
 
 

@@ -215,6 +215,14 @@ def test_a_verdict_changes_what_is_kept_and_back():
     )
 
 
+@pytest.mark.parametrize("what", ["kept", "rejected"])
+def test_a_verdict_that_is_so_already_changes_nothing(what):
+    state = replay([*BEGIN, *attempt(1, what), *attempt(2, "kept"), END])
+    again = verdict(1, 1, {"kept": "keep", "rejected": "reject"}[what])
+    assert refusal(state, again) == ""
+    assert apply(state, again) == state
+
+
 def test_two_attempts_at_one_trial_are_never_kept_together():
     state = replay([*BEGIN, *attempt(1, "rejected"), *attempt(1, "kept"), END])
     assert refusal(state, verdict(1, 1, "keep")) == "another attempt at T01 is kept"

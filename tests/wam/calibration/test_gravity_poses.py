@@ -19,6 +19,7 @@ from wam.calibration.poses import (
     APPROACH_SPEED,
     MARGIN,
     POINT_SPEED,
+    choose_orientations,
     choose_poses,
     leg_speed,
     plan_halts,
@@ -101,6 +102,35 @@ def test_halts_stay_away_from_the_joint_stops(model, halts):
     for halt in halts[:-1]:
         assert (halt.q >= model.constants.q_lower + MARGIN - 1e-9).all()
         assert (halt.q <= model.constants.q_upper - MARGIN + 1e-9).all()
+
+
+def test_poses_come_as_near_to_a_stop_as_their_approach_needs_and_no_nearer(
+    model, poses
+):
+    constants, chosen = model.constants, np.array(poses)
+    room = np.minimum(chosen - constants.q_lower, constants.q_upper - chosen)
+    assert room.min() == pytest.approx(0.2 + OFFSET)
+
+
+@pytest.mark.parametrize("choose", [choose_poses, choose_orientations])
+def test_each_next_pose_is_the_nearest_of_those_that_are_left(model, choose):
+    way = [np.array(UPRIGHT), *choose(model, 8, SPACE)]
+    for number, (here, there) in enumerate(pairwise(way), 1):
+        left = [float(np.abs(q - here).max()) for q in way[number:]]
+        assert float(np.abs(there - here).max()) == min(left)
+
+
+@pytest.mark.parametrize("choose", [choose_poses, choose_orientations])
+def test_the_only_pose_that_is_free_is_enough_for_one(model, poses, choose):
+    class Narrow(FreeSpace):
+        def holds(self, q):
+            return float(np.abs(q - poses[0]).max()) < OFFSET + 1e-6
+
+    space = Narrow(FLOOR)
+    (pose,) = choose(model, 1, space)
+    assert (pose == poses[0]).all()
+    with pytest.raises(SettingsError, match="Only 1 of 1000 poses"):
+        choose(model, 2, space)
 
 
 def test_each_pose_is_approached_once_from_below_and_once_from_above(halts):

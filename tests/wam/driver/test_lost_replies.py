@@ -279,3 +279,25 @@ def test_a_motor_that_is_not_believed_stands_where_it_was(bench):
     speed = abs(reading.jump.counts) * turn / (CYCLE_NS * 1e-9)
     assert reading.jump.speed == pytest.approx(speed, rel=1e-6)
     assert bench.cycle().jump is None
+
+
+@pytest.mark.parametrize("how", ["listen", "skip"])
+def test_an_interface_that_is_down_is_known_though_no_position_is_asked_for(bench, how):
+    assert bench.cycle().arm_ns > 0
+    bench.faults.go_down()
+    errors = bench.arm.counters.link_errors
+    reading = getattr(bench.arm, how)(bench.rig.clock.t_ns)
+    assert (reading.arm_ns, reading.bus_ns) == (0, 0)
+    assert bench.arm.bus_condition is BusCondition.DOWN
+    assert bench.arm.counters.link_errors > errors
+
+
+def test_each_frame_that_the_bus_refuses_is_counted(bench):
+    bench.cycle()
+    bench.faults.go_down()
+    errors = bench.arm.counters.link_errors
+    bench.arm.read(bench.rig.clock.t_ns)
+    asked = bench.arm.counters.link_errors
+    bench.arm.send(ZERO, ZERO)
+    assert asked == errors + 2  # the question for positions, and that for the mode
+    assert bench.arm.counters.link_errors > asked

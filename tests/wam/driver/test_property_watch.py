@@ -43,6 +43,16 @@ def test_a_property_that_changes_is_told_with_both_values(node, name, was, value
     assert bench.run(TURN + 50).change == MotorChange(node, name, was, value)
 
 
+def test_the_first_change_is_told_and_stays_though_the_puck_says_otherwise_again():
+    bench = Bench()
+    bench.rig.network.set_property(2, "MT", 700)
+    first = MotorChange(2, "MT", 4860, 700)
+    assert bench.run(TURN + 50).change == first
+    bench.rig.network.set_property(2, "MT", 4860)
+    bench.rig.network.set_property(1, "IPNM", 2600)
+    assert bench.run(TURN + 50).change == first
+
+
 def test_another_start_begins_anew():
     bench = Bench()
     bench.rig.network.set_property(7, "MT", 1400)

@@ -201,6 +201,15 @@ def test_pucks_that_cannot_be_told_apart_are_warned_of():
     assert "1001 1002 1005 1004 1005 1006 1007" in told
 
 
+@pytest.mark.parametrize("hidden", ["safety_serial", "safety_vers", None])
+def test_a_safety_module_is_told_from_another_only_by_all_that_it_tells(hidden):
+    info = start(Rig(counts=HOME_COUNTS))
+    known = (200, info.safety_serial, 2048, 4096, 4731, 5204)
+    if hidden:
+        info = replace(info, **{hidden: None})
+    assert info.module_identity() == (() if hidden else known)
+
+
 def test_a_serial_number_that_no_puck_told_is_unknown_in_a_recording():
     info = start(Rig(counts=HOME_COUNTS))
     assert info.metadata()["arm:serials"] == "1001 1002 1003 1004 1005 1006 1007"

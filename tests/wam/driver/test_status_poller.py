@@ -8,9 +8,11 @@ import pytest
 from acquisition.devices import SafetyMode
 from fakes.pucks.options import NetworkOptions
 from tests.fakes.stepped import Rig
-from wam.bus.frames import encode_set
+from wam.bus.frames import encode_reply, encode_set, property_reply_id
+from wam.bus.properties import PuckMode
 from wam.driver.arm import WamArm
 from wam.driver.health import PuckHealth, complaints, health_metadata, temperature_range
+from wam.driver.pendant import NO_PENDANT
 from wam.driver.settings import ArmSettings
 from wam.driver.status_poller import StatusPoller
 
@@ -318,3 +320,30 @@ def test_the_pendant_of_a_start_is_known_before_the_first_question():
     again = WamArm(bench.rig.link, bench.rig.clock)
     again.start()
     assert again.safety_warnings() == ("voltage",)
+
+
+def test_a_start_doubts_nothing_of_before_and_excuses_what_is_unclear_now():
+    poller = StatusPoller(Bus(), ArmSettings())
+    poller.is_lowering, poller.contradicted_by = True, 2
+    poller.begin(NO_PENDANT)
+    assert (poller.is_lowering, poller.contradicted_by) == (False, 0)
+    assert poller.excused == NO_PENDANT.unclear != ()
+
+
+@pytest.mark.parametrize(
+    ("node", "said", "mode", "contradicted_by"),
+    [
+        (2, PuckMode.IDLE, SafetyMode.IDLE, 0),
+        (2, PuckMode.TORQUE, SafetyMode.UNKNOWN, 2),
+        (3, PuckMode.IDLE, SafetyMode.UNKNOWN, 2),
+        (10, SafetyMode.IDLE, SafetyMode.UNKNOWN, 2),
+        (9, SafetyMode.ACTIVE, SafetyMode.UNKNOWN, 2),  # nobody of the arm
+    ],
+)
+def test_only_the_puck_that_contradicted_the_module_ends_the_doubt(
+    node, said, mode, contradicted_by
+):
+    poller = StatusPoller(Bus(), ArmSettings())
+    poller.contradicted_by = 2
+    poller.on_frame(property_reply_id(node), encode_reply(8, said, is_wide=False))
+    assert (poller.mode, poller.contradicted_by) == (mode, contradicted_by)

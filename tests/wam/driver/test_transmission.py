@@ -153,6 +153,13 @@ def test_constants_that_make_no_transmission_are_refused(j2mp, cts):
         Transmission(j2mp, cts, IPNM)
 
 
+def test_a_matrix_that_is_changed_afterwards_changes_no_transmission():
+    given = J2MP.copy()
+    wam = Transmission(given, CTS, IPNM)
+    given[:] = np.eye(7)
+    assert (wam.j2mp == J2MP).all()
+
+
 @pytest.mark.parametrize("least", [1, 2])
 def test_the_least_constants_of_a_transmission_are_one(least):
     wam = Transmission(J2MP, (least, *CTS[1:]), (least, *IPNM[1:]))
