@@ -43,13 +43,17 @@ def closure(names):
 
 
 def foreign_modules():
-    """Return what can be imported here, and not where no extra is installed."""
+    """Return what can be imported here, and not where no extra is installed.
+
+    SciPy takes a name among the imported modules for Sphinx itself, even a hidden one.
+    """
     core = closure(Requirement(line).name for line in PROJECT["dependencies"])
     here = metadata.packages_distributions()
     return sorted(
         module
         for module, owners in here.items()
         if module.isidentifier()
+        and module != "sphinx"
         and "traction" not in owners
         and not core & {canonicalize_name(owner) for owner in owners}
     )
