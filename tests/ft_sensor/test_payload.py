@@ -182,6 +182,17 @@ def test_axes_are_right_handed_and_turned_by_the_heading(incline_deg, heading):
     assert np.allclose(axes, straight @ rotation(2, heading).T, atol=EXACT)
 
 
+@pytest.mark.parametrize("incline_deg", INCLINES)
+def test_from_its_other_end_the_same_plane_is_crossed_the_other_way(incline_deg):
+    frame = terrain(incline_deg, heading=0.6)
+    back = frame.from_other_end()
+    turned = np.diag([-1.0, -1.0, 1.0])
+    assert np.allclose(back.axes(), turned @ frame.axes(), atol=EXACT)
+    there = np.array(back.far_end)
+    assert frame.displacement(there) == pytest.approx(frame.travel, abs=EXACT)
+    assert np.allclose(back.from_other_end().far_end, frame.far_end, atol=EXACT)
+
+
 @pytest.mark.parametrize("incline_deg", [10.0, 15.0])
 def test_a_trial_goes_downhill_and_toward_the_base(incline_deg):
     frame = terrain(incline_deg, heading=0.7)

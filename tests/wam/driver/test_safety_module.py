@@ -40,6 +40,14 @@ def test_each_monitor_has_its_field(word, fault):
     assert decode_pendant(word).faults == (fault,)
 
 
+@pytest.mark.parametrize(
+    ("button", "bits"), [("E_STOP", 0), ("ACTIVATE", 1), ("IDLE", 2), ("NONE", 3)]
+)
+def test_the_button_that_is_pressed_is_in_bits_26_and_27(button, bits):
+    word = 0x0D3F1249 & ~(3 << 26) | bits << 26
+    assert decode_pendant(word).button.name == button
+
+
 def test_a_warning_is_no_fault():
     pendant = decode_pendant(0x0D3F1251)
     assert pendant.torque is SafetyLevel.WARNING
