@@ -1,15 +1,27 @@
-"""Minutes of the loop with its recorder: nothing is lost and nothing grows."""
+"""Minutes of the loop with its recorder, and an arm that is taken from it meanwhile."""
 
 import json
+import os
 import subprocess
 import sys
+import threading
+from contextlib import closing
 
+import can
 import pytest
 
+from experiments.preflight.preflight import start_devices
+from experiments.rig.rig import FakeOptions, build_rig
+from experiments.settings.load import load_settings
+from experiments.tools.bench import run_bench
+from fakes.bus.client import SocketBus
 from tests.processes.watching import ROOT, START, children_of
 
 pytestmark = [pytest.mark.wall_clock, pytest.mark.timeout(700)]
 GROWTH_KB = 1024  # per process, second half of the time
+SECONDS = 2.0
+LATER = 1.8  # s, of which the arm is held for one
+TORQUES = can.Message(arbitration_id=0x404, data=bytes(8), is_extended_id=False)
 
 
 @pytest.mark.parametrize("seconds", [30, pytest.param(600, marks=pytest.mark.long)])
@@ -32,3 +44,21 @@ def test_nothing_is_lost_and_memory_stays(tmp_path, seconds):
     for use in report["processes"]:
         assert use["growth_kb"] <= GROWTH_KB, use
     assert not {"traction-contro", "traction-record"} & set(children_of(1))
+
+
+def test_an_arm_that_another_master_takes_while_it_is_timed_is_not_called_held():
+    settings = load_settings(None)
+    rig = build_rig(
+        settings, settings.matrix.terrains[0], FakeOptions("processes", seed=1)
+    )
+    with closing(rig.backend) as backend:
+        start_devices(rig)
+        processes = {**backend.processes(), "console": os.getpid()}
+        with SocketBus(backend.bus_path) as other:
+            timer = threading.Timer(LATER, other.send, [TORQUES])
+            timer.start()
+            report = run_bench(rig, processes, SECONDS)
+            timer.join()
+    assert not report.is_powered
+    assert "404" in report.fault
+    assert report.as_dict()["fault"] == report.fault
