@@ -231,6 +231,7 @@ class Generator:
         parts = [_Prepared.of(self, motion, longest) for motion in motions]
         steps = _Prepared.joined(parts)
         gate, uniform, normal = _Gate.of(self.experts), draws.uniform.T, draws.normal.T
+        slopes = self.experts.weights[:, _OF_F[:4]].T.copy()
         found = np.empty((longest, draws.uniform.shape[0]))
         each = np.arange(draws.uniform.shape[0])
         F = found[0] = np.repeat(steps.m[0], count)
@@ -241,15 +242,9 @@ class Generator:
                 row = i - begin
                 of_F[0] = F
                 np.multiply(F, block.factors[row], out=of_F[2:])
-                if gate is None:
-                    step = block.mean[row, 0] + self.experts.sd[0] * normal[i - 1]
-                    slopes = self.experts.weights[0, _OF_F[:4], None]
-                else:
-                    k = gate.choose(of_F, block.logits[row], uniform[i - 1])
-                    step = block.mean[row, k, each]
-                    step = step + gate.sd[k] * normal[i - 1]
-                    slopes = gate.slopes[:, k]
-                step = step + np.add.reduce(of_F[:4] * slopes)
+                k = gate.choose(of_F, block.logits[row], uniform[i - 1])
+                step = block.mean[row, k, each] + self.experts.sd[k] * normal[i - 1]
+                step = step + np.add.reduce(of_F[:4] * slopes[:, k])
                 new, m = F + block.fade[row] * step, block.m[row]
                 new = new - block.pull[row] * (new - m)
                 new = new - _FLOOR * np.minimum(new - block.low[row], 0.0)
@@ -410,34 +405,26 @@ def scaled_gates(gates: Array, experts: Experts) -> Array:
 
 
 class _Gate(NamedTuple):
-    """What chooses among several experts, by those numbers of g that depend on F.
+    """What chooses among experts, by those numbers of g that depend on F.
 
     Attributes:
         weights: of those numbers, shape (6, K, 1).
         centre: of them, shape (6, 1).
         scale: of them, shape (6, 1).
-        slopes: of x that depends on F, shape (4, K).
-        sd: of the experts [N], shape (K,).
     """
 
     weights: Array
     centre: Array
     scale: Array
-    slopes: Array
-    sd: Array
 
     @classmethod
-    def of(cls, experts: Experts) -> "_Gate | None":
-        """Return the gate; None for a single expert, which is not chosen."""
-        if len(experts.sd) == 1:
-            return None
+    def of(cls, experts: Experts) -> "_Gate":
+        """Return the gate of a mixture."""
         of_F = list(_OF_F)
         return cls(
             experts.gate[:, of_F].T[:, :, None],
             experts.centre[of_F, None],
             experts.scale[of_F, None],
-            experts.weights[:, of_F[:4]].T.copy(),
-            experts.sd,
         )
 
     def choose(self, of_F: Array, logits: Array, uniform: Array) -> NDArray[np.intp]:
@@ -448,6 +435,8 @@ class _Gate(NamedTuple):
             logits: what the others give, shape (K, n).
             uniform: the draws, shape (n,).
         """
+        if len(logits) == 1:  # a single expert is not chosen
+            return np.zeros(uniform.size, dtype=np.intp)
         scaled = (of_F - self.centre) / self.scale
         scaled = np.minimum(np.maximum(scaled, -_CLIPPED), _CLIPPED)
         # summed number by number: a product of matrices depends on how many paths

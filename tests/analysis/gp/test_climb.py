@@ -56,3 +56,23 @@ def test_a_start_without_a_value_is_below_every_top():
     found = climb(objective, START, BOX)
     np.testing.assert_array_equal(found.theta, START)
     assert found.value == -np.inf
+
+
+def test_a_scale_saves_evaluations_and_moves_no_top():
+    scale = 1.0 / np.sqrt(np.diagonal(BEND))
+    found = climb(hill, START, BOX, scale=scale)
+    np.testing.assert_allclose(found.theta, TOP, atol=1e-3)
+    assert found.evaluations < climb(hill, START, BOX).evaluations
+
+
+def test_theta_is_unscaled_at_the_edge_of_the_box_and_where_a_climb_is_left():
+    scale, seen = np.array([0.3, 3.0, 0.07]), []
+    far = np.add(TOP, [9.0, 0.0, 0.0])
+
+    def is_known(theta, value):
+        seen.append(abs(hill(theta, far)[0] - value))
+        return False
+
+    found = climb(lambda theta: hill(theta, far), START, BOX, is_known, scale=scale)
+    assert found.theta[0] == 4.0
+    assert max(seen) < 1e-9

@@ -28,8 +28,6 @@ from analysis.study.store import task_key
 
 SMALL_FIT = FitOptions(gp_points=60, models=(TUSTIN, GP_SE))
 
-MISSED = 0.05  # nat below the best of twenty starts, as in benchmarks.optima
-
 
 @pytest.fixture
 def trials(slice_trials):
@@ -196,7 +194,7 @@ def test_the_search_reaches_the_best_of_twenty_starts(trials, kernel):
         likelihood = Likelihood(kernel, noise, X, r)
         starts = rng.uniform(*box.T, (20, len(box)))
         best = max(climb(likelihood, start, box).value for start in starts)
-        missed += posterior_search(kernel, noise, X, r).lml < best - MISSED
+        missed += posterior_search(kernel, noise, X, r).lml < best - 1e-3
     # 95 % of the fits of a study; of nine that is all
     assert missed == 0
 
