@@ -30,7 +30,7 @@ from wam.calibration import poses
 MS = 1_000_000
 CALIBRATION = "gravity.toml"
 _AFTERWARDS_NS = 500 * MS
-_MOVING_SPEED = 0.3  # rad/s; the trapezoid is on its way
+MOVING_SPEED = 0.3  # rad/s; the trapezoid is on its way
 _PUSHING = 2.0  # N; the foot is loaded and pushes
 _FRESH_NS = 5 * MS  # torques older than two cycles are the last ones
 _PROMPTS = {
@@ -275,7 +275,7 @@ def _at(patch, phase: str, scenes: list[SimulatedScene], inject: Strike) -> None
     def answer(operator, asked):
         if phase == MOVING:
             qd = scenes[0].rig.plant.qd
-            if asked.prompt is Prompt.MOVING and abs(qd).max() > _MOVING_SPEED:
+            if asked.prompt is Prompt.MOVING and abs(qd).max() > MOVING_SPEED:
                 strike_once()
             return usual_answer(operator, asked)
         if phase == STANDING and asked.prompt is Prompt.RECORDING:

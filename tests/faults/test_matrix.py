@@ -8,6 +8,7 @@ import pytest
 
 from acquisition.control_loop.states import ArmState
 from tests.experiments.program import kept_and_sound, write_config
+from tests.faults import rehearse
 from tests.faults.bounds import BOUND_PHASES, COLUMNS, cells_of_all, read_bounds
 from tests.faults.expected import DAMPED_OR_IDLE, TABLE, Cell, End
 from tests.faults.moving import MOVING_CELLS
@@ -185,6 +186,23 @@ def check_resume(seen, cell: Cell) -> None:
         return
     assert done.code == (0 if is_left else 2), done.err
     assert kept_and_sound(seen.folder) == ["T01"]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("speed", [0.05, 0.25, 0.33, 0.4, 0.44])
+@pytest.mark.parametrize("fault", ["replies-late", "replies-late-3", "puck-late"])
+def test_late_positions_are_found_soon_enough_from_any_moment_of_a_move(
+    fault, speed, config, tmp_path, monkeypatch
+):
+    # The cycle that asks for none comes just after the strike, or a tenth of a second.
+    monkeypatch.setattr(rehearse, "MOVING_SPEED", speed)
+    seen = run_with(strike_of(fault), MOVING, config, tmp_path / "data")
+    motion = seen.truth.since(seen.scene.struck_ns, fault)
+    cell = MOVING_CELLS[fault]
+    assert motion.idle_ms is not None
+    assert motion.idle_ms <= cell.arm.limit_ms + ALLOWANCE_MS
+    assert is_within(motion, promise_of(fault, cell)), motion
+    assert motion.speed <= 0.6
 
 
 def test_every_cell_that_cannot_exist_says_why():

@@ -45,7 +45,7 @@ class ArmSettings:
     give_up_ns: int = 1_500_000
     speed_limits: tuple[float, ...] = (1.5, 1.5, 2.0, 2.5, 4.0, 4.0, 4.0)
     jump_margin: float = 2.0
-    unasked_every: int = 250
+    unasked_every: int = 47  # prime: never in step with the polls
     safety_poll_cycles: int = 25
     health_poll_cycles: int = 50
     watch_poll_cycles: int = 50

@@ -100,7 +100,7 @@ def test_a_sound_arm_is_never_late():
     assert bench.arm.counters.late == 0
 
 
-def test_one_cycle_in_250_does_not_ask_and_still_sends_torques():
+def test_one_cycle_in_47_does_not_ask_and_still_sends_torques():
     bench = Bench()
     readings = bench.run(3 * EVERY)
     assert unasked(readings) == [EVERY - 1, 2 * EVERY - 1, 3 * EVERY - 1]

@@ -111,12 +111,13 @@ def test_a_doubled_reply_is_counted_and_changes_nothing(bench):
 def test_swapped_replies_disturb_no_position(bench):
     network_faults(bench.rig.network)["reply-swapped"]()
     incomplete = 0
-    for _ in range(200):
+    for _ in range(210):
         reading = bench.cycle()
         incomplete += not reading.is_complete
-        assert bench.is_true(reading) is reading.is_complete
+        if not reading.is_unasked:
+            assert bench.is_true(reading) is reading.is_complete
         assert reading.missing_cycles <= 1
-    assert incomplete == 4  # puck 6 is a question late every 50 cycles
+    assert incomplete == 4  # puck 6 is a question late every 50 questions
     assert bench.arm.counters.rejected == 0
 
 
