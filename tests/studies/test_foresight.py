@@ -33,6 +33,7 @@ def test_what_is_not_known_meets_no_limit():
     assert len(judge.missed) == 2
 
 
+@pytest.mark.slow
 def test_made_pushes_are_foreseen_within_every_limit(capsys):
     judge, unseen = Judge(), [trial(STONES, k) for k in range(90, 93)]
     report("made", foresee(model(), unseen, {}), judge)

@@ -114,6 +114,7 @@ def judge(folder, name, data, rng):
     return True
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["T01.mcap", "T01.mcap.partial"])
 def test_every_sound_chunk_is_saved(tmp_path, recordings, name):
     rng = np.random.default_rng(5)

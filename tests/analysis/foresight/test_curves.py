@@ -18,6 +18,7 @@ def runs():
     return hold_out(trials(0, 3), {})
 
 
+@pytest.mark.slow
 def test_share_in_alarm_agrees_with_recall_and_falls_with_the_lead(runs):
     curves = foresight_curves(runs)
     assert curves.warned[0] == pytest.approx(score_slips(runs).recall)

@@ -31,6 +31,7 @@ def test_an_outcome_has_scores_curves_and_what_was_learnt(outcome):
     assert outcome.curves.excerpt is not None
 
 
+@pytest.mark.slow
 def test_an_outcome_is_the_same_bit_for_bit_in_two_workers(outcome):
     run = partial(run_tasks, workers=2)
     assert encode(judge(WATCHED, {STONES: BREAKS}, run)) == encode(outcome)

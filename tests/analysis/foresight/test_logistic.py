@@ -2,7 +2,6 @@ import json
 
 import numpy as np
 import pytest
-from sklearn.linear_model import LogisticRegression
 
 from acquisition.validation import first_problem
 from analysis.foresight.logistic import RidgeLogistic, all_pairs, fit_logistic
@@ -24,6 +23,8 @@ def fitted():
 
 
 def test_the_fit_is_that_of_an_independent_library():
+    from sklearn.linear_model import LogisticRegression
+
     X, truth = rows()
     z = (X - X.mean(axis=0)) / X.std(axis=0)
     assert np.abs(z).max() < 5.0  # nothing is cut

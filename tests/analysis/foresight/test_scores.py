@@ -86,6 +86,7 @@ def test_no_trial_is_foreseen_by_what_it_taught():
         assert not {t.name for t in test} & {t.name for t in rest}
 
 
+@pytest.mark.slow
 def test_held_out_pushes_are_foreseen_too():
     runs = hold_out(trials(0, 3), {})
     assert len(runs) == 6

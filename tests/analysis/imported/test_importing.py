@@ -52,6 +52,7 @@ def errors(trial, rubbing):
     return np.sqrt(np.mean(rest**2, axis=0))
 
 
+@pytest.mark.slow
 def test_velocity_and_forces_are_those_of_the_truth(imported):
     rubbing = Rubbing(strokes=2, turn=1.0, tilt=0.3, slope=0.1, heading=0.7, lost=0.003)
     found = imported(rubbing)
@@ -73,6 +74,7 @@ def test_velocity_and_forces_are_those_of_the_truth(imported):
     assert found.warnings == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lag", [-0.02, 0.0, 0.018, 0.06])
 def test_the_lag_is_found_within_the_interval_that_is_stated(imported, lag):
     found = imported(Rubbing(lag=lag), mass=0.3)
@@ -107,6 +109,7 @@ def test_a_lag_of_a_smooth_push_is_not_claimed(imported):
     assert any("is not known and taken as 0" in text for text in found.warnings)
 
 
+@pytest.mark.slow
 def test_the_other_sign_is_refused_with_the_remedy(imported):
     with pytest.raises(SettingsError, match="Give the other --acts"):
         imported(Rubbing(), acts="foot-on-ground", mass=0.3)

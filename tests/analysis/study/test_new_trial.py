@@ -55,6 +55,7 @@ def training(trials, chosen=CHOSEN, seed=1):
     return TrainingSet(rows, tuple(trial.count for trial in trials), take)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("spread", "family"),
     [(normal, "normal"), (growing, "loglinear"), (skewed, "log warp")],

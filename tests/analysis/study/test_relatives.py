@@ -54,6 +54,7 @@ def nlpd(scores):
     return float(np.mean([s.nlpd for s in scores]))
 
 
+@pytest.mark.slow
 def test_terrains_of_one_form_predict_as_well_as_own_trials(alike):
     assert nlpd(alike.joint) < nlpd(alike.alone) + 0.05
     assert nlpd(alike.unseen) < nlpd(alike.alone) + 0.1

@@ -82,6 +82,7 @@ def test_a_sample_has_the_events_of_the_ground(known):
     assert scores[0] < 0.5 * scores[1]
 
 
+@pytest.mark.slow
 def test_free_runs_stay_where_trials_were_in_sticks_of_20_s(known, trials):
     assert held_drift(known, trials, 3) < 3.0
     held = held_longer(trials[0], 20.0)

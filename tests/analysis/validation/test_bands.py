@@ -65,6 +65,7 @@ def failed(grounds, ids):
     return {f.band.id for f in found if f.band.id in ids and not f.is_met}
 
 
+@pytest.mark.slow
 def test_stones_and_a_plate_by_themselves_meet_what_one_trial_can_show():
     grounds = {
         name: ground([PointFoot(name, 1, 1).run()], is_plate=name == "TF")
@@ -149,6 +150,7 @@ def test_the_toy_fails_most_of_what_dynamics_would_show(toy_measures):
     assert set(measures) == {b.id for b in BANDS if b.id[0] in "ABC"} | {"E7"}
 
 
+@pytest.mark.slow
 def test_plates_are_known_by_their_stones_and_not_by_their_names(toy_measures):
     study, measures = toy_measures
     names = {"S0": "Tundra", "B0": "Trail", "TF": "Sand", "Tf": "Beach"}

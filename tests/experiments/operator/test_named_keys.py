@@ -2,6 +2,7 @@
 
 import ast
 import re
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -51,8 +52,10 @@ def exists(prompt, key):
     )
 
 
+@cache
 def texts():
     """Return (module, text) of every text in the code that names a key."""
+    found = []
     for path in sorted(CODE.rglob("*.py")):
         if str(path.relative_to(CODE)).startswith(UNITS):
             continue
@@ -64,21 +67,19 @@ def texts():
         for node in ast.walk(tree):
             is_text = isinstance(node, ast.Constant) and isinstance(node.value, str)
             if is_text and id(node) not in docs and keys_named(node.value):
-                yield str(path.relative_to(CODE)), node.value
+                found.append((str(path.relative_to(CODE)), node.value))
+    return found
 
 
-TEXTS = list(texts())
-
-
-@pytest.mark.parametrize(("module", "text"), TEXTS)
-def test_a_text_of_the_program_names_keys_of_its_screen(module, text):
-    assert module in SHOWN_AT, f"{module} names a key: at which prompt?"
-    for key in keys_named(text):
-        assert any(exists(prompt, key) for prompt in SHOWN_AT[module]), (key, text)
+def test_a_text_of_the_program_names_keys_of_its_screen():
+    for module, text in texts():
+        assert module in SHOWN_AT, f"{module} names a key: at which prompt?"
+        for key in keys_named(text):
+            assert any(exists(prompt, key) for prompt in SHOWN_AT[module]), (key, text)
 
 
 def test_every_module_of_the_table_names_keys():
-    assert {module for module, _ in TEXTS} == set(SHOWN_AT)
+    assert {module for module, _ in texts()} == set(SHOWN_AT)
 
 
 @pytest.mark.parametrize("name", CATALOGUE)

@@ -83,6 +83,7 @@ def test_a_folder_of_too_many_files_is_refused(folder, monkeypatch):
         changed_files(folder)
 
 
+@pytest.mark.slow
 def test_more_than_a_hundred_thousand_files_are_refused(folder):
     """Names of few files: what they hold is not looked at any more."""
     many = folder / "many"

@@ -165,6 +165,7 @@ def disturbed(source, tmp_path):
     return says
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("row", FLAGGED, ids=lambda row: row.name)
 def test_a_disturbed_recording_is_refused_or_named(disturbed, row):
     usual = {re.sub(r"[-+]?[0-9.]+", "", text) for text in disturbed(lambda r: r)}

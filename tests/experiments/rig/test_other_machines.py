@@ -19,6 +19,7 @@ def test_processes_are_not_started(config, tmp_path):
     assert "aarch64" in done.err
 
 
+@pytest.mark.slow
 def test_a_simulation_in_one_thread_runs(config, tmp_path):
     options = ("--fake", "--config", config, "--data", tmp_path)
     assert traction("check", *options).code == 0

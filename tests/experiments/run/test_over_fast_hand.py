@@ -101,6 +101,7 @@ def test_a_damped_arm_comes_to_rest_and_stays_active(build):
     assert bench.loop_client.status.safety is SafetyMode.ACTIVE
 
 
+@pytest.mark.slow
 def test_an_arm_pressed_against_a_stop_is_held_off_by_the_soft_wall(build):
     bench = build()
     upper = bench.rig.model.constants.q_upper[J6]

@@ -154,6 +154,7 @@ def test_light_motors_stay_still_at_steps_of_a_whole_cycle():
     assert np.abs(motors.speed / TURNS).max() < 1e-6
 
 
+@pytest.mark.slow
 # 1 N m/s is twice to ten times the break-away of a wrist joint in a second.
 @pytest.mark.parametrize(("rate", "motors"), [(0.1, 7), (1.0, 4)])
 def test_a_motor_breaks_away_at_its_own_torque_however_fast_it_grows(rate, motors):
