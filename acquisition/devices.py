@@ -93,7 +93,7 @@ class ArmReading:
         counts: motor positions as received [encoder counts], seven of them.
         q: joint positions [rad], shape (7,); extrapolated where a reply is missing.
         qd: joint velocities [rad/s], shape (7,), filtered as the controller uses them.
-        qd7_raw: unfiltered one-cycle difference of joint 7 [rad/s].
+        qd7_raw: unfiltered difference of joint 7 over its last two replies [rad/s].
         fresh: bit i set = the reply of motor i+1 arrived in this cycle, or none was
             asked for.
         is_complete: all replies that were asked for arrived.

@@ -30,7 +30,8 @@ class JointEstimator:
         counts: last accepted position of each motor [encoder counts].
         q: joint positions [rad], shape (7,); extrapolated where a reply is missing.
         qd: filtered joint velocities [rad/s], shape (7,).
-        qd7_raw: unfiltered one-cycle difference of joint 7 [rad/s].
+        qd7_raw: unfiltered difference of joint 7 over its last two replies [rad/s]; zero
+            where it is taken to stand still.
         jump: the worst position that was not believed in the last update, or None.
     """
 
@@ -52,6 +53,7 @@ class JointEstimator:
         self.jump: PositionJump | None = None
         self._positions = [float(c) for c in counts]
         self._rates = [0.0] * MOTORS
+        self._raw_rates = [0.0] * MOTORS
         self._times_ns = [t_ns] * MOTORS
         self._t_ns = t_ns
 
@@ -64,13 +66,15 @@ class JointEstimator:
         fresh = 0
         self.jump = None
         times_ns, rates, positions = self._times_ns, self._rates, self._positions
-        known = self.counts
+        known, raw_rates = self.counts, self._raw_rates
         rows = zip(received, times_ns, known, rates, self._fastest, strict=True)
         for i, (counts, since_ns, last, rate, fastest) in enumerate(rows):
             elapsed = (t_ns - since_ns) * 1e-9
             if counts is None:
                 ahead = elapsed if elapsed < _LONGEST_GUESS else _LONGEST_GUESS
                 positions[i] = last + rate * ahead
+                if elapsed >= _LONGEST_GUESS:
+                    raw_rates[i] = 0.0
                 continue
             farthest, moved = fastest * elapsed + _STILL, counts - last
             if not -farthest <= moved <= farthest:
@@ -78,12 +82,13 @@ class JointEstimator:
                 self._note_jump(i, moved, elapsed)
                 continue
             if elapsed > 0.0:
-                rates[i] = rate + share * (moved / elapsed - rate)
+                raw_rates[i] = moved / elapsed
+                rates[i] = rate + share * (raw_rates[i] - rate)
             known[i] = counts
             positions[i] = counts
             times_ns[i] = t_ns
             fresh |= 1 << i
-        self._advance(t_ns, step)
+        self._advance(t_ns)
         return fresh
 
     def _note_jump(self, index: int, counts: int, elapsed: float) -> None:
@@ -95,9 +100,8 @@ class JointEstimator:
         if self.jump is None or speed > self.jump.speed:
             self.jump = PositionJump(index + 1, counts, speed)
 
-    def _advance(self, t_ns: int, step: float) -> None:
-        q = self.transmission.joints(self._positions)
-        self.qd7_raw = float(q[6] - self.q[6]) / step
-        self.q = q
+    def _advance(self, t_ns: int) -> None:
+        self.q = self.transmission.joints(self._positions)
+        self.qd7_raw = float(self.transmission.joints(self._raw_rates)[6])
         self.qd = self.transmission.joints(self._rates)
         self._t_ns = t_ns

@@ -56,15 +56,34 @@ def test_the_filter_of_velocities_has_its_pole(estimator):
 
 def test_asked_twice_at_one_instant_nothing_is_faster(estimator):
     counts = move(estimator, 50)
-    before = estimator.qd.copy()
+    before, raw = estimator.qd.copy(), estimator.qd7_raw
     assert estimator.update(100 * MS, counts) == 0x7F
     assert estimator.qd == pytest.approx(before)
-    assert estimator.qd7_raw == 0.0
+    assert estimator.qd7_raw == raw
     assert estimator.jump is None
     near = [count + 1 for count in counts]
     estimator.update(100 * MS, near)
     assert estimator.qd == pytest.approx(before)
-    assert np.isfinite(estimator.qd7_raw)
+    assert estimator.qd7_raw == raw
+
+
+def test_the_raw_velocity_of_joint_7_is_between_replies_and_not_from_a_guess(estimator):
+    """What was guessed meanwhile, from a filtered velocity, is no motion."""
+    move(estimator, 1)
+    per_count = estimator.transmission.joints([1] * 7)[6]
+    first = estimator.qd7_raw
+    assert first == pytest.approx(STEP * per_count / 0.002)
+    estimator.update(4 * MS, [None] * 7)
+    assert estimator.qd7_raw == first
+    estimator.update(6 * MS, [4 * STEP] * 7)
+    assert estimator.qd7_raw == pytest.approx(3 * STEP * per_count / 0.004)
+
+
+def test_a_joint_7_that_is_silent_for_long_has_no_raw_velocity(estimator):
+    move(estimator, 10)
+    for cycle in range(11, 60):
+        estimator.update(cycle * 2 * MS, [None] * 7)
+    assert estimator.qd7_raw == 0.0
 
 
 def test_missing_replies_are_guessed_for_a_while_from_the_velocity(estimator):
