@@ -30,8 +30,8 @@ class JointEstimator:
         counts: last accepted position of each motor [encoder counts].
         q: joint positions [rad], shape (7,); extrapolated where a reply is missing.
         qd: filtered joint velocities [rad/s], shape (7,).
-        qd7_raw: unfiltered difference of joint 7 over its last two replies [rad/s]; zero
-            where it is taken to stand still.
+        qd7_raw: unfiltered difference of joint 7 over its last two replies [rad/s];
+            zero where it is taken to stand still.
         jump: the worst position that was not believed in the last update, or None.
     """
 
