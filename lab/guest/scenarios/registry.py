@@ -7,6 +7,7 @@ from lab.guest.machine_room import MachineRoom
 from lab.guest.scenarios import (
     bus,
     calibration,
+    commission,
     foresight,
     losses,
     recording,
@@ -61,6 +62,8 @@ ALL = (
     Scenario("lost in a trial", losses.lost_in_a_trial, weight=16),
     Scenario("sensor lost and back", sensor_losses.lost_and_back, weight=15),
     Scenario("calibrate gravity", calibration.gravity, weight=25),
+    Scenario("commission", commission.first_day, weight=40),
+    Scenario("commission a wrong arm", commission.wrong_arms, weight=6),
 )
 
 
