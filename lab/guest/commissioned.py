@@ -6,9 +6,9 @@ from pathlib import Path
 
 from experiments.commissioning.inputs import inputs_of, present_inputs
 from experiments.commissioning.record import (
+    NAME,
     Commissioning,
     StepRecord,
-    read_commissioning,
     write_commissioning,
 )
 from experiments.commissioning.steps import GATED, ProofStep
@@ -19,32 +19,29 @@ from wam.driver.startup import ArmInfo
 
 
 def take_as_commissioned(config: Path, steps: Sequence[ProofStep] = GATED) -> None:
-    """Write `steps` as sound into the record beside `config`, for the arm it names.
+    """Write a record of sound `steps` beside `config` for the arm that it names.
 
-    The arm is asked what it is, as a command would; what the record has already stays.
+    The arm is asked what it is, as a command would; nothing is done where there is a
+    record already.
 
     Raises:
-        TractionError: there is no such arm, or the record was changed.
+        TractionError: there is no such arm.
     """
-    record = read_commissioning(config.parent)
-    missing = [step for step in steps if record is None or record.of(step) is None]
-    if not missing:
+    if (config.parent / NAME).exists():
         return
     settings = load_settings(config)
     rig = connect_rig(settings, settings.matrix.terrains[0], None)
     try:
-        taken = sound_record(rig, rig.backend.start_arm(), missing)
+        record = sound_record(rig, rig.backend.start_arm(), steps)
     finally:
         rig.backend.close()
-    for done in taken.steps if record is not None else ():
-        record = record.with_step(done)
-    write_commissioning(config.parent, record or taken)
+    write_commissioning(config.parent, record)
 
 
 def sound_record(
     rig: Rig, info: ArmInfo, steps: Sequence[ProofStep] = GATED
 ) -> Commissioning:
-    """Return a record of sound `steps` of an arm that was started."""
+    """Return a record of `steps` for an arm that was started; all: it may be driven."""
     present = present_inputs(rig, rig.backend.arm.answers(), info)
     now = datetime.fromtimestamp(rig.clock.utc_ns() // 1_000_000_000, UTC)
     return record_of(steps, present, now)

@@ -1,6 +1,7 @@
 """The first day by its command: who is on the bus, the stop circuit, the rest pose."""
 
-from collections.abc import Mapping
+import importlib
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -15,15 +16,18 @@ from lab.guest.commissioned import take_as_commissioned
 from lab.guest.machine_room import MachineRoom
 from lab.guest.network import set_up_both
 from lab.guest.scenarios.bus import Figures
+from lab.guest.scenarios.recording import served_arm
 from lab.guest.sessions import LedSession
 from wam.model.arm_model import ArmModel
-from wam.model.constants import Array, load_constants
+from wam.model.constants import load_constants
 
-_STEP = 120.0  # s of guest time until it asks for the next thing
-_BY_ITSELF = 90.0  # s, for C9 to C11: they ask for nothing
+_STEP = 120.0  # s of guest time until it asks for the next thing, or has ended
 _CARRIED = 2.0  # s, in which hands bring the arm into a pose
 _COMES_TO_REST = 0.7  # s, until an arm that is held or let go of is still
+_FRICTION = "0.7"  # of the joints, as a share of what was identified on another arm
 _STOPPED = 3  # exit code: a step found something wrong
+# What each command draws its page with: loaded once, and there in those forked later.
+_PAGE = "experiments.report.commissioning"
 _ON_THE_BUS = GATED[1 : GATED.index(ProofStep.BY_HAND)]
 _BEFORE_TORQUE = GATED[: GATED.index(ProofStep.REST_POSE)]
 _ON_REST_POSE = GATED[len(_BEFORE_TORQUE) :]
@@ -31,96 +35,118 @@ _ON_REST_POSE = GATED[len(_BEFORE_TORQUE) :]
 _WRONG = (
     ("pidx-3-is-2", ProofStep.IDENTITY, "PIDX of puck 3 is 2"),
     ("module-disobeys", ProofStep.STOP_CIRCUIT, "does not go back to idle"),
+    ("motor-3-reversed", ProofStep.RAMPS, "motor 3"),
 )
 
 
-def first_day(room: MachineRoom) -> Figures:
-    """Commission an arm: C1 to C4, then C8 to C11 on its rest pose.
+def on_the_bus(room: MachineRoom) -> Figures:
+    """Commission an arm without torque: C1 to C4, the pendant pressed as asked.
 
-    C0 touches no device and refuses this configuration's short loop test; C5 to C7 want
-    a hand for many poses and send no torque. They are written into the record as sound,
-    for the arm as it answers after C4 and `zero`: the command itself finds that C8 is
-    next, and that nothing before it is stale.
+    C0 touches no device, and refuses this configuration's short test of the loop.
     """
-    arm = _served(room)
-    day = _begun(room, arm, _ON_THE_BUS[0])
-    _press_pendant(day)
+    day = _bus_steps(room, _pushed(room), _ON_THE_BUS[0])
     room.finish(day.program, _STEP)
-    _lay(arm, load_constants().home)
-    room.finish(room.traction("zero", "--yes"), _STEP)
-    take_as_commissioned(room.config, _BEFORE_TORQUE)
-    day = LedSession(room, room.traction("commission", "--until", GATED[-1]), arm)
-    _lie_active(day)
-    room.finish(day.program, _BY_ITSELF)
-    record = _record(room)
-    recorded = {
-        done.step: read_raw(room.folder, done.raw[0])
-        for done in record.steps
-        if done.raw
+    record = _sound_record(room, _ON_THE_BUS)
+    timing = _recorded(room, record, ProofStep.TIMING)
+    p50, p99 = np.percentile(timing["replies_ns"], (50, 99)) / 1e6
+    return {
+        "exchange": f"{p50:.2f} ms (p99 {p99:.2f})",
+        "answer": f"{timing['answer_ns'] / 1e6:.2f} ms",
+        "idle loop": f"{timing['cycles']} cycles, {timing['incomplete']} incomplete",
+        "early": _measured(record, ProofStep.STOP_CIRCUIT, "nobody asked for it"),
+        "stop": _measured(record, ProofStep.STOP_CIRCUIT, "pucks without power"),
     }
-    return _figures(record, recorded)
+
+
+def on_the_rest_pose(room: MachineRoom) -> Figures:
+    """Commission an arm with little torque: C8 to C11 on its rest pose.
+
+    C0 to C7, which send none, are written into the record as sound: C1 to C4 are a
+    scenario of their own, C5 to C7 want a hand for many poses. The command finds by
+    itself that C8 is next, and nothing before it stale.
+    """
+    day = _rest_steps(room, _pushed(room))
+    room.finish(day.program, _STEP)
+    record = _sound_record(room, GATED)
+    recorded = [_recorded(room, record, step) for step in _ON_REST_POSE]
+    lifted = liftoffs(recorded[_ON_REST_POSE.index(ProofStep.RAMPS)])
+    return {
+        "lift-off": ", ".join(
+            f"joint {abs(joint)} {torque:.2f} N m" for joint, torque in lifted.items()
+        ),
+        "sole": f"{1e3 * _travel(room, recorded):.1f} mm at most",
+    }
 
 
 def wrong_arms(room: MachineRoom) -> Figures:
-    """Commission arms that are wrong: C2 stops at a puck's slot, C4 at the module."""
+    """Commission arms that are wrong: C2, C4 and C9 stop, and say why."""
     figures: Figures = {}
     for name, step, words in _WRONG:
-        arm = _served(room, "--wrong", name)
-        day = _begun(room, arm, step)
-        if step is ProofStep.STOP_CIRCUIT:
-            _press_pendant(day)
+        if step in _ON_THE_BUS:
+            arm = _at_home(room, "--wrong", name)
+            day = _bus_steps(room, arm, step)
+        else:
+            arm = _pushed(room, "--wrong", name)
+            day = _rest_steps(room, arm)
         room.finish(day.program, _STEP, _STOPPED)
         arm.close()
-        (cause,) = [done.cause for done in _record(room).steps if done.cause]
-        require(words in cause, f"{name}: {cause}")
-        figures[name] = f"{step}: {cause}"
+        (wrong,) = [done for done in _record(room).steps if done.cause]
+        require(wrong.step is step, f"{name}: {wrong.name}, in place of {step}")
+        require(words in wrong.cause, f"{name}: {wrong.cause}")
+        figures[name] = f"{step}: {wrong.cause}"
         (room.folder / NAME).unlink()
     return figures
 
 
-def _served(room: MachineRoom, *options: str) -> Program:
-    """Return an arm at home with all its friction, its sensor on the bus."""
+def _pushed(room: MachineRoom, *options: str) -> Program:
+    """Return an arm with the friction of many, held by a hand that may let go of it."""
+    importlib.import_module(_PAGE)
+    return served_arm(room, "--friction", _FRICTION, *options)
+
+
+def _at_home(room: MachineRoom, *options: str) -> Program:
+    """Return `traction fake`: an arm at home, computed and answered in the machine."""
+    importlib.import_module(_PAGE)
     set_up_both(room.shell)
     room.write_bus_config()
     return room.serve_home_arm("--hand", "none", *options)
 
 
-def _begun(room: MachineRoom, arm: Program, first: ProofStep) -> LedSession:
-    """Return a commissioning from a step up to C4."""
+def _bus_steps(room: MachineRoom, arm: Program, first: ProofStep) -> LedSession:
+    """Return a commissioning from `first` to C4, the pendant pressed where it asks."""
     words = ("--from", first, "--until", _ON_THE_BUS[-1])
-    return LedSession(room, room.traction("commission", *words), arm)
+    day = LedSession(room, room.traction("commission", *words), arm)
+    if first is not ProofStep.IDENTITY:
+        _press_pendant(day)
+    return day
 
 
 def _press_pendant(day: LedSession) -> None:
     """Press the pendant as C4 asks."""
-    for asked, button in (
-        ("1/4 Press Shift-activate", "activate"),
-        ("2/4 Press the stop button", "estop"),
-    ):
-        day.program.expect(asked, _STEP)
-        day.hand(button)
+    day.program.expect("1/4 Press Shift-activate", _STEP)
+    day.hand("activate")
+    day.program.expect("2/4 Press the stop button", _STEP)
+    day.hand("estop")
     day.program.expect("3/4 Release the stop button", _STEP)
     day.confirm()
     day.program.expect("4/4 Press Shift-idle", _STEP)
     day.hand("idle")
 
 
-def _lie_active(day: LedSession) -> None:
-    """Lay the arm into its rest pose and activate it there, as C8 asks."""
+def _rest_steps(room: MachineRoom, arm: Program) -> LedSession:
+    """Return a commissioning that has its arm laid down and activated, in C8."""
+    take_as_commissioned(room.config, _BEFORE_TORQUE)
+    day = LedSession(room, room.traction("commission", "--until", GATED[-1]), arm)
     day.program.expect("Lay the arm into its rest pose", _STEP)
-    _lay(day.arm, rest_pose(load_constants()))
+    angles = " ".join(f"{angle:.4f}" for angle in rest_pose(load_constants()))
+    day.hand(f"pose {angles} {_CARRIED:g}")
+    day.program.run_on(_CARRIED + _COMES_TO_REST)
     day.hand("release")
-    day.arm.run_on(_COMES_TO_REST)
+    day.program.run_on(_COMES_TO_REST)
     day.confirm()
     day.program.expect("Press Shift-activate", _STEP)
     day.hand("activate")
-
-
-def _lay(arm: Program, q: Array) -> None:
-    """Let hands bring the joints to `q` [rad], shape (7,), and hold them there."""
-    angles = " ".join(f"{angle:.4f}" for angle in q)
-    arm.press(f"pose {angles} {_CARRIED:g}\n")
-    arm.run_on(_CARRIED + _COMES_TO_REST)
+    return day
 
 
 def _record(room: MachineRoom) -> Commissioning:
@@ -130,42 +156,34 @@ def _record(room: MachineRoom) -> Commissioning:
     return record
 
 
-def _figures(record: Commissioning, recorded: Mapping[ProofStep, Values]) -> Figures:
-    """Return what was measured.
-
-    Raises:
-        ScenarioError: a step up to C11 is not there or not sound.
-    """
+def _sound_record(room: MachineRoom, steps: Sequence[ProofStep]) -> Commissioning:
+    """Return the record; raise ScenarioError where one of `steps` is not sound."""
+    record = _record(room)
     sound = {done.step for done in record.steps if done.verdict == "sound"}
-    missing = [step for step in GATED if step not in sound]
+    missing = [step for step in steps if step not in sound]
     require(not missing, f"not sound: {', '.join(missing)}")
-    timing = recorded[ProofStep.TIMING]
-    p50, p99 = np.percentile(timing["replies_ns"], (50, 99)) / 1e6
-    lifted = liftoffs(recorded[ProofStep.RAMPS])
-    return {
-        "exchange": f"{p50:.2f} ms (p99 {p99:.2f})",
-        "answer": f"{float(timing['answer_ns']) / 1e6:.2f} ms",
-        "idle loop": f"{timing['cycles']} cycles, {timing['incomplete']} incomplete",
-        "stop": _measured(record, ProofStep.STOP_CIRCUIT, "pucks without power"),
-        "lift-off": ", ".join(
-            f"joint {abs(joint)} {torque:.2f} N m" for joint, torque in lifted.items()
-        ),
-        "sole": f"{1e3 * _travel(recorded):.1f} mm at most",
-    }
+    return record
+
+
+def _recorded(room: MachineRoom, record: Commissioning, step: ProofStep) -> Values:
+    done = record.of(step)
+    if done is None or not done.raw:
+        raise ScenarioError(f"{step} has no recording")
+    return read_raw(room.folder, done.raw[0])
 
 
 def _measured(record: Commissioning, step: ProofStep, words: str) -> str:
     """Return the quantity of a step whose name ends with `words`."""
     done = record.of(step)
     quantities = () if done is None else done.quantities
-    (found,) = [each for each in quantities if each.name.endswith(words)]
-    return f"{found.value:.3g} {found.unit}"
+    (measured,) = [each for each in quantities if each.name.endswith(words)]
+    return f"{measured.value:.3g} {measured.unit}"
 
 
-def _travel(recorded: Mapping[ProofStep, Values]) -> float:
-    """Return how far the sole went in any step on the rest pose [m]."""
-    settings = load_settings(None)
-    foot = settings.matrix.terrains[0].foot
-    model = ArmModel(load_constants(), build_tool(settings.rig, foot))
-    paths = (model.sole_path(recorded[step]["q"]).position for step in _ON_REST_POSE)
+def _travel(room: MachineRoom, recorded: Sequence[Values]) -> float:
+    """Return how far the sole went at most in one of the recordings [m]."""
+    settings = load_settings(room.config)
+    tool = build_tool(settings.rig, settings.matrix.terrains[0].foot)
+    model = ArmModel(load_constants(), tool)
+    paths = [model.sole_path(values["q"]).position for values in recorded]
     return max(float(np.linalg.norm(path - path[0], axis=1).max()) for path in paths)
