@@ -62,9 +62,9 @@ ALL = (
     Scenario("lost in a trial", losses.lost_in_a_trial, weight=16),
     Scenario("sensor lost and back", sensor_losses.lost_and_back, weight=15),
     Scenario("calibrate gravity", calibration.gravity, weight=25),
-    Scenario("commission the bus", commission.on_the_bus, weight=50),
-    Scenario("commission at rest", commission.on_the_rest_pose, weight=35),
-    Scenario("commission a wrong arm", commission.wrong_arms, weight=25),
+    Scenario("commission the bus", commission.on_the_bus, weight=28),
+    Scenario("commission at rest", commission.on_the_rest_pose, weight=22),
+    Scenario("commission a wrong arm", commission.wrong_arms, weight=18),
 )
 
 
