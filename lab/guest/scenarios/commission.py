@@ -22,8 +22,8 @@ from wam.model.arm_model import ArmModel
 from wam.model.constants import load_constants
 
 _STEP = 120.0  # s of guest time until it asks for the next thing, or has ended
-_CARRIED = 2.0  # s, in which hands bring the arm into a pose
-_COMES_TO_REST = 0.7  # s, until an arm that is held or let go of is still
+_CARRIED = 2.5  # s, in which hands bring the arm into a pose
+_COMES_TO_REST = 1.0  # s, until an arm that is held or let go of is still
 _FRICTION = "0.7"  # of the joints, as a share of what was identified on another arm
 _STOPPED = 3  # exit code: a step found something wrong
 # What each command draws its page with: loaded once, and there in those forked later.
@@ -134,13 +134,16 @@ def _press_pendant(day: LedSession) -> None:
 
 
 def _rest_steps(room: MachineRoom, arm: Program) -> LedSession:
-    """Return a commissioning that has its arm laid down and activated, in C8."""
+    """Return a commissioning that has its arm activated on the rest pose, in C8.
+
+    Hands lay it down before its pucks are woken: shorted windings would slow them.
+    """
+    angles = " ".join(f"{angle:.4f}" for angle in rest_pose(load_constants()))
+    arm.press(f"pose {angles} {_CARRIED:g}\n")
+    arm.run_on(_CARRIED + _COMES_TO_REST)
     take_as_commissioned(room.config, _BEFORE_TORQUE)
     day = LedSession(room, room.traction("commission", "--until", GATED[-1]), arm)
     day.program.expect("Lay the arm into its rest pose", _STEP)
-    angles = " ".join(f"{angle:.4f}" for angle in rest_pose(load_constants()))
-    day.hand(f"pose {angles} {_CARRIED:g}")
-    day.program.run_on(_CARRIED + _COMES_TO_REST)
     day.hand("release")
     day.program.run_on(_COMES_TO_REST)
     day.confirm()
