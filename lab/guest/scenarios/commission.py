@@ -68,13 +68,12 @@ def on_the_rest_pose(room: MachineRoom) -> Figures:
     day = _rest_steps(room, _pushed(room))
     room.finish(day.program, _STEP)
     record = _sound_record(room, GATED)
-    recorded = [_recorded(room, record, step) for step in _ON_REST_POSE]
-    lifted = liftoffs(recorded[_ON_REST_POSE.index(ProofStep.RAMPS)])
+    lifted = liftoffs(_recorded(room, record, ProofStep.RAMPS))
     return {
         "lift-off": ", ".join(
             f"joint {abs(joint)} {torque:.2f} N m" for joint, torque in lifted.items()
         ),
-        "sole": f"{1e3 * _travel(room, recorded):.1f} mm at most",
+        "sole": _farthest(room, record),
     }
 
 
@@ -90,10 +89,13 @@ def wrong_arms(room: MachineRoom) -> Figures:
             day = _rest_steps(room, arm)
         room.finish(day.program, _STEP, _STOPPED)
         arm.close()
-        (wrong,) = [done for done in _record(room).steps if done.cause]
+        record = _record(room)
+        (wrong,) = [done for done in record.steps if done.cause]
         require(wrong.step is step, f"{name}: {wrong.name}, in place of {step}")
         require(words in wrong.cause, f"{name}: {wrong.cause}")
         figures[name] = f"{step}: {wrong.cause}"
+        if step not in _ON_THE_BUS:
+            figures["sole"] = _farthest(room, record)
         (room.folder / NAME).unlink()
     return figures
 
@@ -183,10 +185,14 @@ def _measured(record: Commissioning, step: ProofStep, words: str) -> str:
     return f"{measured.value:.3g} {measured.unit}"
 
 
-def _travel(room: MachineRoom, recorded: Sequence[Values]) -> float:
-    """Return how far the sole went at most in one of the recordings [m]."""
+def _farthest(room: MachineRoom, record: Commissioning) -> str:
+    """Return in words how far the sole went at most in a step of C8 to C11."""
     settings = load_settings(room.config)
     tool = build_tool(settings.rig, settings.matrix.terrains[0].foot)
     model = ArmModel(load_constants(), tool)
-    paths = [model.sole_path(values["q"]).position for values in recorded]
-    return max(float(np.linalg.norm(path - path[0], axis=1).max()) for path in paths)
+    travel = 0.0
+    for step in _ON_REST_POSE:
+        if record.of(step) is not None:
+            path = model.sole_path(_recorded(room, record, step)["q"]).position
+            travel = max(travel, float(np.linalg.norm(path - path[0], axis=1).max()))
+    return f"{1e3 * travel:.1f} mm at most"
