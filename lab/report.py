@@ -43,8 +43,9 @@ _NOT_SHOWN = """
 - Hardware time stamps: `kvaser_pci` has software time stamps only.
 - Replies one by one in a session: what its simulated arm says within 0.55 ms leaves
   together, and the arm computes in no time at all. In "home arm", "link down at start",
-  "second host", "full queue" and where it is commissioned `traction fake` serves the
-  arm inside the machine: replies come one by one, after the time that it needs.
+  "second host", "full queue" and for C2 and C4 of "commission a wrong arm"
+  `traction fake` serves the arm inside the machine: replies come one by one, after the
+  time that it needs.
 - The start of a process: programs begin forked, their libraries loaded, but for the
   `check` of "home arm", which is executed. The preflight tests the loop for 0.5 s
   (`[loop] test_time`), there for 2 s.
