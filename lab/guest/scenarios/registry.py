@@ -63,8 +63,8 @@ ALL = (
     Scenario("sensor lost and back", sensor_losses.lost_and_back, weight=15),
     Scenario("calibrate gravity", calibration.gravity, weight=25),
     Scenario("commission the bus", commission.on_the_bus, weight=28),
-    Scenario("commission at rest", commission.on_the_rest_pose, weight=22),
-    Scenario("commission a wrong arm", commission.wrong_arms, weight=18),
+    Scenario("commission at rest", commission.on_the_rest_pose, weight=21),
+    Scenario("commission a wrong arm", commission.wrong_arms, weight=14),
 )
 
 
