@@ -68,7 +68,7 @@ class Caller:
         rows = FRAME.iter_unpack(self.memory[FRAMES_OUT_AT:end])
         rows = [(can_id, data[:length]) for can_id, length, data in rows]
         self.sent += [(self.t_ns, can_id) for can_id, _ in rows]
-        self.said = dict(rows) or self.said
+        self.said |= dict(rows)
 
 
 @pytest.fixture
@@ -120,6 +120,7 @@ def positions(caller, seconds):
 
 def test_hands_take_orders_as_at_an_arm_that_is_served_by_the_command(caller):
     before = positions(caller, 0.1)
+    assert positions(caller, 0.4)[0] == before[0]  # held by one hand it does not turn
     assert caller.say(Call.DO, "pose 0.1 -1.9 0.1 2.9 0.1 0.5 0.1 0.3") == DONE
     there = positions(caller, 0.4)
     assert all(is_ != was for is_, was in zip(there, before, strict=True))
@@ -128,13 +129,13 @@ def test_hands_take_orders_as_at_an_arm_that_is_served_by_the_command(caller):
 
 
 def test_a_wrong_arm_differs_as_the_catalogue_says(files):
-    reversed_counts = []
+    of_joint_2 = []
     for wrong in ("", "encoder-2-reversed"):
         caller = Caller()
         served = {**files, **WANTED, "wrong": wrong}
         assert caller.say(Call.SERVE, json.dumps(served)) == DONE
-        reversed_counts.append(positions(caller, 0.02)[1])
-    assert reversed_counts[0] != reversed_counts[1]
+        of_joint_2.append(positions(caller, 0.02)[1])
+    assert of_joint_2[0] != of_joint_2[1]
 
 
 def test_a_call_of_an_offset_that_means_nothing_is_refused(caller):
