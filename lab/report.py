@@ -26,8 +26,12 @@ _FIGURES = """
 how many of 100 exchanges were incomplete. `cycles`, `missed`, `gap`: cycles of the kept
 trials, those whose time passed without one, the longest time between two. A trial is
 counted only where `traction verify` accepts it. Where a fault of docs/faults.md is
-raised, the exit code is the one that this page promises for the phase. `repeated`: the
-emulated kernel had panicked in the scenario, which was then run once more.
+raised, the exit code is the one that this page promises for the phase. `answer`: from a
+question to a puck to its answer, median. `early`: an arm active that nobody has asked
+to be, until it is idle again. `stop`: from the mode E-stop to the first cycle without
+any reply. `lift-off`: torque that a ramp of C9 had reached where it lifted the joint
+off its stop. `sole`: how far it went in a step of C8 to C11. `repeated`: the emulated
+kernel had panicked in the scenario, which was then run once more.
 """
 _NOT_SHOWN = """
 ## Not covered
@@ -39,8 +43,9 @@ _NOT_SHOWN = """
 - Hardware time stamps: `kvaser_pci` has software time stamps only.
 - Replies one by one in a session: what its simulated arm says within 0.55 ms leaves
   together, and the arm computes in no time at all. In "home arm", "link down at start",
-  "second host" and "full queue" `traction fake` serves the arm inside the machine:
-  replies come one by one, after the time that it needs.
+  "second host", "full queue" and for C2 and C4 of "commission a wrong arm"
+  `traction fake` serves the arm inside the machine: replies come one by one, after the
+  time that it needs.
 - The start of a process: programs begin forked, their libraries loaded, but for the
   `check` of "home arm", which is executed. The preflight tests the loop for 0.5 s
   (`[loop] test_time`), there for 2 s.

@@ -27,7 +27,7 @@ def judge(values: Values) -> Judgement:
     unusual = words(values, "unusual")
     return judged(
         [
-            found("unusual", len(unusual)),
+            found("unusual", len(unusual), text="; ".join(unusual)),
             found("load", number(values, "load")),
             found("drawings", float(values["gravity_apart"].max())),
         ]

@@ -66,9 +66,7 @@ _MOTION = "Something moves the arm that is not gravity on its stops"
 
 LIMITS: Mapping[str, Limit] = {
     # C0
-    "unusual": Limit(
-        "numbers that no sound rig has", "", "rig.toml or matrix.toml", high=0
-    ),
+    "unusual": Limit("numbers that no sound rig has", "", "{text}", high=0),
     "load": Limit("mass on the plate", "kg", "The arm cannot bear it", high=3.0),
     "drawings": Limit(
         "gravity beside the drawings",

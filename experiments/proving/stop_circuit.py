@@ -18,6 +18,7 @@ _PATIENCE = 60.0  # s, for each press
 _RELEASED = 2.0  # s, that a released stop has to last
 _AFTER = 0.5  # s, that are recorded after the last press
 _SILENT_CYCLES = 20  # in which no puck answers: it has no power
+_TOLD_NS = 100_000_000  # ns, within which this side knows what a cycle found
 _MS = PERIOD_NS / 1e6
 
 
@@ -36,6 +37,7 @@ def collect(scene: Scene) -> Values:
     if simulation is not None:
         simulation.pendant("activate")
     seen.append(_see(scene, SafetyMode.ACTIVE, "Shift-activate"))
+    early_ns = scene.rig.clock.now_ns()
     scene.wait_through(1.0)
     scene.say("2/4 Press the stop button.")
     if simulation is not None:
@@ -56,6 +58,7 @@ def collect(scene: Scene) -> Values:
         "mode": (record["flags"] & SAFETY_MODE_MASK).astype(np.int64),
         "fresh": (record["flags"] >> MOTOR_FRESH_SHIFT & 0x7F).astype(np.int64),
         "seen": np.array(seen),
+        "early_ns": np.array(early_ns),
         "released_ns": np.array(released_ns),
         "idled_ns": np.array(idled_ns),
     }
@@ -100,7 +103,9 @@ def judge(values: Values) -> Judgement:
     t_ns, mode, fresh = values["t_ns"], values["mode"], values["fresh"]
     stop = mode == SafetyMode.E_STOP
     first = int(stop.argmax()) if stop.any() else len(stop)
-    early = _longest(t_ns, mode[:first] == SafetyMode.ACTIVE) / 1e6
+    early = _longest(t_ns, mode[:first] == SafetyMode.ACTIVE)
+    if "early_ns" in values:  # an earlier recording has none
+        early = max(early, _longest_pause(t_ns, int(values["early_ns"])))
     silent = _silent_since(fresh, first)
     stopped = 1e9 if silent is None else max(0.0, float(silent - first) * _MS)
     kept = (t_ns > int(values["released_ns"])) & (t_ns < int(values["idled_ns"]))
@@ -108,7 +113,7 @@ def judge(values: Values) -> Judgement:
     return judged(
         [
             found("seen", int(values["seen"].sum())),
-            found("early", early),
+            found("early", early / 1e6),
             found("stop", stopped),
             found("stays", int((mode[kept] != SafetyMode.E_STOP).sum())),
             found("idles", int(is_idle)),
@@ -133,6 +138,17 @@ def _longest(t_ns: NDArray[np.int64], is_so: NDArray[np.bool_]) -> int:
     if since is not None:
         longest = max(longest, times[len(is_so) - 1] - times[since])
     return longest
+
+
+def _longest_pause(t_ns: NDArray[np.int64], early_ns: int) -> int:
+    """Return the longest time between two cycles about `early_ns` [ns].
+
+    The cycle that meets an active module puts it to idle and tells its mode after that:
+    where it obeys, or its heartbeat brakes it meanwhile, no cycle tells that it was
+    active.
+    """
+    is_near = (t_ns[1:] > early_ns - _TOLD_NS) & (t_ns[:-1] < early_ns)
+    return int(np.diff(t_ns)[is_near].max(initial=0))
 
 
 def _silent_since(fresh: NDArray[np.int64], stop: int) -> int | None:

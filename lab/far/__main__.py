@@ -81,9 +81,15 @@ class FarSide:
         settings = _settings(wanted["rig"], wanted["matrix"])
         if not wanted["row"]:
             return LineSensor(settings, self._clock)
-        has_line = wanted["line"] != ""
-        seed = int(wanted["seed"])
-        return PushedArm(settings, wanted["row"], seed, self._clock, has_line=has_line)
+        return PushedArm(
+            settings,
+            wanted["row"],
+            int(wanted["seed"]),
+            self._clock,
+            has_line=wanted["line"] != "",
+            friction=float(wanted["friction"]),
+            wrong=wanted["wrong"],
+        )
 
 
 def _settings(rig: str, matrix: str) -> Settings:

@@ -2,14 +2,15 @@
 
 Lines move the hand and press the pendant, as a person would do: prepare TRIAL, lift,
 put_down, push, rest, let_go, activate, idle, estop, break FAULT, mend, sensor_off,
-sensor_on.
+sensor_on; and orders to hands as `traction fake` takes them, e.g. pose, release.
 """
 
 from collections.abc import Callable
 
 from acquisition.clock import Clock
-from experiments.rig.fake import SimulatedRig
+from experiments.rig.fake import RigTruth, SimulatedRig
 from experiments.settings.load import Settings
+from experiments.tools.hand_orders import parse_hand_order
 from fakes.pucks.wire import WiredNetwork
 from fakes.world.plain_world import simulated_rig
 from fakes.world_clock import TICK_NS, WorldClock
@@ -21,20 +22,41 @@ from wam.model.constants import load_constants
 # collects frames: seven positions, the last of which starts 0.53 ms after the question.
 _TOGETHER_NS = 550_000
 _HIGHEST_ID = 0x7FF  # of a data frame
-_FRICTION = 0.02  # share of what was identified on another arm
 
 
 class PushedArm:
     """Implements Served: a simulated rig on a bus, and what a person does with it."""
 
     def __init__(
-        self, settings: Settings, row: str, seed: int, clock: Clock, *, has_line: bool
+        self,
+        settings: Settings,
+        row: str,
+        seed: int,
+        clock: Clock,
+        *,
+        has_line: bool,
+        friction: float,
+        wrong: str,
     ) -> None:
         """Put the arm above the container of a row of the matrix.
 
-        `has_line`: its sensor is on the serial line.
+        Args:
+            settings: of the rig.
+            row: of the matrix.
+            seed: of everything random.
+            clock: the guest's time.
+            has_line: its sensor is on the serial line.
+            friction: share of what was identified on another arm.
+            wrong: name of what is wrong with it in the catalogue; "" = nothing.
         """
-        world = SimulatedRig(settings.rig, settings.row(row), seed, _FRICTION, "steady")
+        world = SimulatedRig(
+            settings.rig,
+            settings.row(row),
+            seed,
+            friction,
+            "steady",
+            truth=RigTruth(wrong=wrong) if wrong else None,
+        )
         self._clock = WorldClock(clock)
         simulation = simulated_rig(world.metadata(), load_constants(), self._clock)
         self._simulation, rig = simulation, simulation.rig
@@ -64,8 +86,12 @@ class PushedArm:
             self._simulation.prepare(int(operand))
         elif word == "break":
             self._simulation.inject(operand)
+        elif line in self._actions:
+            self._actions[line]()
+        elif (order := parse_hand_order(line.split())) is not None:
+            order.give(self._simulation)
         else:
-            self._actions[word]()
+            raise KeyError(line)
 
     def advance(self, frames: list[Frame], data: bytes) -> Turn:
         """Let bus, arm and sensor go on up to now."""

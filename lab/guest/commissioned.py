@@ -1,6 +1,6 @@
 """A served arm whose commissioning is taken for granted, so that torque may be sent."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -18,8 +18,8 @@ from experiments.settings.load import load_settings
 from wam.driver.startup import ArmInfo
 
 
-def take_as_commissioned(config: Path) -> None:
-    """Write a record of sound steps beside `config` for the arm that it names.
+def take_as_commissioned(config: Path, steps: Sequence[ProofStep] = GATED) -> None:
+    """Write a record of sound `steps` beside `config` for the arm that it names.
 
     The arm is asked what it is, as a command would; nothing is done where there is a
     record already.
@@ -32,17 +32,19 @@ def take_as_commissioned(config: Path) -> None:
     settings = load_settings(config)
     rig = connect_rig(settings, settings.matrix.terrains[0], None)
     try:
-        record = sound_record(rig, rig.backend.start_arm())
+        record = sound_record(rig, rig.backend.start_arm(), steps)
     finally:
         rig.backend.close()
     write_commissioning(config.parent, record)
 
 
-def sound_record(rig: Rig, info: ArmInfo) -> Commissioning:
-    """Return a record by which an arm that was started may be driven."""
+def sound_record(
+    rig: Rig, info: ArmInfo, steps: Sequence[ProofStep] = GATED
+) -> Commissioning:
+    """Return a record of `steps` for an arm that was started; all: it may be driven."""
     present = present_inputs(rig, rig.backend.arm.answers(), info)
     now = datetime.fromtimestamp(rig.clock.utc_ns() // 1_000_000_000, UTC)
-    return record_of(GATED, present, now)
+    return record_of(steps, present, now)
 
 
 def record_of(

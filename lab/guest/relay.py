@@ -30,6 +30,7 @@ from lab.guest.frame_batch import FrameBatch, open_can
 _DEVICES = Path("/sys/bus/pci/devices")
 _SHARED_MEMORY = (0x1AF4, 0x1110)  # vendor and device of ivshmem
 _AT_ONCE = 4096
+_FRICTION = 0.02  # of the joints, as a share of what was identified on another arm
 
 
 class FarSideError(Exception):
@@ -150,6 +151,8 @@ def _wanted(options: argparse.Namespace) -> dict[str, str]:
         "matrix": config.with_name("matrix.toml").read_text(encoding="utf-8"),
         "row": options.row if options.can else "",
         "seed": str(options.seed),
+        "friction": str(options.friction),
+        "wrong": options.wrong,
         "line": str(options.line or ""),
     }
 
@@ -183,6 +186,8 @@ def main() -> None:
     options.add_argument("--line", type=Path, help="a serial sensor, on this port")
     options.add_argument("--row", default="TF")
     options.add_argument("--seed", type=int, default=1)
+    options.add_argument("--friction", type=float, default=_FRICTION)
+    options.add_argument("--wrong", default="", metavar="NAME", help="of the catalogue")
     relay = Relay(options.parse_args())
     sys.stdout.write("ready\n")
     sys.stdout.flush()

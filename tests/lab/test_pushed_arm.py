@@ -17,12 +17,19 @@ from lab.calls import (
 )
 from lab.far.__main__ import FarSide
 from lab.guest.machine_room import MachineRoom
-from wam.bus.frames import Group, encode_get, group_id
+from wam.bus.frames import (
+    MOTOR_NODES,
+    Group,
+    encode_get,
+    group_id,
+    position_reply_id,
+)
 from wam.bus.properties import Device, property_number
 
 _ASKED_NS = 60_000  # into a cycle
 _START_NS = PERIOD_NS * 1000
 _CYCLES = 20
+WANTED = {"row": "TF", "seed": "1", "line": "", "friction": "0.02", "wrong": ""}
 
 
 class Caller:
@@ -36,6 +43,7 @@ class Caller:
         self.calls = 0
         self.asked_ns = _START_NS + _ASKED_NS
         self.sent = []
+        self.said = {}  # last data by identifier
 
     def say(self, call, text):
         self.exchange.ask(self.t_ns, 0, b"")
@@ -58,7 +66,9 @@ class Caller:
         self.wake_ns, sent, _ = self.exchange.answered()
         end = FRAMES_OUT_AT + sent * FRAME.size
         rows = FRAME.iter_unpack(self.memory[FRAMES_OUT_AT:end])
-        self.sent += [(self.t_ns, can_id) for can_id, _, _ in rows]
+        rows = [(can_id, data[:length]) for can_id, length, data in rows]
+        self.sent += [(self.t_ns, can_id) for can_id, _ in rows]
+        self.said |= dict(rows)
 
 
 @pytest.fixture
@@ -75,8 +85,7 @@ def files(tmp_path):
 @pytest.fixture
 def caller(files):
     caller = Caller()
-    wanted = {**files, "row": "TF", "seed": "1", "line": ""}
-    assert caller.say(Call.SERVE, json.dumps(wanted)) == DONE
+    assert caller.say(Call.SERVE, json.dumps({**files, **WANTED})) == DONE
     return caller
 
 
@@ -101,6 +110,34 @@ def test_a_line_that_is_not_known_is_refused_in_words(caller, line):
     assert caller.say(Call.DO, "lift") == DONE
 
 
+def positions(caller, seconds):
+    """Return the data of the seven positions after a while."""
+    end_ns = caller.t_ns + round(seconds * 1e9)
+    while caller.t_ns < end_ns:
+        caller.step()
+    return [caller.said[position_reply_id(node)] for node in MOTOR_NODES]
+
+
+def test_hands_take_orders_as_at_an_arm_that_is_served_by_the_command(caller):
+    before = positions(caller, 0.1)
+    assert positions(caller, 0.4)[0] == before[0]  # held by one hand it does not turn
+    assert caller.say(Call.DO, "pose 0.1 -1.9 0.1 2.9 0.1 0.5 0.1 0.3") == DONE
+    there = positions(caller, 0.4)
+    assert all(is_ != was for is_, was in zip(there, before, strict=True))
+    assert caller.say(Call.DO, "release") == DONE
+    assert caller.say(Call.DO, "pose 1 2") != DONE
+
+
+def test_a_wrong_arm_differs_as_the_catalogue_says(files):
+    of_joint_2 = []
+    for wrong in ("", "encoder-2-reversed"):
+        caller = Caller()
+        served = {**files, **WANTED, "wrong": wrong}
+        assert caller.say(Call.SERVE, json.dumps(served)) == DONE
+        of_joint_2.append(positions(caller, 0.02)[1])
+    assert of_joint_2[0] != of_joint_2[1]
+
+
 def test_a_call_of_an_offset_that_means_nothing_is_refused(caller):
     assert caller.far.call(4) != DONE
     assert "4 is not a valid Call" in caller.exchange.message()
@@ -122,7 +159,7 @@ def test_a_sensor_alone_says_what_is_due(files):
     caller = Caller()
     rig = files["rig"].replace('kind = "barrett" ', 'kind = "bota" ')
     rig = rig.replace("[ft_sensor]", '[ft_sensor]\nport = "/dev/ttyUSB0"\nsinc = 64')
-    wanted = {**files, "rig": rig, "row": "", "seed": "1", "line": "a port"}
+    wanted = {**files, **WANTED, "rig": rig, "row": "", "line": "a port"}
     assert caller.say(Call.SERVE, json.dumps(wanted)) == DONE, caller.exchange.message()
     written = b""
     for _ in range(500):

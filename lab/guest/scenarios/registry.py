@@ -7,6 +7,7 @@ from lab.guest.machine_room import MachineRoom
 from lab.guest.scenarios import (
     bus,
     calibration,
+    commission,
     foresight,
     losses,
     recording,
@@ -61,6 +62,9 @@ ALL = (
     Scenario("lost in a trial", losses.lost_in_a_trial, weight=16),
     Scenario("sensor lost and back", sensor_losses.lost_and_back, weight=15),
     Scenario("calibrate gravity", calibration.gravity, weight=25),
+    Scenario("commission the bus", commission.on_the_bus, weight=28),
+    Scenario("commission at rest", commission.on_the_rest_pose, weight=21),
+    Scenario("commission a wrong arm", commission.wrong_arms, weight=14),
 )
 
 

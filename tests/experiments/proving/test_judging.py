@@ -3,7 +3,7 @@ import pytest
 
 from acquisition.devices import SafetyMode
 from acquisition.errors import SettingsError
-from experiments.proving import bus, by_hand, rest_pose, stop_circuit
+from experiments.proving import bus, by_hand, configuration, rest_pose, stop_circuit
 from experiments.proving.recording import read_raw, texts, write_raw
 from wam.model.constants import load_constants
 
@@ -99,6 +99,31 @@ def test_a_module_that_does_not_go_to_idle_is_named_by_the_time_that_passes():
     assert "does not go back to idle" in stop_circuit.judge(late).cause
     mode[20:26] = SafetyMode.ACTIVE
     assert "does not go back" in stop_circuit.judge({**sound, "mode": mode}).cause
+
+
+def test_a_module_that_its_heartbeat_brakes_is_named_though_no_cycle_saw_it_active():
+    sound = pressed()
+    for pause_ns, is_named in ((4_000_000, False), (104_000_000, True)):
+        t_ns = sound["t_ns"].copy()
+        t_ns[21:] += pause_ns
+        times = {name: sound[name] + pause_ns for name in ("released_ns", "idled_ns")}
+        seen = {**sound, **times, "t_ns": t_ns}
+        seen |= {"early_ns": t_ns[21] + 4_000_000}  # it is told of it then
+        cause = stop_circuit.judge(seen).cause
+        assert ("does not go back to idle" in cause) is is_named, cause
+    # A pause at another time says nothing of the module.
+    far = {**seen, "early_ns": np.array(2_000_000_000)}
+    assert stop_circuit.judge(far).cause == ""
+
+
+def test_a_number_that_no_sound_rig_has_is_named():
+    values = {
+        "unusual": texts(["rig.toml: loop.test_time = 0.5"]),
+        "load": np.array(1.0),
+        "gravity_apart": np.zeros(3),
+    }
+    assert "loop.test_time = 0.5" in configuration.judge(values).cause
+    assert configuration.judge({**values, "unusual": texts([])}).cause == ""
 
 
 def test_an_arm_that_moves_without_torque_is_named():
