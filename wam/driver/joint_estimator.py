@@ -31,7 +31,7 @@ class JointEstimator:
         q: joint positions [rad], shape (7,); extrapolated where a reply is missing.
         qd: filtered joint velocities [rad/s], shape (7,).
         qd7_raw: unfiltered difference of joint 7 over its last two replies [rad/s];
-            zero where it is taken to stand still.
+            zero while it is silent for long or not believed, and taken to stand.
         jump: the worst position that was not believed in the last update, or None.
     """
 
@@ -78,7 +78,7 @@ class JointEstimator:
                 continue
             farthest, moved = fastest * elapsed + _STILL, counts - last
             if not -farthest <= moved <= farthest:
-                positions[i] = last
+                positions[i], raw_rates[i] = last, 0.0
                 self._note_jump(i, moved, elapsed)
                 continue
             if elapsed > 0.0:

@@ -178,9 +178,6 @@ def test_two_trials_are_enough(trials):
     assert notes == []
 
 
-MISSED = 0.05  # nat: below it tops are too alike for any score to tell
-
-
 @pytest.mark.long
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize("kernel", [SquaredExponential(2), Arcsine(2)])
@@ -197,8 +194,8 @@ def test_the_search_reaches_the_best_of_twenty_starts(trials, kernel):
         likelihood = Likelihood(kernel, noise, X, r)
         starts = rng.uniform(*box.T, (20, len(box)))
         best = max(climb(likelihood, start, box).value for start in starts)
-        missed += posterior_search(kernel, noise, X, r).lml < best - MISSED
-    # All of nine. `benchmarks.optima` asks the same of every fit of a study.
+        missed += posterior_search(kernel, noise, X, r).lml < best - 1e-3
+    # 95 % of the fits of a study; of nine that is all
     assert missed == 0
 
 

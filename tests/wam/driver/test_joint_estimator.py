@@ -86,6 +86,13 @@ def test_a_joint_7_that_is_silent_for_long_has_no_raw_velocity(estimator):
     assert estimator.qd7_raw == 0.0
 
 
+def test_a_joint_7_that_is_not_believed_has_no_raw_velocity(estimator):
+    counts = move(estimator, 10)
+    estimator.update(22 * MS, [*counts[:6], counts[6] + 1_000_000])
+    assert estimator.jump is not None
+    assert estimator.qd7_raw == 0.0
+
+
 def test_missing_replies_are_guessed_for_a_while_from_the_velocity(estimator):
     counts = move(estimator, 1000)
     none = [None] * 7
