@@ -7,6 +7,7 @@ import numpy as np
 
 from acquisition.control_loop.contact import Contact, WrenchFeed, contact_of
 from acquisition.control_loop.faults import (
+    OK,
     Action,
     CircuitCauses,
     Fault,
@@ -106,6 +107,7 @@ class Cycle:
         self._move: tuple[Vector, float] | None = None
         self._stance: SoleGoal | None = None
         self._proof: ProofGoal | None = None
+        self._silent_until_ns = 0
         self._reported: GuardVerdict | None = None
         self.is_recording = False
         self.replies_ns = 0
@@ -121,6 +123,7 @@ class Cycle:
         self._move = None
         self._stance = None
         self._proof = None
+        self._silent_until_ns = 0
         self.status.verdict = None
 
     def move_to(self, goal: Sequence[float], speed: float) -> None:
@@ -179,9 +182,14 @@ class Cycle:
         self._on_sample(sample.payload())
 
     def _read(self, now_ns: int) -> ArmReading:
-        """Ask for the positions; starve the heartbeat of an arm that did not idle."""
+        """Ask for the positions; starve the heartbeat of an arm that did not idle.
+
+        And that of one whose heartbeat is proved.
+        """
         is_wanted = self._requested not in (None, _REQUEST_IDLE)
-        is_starved = self.status.state is _UNKNOWN and not is_wanted
+        is_starved = (self.status.state is _UNKNOWN and not is_wanted) or (
+            now_ns < self._silent_until_ns
+        )
         return self._arm.listen(now_ns) if is_starved else self._arm.read(now_ns)
 
     def _observe(self, reading: ArmReading, wrench: WrenchSample | None) -> None:
@@ -217,6 +225,7 @@ class Cycle:
                 self.law.stand(stance, reading)
             elif proof is not None:
                 self.law.prove(proof, reading)
+                self._silent_until_ns = reading.host_ns + proof.silence_ns
                 # It was laid onto its stops, from wherever it was.
                 self._guard = replace(self._guard, armed=0)
         except ValueError:
@@ -282,6 +291,9 @@ class Cycle:
     def _judge_proof(self, reading: ArmReading, verdict: GuardVerdict) -> GuardVerdict:
         """Return what the guard says of a proof, or else what the proof itself does."""
         is_powered = self.status.safety is SafetyMode.ACTIVE
+        is_silent = reading.host_ns < self._silent_until_ns
+        if is_silent and verdict.fault is Fault.CAN_SILENCE:
+            verdict = OK  # nothing was asked
         excess = self.law.proof_excess(reading, self._energy, is_powered=is_powered)
         if excess is None or verdict.action is not _NONE:
             return verdict

@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
+from acquisition.clock import NS_PER_S
+
 
 class ProofKind(IntEnum):
     """What is given to the arm.
@@ -15,13 +17,15 @@ class ProofKind(IntEnum):
     REST: nothing. RAMP: a torque of one joint that grows evenly, until the joint has
     moved. LIFT: a bounded torque that takes one joint slowly off its stop and back, and
     a small one that keeps the other joint of its motors where it is.
-    GRAVITY: a share of the compensation of gravity that grows to the whole.
+    GRAVITY: a share of the compensation of gravity that grows to the whole. SILENCE:
+    nothing, and no position is asked for: the heartbeat of the module has to brake.
     """
 
     REST = 0
     RAMP = 1
     LIFT = 2
     GRAVITY = 3
+    SILENCE = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,13 +37,18 @@ class ProofGoal:
         joint: the joint that is pushed, 1-7; 0 = none.
         torque: RAMP: at the end of the ramp; LIFT: the largest; its sign is that of the
             motion to come [N m].
-        seconds: in which a ramp grows [s].
+        seconds: in which a ramp grows; SILENCE: that it lasts [s].
     """
 
     kind: ProofKind
     joint: int = 0
     torque: float = 0.0
     seconds: float = 1.0
+
+    @property
+    def silence_ns(self) -> int:
+        """How long no position is asked for [ns]."""
+        return round(self.seconds * NS_PER_S) if self.kind is ProofKind.SILENCE else 0
 
     @property
     def values(self) -> tuple[float, float, float, float]:
@@ -89,7 +98,7 @@ class ProofLimits:
 
     def ways(self, goal: ProofGoal) -> list[tuple[float, float]]:
         """Return between which ways each joint may be [rad], from where it began."""
-        if goal.kind is ProofKind.REST:
+        if goal.kind in (ProofKind.REST, ProofKind.SILENCE):
             return [(-way, way) for way in self.rest]
         if goal.kind is ProofKind.GRAVITY:
             return [(-self.gravity * way, self.gravity * way) for way in self.rest]

@@ -284,11 +284,12 @@ LIMITS: Mapping[str, Limit] = {
     # C8
     "active": Limit("active without torque", "s", "The module left it", low=0.9),
     "rest": Limit("way of joint {joint} without torque", "mrad", _MOTION),
-    "rest_stop": Limit(
-        "from the stop button to the brakes, active",
+    "silence": Limit(
+        "from the last question to a module that brakes",
         "ms",
-        "The stop button does not end an active arm",
-        high=250.0,
+        "The module does not brake an arm that nobody asks any more: no program that "
+        "ends, and no cable that breaks, would be noticed",
+        high=150.0,
     ),
     # C9
     "moved": Limit(

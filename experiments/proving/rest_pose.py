@@ -12,9 +12,9 @@ from acquisition.control_loop.proof import (
     ProofKind,
 )
 from acquisition.control_loop.states import ArmState
-from acquisition.devices import SafetyMode
+from acquisition.devices import SHORTED, SafetyMode
 from acquisition.errors import PreflightError
-from acquisition.sample import SAFETY_MODE_MASK
+from acquisition.sample import MOTOR_FRESH_SHIFT, SAFETY_MODE_MASK
 from experiments.messages import preflight_error
 from experiments.proving.limits import Found, Judgement, found, judged
 from experiments.proving.recording import Values, texts, words
@@ -28,6 +28,7 @@ _RAMP_SECONDS = 1.0
 _AFTER = 0.3  # s, recorded beyond the end of a ramp
 _REST = 0.6  # s, without torque at the end of a proof
 _STILL = 1.0  # s, C8
+_SILENT = 0.3  # s, C8; twice what a module may take
 _LIFT_SECONDS = 2 * PROOF_LIMITS.lift_way / PROOF_LIMITS.lift_speed + 0.6
 _GRAVITY_SECONDS, _GRAVITY_KEPT = 1.4, 0.6
 _ON_POSE = 0.12  # rad
@@ -74,11 +75,17 @@ def lay_down(scene: Scene) -> None:
             hint="Lay the arm onto its stops and begin the step again.",
             arm_state="idle; it sinks slowly, support it",
         )
+    _activate(scene, "Press Shift-activate.")
+
+
+def _activate(scene: Scene, presses: str) -> None:
+    """Have an arm that lies activated without torque; raises as `lay_down`."""
     scene.loop_client.request(ArmState.HOLD)
     scene.prove(ProofGoal(ProofKind.REST))
     scene.wait(0.1)
-    scene.say("Press Shift-activate. Keep the hands off the arm: it gets no torque.")
+    scene.say(f"{presses} Keep the hands off the arm: it gets no torque.")
     if scene.simulation is not None:
+        scene.simulation.pendant("idle")
         scene.simulation.pendant("activate")
     waited = 0.0
     while scene.loop_client.status.safety is not SafetyMode.ACTIVE:
@@ -103,9 +110,50 @@ def rest(scene: Scene) -> Values:
     }
 
 
+def rest_and_silence(scene: Scene) -> Values:
+    """Do `rest`, then ask for no position until the module brakes: its heartbeat.
+
+    A module that braked takes a press of the pendant to be active again.
+    """
+    values = rest(scene)
+    if words(values, "ended"):
+        return values
+    scene.show_share(0.8, "nothing is asked for: the module has to brake")
+    reader = scene.rig.shared.cycles.reader()
+    scene.prove(ProofGoal(ProofKind.SILENCE, seconds=_SILENT))
+    braked = scene.until_fault(lambda: None, _SILENT + _AFTER)
+    record = reader.read()
+    if braked:
+        _activate(scene, "The module braked. Press Shift-idle, then Shift-activate.")
+    return {
+        **values,
+        "silent_ns": record["host_ns"].astype(np.int64),
+        "silent_mode": (record["flags"] & SAFETY_MODE_MASK).astype(np.int64),
+        "silent_fresh": (record["flags"] >> MOTOR_FRESH_SHIFT & 0x7F).astype(np.int64),
+    }
+
+
 def judge_rest(values: Values) -> Judgement:
-    """Judge an arm without torque from its first active cycle."""
-    return judged(rest_rows(values))
+    """Judge an arm without torque from its first active cycle, and its module."""
+    rows = rest_rows(values)
+    if "silent_ns" in values:  # an earlier recording has none
+        rows.append(found("silence", _braked_after(values)))
+    return judged(rows)
+
+
+def _braked_after(values: Values) -> float:
+    """Return the time from the last position to a module that braked [ms].
+
+    One that did not is given the whole of the silence.
+    """
+    t_ns, mode = values["silent_ns"], values["silent_mode"]
+    is_braked = np.isin(mode, [int(each) for each in SHORTED])
+    if not is_braked.any():
+        return 1e3 * _SILENT
+    first = int(is_braked.argmax())
+    heard = np.flatnonzero(values["silent_fresh"][:first])
+    last = int(heard[-1]) if heard.size else 0
+    return float(t_ns[first] - t_ns[last]) * 1e-6
 
 
 def rest_rows(values: Values) -> list[Found]:

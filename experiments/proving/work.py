@@ -128,7 +128,7 @@ WORK: Mapping[ProofStep, StepWork] = {
         needs_zero=True,
     ),
     ProofStep.REST_POSE: StepWork(
-        rest_pose.rest,
+        rest_pose.rest_and_silence,
         rest_pose.judge_rest,
         5,
         "Lay the arm down again with nothing leaning on it; look at the mounting.",

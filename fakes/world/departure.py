@@ -78,12 +78,14 @@ class ModuleTrouble:
         limits: factor by which it sets another limit than it was told: (name, factor).
         dead_button: of the pendant that does nothing; None = none.
         is_disobedient: it ignores a host that lowers its mode.
+        heartbeat: how long it waits for positions, as a multiple.
         voltage: of the power bus [V]; None = nominal.
     """
 
     limits: tuple[tuple[str, float], ...] = ()
     dead_button: PendantAction | None = None
     is_disobedient: bool = False
+    heartbeat: float = 1.0
     voltage: float | None = None
 
 

@@ -152,6 +152,8 @@ def _break_module(network: PuckNetwork, departure: Departure) -> None:
         network.break_button(module.dead_button)
     if module.is_disobedient:
         network.disobey()
+    if module.heartbeat != 1.0:
+        network.set_heartbeat(round(module.heartbeat * NetworkOptions().heartbeat_ns))
     if module.voltage is not None:
         network.set_bus_voltage(module.voltage)
 

@@ -281,6 +281,7 @@ _OTHERS = (
     WrongRig("supply-40v", 75, _E, "the power bus has 40 V", "another supply", ("C2",), Departure(module=ModuleTrouble(voltage=40.0))),
     WrongRig("puck-6-hot", 76, _M, "puck 6 is 58 degrees warm, idle", "motor that was stalled", ("C2",), _said((6, "TEMP", 58), (6, "THERM", 57))),
     WrongRig("motor-7-half", 77, _W, "motor 7 makes half its torque", "a phase with little contact", ("C9", "C12"), Departure(torque=scaled(m7=0.5))),
+    WrongRig("heartbeat-1s", 78, _E, "the safety module waits a second for positions before it brakes", "firmware", ("C8",), Departure(module=ModuleTrouble(heartbeat=10.0))),
 )
 # fmt: on
 

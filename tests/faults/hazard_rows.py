@@ -186,7 +186,7 @@ ROWS: dict[str, dict[str, Fields]] = {
         "late": (
             "a stop is known late",
             "the module answers slowly",
-            "its heartbeat limit is not known outside Barrett: taken as 100 ms",
+            "its heartbeat limit is not known outside Barrett: taken as 100 ms; C8 of the first day measures that of the arm at hand, 150 ms at most",
             "the module idles the arm when no position is asked for, later where its limit is longer",
             ("safety-heartbeat", "can-silence, heartbeat 1 s"),
             "",

@@ -32,10 +32,10 @@ _S = ProofStep
 PROOFS: dict[str, tuple[ProofStep, ...]] = {
     "joint position": (_S.IDENTITY, _S.TIMING, _S.BY_HAND),
     "joint torque command": (_S.IDENTITY, _S.RAMPS, _S.LIFT, _S.GRAVITY_RAMP),
-    "safety mode": (_S.IDENTITY, _S.STOP_CIRCUIT),
+    "safety mode": (_S.IDENTITY, _S.STOP_CIRCUIT, _S.REST_POSE),
     "pendant and e-stop": (_S.STOP_CIRCUIT,),
     "F/T wrench": (_S.OWN_WEIGHT, _S.HUNG_WEIGHT, _S.LOCK_AND_CLOCK, _S.PLATE),
-    "host cycle": (_S.TIMING,),
+    "host cycle": (_S.TIMING, _S.REST_POSE),
     "CAN bus": (_S.LISTEN, _S.TIMING),
     "contact force": (_S.CONFIGURATION, _S.PLATE),
     "second command": (_S.LISTEN,),

@@ -151,6 +151,9 @@ def _rest_steps(room: MachineRoom, arm: Program) -> LedSession:
     day.confirm()
     day.program.expect("Press Shift-activate", _STEP)
     day.hand("activate")
+    day.program.expect("The module braked", _STEP)
+    day.hand("idle")
+    day.hand("activate")
     return day
 
 

@@ -13,6 +13,7 @@ from acquisition.control_loop.faults import (
     verdict_for,
 )
 from acquisition.control_loop.loop import Tick
+from acquisition.control_loop.proof import ProofGoal, ProofKind
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import ArmReading, SafetyMode, WrenchSample
 from acquisition.errors import LinkError
@@ -749,6 +750,54 @@ def test_an_unknown_arm_is_asked_for_no_position_until_torques_are_wanted(bench)
     bench.enter(ArmState.HOLD)
     assert bench.arm.asked_ns > asked_ns
     assert bench.state is ArmState.HOLD
+
+
+@pytest.fixture
+def proved(bench):
+    """Return a held arm that takes any proof and does nothing."""
+    bench.law.prove = lambda proof, reading: None
+    bench.law.is_proving = lambda: True
+    bench.law.proof_excess = lambda reading, energy, is_powered: None
+    bench.enter(ArmState.HOLD)
+    return bench
+
+
+def silent(bench, cycles):
+    """Run cycles in which no puck answers."""
+    for _ in range(cycles):
+        bench.arm.missing += 1
+        bench.run()
+
+
+def test_a_proof_of_the_heartbeat_asks_for_nothing_until_it_is_over(proved):
+    proved.cycle.prove(ProofGoal(ProofKind.SILENCE, seconds=0.1))
+    proved.run()
+    asked_ns = proved.arm.asked_ns
+    silent(proved, 49)
+    assert proved.arm.asked_ns == asked_ns
+    assert (proved.reason, proved.state) == ("", ArmState.HOLD)
+    proved.arm.missing = 0
+    proved.run()
+    assert proved.arm.asked_ns > asked_ns
+    silent(proved, LIMITS.idle_after_missing)  # nobody wanted this silence
+    assert proved.reason == Fault.CAN_SILENCE
+
+
+def test_a_silence_that_was_wanted_hides_no_other_fault(proved):
+    proved.cycle.prove(ProofGoal(ProofKind.SILENCE, seconds=0.1))
+    proved.run()
+    silent(proved, 10)
+    proved.arm.mode = SafetyMode.E_STOP
+    silent(proved, 1)
+    assert proved.reason == Fault.E_STOP
+
+
+def test_a_request_ends_a_silence_that_was_wanted(proved):
+    proved.cycle.prove(ProofGoal(ProofKind.SILENCE, seconds=0.1))
+    proved.run()
+    asked_ns = proved.arm.asked_ns
+    proved.enter(ArmState.HOLD)
+    assert proved.arm.asked_ns > asked_ns
 
 
 def test_nothing_is_known_before_the_first_cycle(bench):

@@ -134,6 +134,29 @@ def test_an_arm_that_moves_without_torque_is_named():
     assert "way of joint 3" in rest_pose.judge_rest(values).cause
 
 
+@pytest.mark.parametrize(
+    ("braked_ms", "is_sound"), [(100, True), (148, True), (152, False), (None, False)]
+)
+def test_a_module_brakes_an_arm_that_nobody_asks(braked_ms, is_sound):
+    t_ns = np.arange(500) * 2_000_000
+    mode = np.full(500, int(SafetyMode.ACTIVE))
+    fresh = np.where(np.arange(500) < 10, 0x7F, 0)  # the last one at 18 ms
+    if braked_ms is not None:
+        mode[t_ns >= (18 + braked_ms) * 1_000_000] = SafetyMode.IDLE
+    fresh[-100:] = 0x7F  # asked again
+    values = {
+        "t_ns": t_ns,
+        "q": np.tile(CONSTANTS.home, (500, 1)),
+        "ended": texts([]),
+        "silent_ns": t_ns,
+        "silent_mode": mode,
+        "silent_fresh": fresh,
+    }
+    cause = rest_pose.judge_rest(values).cause
+    assert (cause == "") is is_sound
+    assert is_sound or "a module that brakes" in cause
+
+
 def lifted(share):
     """Return what is recorded of joint 2 that weighs `share` of what is predicted."""
     way = np.concatenate([np.linspace(0.0, 0.08, 400), np.linspace(0.08, 0.0, 400)])

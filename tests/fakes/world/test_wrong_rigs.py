@@ -33,7 +33,7 @@ from wam.bus.frames import (
 from wam.bus.properties import Device, property_number
 
 MS = 1_000_000
-ROWS, OWN = range(1, 67), range(67, 78)
+ROWS, OWN = range(1, 67), range(67, 79)
 TURNS = 2.0 * np.pi / np.array(CONSTANTS.cts)
 NEAR_HOME = CONSTANTS.home + np.array([0.1, 0.2, 0.3, -0.4, 0.2, 0.15, 0.25])
 LOAD = np.array([1.0, 2.0, -4.0, 0.1, -0.2, 0.05])
@@ -94,7 +94,7 @@ def believed(plant: ArmPlant):
     return np.linalg.solve(CONSTANTS.j2mp, TURNS * np.array(plant.counts()))
 
 
-def test_the_catalogue_has_every_row_and_eleven_more():
+def test_the_catalogue_has_every_row_and_twelve_more():
     rigs = catalogue()
     assert {rig.number for rig in rigs.values()} == {*ROWS, *OWN}
     numbers = [rig.number for rig in rigs.values()]
@@ -434,6 +434,18 @@ def test_a_disobedient_module_stays_active(build):
         say(rig, SAFETY_NODE, encode_set(8, int(SafetyMode.IDLE)))
         modes.append(rig.network.safety_mode)
     assert modes == [SafetyMode.ACTIVE, SafetyMode.IDLE]
+
+
+def test_a_module_waits_a_second_for_positions(build):
+    modes = []
+    for name in ("heartbeat-1s", ""):
+        rig = build(name)
+        rig.network.pendant("activate")
+        for wait in (500 * MS, 600 * MS):
+            rig.network.due(rig.network.schedule.now_ns + wait)
+            modes.append(rig.network.safety_mode)
+    active, idle = SafetyMode.ACTIVE, SafetyMode.IDLE
+    assert modes == [active, idle, idle, idle]
 
 
 def test_a_module_sets_twice_the_limit_it_is_told(build):
