@@ -1,20 +1,24 @@
 """Trials to look at first: those that stand out among the trials of their terrain.
 
-Of every trial some measures are taken, and each is compared with the median of the
-other trials of its terrain. The scale is the median absolute deviation (Huber 1981,
-Robust Statistics, section 5.1), of the terrain's own trials and of those of all
-terrains together, as ten trials alone tell their spread badly:
+Of every trial some measures are taken, and each is compared with those of the other
+trials of its terrain. Ten trials tell their spread badly, so the other terrains' counts
+as some more of them (as in moderated t statistics, Smyth 2004, Statistical Applications
+in Genetics and Molecular Biology 3):
 
-    z = (x - median) / sqrt((n s^2 + n0 s0^2) / (n + n0))
+    t = (x - median) / (s sqrt(1 + pi / (2 n))),  s^2 = (n s_1^2 + n0 s_0^2) / (n + n0)
 
-A trial is named beyond `LIMIT`, or where its motion and forces cannot be right. What a
-foot shows that stands, before anybody pushes, tells most of the sensor: stones and
-hands differ from trial to trial, its weight and the noise do not. Forces that are some
-milliseconds late do not show on plates.
+s_1 is the scale Q_n of the others (Rousseeuw and Croux 1993, J. Am. Stat. Assoc. 88),
+which bears several spoilt trials; s_0 is the geometric mean of that of other terrains.
+t becomes the normal value that is as rare; a terrain by itself whose trials differ by
+less than counts is compared with that. A trial is named beyond `LIMIT`, or where
+its motion and forces cannot be right. What a foot shows that stands, before anybody
+pushes, tells most of the sensor: stones and hands differ from trial to trial, its
+weight and the noise do not. Forces that are some milliseconds late do not show on
+plates.
 """
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,10 +31,15 @@ from analysis.study.study import Study
 from analysis.study.terrain_fit import TerrainResult
 
 _HAND = 0.15  # a hand differs by so much, or its double, from push to push [log]
-LIMIT = 6.0  # scales from the median of the terrain's trials
+LIMIT = 4.4  # of a normal value: one of 100,000 is so far out
 _FEWEST = 4  # trials of a terrain that are compared
-_PRIOR = 5.0  # trials that the scale of all terrains counts as
-_TO_SD = 1.4826  # of a median absolute deviation of normal values
+_PRIOR = 5.0  # trials that the scale of the other terrains counts as
+_MANY = 30  # trials of which one more does not change the scale
+# Q_n: to the standard deviation of normal values, of 2 to 9 of them, and how much of
+# them it uses.
+_QN_TO_SD = 2.2219
+_QN_FEW = (0.399, 0.994, 0.512, 0.844, 0.611, 0.857, 0.669, 0.872)
+_QN_EFFICIENCY = 0.8
 _SMOOTH = "friction"  # a doubt that smooth ground raises; the ratio is compared
 _TOLD = 3  # measures in one reason
 _STANDING = 0.5  # s at the start in which the foot stands and nobody pushes yet
@@ -84,7 +93,8 @@ class OddTrial:
         terrain: its terrain.
         number: of the trial on its terrain, from 1.
         name: of the trial.
-        score: how far it stands out [scales]; infinite where it cannot be right.
+        score: how far it stands out, as a normal value; infinite where it cannot be
+            right.
         reasons: what stands out, the farthest first.
     """
 
@@ -100,19 +110,18 @@ def look_first(study: Study, limit: float = LIMIT) -> list[OddTrial]:
 
     Args:
         study: the study.
-        limit: beyond which a trial stands out [scales].
+        limit: beyond which a trial stands out, as a normal value.
     """
     measured = {
         name: [_measured(result, k) for k in range(len(result.trials))]
         for name, result in study.terrains.items()
     }
-    scales = _scales(measured.values())
+    compared = _compared(measured)
     odd: list[OddTrial] = []
     for name, result in study.terrains.items():
-        compared = _compared(measured[name], scales)
         for k, trial in enumerate(result.trials):
             doubts = [d.seen for d in doubts_of(trial) if d.name != _SMOOTH]
-            ranked = sorted(compared[k], key=lambda found: -abs(found[0]))
+            ranked = sorted(compared[name][k], key=lambda found: -abs(found[0]))
             told = [text for z, text in ranked if abs(z) > limit][:_TOLD]
             if doubts or told:
                 score = math.inf if doubts else abs(ranked[0][0])
@@ -168,46 +177,82 @@ def _noise(force: Array) -> float:
     return float(np.log(np.abs(np.diff(force)).mean() + 1e-9))
 
 
-def _deviations(values: Sequence[Mapping[str, float]], name: str) -> Array:
-    """Return how far trials are from the median of the others; nan where unknown."""
-    x = np.array([each.get(name, math.nan) for each in values])
-    if np.count_nonzero(np.isfinite(x)) < _FEWEST:
-        return np.full(x.shape, math.nan)
-    away = np.full(x.shape, math.nan)
-    for k in np.flatnonzero(np.isfinite(x)):
-        away[k] = x[k] - np.nanmedian(np.delete(x, k))
-    return away
+def qn_scale(x: Array) -> float:
+    """Return the scale Q_n of values; about their standard deviation if normal.
 
+    A quantile of the distances between any two, which half of the values may spoil.
 
-def _spread(away: Array) -> float:
-    known = np.abs(away[np.isfinite(away)])
-    return _TO_SD * float(np.median(known)) if known.size else 0.0
-
-
-def _scales(
-    terrains: Collection[Sequence[Mapping[str, float]]],
-) -> dict[str, float]:
-    """Return the scale of every measure over all terrains."""
-    return {
-        name: _spread(
-            np.concatenate([_deviations(values, name) for values in terrains])
-        )
-        for name in MEASURES
-    }
+    Args:
+        x: two values at least, shape (n,).
+    """
+    n, half = x.size, x.size // 2 + 1
+    above = np.triu_indices(n, 1)
+    apart = np.sort(np.abs(x[above[0]] - x[above[1]]))
+    corrected = n / (n + (1.4 if n % 2 else 3.8))
+    if n - 2 < len(_QN_FEW):
+        corrected = _QN_FEW[n - 2]
+    return _QN_TO_SD * corrected * float(apart[half * (half - 1) // 2 - 1])
 
 
 def _compared(
-    values: Sequence[Mapping[str, float]], scales: Mapping[str, float]
-) -> list[list[tuple[float, str]]]:
-    """Return for every trial its z and words of every measure that it shows."""
-    found: list[list[tuple[float, str]]] = [[] for _ in values]
-    for name, measure in MEASURES.items():
-        away = _deviations(values, name)
-        count = float(np.count_nonzero(np.isfinite(away)))
-        own, common = _spread(away), scales[name]
-        pooled = (count * own**2 + _PRIOR * common**2) / (count + _PRIOR)
-        scale = max(math.sqrt(pooled), measure.least)
-        for k, difference in enumerate(away.tolist()):
-            if math.isfinite(difference):
-                found[k].append((difference / scale, measure.text(difference)))
+    measured: Mapping[str, Sequence[Mapping[str, float]]],
+) -> dict[str, list[list[tuple[float, str]]]]:
+    """Return for every trial its z and words of every measure that it shows.
+
+    Args:
+        measured: measures of the trials, by terrain.
+    """
+    found: dict[str, list[list[tuple[float, str]]]] = {
+        name: [[] for _ in trials] for name, trials in measured.items()
+    }
+    for key, measure in MEASURES.items():
+        shown = {
+            name: {k: each[key] for k, each in enumerate(trials) if key in each}
+            for name, trials in measured.items()
+        }
+        known = {n: one for n, one in shown.items() if len(one) >= _FEWEST}
+        values = {name: np.array([*one.values()]) for name, one in known.items()}
+        scales = {n: max(qn_scale(x), measure.least) for n, x in values.items()}
+        for name, x in values.items():
+            beside = [s for other, s in scales.items() if other != name]
+            for (k, value), others, scale in zip(
+                known[name].items(), _others(x), _scales_of_others(x), strict=True
+            ):
+                away = value - float(np.median(others))
+                if scale < measure.least and not beside:  # what counts is known
+                    z = away / measure.least
+                else:
+                    z = _normal(away, max(scale, measure.least), others.size, beside)
+                found[name][k].append((z, measure.text(away)))
     return found
+
+
+def _others(x: Array) -> list[Array]:
+    """Return the values but one, for every one."""
+    return [np.delete(x, k) for k in range(x.size)]
+
+
+def _scales_of_others(x: Array) -> list[float]:
+    """Return the scale of the values but one, for every one."""
+    if x.size > _MANY:
+        return [qn_scale(x)] * x.size
+    return [qn_scale(others) for others in _others(x)]
+
+
+def _normal(away: float, scale: float, count: int, beside: Sequence[float]) -> float:
+    """Return the normal value that is as rare as a trial so far from the others.
+
+    Args:
+        away: from their median.
+        scale: theirs.
+        count: how many they are.
+        beside: scales of other terrains.
+    """
+    from scipy.special import ndtri, stdtr
+
+    prior = _PRIOR if beside else 0.0
+    common = math.exp(float(np.log(beside).mean())) if beside else scale
+    variance = (count * scale**2 + prior * common**2) / (count + prior)
+    t = away / math.sqrt(variance * (1.0 + math.pi / (2 * count)))
+    freedom = _QN_EFFICIENCY * (count - 1) + prior
+    return math.copysign(float(ndtri(stdtr(freedom, -abs(t)))), away)

@@ -72,9 +72,10 @@ def look_first_tables(study: Study) -> list[ReportTable]:
             ]
             for trial in odd[:_MOST_ODD]
         ],
-        note="Distance from the median of the terrain's other trials, in robust "
-        f"standard deviations; named beyond {LIMIT:g}, or where motion and forces "
-        "contradict each other. A trial that stands out is not wrong by that: look at "
+        note="Distance from the median of the terrain's other trials: as rare as a "
+        "normal value so many standard deviations out; named beyond "
+        f"{LIMIT:g}, or where motion and forces contradict each other. A trial that "
+        "stands out is not wrong by that: look at "
         "its curve, then decide."
         + (f" {len(odd) - _MOST_ODD} more." if odd[_MOST_ODD:] else ""),
         section=ReportSection.SUMMARY,

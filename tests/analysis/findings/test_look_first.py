@@ -7,7 +7,7 @@ import pytest
 
 from analysis.data.prepare import PrepareOptions
 from analysis.data.series import TractionSeries
-from analysis.findings.look_first import LIMIT, look_first
+from analysis.findings.look_first import LIMIT, look_first, qn_scale
 from analysis.report.further_tables import look_first_tables
 from analysis.study.models import TUSTIN, FitOptions
 from analysis.study.study import StudyOptions, run_study
@@ -63,6 +63,26 @@ def test_a_trial_with_something_wrong_is_the_first_and_says_what(change, words):
     assert any(words in reason for reason in odd[0].reasons), odd[0].reasons
     (table,) = look_first_tables(study)
     assert table.rows[0][1] == "4"
+
+
+def test_three_of_ten_trials_with_the_same_fault_do_not_hide_each_other():
+    trials = [push(k) for k in range(10)]
+    for k in (2, 5, 8):
+        trials[k] = replace(trials[k], F_t=trials[k].F_t + 3.0)
+    assert {odd.number for odd in look_first(studied(trials))} == {3, 6, 9}
+
+
+def test_the_scale_is_the_standard_deviation_of_normal_values():
+    rng = np.random.default_rng(1)
+    for count in (4, 9, 10, 31):
+        found = [qn_scale(rng.normal(5.0, 2.0, count)) for _ in range(2000)]
+        assert np.mean(found) == pytest.approx(2.0, rel=0.04), count
+
+
+def test_half_of_the_values_spoil_no_scale():
+    x = np.random.default_rng(1).normal(size=20)
+    x[:9] = 1e6
+    assert qn_scale(x) < 5.0
 
 
 def stood(series):
