@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.data.series import TractionSeries
-from analysis.findings.look_first import LIMIT, OddTrial, look_first
+from analysis.findings.look_first import OddTrial, look_first
 from analysis.study.models import TUSTIN, FitOptions
 from analysis.study.study import StudyOptions, run_study
 from tests.fakes.point_foot import PointFoot
@@ -78,20 +78,20 @@ def main() -> int:
             for name in TERRAINS
         }
         most = studied(trials)[0]
-        called += most.score > LIMIT
+        called += most.score > 1.0
         rng = np.random.default_rng(seed)
         how = list(SPOILT)[(seed - seeds[0]) % len(SPOILT)]
         terrain, k = TERRAINS[rng.integers(len(TERRAINS))], rng.integers(args.trials)
         spoilt = {name: list(group) for name, group in trials.items()}
         spoilt[terrain][k] = SPOILT[how](spoilt[terrain][k])
-        odd = [each for each in studied(spoilt) if each.score > LIMIT]
+        odd = [each for each in studied(spoilt) if each.score > 1.0]
         named = [(each.terrain, each.number) for each in odd[:FIRST]]
         found += (terrain, k + 1) in named
         place = named.index((terrain, k + 1)) + 1 if (terrain, k + 1) in named else "-"
         reason = next((o.reasons[0] for o in odd if o.number == k + 1), "")[:60]
         print(
-            f"seed {seed}: sound, farthest {most.score:.1f} ({most.terrain}, "
-            f"{most.reasons[0]}); "
+            f"seed {seed}: sound, farthest {most.score:.2f} of its limit "
+            f"({most.terrain}, {most.reasons[0]}); "
             f"{how} on {terrain} {k + 1}: place {place} of {len(odd)} ({reason})",
             flush=True,
         )

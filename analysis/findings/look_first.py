@@ -8,13 +8,12 @@ in Genetics and Molecular Biology 3):
     t = (x - median) / (s sqrt(1 + pi / (2 n))),  s^2 = (n s_1^2 + n0 s_0^2) / (n + n0)
 
 s_1 is the scale Q_n of the others (Rousseeuw and Croux 1993, J. Am. Stat. Assoc. 88),
-which bears several spoilt trials; s_0 is the geometric mean of that of other terrains.
-t becomes the normal value that is as rare; a terrain by itself whose trials differ by
-less than counts is compared with that. A trial is named beyond `LIMIT`, or where
-its motion and forces cannot be right. What a foot shows that stands, before anybody
-pushes, tells most of the sensor: stones and hands differ from trial to trial, its
-weight and the noise do not. Forces that are some milliseconds late do not show on
-plates.
+which bears several spoilt trials; s_0 is the geometric mean of that of other terrains;
+a terrain by itself has its own. t becomes the normal value that is as rare. A trial is
+named beyond the limit of a measure, or where its motion and forces cannot be right.
+What a foot shows that stands, before anybody pushes, tells most of the sensor: its
+weight and the noise hardly differ from trial to trial. Stones and hands do, and more
+often far than normal values. Forces some milliseconds late do not show on plates.
 """
 
 import math
@@ -31,7 +30,8 @@ from analysis.study.study import Study
 from analysis.study.terrain_fit import TerrainResult
 
 _HAND = 0.15  # a hand differs by so much, or its double, from push to push [log]
-LIMIT = 4.4  # of a normal value: one of 100,000 is so far out
+SENSOR_LIMIT = 4.0  # of a normal value, in what only the sensor changes
+PUSH_LIMIT = 5.0  # in what stones and hand change, too
 _FEWEST = 4  # trials of a terrain that are compared
 _PRIOR = 5.0  # trials that the scale of the other terrains counts as
 _MANY = 30  # trials of which one more does not change the scale
@@ -55,12 +55,14 @@ class Measure:
         least: scale below which no difference counts.
         is_log: values are logarithms of a ratio.
         unit: of values that are none.
+        limit: beyond which a trial is named, as a normal value.
     """
 
     words: str
     least: float
     is_log: bool = False
     unit: str = ""
+    limit: float = PUSH_LIMIT
 
     def text(self, difference: float) -> str:
         """Return how far a trial is from the others."""
@@ -76,12 +78,18 @@ MEASURES: Mapping[str, Measure] = {
     "speed": Measure("velocity", _HAND, is_log=True),
     "kept": Measure("kept samples", _HAND, is_log=True),
     "way": Measure("way", 0.05, is_log=True),
-    "noise": Measure("change from sample to sample", _HAND, is_log=True),
-    "lag": Measure("delay of the force", 1.0, unit="ms"),
-    "rest_t": Measure("F_t of the foot that stands", 0.2, unit="N"),
-    "rest_n": Measure("F_n of the foot that stands", 0.2, unit="N"),
-    "rest_noise_t": Measure("noise of F_t at rest", 0.05, is_log=True),
-    "rest_noise_n": Measure("noise of F_n at rest", 0.05, is_log=True),
+    "noise": Measure(
+        "change from sample to sample", _HAND, is_log=True, limit=SENSOR_LIMIT
+    ),
+    "lag": Measure("delay of the force", 1.0, unit="ms", limit=SENSOR_LIMIT),
+    "rest_t": Measure("F_t of the foot that stands", 0.2, unit="N", limit=SENSOR_LIMIT),
+    "rest_n": Measure("F_n of the foot that stands", 0.2, unit="N", limit=SENSOR_LIMIT),
+    "rest_noise_t": Measure(
+        "noise of F_t at rest", 0.05, is_log=True, limit=SENSOR_LIMIT
+    ),
+    "rest_noise_n": Measure(
+        "noise of F_n at rest", 0.05, is_log=True, limit=SENSOR_LIMIT
+    ),
 }
 
 
@@ -93,8 +101,8 @@ class OddTrial:
         terrain: its terrain.
         number: of the trial on its terrain, from 1.
         name: of the trial.
-        score: how far it stands out, as a normal value; infinite where it cannot be
-            right.
+        score: how far it stands out, 1 = at the limit of a measure; infinite where it
+            cannot be right.
         reasons: what stands out, the farthest first.
     """
 
@@ -105,12 +113,12 @@ class OddTrial:
     reasons: tuple[str, ...]
 
 
-def look_first(study: Study, limit: float = LIMIT) -> list[OddTrial]:
+def look_first(study: Study, limit: float = 1.0) -> list[OddTrial]:
     """Return the trials that stand out, the farthest first; none in a sound study.
 
     Args:
         study: the study.
-        limit: beyond which a trial stands out, as a normal value.
+        limit: score beyond which a trial is named.
     """
     measured = {
         name: [_measured(result, k) for k in range(len(result.trials))]
@@ -122,7 +130,7 @@ def look_first(study: Study, limit: float = LIMIT) -> list[OddTrial]:
         for k, trial in enumerate(result.trials):
             doubts = [d.seen for d in doubts_of(trial) if d.name != _SMOOTH]
             ranked = sorted(compared[name][k], key=lambda found: -abs(found[0]))
-            told = [text for z, text in ranked if abs(z) > limit][:_TOLD]
+            told = [text for share, text in ranked if abs(share) > limit][:_TOLD]
             if doubts or told:
                 score = math.inf if doubts else abs(ranked[0][0])
                 odd.append(OddTrial(name, k + 1, trial.name, score, (*doubts, *told)))
@@ -197,7 +205,7 @@ def qn_scale(x: Array) -> float:
 def _compared(
     measured: Mapping[str, Sequence[Mapping[str, float]]],
 ) -> dict[str, list[list[tuple[float, str]]]]:
-    """Return for every trial its z and words of every measure that it shows.
+    """Return for every trial its score and words of every measure that it shows.
 
     Args:
         measured: measures of the trials, by terrain.
@@ -219,11 +227,8 @@ def _compared(
                 known[name].items(), _others(x), _scales_of_others(x), strict=True
             ):
                 away = value - float(np.median(others))
-                if scale < measure.least and not beside:  # what counts is known
-                    z = away / measure.least
-                else:
-                    z = _normal(away, max(scale, measure.least), others.size, beside)
-                found[name][k].append((z, measure.text(away)))
+                z = _normal(away, max(scale, measure.least), others.size, beside)
+                found[name][k].append((z / measure.limit, measure.text(away)))
     return found
 
 
@@ -250,9 +255,8 @@ def _normal(away: float, scale: float, count: int, beside: Sequence[float]) -> f
     """
     from scipy.special import ndtri, stdtr
 
-    prior = _PRIOR if beside else 0.0
     common = math.exp(float(np.log(beside).mean())) if beside else scale
-    variance = (count * scale**2 + prior * common**2) / (count + prior)
+    variance = (count * scale**2 + _PRIOR * common**2) / (count + _PRIOR)
     t = away / math.sqrt(variance * (1.0 + math.pi / (2 * count)))
-    freedom = _QN_EFFICIENCY * (count - 1) + prior
+    freedom = _QN_EFFICIENCY * (count - 1) + _PRIOR
     return math.copysign(float(ndtri(stdtr(freedom, -abs(t)))), away)

@@ -7,7 +7,7 @@ from statistics import median
 from analysis.data.plausibility import LATEST_MS
 from analysis.figures.sections import ReportSection
 from analysis.findings.findings import StudyResults
-from analysis.findings.look_first import LIMIT, look_first
+from analysis.findings.look_first import PUSH_LIMIT, SENSOR_LIMIT, look_first
 from analysis.findings.trends import MEAN_FORCE, MEAN_LOAD, TRACTION_RATIO, Trend
 from analysis.report.new_trial_tables import new_trial_tables
 from analysis.report.page_model import ReportTable
@@ -61,21 +61,22 @@ def look_first_tables(study: Study) -> list[ReportTable]:
         return []
     table = ReportTable(
         name="Look at these first",
-        header=("terrain", "trial", "name", "stands out by", "why"),
+        header=("terrain", "trial", "name", "times the limit", "why"),
         rows=[
             [
                 trial.terrain,
                 str(trial.number),
                 trial.name,
-                "cannot be right" if isinf(trial.score) else f"{trial.score:.0f}",
+                "cannot be right" if isinf(trial.score) else f"{trial.score:.1f}",
                 "; ".join(trial.reasons),
             ]
             for trial in odd[:_MOST_ODD]
         ],
-        note="Distance from the median of the terrain's other trials: as rare as a "
-        "normal value so many standard deviations out; named beyond "
-        f"{LIMIT:g}, or where motion and forces contradict each other. A trial that "
-        "stands out is not wrong by that: look at "
+        note="Distance from the median of the terrain's other trials, as rare as a "
+        "normal value so many standard deviations out. Its limit is "
+        f"{SENSOR_LIMIT:g} in what only the sensor changes, {PUSH_LIMIT:g} in what "
+        "stones and hand change, too; a trial whose motion and forces contradict each "
+        "other is named in any case. One that stands out is not wrong by that: look at "
         "its curve, then decide."
         + (f" {len(odd) - _MOST_ODD} more." if odd[_MOST_ODD:] else ""),
         section=ReportSection.SUMMARY,
