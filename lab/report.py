@@ -30,7 +30,8 @@ raised, the exit code is the one that this page promises for the phase. `answer`
 question to a puck to its answer, median. `early`: an arm active that nobody has asked
 to be, until it is idle again. `stop`: from the mode E-stop to the first cycle without
 any reply. `lift-off`: torque that a ramp of C9 had reached where it lifted the joint
-off its stop. `sole`: how far it went in a step of C8 to C11. `repeated`: the emulated
+off its stop. `silence`: from the last question of C8 to a module that brakes. `sole`:
+how far it went in a step of C8 to C11. `repeated`: the emulated
 kernel had panicked in the scenario, which was then run once more.
 """
 _NOT_SHOWN = """

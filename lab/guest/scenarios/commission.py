@@ -73,6 +73,7 @@ def on_the_rest_pose(room: MachineRoom) -> Figures:
         "lift-off": ", ".join(
             f"joint {abs(joint)} {torque:.2f} N m" for joint, torque in lifted.items()
         ),
+        "silence": _measured(record, ProofStep.REST_POSE, "a module that brakes"),
         "sole": _farthest(room, record),
     }
 
