@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.control_loop.faults import Fault
 from acquisition.control_loop.proof import (
     PROOF_LIMITS,
     ProofGoal,
@@ -19,6 +20,7 @@ from experiments.messages import preflight_error
 from experiments.proving.limits import Found, Judgement, found, judged
 from experiments.proving.recording import Values, texts, words
 from experiments.proving.scene import Scene
+from experiments.run.stop import ArmFaultError
 from wam.model.constants import ArmConstants, Array
 
 # Joints as they are pushed, the sign is that of the motion: what bears least first.
@@ -121,12 +123,19 @@ def rest_and_silence(scene: Scene) -> Values:
     scene.show_share(0.8, "nothing is asked for: the module has to brake")
     reader = scene.rig.shared.cycles.reader()
     scene.prove(ProofGoal(ProofKind.SILENCE, seconds=_SILENT))
-    braked = scene.until_fault(lambda: None, _SILENT + _AFTER)
+    ended: list[str] = []
+    try:
+        scene.wait(_SILENT + _AFTER)
+    except ArmFaultError as fault:
+        said = scene.fault_words(fault)
+        if fault.verdict.fault is not Fault.PENDANT_IDLE:
+            ended = [said]
     record = reader.read()
-    if braked:
+    if not (ended or scene.is_proving):
         _activate(scene, "The module braked. Press Shift-idle, then Shift-activate.")
     return {
         **values,
+        "ended": texts(ended),
         "silent_ns": record["host_ns"].astype(np.int64),
         "silent_mode": (record["flags"] & SAFETY_MODE_MASK).astype(np.int64),
         "silent_fresh": (record["flags"] >> MOTOR_FRESH_SHIFT & 0x7F).astype(np.int64),
