@@ -70,6 +70,9 @@ def run(args: argparse.Namespace) -> int:
     require_extra("report")  # before its page is imported
     if args.scheduler:
         require_extra("cluster")
+    from experiments.report.workers import start_workers
+
+    start_workers(args.scheduler)
     from analysis.dialects.columns import parse_covariates, parse_inputs
     from analysis.findings.covariates import WAY
     from analysis.findings.findings import compute_results

@@ -25,18 +25,6 @@ EXAMPLES = """\
   traction report S012                             one session, in its own folder
   traction report --all --what-if smoothing=25     the study under another choice"""
 
-_WORK = (  # what fits and figures need, the first needed first
-    "analysis.breakaway.fitting",
-    "analysis.study.relatives",
-    "analysis.study.store",
-    "analysis.foresight.judged",
-    "analysis.terrains.export",
-    "analysis.report.page",
-    "scipy.signal",
-    "matplotlib.backends.backend_agg",
-    "analysis.figures.curves",
-)
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `report`."""
@@ -65,11 +53,10 @@ def run(args: argparse.Namespace) -> int:
     require_extra("report")
     if args.scheduler:
         require_extra("cluster")
-    if not args.scheduler and not _is_kept(Path(args.data)):
-        from acquisition.worker_processes import available_cores, prepare_workers
+    from experiments.report.workers import start_workers
 
-        if available_cores() > 1:
-            prepare_workers(_WORK)  # first, as it imports while this process does
+    if not _is_kept(Path(args.data)):
+        start_workers(args.scheduler)
     from analysis.dialects.columns import parse_covariates
     from analysis.study.jobs import Shard
     from experiments.operator.console import Console, PageRecorder
