@@ -1,10 +1,13 @@
 """Options and fixtures of the whole suite."""
 
+import fcntl
 import gc
 import json
+import os
+import shutil
 import signal
 from collections.abc import Generator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -154,10 +157,23 @@ def config(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def recorded(tmp_path_factory, config):
-    from tests.experiments.program import only_session, run_short
+    """Record a session; of several workers the first does, the others copy it."""
+    from tests.experiments.program import Done, only_session, run_short
 
     data = tmp_path_factory.mktemp("data")
-    done = run_short(config, data, "TF", 2)
+    if "PYTEST_XDIST_WORKER" not in os.environ:
+        return Recorded(run_short(config, data, "TF", 2), data, only_session(data))
+    common = tmp_path_factory.getbasetemp().parent / "recorded"
+    with common.with_suffix(".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        said = common / "said.json"
+        if said.exists():
+            shutil.copytree(common / "data", data, dirs_exist_ok=True)
+            done = Done(**json.loads(said.read_text().replace("DATA", str(data))))
+        else:
+            done = run_short(config, data, "TF", 2)
+            shutil.copytree(data, common / "data")
+            said.write_text(json.dumps(asdict(done)).replace(str(data), "DATA"))
     return Recorded(done, data, only_session(data))
 
 
