@@ -6,6 +6,8 @@ from typing import Literal, Protocol
 
 from acquisition.sample import Record
 
+PendantAction = Literal["activate", "idle", "estop"]
+
 ENDS = 100  # numbers of touches above it: the near end, the far end, and again
 
 
@@ -97,7 +99,7 @@ class SimulationControl(Hands, Protocol):
         """Return the traction that the ground can bear under the foot now [N]."""
         ...
 
-    def pendant(self, button: Literal["activate", "idle", "estop"]) -> None:
+    def pendant(self, button: PendantAction) -> None:
         """Press the pendant."""
         ...
 

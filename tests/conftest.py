@@ -169,11 +169,13 @@ def recorded(tmp_path_factory, config):
         said = common / "said.json"
         if said.exists():
             shutil.copytree(common / "data", data, dirs_exist_ok=True)
-            done = Done(**json.loads(said.read_text().replace("DATA", str(data))))
+            made = json.loads(said.read_text())
+            text = json.dumps(made["done"]).replace(made["data"], str(data))
+            done = Done(**json.loads(text))
         else:
             done = run_short(config, data, "TF", 2)
             shutil.copytree(data, common / "data")
-            said.write_text(json.dumps(asdict(done)).replace(str(data), "DATA"))
+            said.write_text(json.dumps({"data": str(data), "done": asdict(done)}))
     return Recorded(done, data, only_session(data))
 
 

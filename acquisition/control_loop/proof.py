@@ -80,6 +80,8 @@ class ProofLimits:
         beyond: of what is aimed at, on the way it is pushed [rad].
         gravity: of each joint under its compensation, as a multiple of `rest`.
         energy: kinetic energy of the arm [J].
+        silence: longest time that no position is asked for [s]: twice what a module may
+            take to brake.
     """
 
     rest: Sequence[float] = (0.008, 0.015, 0.015, 0.015, 0.030, 0.030, 0.030)
@@ -91,6 +93,7 @@ class ProofLimits:
     beyond: float = 0.025
     gravity: float = 1.5
     energy: float = 0.07
+    silence: float = 0.3
 
     def aside_of(self, pushed: int, joint: int) -> float:
         """Return how far joint 1-7 may go while another is pushed [rad]."""

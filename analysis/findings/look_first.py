@@ -34,7 +34,7 @@ SENSOR_LIMIT = 4.0  # of a normal value, in what only the sensor changes
 PUSH_LIMIT = 5.0  # in what stones and hand change, too
 _FEWEST = 4  # trials of a terrain that are compared
 _PRIOR = 5.0  # trials that the scale of the other terrains counts as
-_MANY = 30  # trials of which one more does not change the scale
+_MANY = 30  # trials, beyond which the scale is that of all
 # Q_n: to the standard deviation of normal values, of 2 to 9 of them, and how much of
 # them it uses.
 _QN_TO_SD = 2.2219
@@ -63,6 +63,10 @@ class Measure:
     is_log: bool = False
     unit: str = ""
     limit: float = PUSH_LIMIT
+
+    def is_known(self, scale: float) -> bool:
+        """Return whether trials differ by less than hands are known to."""
+        return self.least == _HAND and scale < _HAND
 
     def text(self, difference: float) -> str:
         """Return how far a trial is from the others."""
@@ -193,13 +197,15 @@ def qn_scale(x: Array) -> float:
     Args:
         x: two values at least, shape (n,).
     """
+    from scipy.spatial.distance import pdist
+
     n, half = x.size, x.size // 2 + 1
-    above = np.triu_indices(n, 1)
-    apart = np.sort(np.abs(x[above[0]] - x[above[1]]))
+    nearest = half * (half - 1) // 2 - 1
+    apart = np.partition(pdist(x[:, None], "cityblock"), nearest)
     corrected = n / (n + (1.4 if n % 2 else 3.8))
     if n - 2 < len(_QN_FEW):
         corrected = _QN_FEW[n - 2]
-    return _QN_TO_SD * corrected * float(apart[half * (half - 1) // 2 - 1])
+    return _QN_TO_SD * corrected * float(apart[nearest])
 
 
 def _compared(
@@ -220,28 +226,24 @@ def _compared(
         }
         known = {n: one for n, one in shown.items() if len(one) >= _FEWEST}
         values = {name: np.array([*one.values()]) for name, one in known.items()}
-        scales = {n: max(qn_scale(x), measure.least) for n, x in values.items()}
+        scales = {name: qn_scale(x) for name, x in values.items()}
         for name, x in values.items():
-            beside = [s for other, s in scales.items() if other != name]
-            for (k, value), others, scale in zip(
-                known[name].items(), _others(x), _scales_of_others(x), strict=True
-            ):
+            beside = [
+                max(scale, measure.least)
+                for other, scale in scales.items()
+                if other != name
+            ]
+            for i, (k, value) in enumerate(known[name].items()):
+                others = np.delete(x, i)
                 away = value - float(np.median(others))
-                z = _normal(away, max(scale, measure.least), others.size, beside)
+                # of many trials one more does not change the scale
+                own = scales[name] if x.size > _MANY else qn_scale(others)
+                if measure.is_known(own) and not beside:
+                    z = away / measure.least
+                else:
+                    z = _normal(away, max(own, measure.least), others.size, beside)
                 found[name][k].append((z / measure.limit, measure.text(away)))
     return found
-
-
-def _others(x: Array) -> list[Array]:
-    """Return the values but one, for every one."""
-    return [np.delete(x, k) for k in range(x.size)]
-
-
-def _scales_of_others(x: Array) -> list[float]:
-    """Return the scale of the values but one, for every one."""
-    if x.size > _MANY:
-        return [qn_scale(x)] * x.size
-    return [qn_scale(others) for others in _others(x)]
 
 
 def _normal(away: float, scale: float, count: int, beside: Sequence[float]) -> float:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.control_loop.faults import Fault
+from acquisition.control_loop.faults import CircuitCauses, Fault, GuardVerdict
 from acquisition.control_loop.proof import (
     PROOF_LIMITS,
     ProofGoal,
@@ -16,6 +16,7 @@ from acquisition.control_loop.states import ArmState
 from acquisition.devices import SHORTED, SafetyMode
 from acquisition.errors import PreflightError
 from acquisition.sample import MOTOR_FRESH_SHIFT, SAFETY_MODE_MASK
+from acquisition.simulation import PendantAction
 from experiments.messages import preflight_error
 from experiments.proving.limits import Found, Judgement, found, judged
 from experiments.proving.recording import Values, texts, words
@@ -30,7 +31,6 @@ _RAMP_SECONDS = 1.0
 _AFTER = 0.3  # s, recorded beyond the end of a ramp
 _REST = 0.6  # s, without torque at the end of a proof
 _STILL = 1.0  # s, C8
-_SILENT = 0.3  # s, C8; twice what a module may take
 _LIFT_SECONDS = 2 * PROOF_LIMITS.lift_way / PROOF_LIMITS.lift_speed + 0.6
 _GRAVITY_SECONDS, _GRAVITY_KEPT = 1.4, 0.6
 _ON_POSE = 0.12  # rad
@@ -77,18 +77,18 @@ def lay_down(scene: Scene) -> None:
             hint="Lay the arm onto its stops and begin the step again.",
             arm_state="idle; it sinks slowly, support it",
         )
-    _activate(scene, "Press Shift-activate.")
+    _activate(scene, "Press Shift-activate.", "activate")
 
 
-def _activate(scene: Scene, presses: str) -> None:
+def _activate(scene: Scene, said: str, *presses: PendantAction) -> None:
     """Have an arm that lies activated without torque; raises as `lay_down`."""
     scene.loop_client.request(ArmState.HOLD)
     scene.prove(ProofGoal(ProofKind.REST))
     scene.wait(0.1)
-    scene.say(f"{presses} Keep the hands off the arm: it gets no torque.")
+    scene.say(f"{said} Keep the hands off the arm: it gets no torque.")
     if scene.simulation is not None:
-        scene.simulation.pendant("idle")
-        scene.simulation.pendant("activate")
+        for press in presses:
+            scene.simulation.pendant(press)
     waited = 0.0
     while scene.loop_client.status.safety is not SafetyMode.ACTIVE:
         scene.wait(0.1)
@@ -122,17 +122,18 @@ def rest_and_silence(scene: Scene) -> Values:
         return values
     scene.show_share(0.8, "nothing is asked for: the module has to brake")
     reader = scene.rig.shared.cycles.reader()
-    scene.prove(ProofGoal(ProofKind.SILENCE, seconds=_SILENT))
+    scene.prove(ProofGoal(ProofKind.SILENCE, seconds=PROOF_LIMITS.silence))
     ended: list[str] = []
     try:
-        scene.wait(_SILENT + _AFTER)
+        scene.wait(PROOF_LIMITS.silence + _AFTER)
     except ArmFaultError as fault:
         said = scene.fault_words(fault)
-        if fault.verdict.fault is not Fault.PENDANT_IDLE:
+        if not is_heartbeat(fault.verdict):
             ended = [said]
     record = reader.read()
     if not (ended or scene.is_proving):
-        _activate(scene, "The module braked. Press Shift-idle, then Shift-activate.")
+        said = "The module braked. Press Shift-idle, then Shift-activate."
+        _activate(scene, said, "idle", "activate")
     return {
         **values,
         "ended": texts(ended),
@@ -140,6 +141,12 @@ def rest_and_silence(scene: Scene) -> Values:
         "silent_mode": (record["flags"] & SAFETY_MODE_MASK).astype(np.int64),
         "silent_fresh": (record["flags"] >> MOTOR_FRESH_SHIFT & 0x7F).astype(np.int64),
     }
+
+
+def is_heartbeat(verdict: GuardVerdict) -> bool:
+    """Return whether the module went idle for its heartbeat, and for no press."""
+    causes = verdict.detail.causes if isinstance(verdict.detail, CircuitCauses) else ()
+    return verdict.fault is Fault.PENDANT_IDLE and "heartbeat" in causes
 
 
 def judge_rest(values: Values) -> Judgement:
@@ -158,7 +165,7 @@ def _braked_after(values: Values) -> float:
     t_ns, mode = values["silent_ns"], values["silent_mode"]
     is_braked = np.isin(mode, [int(each) for each in SHORTED])
     if not is_braked.any():
-        return 1e3 * _SILENT
+        return 1e3 * PROOF_LIMITS.silence
     first = int(is_braked.argmax())
     heard = np.flatnonzero(values["silent_fresh"][:first])
     last = int(heard[-1]) if heard.size else 0

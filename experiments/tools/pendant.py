@@ -12,7 +12,7 @@ from typing import Literal, Protocol
 from acquisition.clock import NS_PER_S
 from acquisition.errors import SettingsError
 from acquisition.settings import read_text
-from acquisition.simulation import Hands
+from acquisition.simulation import Hands, PendantAction
 from experiments.tools.hand_orders import (
     HAND_WORDS,
     HandOrder,
@@ -21,7 +21,6 @@ from experiments.tools.hand_orders import (
 )
 
 Press = Literal["activate", "idle", "estop", "quit"]
-PendantButton = Literal["activate", "idle", "estop"]
 PRESSES: tuple[Press, ...] = ("activate", "idle", "estop", "quit")
 _LONGEST_LINE = 256  # bytes; what is longer is no button
 _LATEST_S = 1e6
@@ -37,7 +36,7 @@ class Pressable(Protocol):
         """The person at the arm; None = there can be none."""
         ...
 
-    def press(self, action: PendantButton) -> None:
+    def press(self, action: PendantAction) -> None:
         """Press a button now."""
         ...
 

@@ -5,6 +5,7 @@ as far as hosts have described them.
 """
 
 from acquisition.devices import SafetyMode
+from acquisition.simulation import PendantAction
 from fakes.pucks.bank import MotorSide, PuckBank
 from fakes.pucks.bus_faults import BusFaults, OtherMaster
 from fakes.pucks.event_queue import NEVER, EventQueue, OutFrame
@@ -13,7 +14,6 @@ from fakes.pucks.options import NetworkOptions
 from fakes.pucks.safety_module import (
     TORQUE_GROUPS,
     FakeSafetyModule,
-    PendantAction,
     Strainable,
 )
 from wam.bus.frames import (

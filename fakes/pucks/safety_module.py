@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Literal
 
 from acquisition.devices import SafetyMode
+from acquisition.simulation import PendantAction
 from fakes.pucks.event_queue import NEVER, EventQueue
 from fakes.pucks.options import NetworkOptions
 from fakes.pucks.speed_monitor import SpeedMonitor
@@ -29,7 +30,6 @@ from wam.driver.pendant import (
 )
 from wam.driver.safety_module import COUNTS_PER_SPEED
 
-PendantAction = Literal["activate", "idle", "estop"]
 Strainable = Literal["velocity", "torque", "heartbeat"]
 TORQUE_GROUPS = (Group.LOWER_TORQUE, Group.WRIST_TORQUE)
 _MODE = 8  # number of the property in every firmware

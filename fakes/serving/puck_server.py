@@ -5,11 +5,10 @@ from pathlib import Path
 from typing import Protocol
 
 from acquisition.clock import Clock
-from acquisition.simulation import Hands
+from acquisition.simulation import Hands, PendantAction
 from fakes.bus.hub import CanPort, Frame, SocketHub
 from fakes.pucks.bank import MotorSide
 from fakes.pucks.network import PuckNetwork
-from fakes.pucks.safety_module import PendantAction
 from fakes.pucks.wire import WiredNetwork
 from fakes.serving.sensor_server import SensorServer
 from fakes.world_clock import TICK_NS, WorldClock

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from fakes.pucks.safety_module import PendantAction
+from acquisition.simulation import PendantAction
 from fakes.randomness import sound_rig_generator
 from wam.model.constants import Array
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from acquisition.clock import PERIOD_NS, Clock
 from acquisition.sample import Record
+from acquisition.simulation import PendantAction
 from fakes.bus.in_process import FakeCanBus
 from fakes.clock import SteppedClock
 from fakes.ground.terrain import Container, GroundChoice, Terrain, make_terrain
@@ -18,7 +19,6 @@ from fakes.plant.push import Pace
 from fakes.pucks.ft_puck import SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS, Load
 from fakes.pucks.network import PuckNetwork
 from fakes.pucks.options import NetworkOptions
-from fakes.pucks.safety_module import PendantAction
 from fakes.randomness import TrialGenerators, trial_generators
 from fakes.sensor.errors import SensorErrors
 from fakes.sensor.kinds import SensorChoice, make_stream

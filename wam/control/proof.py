@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from acquisition.clock import NS_PER_S
 from acquisition.control_loop.details import MotionExcess
 from acquisition.control_loop.proof import (
     PARTNERS,
@@ -38,6 +39,8 @@ class Proof:
             raise ValueError(f"there is no joint {goal.joint}")
         if not (np.isfinite(goal.torque) and 0.0 < goal.seconds <= 60.0):
             raise ValueError(f"{goal} is no proof")
+        if goal.silence_ns > limits.silence * NS_PER_S:
+            raise ValueError(f"{goal} leaves the arm unwatched for too long")
         self.goal = goal
         self._constants = constants
         self._limits = limits

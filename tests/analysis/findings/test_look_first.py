@@ -43,7 +43,7 @@ def test_nothing_stands_out_among_trials_that_are_alike():
     [
         (lambda s: replace(s, F_t=s.F_t + 2.0), "F_t of the same load and velocity +2"),
         (lambda s: replace(s, F_n=s.F_n + 4.0), "F_t/F_n 0."),
-        (lambda s: replace(s, v_t=0.2 * s.v_t), "way 0."),
+        (lambda s: replace(s, v_t=0.3 * s.v_t), "velocity 0."),
         (
             lambda s: replace(
                 s, F_t=s.F_t + np.random.default_rng(1).normal(0.0, 3.0, s.t.size)

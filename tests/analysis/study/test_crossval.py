@@ -178,16 +178,12 @@ def test_two_trials_are_enough(trials):
     assert notes == []
 
 
-MISSED = 0.05  # nat: a top so much below the best is another one, as in a benchmark
-ALIKE = 1e-3  # nat
-
-
 @pytest.mark.long
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize("kernel", [SquaredExponential(2), Arcsine(2)])
 def test_the_search_reaches_the_best_of_twenty_starts(trials, kernel):
     tasks, _ = plan_folds(trials, FitOptions())
-    below: list[float] = []
+    missed = 0
     for task in tasks:
         rows = task.training.take(choose_rows(task))
         X = (rows.inputs - rows.inputs.mean(axis=0)) / rows.inputs.std(axis=0)
@@ -198,10 +194,9 @@ def test_the_search_reaches_the_best_of_twenty_starts(trials, kernel):
         likelihood = Likelihood(kernel, noise, X, r)
         starts = rng.uniform(*box.T, (20, len(box)))
         best = max(climb(likelihood, start, box).value for start in starts)
-        below.append(best - posterior_search(kernel, noise, X, r).lml)
-    # Of nine fits all; one may end on the lower of two tops that are all but as likely.
-    assert max(below) < MISSED, below
-    assert np.count_nonzero(np.array(below) > ALIKE) <= 1, below
+        missed += posterior_search(kernel, noise, X, r).lml < best - 1e-3
+    # 95 % of the fits of a study; of nine that is all
+    assert missed == 0
 
 
 def counted(name, kept, seed):

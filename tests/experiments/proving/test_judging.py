@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from acquisition.control_loop.faults import CircuitCauses, Fault, verdict_for
 from acquisition.devices import SafetyMode
 from acquisition.errors import SettingsError
 from experiments.proving import bus, by_hand, configuration, rest_pose, stop_circuit
@@ -155,6 +156,21 @@ def test_a_module_brakes_an_arm_that_nobody_asks(braked_ms, is_sound):
     cause = rest_pose.judge_rest(values).cause
     assert (cause == "") is is_sound
     assert is_sound or "a module that brakes" in cause
+
+
+@pytest.mark.parametrize(
+    ("fault", "causes", "is_heartbeat"),
+    [
+        (Fault.PENDANT_IDLE, ("heartbeat",), True),
+        (Fault.PENDANT_IDLE, (), False),  # a person pressed Shift-idle
+        (Fault.PENDANT_IDLE, ("velocity",), False),
+        (Fault.E_STOP, ("heartbeat",), False),  # the positions are lost
+        (Fault.PROOF_MOTION, (), False),
+    ],
+)
+def test_only_the_heartbeat_proves_the_heartbeat(fault, causes, is_heartbeat):
+    verdict = verdict_for(fault, CircuitCauses(causes))
+    assert rest_pose.is_heartbeat(verdict) is is_heartbeat
 
 
 def lifted(share):

@@ -260,6 +260,14 @@ def test_no_proof_begins_outside_of_hold(law, state):
     assert not law.is_proving()
 
 
+def test_no_arm_is_left_unwatched_for_longer_than_a_module_may_take(law):
+    law.enter(ArmState.HOLD, reading(0.0))
+    with pytest.raises(ValueError, match="unwatched for too long"):
+        law.prove(ProofGoal(ProofKind.SILENCE, seconds=0.4), reading(1.0))
+    law.prove(ProofGoal(ProofKind.SILENCE, seconds=0.3), reading(1.0))
+    assert not law.torque(reading(1.1))[0].any()
+
+
 def test_no_proof_begins_in_a_move(law):
     law.enter(ArmState.HOLD, reading(0.0))
     law.move_to(DOWN, 0.5, reading(1.0))
