@@ -11,13 +11,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from acquisition.worker_processes import running_workers
 from analysis.data.events import Slip
 from analysis.data.prepare import PreparedTrial
 from analysis.data.samples import SampleTable
 from analysis.data.terrain_kinds import BIG, FLAT, SMALL
 from analysis.findings.trends import NoiseSummary
+from analysis.gp.regression import GaussianProcess
 from analysis.study.crossval import FoldResult
 from analysis.study.fits import tustin_medians
+from analysis.study.jobs import Batch, run_batches
 from analysis.study.metrics import (
     PairedComparison,
     adjusted_by_holm,
@@ -139,13 +142,12 @@ def gather_evidence(
     """Return what the paper's statements are held against."""
     results = study.terrains.values()
     sticking = [sticking_bound(result, study) for result in results]
-    more = [more_rows(result, study) for result in results]
     return PaperEvidence(
         study=study,
         identification=identification,
         noise=noise,
         sticking=[entry for entry in sticking if entry is not None],
-        more_rows=[entry for entry in more if entry is not None],
+        more_rows=more_rows(study),
     )
 
 
@@ -179,48 +181,79 @@ def _sticking(trial: PreparedTrial, slowest: float) -> SampleTable:
     return SampleTable(smooth.F_n[rows], smooth.v_t[rows], smooth.F_t[rows])
 
 
-def more_rows(result: TerrainResult, study: Study) -> MoreRows | None:
-    """Return what four times as many training rows change, None without such rows."""
-    folds = [f for f in result.folds if isinstance(_model(f), GpModel)]
-    pairs = [_with_more_rows(result, fold, study) for fold in folds]
-    present = [pair for pair in pairs if pair is not None]
-    if not present:
-        return None
-    counts, before, after = zip(*present, strict=True)
-    paired, mean = compare(before, after), mean_of(before)
-    if paired is None or not mean:
-        return None
-    return MoreRows(result.terrain, max(counts), mean, paired)
+@dataclass(frozen=True, slots=True)
+class MoreRowsTask:
+    """A fold's process that is given more of its training rows.
+
+    Attributes:
+        process: fitted to few of them.
+        rows: many of them.
+        tested: what the fold leaves out.
+    """
+
+    process: GaussianProcess
+    rows: SampleTable
+    tested: SampleTable
+
+    @classmethod
+    def of(
+        cls, result: TerrainResult, fold: FoldResult, study: Study
+    ) -> "MoreRowsTask | None":
+        """Return the task of a fold, None without such a process or more rows."""
+        model = fold.models[GP_SE].model if GP_SE in fold.models else None
+        fit = study.options.fit
+        every = [k for f in result.folds for k in f.left_out]
+        others = [k for k in sorted(every) if k not in fold.left_out]
+        training = SampleTable.of([result.trials[k] for k in others])
+        count = min(_MORE * fit.gp_points, training.count)
+        if not isinstance(model, GpModel) or count <= len(fold.gp_rows):
+            return None
+        key = (fit.seed, zlib.crc32(result.terrain.encode()), _STREAM + fold.fold)
+        unused = np.setdiff1d(np.arange(training.count), fold.gp_rows)
+        added = np.random.default_rng(key).choice(
+            unused, count - len(fold.gp_rows), replace=False
+        )
+        return cls(
+            model.process,
+            training.take(np.concatenate([np.array(fold.gp_rows, np.intp), added])),
+            SampleTable.of([result.trials[k] for k in fold.left_out]),
+        )
 
 
-def _model(fold: FoldResult) -> object:
-    return fold.models[GP_SE].model if GP_SE in fold.models else None
+def errors_of_more(task: MoreRowsTask) -> tuple[float, float]:
+    """Return the mean absolute errors [N] with few and with many rows.
 
-
-def _with_more_rows(
-    result: TerrainResult, fold: FoldResult, study: Study
-) -> tuple[int, float, float] | None:
-    """Return rows, and errors with few and many of them [N] on what is left out."""
-    model, fit = _model(fold), study.options.fit
-    every = [k for f in result.folds for k in f.left_out]
-    others = [k for k in sorted(every) if k not in fold.left_out]
-    training = SampleTable.of([result.trials[k] for k in others])
-    count = min(_MORE * fit.gp_points, training.count)
-    if not isinstance(model, GpModel) or count <= len(fold.gp_rows):
-        return None
-    key = (fit.seed, zlib.crc32(result.terrain.encode()), _STREAM + fold.fold)
-    unused = np.setdiff1d(np.arange(training.count), fold.gp_rows)
-    added = np.random.default_rng(key).choice(
-        unused, count - len(fold.gp_rows), replace=False
-    )
-    rows = training.take(np.concatenate([np.array(fold.gp_rows, np.intp), added]))
-    tested = SampleTable.of([result.trials[k] for k in fold.left_out])
-    processes = model.process, model.process.given(rows.inputs, rows.F_t)
-    errors = [
+    A pure function of the task.
+    """
+    tested, rows = task.tested, task.rows
+    more = task.process.given(rows.inputs, rows.F_t)
+    few, many = (
         float(np.mean(np.abs(tested.F_t - process.mean(tested.inputs))))
-        for process in processes
-    ]
-    return count, errors[0], errors[1]
+        for process in (task.process, more)
+    )
+    return few, many
+
+
+def more_rows(study: Study) -> list[MoreRows]:
+    """Return what four times as many training rows change, by terrain that has them."""
+    tasks = {
+        name: [
+            task
+            for fold in result.folds
+            if (task := MoreRowsTask.of(result, fold, study)) is not None
+        ]
+        for name, result in study.terrains.items()
+    }
+    batches = [Batch(errors_of_more, given) for given in tasks.values()]
+    done = run_batches(batches, study.options.n_jobs or running_workers())
+    found: list[MoreRows] = []
+    for (name, given), errors in zip(tasks.items(), done, strict=True):
+        before, after = ([pair[k] for pair in errors] for k in (0, 1))
+        paired, mean = compare(before, after), mean_of(before)
+        if paired is not None and mean:
+            count = max(task.rows.count for task in given)
+            found.append(MoreRows(name, count, mean, paired))
+    return found
 
 
 def slips_of(results: Sequence[TerrainResult]) -> list[Slip]:

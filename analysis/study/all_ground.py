@@ -17,6 +17,7 @@ from analysis.data.series import Array
 from analysis.gp.ground import Ground, GroundRows
 from analysis.gp.hierarchy import (
     GroundPosterior,
+    GroundPrediction,
     GroundProcess,
     PredictiveProcess,
     in_unit,
@@ -106,15 +107,7 @@ class AllGroundModel:
             ground: that it is recorded on, known or not.
             inputs: (F_n [N], v_t [m/s]), shape (m, 2).
         """
-        z = self.given.predict(ground, inputs)
-        return NewTrialPrediction(
-            centre=z.mean,
-            within=z.latent + z.noise,
-            between=np.full(z.mean.shape, z.between),
-            freedom=max(self.freedom[ground.is_plate], FEWEST),
-            c=self.c,
-            shape=self.shapes[ground.is_plate],
-        )
+        return self._of_measurements(ground, self.given.predict(ground, inputs))
 
     def shaped(self, known: Sequence[TerrainRows]) -> "AllGroundModel":
         """Return the model with the shapes that trials of stones and plates ask for.
@@ -139,11 +132,23 @@ class AllGroundModel:
         zero = warped(np.zeros(1), self.c)[0]
         z = self.given.predict(ground, rows.inputs)
         latent = ndtr((zero - z.mean) / np.sqrt(np.maximum(z.latent, 1e-12)))
-        prediction = self.predict(ground, rows.inputs)
+        prediction = self._of_measurements(ground, z)
         return Dissipation(
             float(latent.mean()),
             float(prediction.cdf(np.zeros(rows.count)).mean()),
             float(np.mean(rows.F_t < 0.0)),
+        )
+
+    def _of_measurements(
+        self, ground: Ground, z: GroundPrediction
+    ) -> NewTrialPrediction:
+        return NewTrialPrediction(
+            centre=z.mean,
+            within=z.latent + z.noise,
+            between=np.full(z.mean.shape, z.between),
+            freedom=max(self.freedom[ground.is_plate], FEWEST),
+            c=self.c,
+            shape=self.shapes[ground.is_plate],
         )
 
 

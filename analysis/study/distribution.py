@@ -29,6 +29,8 @@ FEWEST = 4  # degrees of freedom of a variance between trials, however few there
 _MIXED = 40  # values of the variance between trials
 _NODES = 64  # shares that moments and scores are integrated over
 _RATIOS = 129  # of variance between trials over all of it, for quantiles
+_LOWEST = -37.0  # normal score of a quantile at most; double precision ends there
+_STEPS, _ROUNDING = 50, 1e-11  # of Newton's method, mostly five; the last one's length
 _EDGE = 1e-12  # a share nearer to 0 or 1 has no normal score worth the name
 
 
@@ -206,16 +208,22 @@ def _mixture_quantiles(shares: tuple[float, ...], freedom: int) -> Array:
     """Return quantiles of the mixture of unit variance, shape (q, 129).
 
     A column for every ratio from 0 to 1 of the variance between trials to all of it.
+    Newton's method on the normal score of the share that is reached, nearly a straight
+    line in the quantile; in the lower half, whose shares lose no digits.
     """
-    from scipy.special import ndtr
+    from scipy.special import ndtr, ndtri
 
     ratio = np.linspace(0.0, 1.0, _RATIOS)
     spread = np.sqrt(1.0 - ratio + ratio * _mixed(freedom)[:, None, None])
-    wanted = np.array(shares)[:, None]
-    low = np.full((wanted.size, _RATIOS), -60.0)
-    high = -low
-    for _ in range(50):  # halves 120 down to rounding
-        middle = 0.5 * (low + high)
-        is_low = ndtr(middle / spread).mean(axis=0) < wanted
-        low, high = np.where(is_low, middle, low), np.where(is_low, high, middle)
-    return 0.5 * (low + high)
+    score = ndtri(np.array(shares))[:, None]
+    wanted = np.maximum(-np.abs(score), _LOWEST)
+    quantile = np.repeat(wanted, _RATIOS, axis=1)
+    for _ in range(_STEPS):
+        each = quantile / spread
+        reached = ndtri(ndtr(each).mean(axis=0))
+        slope = np.mean(np.exp(0.5 * (reached**2 - each**2)) / spread, axis=0)
+        step = (reached - wanted) / slope
+        quantile = quantile - step
+        if np.abs(step).max(initial=0.0) < _ROUNDING:
+            break
+    return -np.sign(score) * quantile

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -60,6 +61,14 @@ from analysis.study.trial_components import (
 _NAMED = 10  # trials in one warning
 _LOADED = 5.0  # N: below it F_t/F_n says little, whatever the ground
 _PLOUGHING = 1.5  # of F_t/F_n in the upper quarter; stones of one layer stay below
+
+
+# prepared trials -> tasks that are done beside the fits
+FurtherBatches = Callable[[Prepared], Sequence[Batch]]
+
+
+def _nothing(prepared: Prepared) -> Sequence[Batch]:
+    return ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,7 +163,6 @@ def run_study(
     simulated: bool,
     progress: Progress | None = None,
     store: Store | None = None,
-    beside: Callable[[Prepared], Sequence[Batch]] = lambda _: (),
 ) -> Study:
     """Return the analysis of all trials.
 
@@ -164,15 +172,39 @@ def run_study(
         simulated: the trials were simulated; marks every product.
         progress: called with (fits done, fits in all).
         store: results of earlier runs, so that an interrupted study resumes.
-        beside: gives tasks of the prepared trials that are done with the fits; what
-            comes of them is in the store.
 
     Raises:
         SettingsError: there is no trial at all.
     """
-    plan = _Plan.of(trials, options, beside)
+    study, _ = run_study_and(_nothing, trials, options, simulated, progress, store)
+    return study
+
+
+def run_study_and(
+    further: FurtherBatches,
+    trials: Mapping[str, Sequence[TractionSeries]],
+    options: StudyOptions,
+    simulated: bool,
+    progress: Progress | None = None,
+    store: Store | None = None,
+) -> tuple[Study, list[list[Any]]]:
+    """Return the analysis of all trials, and what came of further tasks.
+
+    Args:
+        further: gives batches of tasks from the prepared trials; they are done with the
+            fits, so that no core waits for the last of either.
+        trials: recorded trials by terrain.
+        options: every choice.
+        simulated: the trials were simulated.
+        progress: called with (tasks done, tasks in all).
+        store: results of earlier runs.
+
+    Raises:
+        SettingsError: there is no trial at all.
+    """
+    plan = _Plan.of(trials, options, further)
     prepared, notes = plan.prepared, list(plan.notes)
-    *_, folds, outcomes, fitted, wholes = run_batches(
+    *found, folds, outcomes, fitted, wholes = run_batches(
         plan.batches, Workers(options.n_jobs, options.scheduler), progress, store
     )
     done = zip(plan.apart, fitted, strict=True)
@@ -187,7 +219,8 @@ def run_study(
     relatives = {
         outcome.terrain: outcome for outcome in outcomes if outcome is not None
     }
-    return Study(simulated, options, results, tuple(notes), warnings, relatives)
+    study = Study(simulated, options, results, tuple(notes), warnings, relatives)
+    return study, found
 
 
 def run_study_shard(
@@ -196,7 +229,7 @@ def run_study_shard(
     shard: Shard,
     store: Store,
     progress: Progress | None = None,
-    beside: Callable[[Prepared], Sequence[Batch]] = lambda _: (),
+    further: FurtherBatches = _nothing,
 ) -> int:
     """Keep one run's share of what a study is made of; return its number of tasks.
 
@@ -209,12 +242,12 @@ def run_study_shard(
         shard: which share.
         store: on a folder that all runs see.
         progress: called with (fits done, fits in all).
-        beside: as for `run_study`.
+        further: as for `run_study_and`.
 
     Raises:
         SettingsError: there is no trial at all.
     """
-    plan = _Plan.of(trials, options, beside)
+    plan = _Plan.of(trials, options, further)
     workers = Workers(options.n_jobs, options.scheduler)
     return run_shard(plan.batches, shard, store, workers, progress)
 
@@ -240,7 +273,7 @@ class _Plan:
         cls,
         trials: Mapping[str, Sequence[TractionSeries]],
         options: StudyOptions,
-        beside: Callable[[Prepared], Sequence[Batch]],
+        further_batches: FurtherBatches,
     ) -> "_Plan":
         _require_trials(trials)
         prepared = _prepared(trials, options.prepare)
@@ -251,7 +284,7 @@ class _Plan:
         apart = [] if further else _apart(prepared, options.fit)
         relatives = plan_relatives(prepared, grounds_of(trials), options.fit)
         batches = (
-            *beside(prepared),  # first: they are longer than a fit
+            *further_batches(prepared),  # first: they are longer than a fit
             Batch(run_fold, tasks),
             Batch(run_relatives, relatives),
             Batch(fit_components, apart),

@@ -8,8 +8,6 @@ import numpy as np
 from acquisition.errors import SettingsError
 from analysis.data.prepare import PreparedTrial
 from analysis.data.series import Array
-from analysis.study.jobs import Store, Workers, run_tasks
-from analysis.study.study import Study
 from analysis.terrains.generator import EDGES, Draws, Generator
 from analysis.terrains.generator_fit import GeneratorTask, fit_generator
 from analysis.terrains.process_rows import ProcessTrial
@@ -74,23 +72,6 @@ def generator_tasks(
         for name, group in trials.items()
     }
     return {name: task for name, task in tasks.items() if len(task.trials) >= _FEWEST}
-
-
-def sampled_trials(
-    study: Study, workers: Workers | int | None = None, store: Store | None = None
-) -> dict[str, SampledTrials]:
-    """Return how like trials left out samples are, by terrain that can be sampled.
-
-    Args:
-        study: the trials.
-        workers: where generators are fitted.
-        store: results of earlier runs.
-    """
-    trials = {name: result.trials for name, result in study.terrains.items()}
-    tasks = generator_tasks(trials, study.kinds, study.options.fit.seed)
-    found = run_tasks(judge_generator, list(tasks.values()), workers, store=store)
-    pairs = zip(tasks, found, strict=True)
-    return {name: one for name, one in pairs if one is not None}
 
 
 def judge_generator(task: GeneratorTask) -> SampledTrials | None:

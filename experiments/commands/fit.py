@@ -74,15 +74,14 @@ def run(args: argparse.Namespace) -> int:
 
     start_workers(args.scheduler)
     from analysis.dialects.columns import parse_covariates, parse_inputs
+    from analysis.findings.beside import run_whole_study
     from analysis.findings.covariates import WAY
     from analysis.findings.findings import compute_results
     from analysis.report.covariate_table import covariate_tables
     from analysis.report.page import ReportContext, write_report
     from analysis.report.what_if_tables import plain_choice, side_by_side
-    from analysis.study.jobs import Workers
     from analysis.study.models import FitOptions
-    from analysis.study.study import StudyOptions, notes_of_tables, run_study
-    from analysis.terrains.generator_check import sampled_trials
+    from analysis.study.study import StudyOptions, notes_of_tables
     from experiments.operator.console import Console
     from experiments.report.choices import analysis_choices, repeat_study
     from experiments.report.covariates import columns_tested
@@ -113,7 +112,7 @@ def run(args: argparse.Namespace) -> int:
     fit = FitOptions(bounds=choices.bounds, seed=args.seed, models=choices.models)
     options = StudyOptions(choices.prepare, fit=fit, scheduler=args.scheduler)
     with fitting(console) as progress:
-        study = run_study(trials, options, is_simulated, progress)
+        study, beside = run_whole_study(trials, options, is_simulated, progress)
     require_samples(study)
     others = repeat_study(study, trials, choices.variants, console)
     found = columns_tested(study, tested, columns, console)
@@ -134,7 +133,7 @@ def run(args: argparse.Namespace) -> int:
         },
         with_pdf=args.pdf,
         results=compute_results(
-            study, sampled=sampled_trials(study, Workers(None, args.scheduler))
+            study, break_away=beside.break_away, sampled=beside.sampled
         ),
     )
     page = write_report(study, args.to, context)

@@ -67,7 +67,9 @@ def rebuild(folder: Path, console: Console) -> TableComparison:
         analysed = study_sessions(sessions, data, order, console, fit)
     trials = [trial for group in analysed.trials.values() for trial in group]
     results = compute_results(
-        analysed.study, with_tares([t.health for t in trials], trials)
+        analysed.study,
+        with_tares([t.health for t in trials], trials),
+        analysed.beside.break_away,
     )
     again = to_csv(analysed.study, findings_rows(results))
     return compare_tables(_text(folder / TABLE), again)

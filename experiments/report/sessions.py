@@ -15,7 +15,11 @@ from analysis.data.load import load_trial
 from analysis.data.plausibility import summed_up
 from analysis.data.recorded_factors import stated_factors
 from analysis.data.series import TractionSeries
-from analysis.data.terrain_kinds import terrain_kind
+from analysis.findings.beside import (
+    FittedBeside,
+    run_whole_study,
+    run_whole_study_shard,
+)
 from analysis.findings.covariates import COVARIATE_TYPES, CovariateResult
 from analysis.findings.findings import compute_results
 from analysis.findings.held_trial import HeldTrial, TrialFiles
@@ -27,8 +31,7 @@ from analysis.report.drawing import DRAWN_TYPES
 from analysis.report.page_model import BedPhoto, ReportContext
 from analysis.report.what_if import StudyVariant
 from analysis.report.what_if_tables import plain_choice, side_by_side
-from analysis.study.crossval import Prepared
-from analysis.study.jobs import Batch, Shard
+from analysis.study.jobs import Shard
 from analysis.study.models import (
     GP_SE,
     GP_SE_TRIAL,
@@ -36,14 +39,9 @@ from analysis.study.models import (
     FitOptions,
 )
 from analysis.study.store import MOST_BYTES, TYPES, ResultStore
-from analysis.study.study import Study, StudyOptions, run_study, run_study_shard
-from analysis.terrains.export import break_away_batch, break_away_of, database_of
-from analysis.terrains.generator_check import (
-    SAMPLED_TYPES,
-    generator_tasks,
-    judge_generator,
-    sampled_trials,
-)
+from analysis.study.study import Study, StudyOptions
+from analysis.terrains.export import database_of
+from analysis.terrains.generator_check import SAMPLED_TYPES
 from analysis.terrains.identify import identify_study
 from experiments.operator.console import Console
 from experiments.report.cells import (
@@ -145,12 +143,14 @@ class StudySession:
 
     Attributes:
         study: the result.
+        beside: what was fitted beside it.
         trials: the kept trials by terrain, in the matrix's order.
         left_out: recordings that are not in it, and why.
         truths: how far trials are from their truth files, by path of the trial.
     """
 
     study: Study
+    beside: FittedBeside
     trials: dict[str, list[HeldTrial]]
     left_out: list[str]
     truths: dict[Path, TruthErrors]
@@ -234,19 +234,6 @@ class StudyInputs:
         """The trials as they were recorded, by terrain."""
         return {name: [t.series for t in group] for name, group in self.trials.items()}
 
-    def beside(self, prepared: Prepared) -> list[Batch]:
-        """Return what is fitted beside the models of a study."""
-        kinds = {
-            name: terrain_kind(name, [t.stones for t in group])
-            for name, group in self.series.items()
-        }
-        seed = self.options.fit.seed
-        judged = list(generator_tasks(prepared, kinds, seed).values())
-        return [
-            Batch(judge_generator, judged),
-            break_away_batch(prepared, kinds, seed),
-        ]
-
 
 def study_sessions(
     sessions: Sequence[SessionFolder],
@@ -262,15 +249,10 @@ def study_sessions(
     """
     given = StudyInputs.of(sessions, data, order, console, fit)
     with fitting(console) as progress:
-        study = run_study(
-            given.series,
-            given.options,
-            given.is_simulated,
-            progress,
-            given.store,
-            given.beside,
+        study, beside = run_whole_study(
+            given.series, given.options, given.is_simulated, progress, given.store
         )
-    return StudySession(study, given.trials, given.left_out, given.truths)
+    return StudySession(study, beside, given.trials, given.left_out, given.truths)
 
 
 def fit_shard(
@@ -288,8 +270,8 @@ def fit_shard(
     fit = _fit_options(order)
     given = StudyInputs.of(sessions, data, order, console, fit)
     with fitting(console) as progress:
-        count = run_study_shard(
-            given.series, given.options, shard, given.store, progress, given.beside
+        count = run_whole_study_shard(
+            given.series, given.options, shard, given.store, progress
         )
     console.say(
         f"Shard {shard.number} of {shard.of}: {count} results are kept. When all have "
@@ -380,11 +362,10 @@ def report_sessions(
     analysed = study_sessions(sessions, data, order, console, _fit_options(order))
     study, trials = analysed.study, analysed.trials
     store = results_below(data)
-    break_away = break_away_of(study, store)
+    break_away, sampled = analysed.beside
     others = repeat_study(study, analysed.files, order.choices.variants, console, store)
     every = [trial for group in trials.values() for trial in group]
     rig = with_tares([trial.health for trial in every], every)
-    sampled = sampled_trials(study, 1, store)
     findings = cache(partial(compute_results, study, rig, break_away, sampled))
     foresight = study_foresight(study, trials, break_away, store, findings)
     own = sessions[0].path if len(sessions) == 1 else data / "study"

@@ -13,7 +13,7 @@ from analysis.data.series import TractionSeries
 from analysis.study.fits import to_csv, to_fits
 from analysis.study.jobs import Batch
 from analysis.study.models import GP_SE, TUSTIN, FitOptions
-from analysis.study.study import StudyOptions, run_study
+from analysis.study.study import StudyOptions, run_study, run_study_and
 
 SMALL_FIT = FitOptions(gp_points=60, draws=20)  # as in the shared small study
 TWO = (TUSTIN, GP_SE)
@@ -109,20 +109,21 @@ def names(trials):
     return [trial.name for trial in trials]
 
 
-def test_what_is_done_beside_the_fits_is_in_the_store(slice_trials):
+def test_what_is_done_beside_the_fits_is_given_and_kept(slice_trials):
     kept = {}
     store = SimpleNamespace(
         get=lambda function, task: None,
         put=lambda function, task, result: kept.update({repr(task): result}),
     )
-    run_study(
+    _, ((found,),) = run_study_and(
+        lambda prepared: [Batch(names, [prepared["TF"]])],
         {"TF": slice_trials["TF"]},
         OPTIONS,
         simulated=True,
         store=store,
-        beside=lambda prepared: [Batch(names, [prepared["TF"]])],
     )
-    assert [t.name for t in slice_trials["TF"]] in kept.values()
+    assert found == [t.name for t in slice_trials["TF"]]
+    assert found in kept.values()
 
 
 def test_a_terrain_is_fitted_alike_alone_and_in_company(small_study, slice_trials):
