@@ -29,6 +29,8 @@ from analysis.gp.trial_noise import TrialRows
 _DESIGN_ROWS = 150  # rows by whose likelihood the first start is chosen
 _SAME_TOP = (0.2, 0.1)  # in theta and likelihood: a climb so near to a top is left
 _LEAST_MOVE = 1.0  # in theta: a move that ends nearer to a known top leads back to it
+_ASIDE = 0.3  # in theta: how near to a top another one may be
+_BARELY = 0.1  # log likelihood that is lost on the way from one to the other
 _PROMISING = 5.0  # log likelihood that a move may be below the best top it leaves
 _NEIGHBOURS = 0.5  # in theta: of two tops that are nearer, one is enough to begin with
 _LOSING = 5.0  # log likelihood below the best top at which another will not become it
@@ -148,7 +150,7 @@ class Search:
 
         The points of the design are the last kind. The likelihood is that of all rows,
         with the noise of that top. Moves that end near what is known lead back to it,
-        and are left out; so is a kind that promises too little.
+        and are left out; so is a kind that promises too little. At last a step aside.
         """
         for kind in range(len(self._moves_of(self._best.theta))):
             best = self._best
@@ -160,6 +162,24 @@ class Search:
             ]
             if rated and max(rated)[0] > best.value - _PROMISING:
                 self.climb(max(rated)[2])
+        self._step_aside()
+
+    def _step_aside(self) -> None:
+        """Climb from beside the best top where the likelihood hardly falls.
+
+        Two tops may be nearer to each other than any move goes. What leads back to the
+        top that it left is left soon; along what makes no difference nothing is sought.
+        """
+        best = self._best
+        used = [k for k in _shape_of(self._kernel) if best.theta[k] < _UNUSED]
+        aside = [
+            np.clip(best.theta + size * np.eye(best.theta.size)[k], *self._bounds.T)
+            for k in used
+            for size in (-_ASIDE, _ASIDE)
+        ]
+        highest = max(aside, key=self._posterior.value, default=best.theta)
+        if self._posterior.value(highest) > best.value - _BARELY:
+            self.climb(highest)
 
     def optimum(self) -> Optimum:
         """Return the best of what was reached."""
@@ -260,8 +280,13 @@ def spread(X: Array) -> Array:
     return np.where(np.ptp(X, axis=0) > 0, sd, 1.0)
 
 
+def _shape_of(kernel: Kernel) -> list[int]:
+    """Return which hyperparameters are lengths and biases."""
+    return [k for k, name in enumerate(kernel.names) if not name.endswith("log_sf")]
+
+
 def _distance(kernel: Kernel, theta: Array, others: Sequence[Array]) -> float:
     """Return how far theta is from the nearest of others, in lengths and biases."""
-    shape = [k for k, name in enumerate(kernel.names) if not name.endswith("log_sf")]
+    shape = _shape_of(kernel)
     held = np.minimum(np.vstack([theta, *others])[:, shape], _UNUSED)
     return float(np.abs(held[1:] - held[0]).max(axis=1).min())
