@@ -183,7 +183,7 @@ class PredictiveProcess:
         self._X = (rows.inputs - process.centre) / process.scale
         theta = process.theta
         B = Resemblance(rows.grounds, rows.grounds, process.terms).at(theta)[0]
-        K = _covariance(theta, self._X, self._X, B[np.ix_(rows.ground, rows.ground)])
+        K = _covariance(theta, self._X, None, B[np.ix_(rows.ground, rows.ground)])
         self._factor = _factor(K, theta, rows.is_plate, rows.blocks())
         self._alpha = self._factor.solve(rows.y - process.offset)
 
@@ -338,8 +338,13 @@ def _factor(K: Array, theta: Array, is_plate: Array, trials: Sequence[slice]) ->
     return factorise(K, sn2, blocks=shared)
 
 
-def _covariance(theta: Array, X: Array, X_other: Array, B: Array) -> Array:
-    """Return the covariance of f_0 + d_g between two sets of rows, shape (n, m)."""
-    se = SquaredExponential()
-    added = se.matrix(np.concatenate([[0.0], theta[5:7]]), X, X_other)
-    return se.matrix(theta[:3], X, X_other) + B * added
+def _covariance(theta: Array, X: Array, X_other: Array | None, B: Array) -> Array:
+    """Return the covariance of f_0 + d_g between two sets of rows, shape (n, m).
+
+    Of one set with itself, `X_other` None, only the upper triangle is good.
+    """
+    over = SquaredExponential().over(X, X_other)
+    shared, _ = over(theta[:3])
+    K = shared.copy()
+    added, _ = over(np.concatenate([[0.0], theta[5:7]]))
+    return K + B * added

@@ -12,6 +12,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+# here, not where it is first called: a limit of threads reaches only libraries that
+# are loaded, and on busy cores several threads for small matrices wait for each other
+from scipy.linalg import get_blas_funcs, get_lapack_funcs
+
 from acquisition.errors import SettingsError
 from analysis.data.series import Array
 from analysis.gp.kernels import Contraction, Kernel
@@ -19,7 +23,7 @@ from analysis.gp.noise import Noise
 from analysis.gp.trial_noise import SharedAt, TrialRows, shared_over
 
 _JITTERS = (0.0, 1e-10, 1e-8, 1e-6)  # times the mean variance; the first that works
-_BLAS = frozenset({"syr", "trmm"})
+_BLAS = frozenset({"syr", "trmm", "trsm"})
 _SMALL = 40  # rows of a triangle that LAPACK inverts as fast as products do
 
 
@@ -39,8 +43,11 @@ class Factor(NamedTuple):
         return lapack("potrs")(self.L, r, lower=1)[0]
 
     def half(self, r: Array) -> Array:
-        """Return L^-1 r, of the shape of r."""
-        return lapack("trtrs")(self.L, r, lower=1)[0]
+        """Return L^-1 r, of the shape of r: (n, m).
+
+        Solved as r' = x' L', so that rows in C's order are taken as they are.
+        """
+        return lapack("trsm")(1.0, self.L, r.T, side=1, lower=1, trans_a=1).T
 
     def inverse(self) -> Array:
         """Return C^-1, shape (n, n)."""
@@ -222,7 +229,5 @@ def _invert(L: Array, inverse: Array, low: int, high: int) -> None:
 @lru_cache
 def lapack(name: str) -> Callable[..., Any]:
     """Return a routine of LAPACK or BLAS for double precision, by its bare name."""
-    from scipy.linalg import get_blas_funcs, get_lapack_funcs
-
     get: Any = get_blas_funcs if name in _BLAS else get_lapack_funcs
     return get(name, dtype=float)

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
 from acquisition.errors import SettingsError
 from analysis.data.samples import inputs_of
@@ -138,12 +137,12 @@ class GaussianProcess:
         """
         theta, theta_noise = split(self.kernel, self.theta)
         Z = (inputs - self.centre) / self.scale
-        L = self.factor().L
+        factor = self.factor()
         mean, variance = np.empty(Z.shape[0]), self.kernel.diagonal(theta, Z)
         for i in range(0, Z.shape[0], _BLOCK):
             cross = self.kernel.matrix(theta, self.X, Z[i : i + _BLOCK])
             mean[i : i + _BLOCK] = self.offset + self.alpha @ cross
-            half = solve_triangular(L, cross, lower=True, check_finite=False)
+            half = factor.half(cross)
             variance[i : i + _BLOCK] -= np.einsum("nm,nm->m", half, half)
         variance = np.maximum(variance, 0.0)
         if include_noise:
@@ -169,8 +168,8 @@ class LeaveOut:
 
     def __init__(self, process: GaussianProcess) -> None:
         self._process = process
-        factor = process.factor()
-        self._L, self._P = factor.L, factor.inverse()
+        self._factor = process.factor()
+        self._P = self._factor.inverse()
 
     def predict(self, rows: slice, inputs: Array) -> tuple[Array, Array]:
         """Return mean and variance of measurements at `inputs` without some rows.
@@ -186,10 +185,10 @@ class LeaveOut:
         theta, theta_noise = split(process.kernel, process.theta)
         Z = (inputs - process.centre) / process.scale
         cross = process.kernel.matrix(theta, process.X, Z)
-        half = lapack("trtrs")(self._L, cross, lower=1)[0]
+        half = self._factor.half(cross)
         L_left, _ = lapack("potrf")(self._P[rows, rows], lower=1, clean=1)
         joint = np.column_stack([self._P[rows] @ cross, process.alpha[rows]])
-        left = lapack("trtrs")(L_left, joint, lower=1)[0]
+        left = Factor(L_left, 0.0).half(joint)
         mean = process.offset + process.alpha @ cross - left[:, -1] @ left[:, :-1]
         variance = process.kernel.diagonal(theta, Z)
         variance -= np.einsum("nm,nm->m", half, half)
@@ -204,7 +203,8 @@ def _factor(
     theta_kernel, theta_noise = split(kernel, theta)
     S, _ = noise.evaluate(theta_noise, X)
     blocks = shared_over(noise, X, trials)(theta_noise).blocks
-    return factorise(kernel.matrix(theta_kernel, X, X), S, blocks=blocks)
+    K, _ = kernel.over(X)(theta_kernel)  # its upper triangle
+    return factorise(K, S, blocks=blocks)
 
 
 def fit_gp(

@@ -150,7 +150,7 @@ class Search:
 
         The points of the design are the last kind. The likelihood is that of all rows,
         with the noise of that top. Moves that end near what is known lead back to it,
-        and are left out; so is a kind that promises too little. At last a step aside.
+        and are left out; so is a kind that promises too little.
         """
         for kind in range(len(self._moves_of(self._best.theta))):
             best = self._best
@@ -162,9 +162,8 @@ class Search:
             ]
             if rated and max(rated)[0] > best.value - _PROMISING:
                 self.climb(max(rated)[2])
-        self._step_aside()
 
-    def _step_aside(self) -> None:
+    def step_aside(self) -> None:
         """Climb from beside the best top where the likelihood hardly falls.
 
         Two tops may be nearer to each other than any move goes. What leads back to the
@@ -226,6 +225,7 @@ def likeliest(likelihood: Likelihood) -> Optimum:
     search = Search(likelihood)
     search.climb(search.designed_start())
     search.move()
+    search.step_aside()
     return search.optimum()
 
 
@@ -244,6 +244,7 @@ def climb_from(
         search.climb(start)
     if is_searched:
         search.move()
+        search.step_aside()
     return search.optimum()
 
 

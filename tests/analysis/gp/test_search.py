@@ -5,7 +5,7 @@ from acquisition.errors import SettingsError
 from analysis.gp.arcsine import Arcsine
 from analysis.gp.kernels import SquaredExponential
 from analysis.gp.noise import ConstantNoise, LogLinearNoise
-from analysis.gp.search import climb_from, likeliest, posterior_search
+from analysis.gp.search import Search, climb_from, likeliest, posterior_search
 
 SE = SquaredExponential(2)
 ROWS = np.random.default_rng(0).normal(size=(40, 2))
@@ -67,12 +67,32 @@ def test_a_move_finds_a_top_that_the_first_start_misses():
 
 @pytest.mark.parametrize("length", [0.5, 5.5])
 def test_a_move_is_far_from_what_is_known(length):
-    optimum = likeliest(Hills((np.array([0.0, -1.0, length, -0.5]), 5.0, 3.0)))
+    search = Search(Hills((np.array([0.0, -1.0, length, -0.5]), 5.0, 3.0)))
+    search.climb(search.designed_start())
+    search.move()
+    optimum = search.optimum()
     # lengths beyond e^4 standard deviations are all the same
     known = np.minimum([optimum.starts[0].theta, optimum.began[0]], 4.0)
     for moved in optimum.began[1:]:
         gaps = np.abs(known - np.minimum(moved, 4.0))[:, 1:3]
         assert gaps.max(axis=1).min() >= 1.0
+
+
+@pytest.mark.parametrize("apart", [-0.35, 0.35])
+def test_a_top_beside_the_best_one_is_found(apart):
+    low = np.array([0.0, -1.0, 0.5, -0.5])
+    high = low + np.array([0.0, apart, 0.0, 0.0])
+    both = Hills((low, 5.0, 0.15), (high, 5.1, 0.15))
+    assert climb_from(both, [low]).theta[1] == pytest.approx(low[1], abs=0.05)
+    found = climb_from(both, [low], is_searched=True)
+    assert found.theta[1] == pytest.approx(high[1], abs=0.05)
+
+
+def test_nothing_is_sought_beside_a_top_along_a_length_without_effect():
+    top = np.array([0.0, 5.5, 5.5, -0.5])
+    optimum = climb_from(Hills((top, 5.0, 3.0)), [top], is_searched=True)
+    gaps = np.abs(np.array(optimum.began[1:])[:, 1:3] - optimum.starts[0].theta[1:3])
+    assert gaps.max(axis=1).min() >= 1.0
 
 
 def test_a_climb_is_left_beside_a_known_top():
