@@ -176,9 +176,9 @@ class Search:
             for k in used
             for size in (-_ASIDE, _ASIDE)
         ]
-        highest = max(aside, key=self._posterior.value, default=best.theta)
-        if self._posterior.value(highest) > best.value - _BARELY:
-            self.climb(highest)
+        rated = [(self._posterior.value(theta), k) for k, theta in enumerate(aside)]
+        if rated and max(rated)[0] > best.value - _BARELY:
+            self.climb(aside[max(rated)[1]])
 
     def optimum(self) -> Optimum:
         """Return the best of what was reached."""
