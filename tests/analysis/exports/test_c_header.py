@@ -106,19 +106,19 @@ def test_every_law_of_break_away_is_tabulated_to_1e_5(family, kind):
     assert np.abs(between - expected).max() <= 1e-5
 
 
-@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-@pytest.mark.parametrize("place", [0, 1, 2])
-def test_what_is_not_finite_is_refused(header, bad, place):
-    row = [np.array([2.0]), np.array([3.0]), np.array([0.05])]
-    row[place] = np.array([bad])
-    force, code = ask(header, "traction_S0_quantiles(b, c, out)", 9, *row)
-    if place > 0:
-        assert (force.tolist(), code.tolist()) == ([[0.0] * 9], [-1])
-    risk, code = ask(header, "traction_S0_risk_sliding(a, b, c, out)", 1, *row)
-    assert (risk.tolist(), code.tolist()) == ([[1.0]], [-1])
-    if place < 2:
-        risk, code = ask(header, "traction_S0_risk_rest(a, b, out)", 1, *row)
-        assert (risk.tolist(), code.tolist()) == ([[1.0]], [-1])
+def test_what_is_not_finite_is_refused(header):
+    bad = np.array([np.nan, np.inf, -np.inf])
+    rows = [np.full(9, value) for value in (2.0, 3.0, 0.05)]
+    for place, row in enumerate(rows):
+        row[3 * place : 3 * place + 3] = bad
+    force, code = ask(header, "traction_S0_quantiles(b, c, out)", 9, *rows)
+    assert np.array_equal(force[3:], np.zeros((6, 9)))
+    assert code[3:].tolist() == [-1] * 6
+    assert code[:3].tolist() == [0] * 3  # the force required is none of its inputs
+    risk, code = ask(header, "traction_S0_risk_sliding(a, b, c, out)", 1, *rows)
+    assert (risk.ravel().tolist(), code.tolist()) == ([1.0] * 9, [-1] * 9)
+    risk, code = ask(header, "traction_S0_risk_rest(a, b, out)", 1, *rows)
+    assert (risk[:6].ravel().tolist(), code[:6].tolist()) == ([1.0] * 6, [-1] * 6)
 
 
 def test_negative_forces_from_rest_are_refused(header):
