@@ -31,6 +31,22 @@ def test_quantiles_invert_the_distribution_function(kind):
         assert law.cdf(np.array([force]))[0] == pytest.approx(share, abs=2e-5)
 
 
+@pytest.mark.parametrize("freedom", [4, 9, 1000])
+@pytest.mark.parametrize("between", [0.0, 0.5, 0.5e6])
+def test_quantiles_of_rare_forces_invert_it_too(freedom, between):
+    law = predicted(within=0.5, between=between, freedom=freedom, centre=0.0)
+    shares = np.array([1e-12, 1e-6, 0.3, 0.5])
+    low, high = (law.quantiles(x)[:, 0] for x in (shares, 1.0 - shares))
+    assert low == pytest.approx(-high, rel=1e-4, abs=1e-12)
+    reached = [law.cdf(np.array([force]))[0] for force in low]
+    # the ratio of variances is one of the 129, or as near to one as it can be
+    assert reached == pytest.approx(shares, rel=1e-4)
+    never, always = law.quantiles((0.0, 1.0))[:, 0]
+    assert np.isfinite([never, always]).all()
+    assert never < low[0]
+    assert always > high[0]
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_density_is_the_slope_of_the_distribution_function(kind):
     law = predicted(*KINDS[kind])
