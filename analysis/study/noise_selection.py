@@ -6,6 +6,7 @@ of an inner fit, which begins where the fit to all of them ended; the simplest w
 unless another is clearly better.
 """
 
+from dataclasses import replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -105,6 +106,7 @@ def choose_noise(
     groups = min(_GROUPS, len(training.lengths))
     if groups < 2:
         return NoiseChoice("constant", {})
+    constant, changing = _at_best(constant), _at_best(changing)
     nlpd = np.concatenate(
         [
             _left_out(training, group, constant, changing, seed)
@@ -149,6 +151,11 @@ def predict_normal(process: GaussianProcess, rows: SampleTable) -> Prediction:
     """Return what a process predicts for `rows`, noise included."""
     mean, variance = process.predict(rows.inputs)
     return Prediction(mean, np.sqrt(variance))
+
+
+def _at_best(process: GaussianProcess) -> GaussianProcess:
+    """Return a process that a refit begins with at its best top, and at no other."""
+    return replace(process, starts=(max(process.starts, key=lambda top: top.lml),))
 
 
 def _left_out(
