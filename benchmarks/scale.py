@@ -40,7 +40,9 @@ def made_trials(count: int) -> dict[str, list[Any]]:
     trials: dict[str, list[Any]] = {}
     for k in range(count):
         F_n, v_t, F_t = noise.normal(size=(3, _KEPT))
-        made = SimpleNamespace(name=f"T{k}", kept=_KEPT, F_n=F_n, v_t=v_t, F_t=F_t)
+        made = SimpleNamespace(
+            name=f"T{k}", kept=_KEPT, F_n=F_n, v_t=v_t, F_t=F_t, further=None
+        )
         trials.setdefault(TERRAINS[k % len(TERRAINS)], []).append(made)
     return trials
 

@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks.__main__ import NAMES, PAGE, table_of, with_table
 from benchmarks.rows import BenchRow
-from benchmarks.scale import exponent, rows_of
+from benchmarks.scale import exponent, folds_of, rows_of
 
 
 @pytest.mark.parametrize(
@@ -33,6 +33,12 @@ def test_a_row_without_a_value_says_why():
 def test_growth_is_told_as_a_power(power):
     points = [{"count": n, "seconds": 3.0 * n**power} for n in (10, 100, 1000)]
     assert exponent(points, "seconds") == pytest.approx(power)
+
+
+def test_folds_of_made_trials_are_planned_and_known():
+    cost = folds_of(16)
+    assert cost["count"] == 16
+    assert 0.0 < cost["megabytes"] < 10.0
 
 
 def test_growth_beyond_linear_is_not_met():
