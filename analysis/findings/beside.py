@@ -11,7 +11,7 @@ from analysis.study.jobs import Batch, Progress, Shard, Store
 from analysis.study.study import (
     Study,
     StudyOptions,
-    run_study_and,
+    run_study_beside,
     run_study_shard,
 )
 from analysis.terrains.export import break_away_batch
@@ -78,7 +78,7 @@ def run_whole_study(
         SettingsError: there is no trial at all.
     """
     beside = _Beside(trials, options.fit.seed)
-    study, (judged, break_away) = run_study_and(
+    study, (judged, break_away) = run_study_beside(
         beside.batches, trials, options, simulated, progress, store
     )
     return study, beside.fitted(judged, break_away)

@@ -64,10 +64,10 @@ _PLOUGHING = 1.5  # of F_t/F_n in the upper quarter; stones of one layer stay be
 
 
 # prepared trials -> tasks that are done beside the fits
-FurtherBatches = Callable[[Prepared], Sequence[Batch]]
+TasksBeside = Callable[[Prepared], Sequence[Batch]]
 
 
-def _nothing(prepared: Prepared) -> Sequence[Batch]:
+def _none_beside(prepared: Prepared) -> Sequence[Batch]:
     return ()
 
 
@@ -176,22 +176,24 @@ def run_study(
     Raises:
         SettingsError: there is no trial at all.
     """
-    study, _ = run_study_and(_nothing, trials, options, simulated, progress, store)
+    study, _ = run_study_beside(
+        _none_beside, trials, options, simulated, progress, store
+    )
     return study
 
 
-def run_study_and(
-    further: FurtherBatches,
+def run_study_beside(
+    beside: TasksBeside,
     trials: Mapping[str, Sequence[TractionSeries]],
     options: StudyOptions,
     simulated: bool,
     progress: Progress | None = None,
     store: Store | None = None,
 ) -> tuple[Study, list[list[Any]]]:
-    """Return the analysis of all trials, and what came of further tasks.
+    """Return the analysis of all trials, and what came of the tasks beside it.
 
     Args:
-        further: gives batches of tasks from the prepared trials; they are done with the
+        beside: gives batches of tasks from the prepared trials; they are done with the
             fits, so that no core waits for the last of either.
         trials: recorded trials by terrain.
         options: every choice.
@@ -202,7 +204,7 @@ def run_study_and(
     Raises:
         SettingsError: there is no trial at all.
     """
-    plan = _Plan.of(trials, options, further)
+    plan = _Plan.of(trials, options, beside)
     prepared, notes = plan.prepared, list(plan.notes)
     *found, folds, outcomes, fitted, wholes = run_batches(
         plan.batches, Workers(options.n_jobs, options.scheduler), progress, store
@@ -229,7 +231,7 @@ def run_study_shard(
     shard: Shard,
     store: Store,
     progress: Progress | None = None,
-    further: FurtherBatches = _nothing,
+    beside: TasksBeside = _none_beside,
 ) -> int:
     """Keep one run's share of what a study is made of; return its number of tasks.
 
@@ -242,12 +244,12 @@ def run_study_shard(
         shard: which share.
         store: on a folder that all runs see.
         progress: called with (fits done, fits in all).
-        further: as for `run_study_and`.
+        beside: as for `run_study_beside`.
 
     Raises:
         SettingsError: there is no trial at all.
     """
-    plan = _Plan.of(trials, options, further)
+    plan = _Plan.of(trials, options, beside)
     workers = Workers(options.n_jobs, options.scheduler)
     return run_shard(plan.batches, shard, store, workers, progress)
 
@@ -273,7 +275,7 @@ class _Plan:
         cls,
         trials: Mapping[str, Sequence[TractionSeries]],
         options: StudyOptions,
-        further_batches: FurtherBatches,
+        beside: TasksBeside,
     ) -> "_Plan":
         _require_trials(trials)
         prepared = _prepared(trials, options.prepare)
@@ -284,7 +286,7 @@ class _Plan:
         apart = [] if further else _apart(prepared, options.fit)
         relatives = plan_relatives(prepared, grounds_of(trials), options.fit)
         batches = (
-            *further_batches(prepared),  # first: they are longer than a fit
+            *beside(prepared),  # first: they are longer than a fit
             Batch(run_fold, tasks),
             Batch(run_relatives, relatives),
             Batch(fit_components, apart),

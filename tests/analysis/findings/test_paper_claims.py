@@ -6,16 +6,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from analysis.data.samples import SampleTable
 from analysis.findings.findings import compute_results, plain_findings
 from analysis.findings.paper_claims import paper_claims
 from analysis.findings.paper_measures import (
     Agreement,
     MoreRows,
+    MoreRowsTask,
     PaperEvidence,
     StickingBound,
     beyond_chance,
+    errors_of_more,
     gather_evidence,
 )
+from analysis.gp.regression import fit_gp
 from analysis.report.paper_tables import statements
 from analysis.study.fits import to_plain
 from analysis.study.metrics import PairedComparison, adjusted_by_holm, smallest_adjusted
@@ -97,6 +101,17 @@ def test_more_rows_help_where_the_error_falls(evidence, change, agreement):
     claim = claim_at(replace(evidence, more_rows=entries), FEW_ROWS)
     assert claim.agreement is agreement
     assert "1200" in claim.shown
+
+
+def test_errors_come_with_few_rows_first():
+    rng = np.random.default_rng(0)
+    x = rng.uniform(-3.0, 3.0, (300, 2))
+    y = np.sin(x[:, 0]) + 0.5 * x[:, 1] + rng.normal(0.0, 0.02, 300)
+    rows, tested = (SampleTable(*x[k].T, y[k]) for k in (slice(200), slice(200, 300)))
+    process = fit_gp(x[:25], y[:25])
+    few, many = errors_of_more(MoreRowsTask(process, rows, tested))
+    assert few == np.mean(np.abs(tested.F_t - process.mean(tested.inputs)))
+    assert many < few
 
 
 def test_more_rows_are_four_times_as_many(evidence):

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -5,6 +7,7 @@ from analysis.data.samples import SampleTable, TrainingSet
 from analysis.gp.noise import LogLinearNoise
 from analysis.gp.refit import refit_gp
 from analysis.gp.regression import fit_gp
+from analysis.study import noise_selection
 from analysis.study.metrics import Prediction, log_density
 from analysis.study.noise_selection import TailedNoise, choose_noise, tail_cost
 
@@ -51,6 +54,27 @@ def test_heavy_tails_are_chosen():
 def test_one_training_trial_leaves_nothing_to_choose_by():
     data = training(lambda rng, F_n: rng.normal(0, 0.5, F_n.size), trials=1)
     assert chosen_for(data).chosen == "constant"
+
+
+def test_inner_fits_begin_at_the_best_top_alone(monkeypatch):
+    data = training(lambda rng, F_n: rng.normal(0, 0.5, F_n.size))
+    rows = data.subset
+    constant = fit_gp(rows.inputs, rows.F_t)
+    (best,) = (top for top in constant.starts if top.lml == constant.lml)
+    # another top, 1 nat lower: near enough to be begun with in other refits
+    lower = best._replace(theta=tuple(x + 2.0 for x in best.theta), lml=best.lml - 1.0)
+    begun = []
+
+    def watched(process, y):
+        begun.append(process.starts)
+        return refit_gp(process, y)
+
+    monkeypatch.setattr(noise_selection, "refit_gp", watched)
+    both = replace(constant, starts=(lower, best))
+    changing = refit_gp(both, rows.F_t, noise=LogLinearNoise())
+    choose_noise(data, both, changing, seed=0)
+    assert begun[::2] == [(best,)] * 3
+    assert [len(starts) for starts in begun] == [1] * 6
 
 
 def test_tails_have_the_degrees_of_freedom_of_the_noise():

@@ -1,3 +1,4 @@
+import os
 import platform
 import resource
 import subprocess
@@ -34,6 +35,25 @@ def test_the_first_task_of_a_process_has_one_thread_too():
         [sys.executable, "-c", _FIRST_TASK], capture_output=True, text=True, check=True
     )
     assert done.stdout.strip() == "[1, 1]"
+
+
+def test_a_limit_reaches_all_that_a_process_solves_with():
+    code = (
+        "import analysis.gp.regression\n"
+        "from threadpoolctl import threadpool_limits\n"
+        "with threadpool_limits(1):\n"
+        "    from tests.analysis.study.test_one_thread import threads\n"
+        "    print(threads(0))"
+    )
+    environment = {k: v for k, v in os.environ.items() if "NUM_THREADS" not in k}
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        check=True,
+        env=environment | {"OPENBLAS_NUM_THREADS": "3"},
+    )
+    assert done.stdout.strip() == "1"
 
 
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="another C library")

@@ -13,7 +13,7 @@ from analysis.data.series import TractionSeries
 from analysis.study.fits import to_csv, to_fits
 from analysis.study.jobs import Batch
 from analysis.study.models import GP_SE, TUSTIN, FitOptions
-from analysis.study.study import StudyOptions, run_study, run_study_and
+from analysis.study.study import StudyOptions, run_study, run_study_beside
 
 SMALL_FIT = FitOptions(gp_points=60, draws=20)  # as in the shared small study
 TWO = (TUSTIN, GP_SE)
@@ -115,7 +115,7 @@ def test_what_is_done_beside_the_fits_is_given_and_kept(slice_trials):
         get=lambda function, task: None,
         put=lambda function, task, result: kept.update({repr(task): result}),
     )
-    _, ((found,),) = run_study_and(
+    _, ((found,),) = run_study_beside(
         lambda prepared: [Batch(names, [prepared["TF"]])],
         {"TF": slice_trials["TF"]},
         OPTIONS,

@@ -59,10 +59,16 @@ def test_a_second_process_is_refused_and_told_who_has_the_arm(shared, holder):
 
 
 def test_another_channel_is_another_arm(shared, holder):
-    take(shared, "can8").close()
+    other = take(shared, "can8")
+    assert "can8" in other.path.name
+    other.close()
+    with pytest.raises(PreflightError):
+        take(shared)
 
 
 def test_a_killed_owner_gives_the_arm_back(shared, holder):
+    with pytest.raises(PreflightError):
+        take(shared)
     holder.send_signal(signal.SIGKILL)
     holder.wait()
     take(shared).close()
@@ -73,13 +79,18 @@ def test_a_child_of_the_owner_does_not_keep_the_arm(shared):
     child = subprocess.Popen(
         [sys.executable, "-c", "import sys; sys.stdin.read()"], stdin=subprocess.PIPE
     )
+    with pytest.raises(PreflightError):
+        take(shared)
     lock.close()
     take(shared).close()
+    assert child.poll() is None
     child.communicate()
 
 
 def test_closing_gives_the_arm_back_and_can_be_repeated(shared):
     lock = take(shared)
+    with pytest.raises(PreflightError):
+        take(shared)
     lock.close()
     lock.close()
     take(shared).close()
