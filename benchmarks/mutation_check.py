@@ -1,6 +1,6 @@
 """Small errors sown into the code that decides: do the tests notice? Run by hand.
 
-python -m studies.mutation_check [--count 300] [--seed 1] [--round 0] [--only guard]
+python -m benchmarks.mutation_check [--count 300] [--seed 1] [--round 0] [--only guard]
 
 Every mutation - a comparison flipped, a constant or sign changed, a statement removed -
 is run against the tests of its module in a copy of the tree, with a time limit. Rounds
@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 
 from acquisition.clock import SystemClock
-from studies.mutation_targets import EQUIVALENT, TESTS
+from benchmarks.mutation_targets import EQUIVALENT, TESTS
 
 ROOT = Path(__file__).parents[1]
 # A mutation that hangs is noticed: beyond 10 s and eight times what is usual.

@@ -1,10 +1,8 @@
 """Simulated hours of sessions with random faults; what has to hold is checked.
 
-python -m studies.soak --hours 1 --seed 1 [--record FILE]
-python -m studies.soak --write docs/soak.md FILE ...
+python -m tests.soak --hours 1 --seed 1
 
-A run that is stopped counts for as long as it ran: its record is written after every
-session. Every session is run, and resumed until it is complete, as a person would.
+Every session is run, and resumed until it is complete, as a person would.
 Before each trial the journal, session.json and the verified files have to agree; after
 each command the exit code and every message have to be known, the arm at rest, and
 nothing left behind: descriptors, children, shared memory, memory.
@@ -20,15 +18,12 @@ import tempfile
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
 from pathlib import Path
 from string import Formatter
-from subprocess import run
 
 import numpy as np
 import pytest
 
-from acquisition.clock import NS_PER_S, SystemClock
 from acquisition.devices import SafetyMode
 from experiments.messages import CATALOGUE
 from experiments.operator.auto_operator import AutoOperator
@@ -46,7 +41,6 @@ from tests.experiments.program import (
     write_config,
 )
 
-TEXT = {"capture_output": True, "text": True}
 TRIALS = 3
 CODES = {0, 3, 4, 5, 6}
 FAULT_SHARE = 0.7  # of the sessions
@@ -272,95 +266,18 @@ def summary(soak: Soak) -> list[str]:
 def tell(soak: Soak) -> None:
     """Print a line now and then, for whoever waits."""
     if soak.counts["sessions"] % 20 == 0:
-        print(" · ".join(summary(soak)[:1] + summary(soak)[-5:]))
-
-
-def recorder(path: Path, seed: int) -> Callable[[Soak], None]:
-    """Return what writes down, after every session, what a run came to."""
-    today = datetime.fromtimestamp(SystemClock().utc_ns() / NS_PER_S, UTC)
-    commit = run(["git", "rev-parse", "--short", "HEAD"], check=True, **TEXT).stdout
-
-    def record(soak: Soak) -> None:
-        tell(soak)
-        fields = {
-            "seed": seed,
-            "commit": commit.strip(),
-            "date": f"{today:%Y-%m-%d}",
-            "hours": round(soak.simulated_ns / 3.6e12, 3),
-            "counts": dict(sorted(soak.counts.items())),
-            "descriptors": [soak.base[0] if soak.base else None, descriptors()],
-            "memory_kb": [soak.base[1] if soak.base else None, resident_kb()],
-        }
-        path.with_suffix(".new").write_text(json.dumps(fields, indent=1) + "\n")
-        path.with_suffix(".new").replace(path)
-
-    return record
-
-
-PAGE = """# Soak
-
-Simulated sessions with random faults, one after the other in one process. After every
-session journal, session.json and verified files have to agree; exit code and messages
-have to be known; the arm has to be idle; no child, shared memory or descriptor may be
-left, and the process must not grow by more than {growth} MB after its first sessions. A
-run ends at the first of these that does not hold. {hours:.1f} simulated hours in {runs}
-processes:
-
-| {titles} |
-|{lines}|
-{rows}
-
-Measured by `python -m studies.soak --seed N --hours H --record FILE` for each row;
-this page by `python -m studies.soak --write docs/soak.md tests/data/soak/*.json`.
-Descriptors and memory (MB): after the first sessions, and at the end.
-"""
-TITLES = ("seed", "commit", "date", "hours", "sessions", "trials", "with a fault")
-TITLES += ("resumes", "descriptors", "memory")
-
-
-def page(records: list[dict]) -> str:
-    """Return the page of the runs whose records are given."""
-    rows = [_row(record) for record in records]
-    hours = sum(record["hours"] for record in records)
-    return PAGE.format(
-        titles=" | ".join(TITLES),
-        lines="|".join(["---"] * len(TITLES)),
-        rows="\n".join(rows),
-        hours=hours,
-        runs=len(rows),
-        growth=GROWTH_KB // 1000,
-    )
-
-
-def _row(record: dict) -> str:
-    counts = record["counts"]
-    faults = sum(n for name, n in counts.items() if name.startswith("fault "))
-    numbers = [counts.get(name, 0) for name in ("sessions", "trials")]
-    numbers += [faults, counts.get("resumes", 0)]
-    first, last = record["descriptors"]
-    grown = [f"{kb / 1000:.1f}" for kb in record["memory_kb"]]
-    cells = [record["seed"], record["commit"], record["date"]]
-    cells += [f"{record['hours']:.2f}", *numbers, f"{first}, {last}", ", ".join(grown)]
-    return f"| {' | '.join(map(str, cells))} |"
+        print(" · ".join(summary(soak)[:1] + summary(soak)[-5:]))  # noqa: T201
 
 
 def main() -> None:
-    """Soak as long as the command line says, or write the page of earlier runs."""
+    """Soak as long as the command line says."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--hours", type=float, default=1.0)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--record", type=Path, metavar="FILE")
-    parser.add_argument("--write", type=Path, metavar="PAGE")
-    parser.add_argument("records", type=Path, nargs="*", metavar="FILE")
     given = parser.parse_args()
-    if given.write:
-        records = [json.loads(path.read_text()) for path in given.records]
-        given.write.write_text(page(records))
-        return
-    report = recorder(given.record, given.seed) if given.record else tell
     with tempfile.TemporaryDirectory(prefix="soak-") as scratch:
-        soak = soaked(given.hours, given.seed, Path(scratch), report)
-    print("\n".join(summary(soak)))
+        soak = soaked(given.hours, given.seed, Path(scratch), tell)
+    print("\n".join(summary(soak)))  # noqa: T201
 
 
 if __name__ == "__main__":
