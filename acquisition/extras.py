@@ -9,7 +9,6 @@ from acquisition.errors import MissingLibraryError
 EXTRAS: Mapping[str, Mapping[str, str]] = {
     "report": {"jinja2": "Jinja2", "matplotlib": "matplotlib", "PIL": "pillow"},
     "cluster": {"dask": "dask", "distributed": "distributed"},
-    "gym": {"gymnasium": "gymnasium"},
     "live": {"foxglove": "foxglove-sdk"},
     "onnx": {"onnx": "onnx"},
     "pandas": {"pandas": "pandas"},

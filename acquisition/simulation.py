@@ -91,14 +91,6 @@ class SimulationControl(Hands, Protocol):
         """Let the hand push the foot across; the truth is written from here on."""
         ...
 
-    def stand(self) -> None:
-        """Let the hand let go; the truth is written from here on."""
-        ...
-
-    def capacity(self) -> float:
-        """Return the traction that the ground can bear under the foot now [N]."""
-        ...
-
     def pendant(self, button: PendantAction) -> None:
         """Press the pendant."""
         ...

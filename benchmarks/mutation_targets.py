@@ -34,7 +34,6 @@ TESTS = {
     f"{_LOOP}/cycle.py": (
         f"{_LOOP_TESTS}/test_cycle.py",
         f"{_CONTROL_TESTS}/test_move_in_the_cycle.py",
-        f"{_CONTROL_TESTS}/test_stance_in_the_cycle.py",
     ),
     f"{_LOOP}/states.py": (
         f"{_LOOP_TESTS}/test_states.py",
@@ -57,7 +56,6 @@ TESTS = {
     f"{_CONTROL}/controller.py": (
         f"{_CONTROL_TESTS}/test_controller.py",
         f"{_CONTROL_TESTS}/test_move_in_the_cycle.py",
-        f"{_CONTROL_TESTS}/test_stance_in_the_cycle.py",
         f"{_CONTROL_TESTS}/test_friction_compensation.py",
     ),
     f"{_CONTROL}/position_control.py": (
@@ -73,7 +71,6 @@ TESTS = {
         f"{_CONTROL_TESTS}/test_friction_compensation.py",
     ),
     f"{_CONTROL}/proof.py": (f"{_CONTROL_TESTS}/test_proof.py",),
-    f"{_CONTROL}/sole_impedance.py": (f"{_CONTROL_TESTS}/test_sole_impedance.py",),
     f"{_CONTROL}/soft_walls.py": (f"{_CONTROL_TESTS}/test_soft_walls.py",),
     f"{_DRIVER}/transmission.py": (f"{_DRIVER_TESTS}/test_transmission.py",),
     f"{_DRIVER}/status_poller.py": (
@@ -318,16 +315,6 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         "tau *= np.where(self._j2mp != 0.0, free, 1.0).min(axis=1) -> "
         "tau *= np.where(self._j2mp != 0.0, free, 2.0).min(axis=1)",
     ): "every motor turns a joint, and no joint is freer than 1",
-    (
-        f"{_CONTROL}/sole_impedance.py",
-        "rate = TRACTION_RATE if wanted > self._F_t else RELEASE_RATE -> "
-        "rate = TRACTION_RATE if wanted >= self._F_t else RELEASE_RATE",
-    ): "a force that is as wanted stays, at every rate",
-    (
-        f"{_CONTROL}/sole_impedance.py",
-        "self._goal = SoleGoal(nan, nan, x, z, 0.0) -> "
-        "self._goal = SoleGoal(nan, nan, x, z, 1.0)",
-    ): "a reference that is where it is to be goes nowhere, at every speed",
     (
         f"{_CONTROL}/friction_compensation.py",
         "self._fading = np.zeros(7) -> self._fading = np.zeros(8)",

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 COMMANDS = {
     "check": "check that the rig is ready: one graded page",
     "run": "record a session of trials on one terrain",
-    "stance": "record stances: the simulated foot stands and is asked for traction",
     "resume": "continue an unfinished session",
     "redo": "record one trial of a session again",
     "status": "kept trials per terrain, counted from verified files",

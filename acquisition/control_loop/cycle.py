@@ -15,7 +15,7 @@ from acquisition.control_loop.faults import (
     verdict_for,
 )
 from acquisition.control_loop.guard import GuardState, Observation, check
-from acquisition.control_loop.law import ControlLaw, FootObserver, SoleGoal
+from acquisition.control_loop.law import ControlLaw, FootObserver
 from acquisition.control_loop.limits import GuardLimits, bounded_torque
 from acquisition.control_loop.loop import Tick
 from acquisition.control_loop.proof import ProofGoal
@@ -105,7 +105,6 @@ class Cycle:
         self._speed = self._energy = 0.0
         self._requested: ArmEvent | None = None
         self._move: tuple[Vector, float] | None = None
-        self._stance: SoleGoal | None = None
         self._proof: ProofGoal | None = None
         self._silent_until_ns = 0
         self._reported: GuardVerdict | None = None
@@ -121,7 +120,6 @@ class Cycle:
         """
         self._requested = REQUESTS[state]
         self._move = None
-        self._stance = None
         self._proof = None
         self._silent_until_ns = 0
         self.status.verdict = None
@@ -133,10 +131,6 @@ class Cycle:
         hold has to be asked for before.
         """
         self._move = np.array(goal), speed
-
-    def stand(self, goal: SoleGoal) -> None:
-        """Ask for what the sole is to do; else as `move_to`."""
-        self._stance = goal
 
     def prove(self, goal: ProofGoal) -> None:
         """Ask for a proof; else as `move_to`. Any verdict ends it in idle."""
@@ -210,19 +204,16 @@ class Cycle:
         self._handle(event, reading)
 
     def _begin_move(self, reading: ArmReading) -> None:
-        """Begin the move, stance or proof asked for; none if a fault stands."""
+        """Begin the move or proof asked for; none if a fault stands."""
         if reading.missing_cycles:
             return
         move, self._move = self._move, None
-        stance, self._stance = self._stance, None
         proof, self._proof = self._proof, None
         if self.status.verdict is not None:
             return
         try:
             if move is not None:
                 self.law.move_to(*move, reading)
-            elif stance is not None:
-                self.law.stand(stance, reading)
             elif proof is not None:
                 self.law.prove(proof, reading)
                 self._silent_until_ns = reading.host_ns + proof.silence_ns

@@ -1,7 +1,6 @@
 """What a cycle asks of the control law and of the observer of the foot."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Protocol
 
 from acquisition.control_loop.details import MotionExcess
@@ -9,30 +8,6 @@ from acquisition.control_loop.proof import ProofGoal
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import ArmReading, Vector, WrenchSample
 from acquisition.sample import Sample
-
-
-@dataclass(frozen=True, slots=True)
-class SoleGoal:
-    """What a sole that stands by itself is to do, in the terrain frame.
-
-    Attributes:
-        F_t: traction to ask the ground for, along x [N]; NaN = go to `x` instead.
-        F_n: normal force to press with [N]; NaN = go to `z` instead.
-        x: way from the far end [m].
-        z: height above the plane [m].
-        speed: of the way there [m/s].
-    """
-
-    F_t: float
-    F_n: float
-    x: float
-    z: float
-    speed: float
-
-    @property
-    def values(self) -> tuple[float, float, float, float, float]:
-        """The five numbers in order."""
-        return self.F_t, self.F_n, self.x, self.z, self.speed
 
 
 class ControlLaw(Protocol):
@@ -53,14 +28,6 @@ class ControlLaw(Protocol):
 
         Raises:
             ValueError: the arm is not in hold, or `goal` cannot be reached so.
-        """
-        ...
-
-    def stand(self, goal: SoleGoal, reading: ArmReading) -> None:
-        """Let the sole do what `goal` says, in hold, with joint 7 locked.
-
-        Raises:
-            ValueError: the arm is not in hold, or `goal` cannot be obeyed.
         """
         ...
 
@@ -89,7 +56,7 @@ class ControlLaw(Protocol):
         ...
 
     def is_moving(self) -> bool:
-        """Return whether a move or stance is made, or the goal of one is kept."""
+        """Return whether a move is made, or its goal is kept."""
         ...
 
     def stuck_motor(self) -> int:

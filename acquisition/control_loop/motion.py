@@ -4,7 +4,7 @@ An arm whose model, motors or encoders are not what they are taken for moves by 
 it runs away in hold, or damping does not slow it down. No single limit of speed tells
 that from a hand that pushes. The kinetic energy does, with how long the arm has been
 asked to stand still and how far the sole has gone since. What a sound arm does in
-sessions, stances and calibrations stays below half of each limit.
+sessions and calibrations stays below half of each limit.
 """
 
 from collections.abc import Sequence
@@ -99,7 +99,7 @@ class MotionMemory(NamedTuple):
         powered_ns: since when its motors have had power [ns].
         since_ns: since when the same has been asked for [ns].
         state: that.
-        is_moving: in hold, a move or stance.
+        is_moving: in hold, a move.
         sole: where it was then [m].
         energy: that it had then [J]; filtered velocities show it a little later.
         least: the least since [J].

@@ -37,8 +37,7 @@ class CommandKind(IntEnum):
     SET_BIAS = 3  # values: the sensor's reading without load, six of them
     MOVE = 4  # values: joint positions to go to, seven of them, and the speed
     LEAVE = 5  # end the loop; the arm is idle by then, or is made so
-    STAND = 6  # values: what the sole is to do, five numbers as of `SoleGoal`
-    PROVE = 7  # values: what the arm is given, four numbers as of `ProofGoal`
+    PROVE = 6  # values: what the arm is given, four numbers as of `ProofGoal`
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,6 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from acquisition.clock import NS_PER_S, PERIOD_NS, Clock
-from acquisition.control_loop.law import SoleGoal
 from acquisition.control_loop.proof import ProofGoal
 from acquisition.control_loop.states import ArmState, ControlStatus
 from acquisition.ipc.commands import CommandKind, CommandQueue, LoopStatus, StatusSlot
@@ -101,10 +100,6 @@ class LoopClient:
         No joint is faster than `speed` [rad/s] on the way.
         """
         self._asked = self._commands.post(CommandKind.MOVE, values=(*goal, speed))
-
-    def stand(self, goal: SoleGoal) -> None:
-        """Ask for what the sole is to do, in hold; again at least every 0.1 s."""
-        self._commands.post(CommandKind.STAND, values=goal.values)
 
     def prove(self, goal: ProofGoal) -> None:
         """Ask for a proof, in hold."""

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from acquisition.clock import RATE_HZ
 from acquisition.control_loop.cycle import Cycle
 from acquisition.control_loop.faults import Fault, verdict_for
-from acquisition.control_loop.law import SoleGoal
 from acquisition.control_loop.loop import LoopStats, Tick
 from acquisition.control_loop.proof import ProofGoal
 from acquisition.control_loop.states import ArmState
@@ -108,8 +107,6 @@ class LoopServer:
         elif kind is CommandKind.MOVE:
             *goal, speed = command.values[:8]
             cycle.move_to(tuple(goal), speed)
-        elif kind is CommandKind.STAND:
-            cycle.stand(SoleGoal(*command.values[:5]))
         elif kind is CommandKind.PROVE:
             cycle.prove(ProofGoal.of(command.values))
         else:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from experiments.arguments import (
     add_allow_missing,
@@ -15,11 +14,6 @@ from experiments.arguments import (
     add_seed,
     add_shard,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from experiments.session.store import SessionFolder
 
 EXAMPLES = """\
   traction report S012                             one session, in its own folder
@@ -46,8 +40,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the report of one session or of a study."""
-    import json
-
     from acquisition.extras import require_extra
 
     require_extra("report")
@@ -72,13 +64,6 @@ def run(args: argparse.Namespace) -> int:
     choices = analysis_choices(args)
     console = PageRecorder() if args.json else Console(color=not args.no_color)
     data = Path(args.data)
-    if not args.all and (standing := _stance_sessions(data, args.sessions)):
-        tell_missing(standing, console, allow_missing=args.allow_missing)
-        page = _report_stances(standing, data)
-        names = {"sessions": [session.id for session in standing], "page": str(page)}
-        shown = json.dumps(names) if args.json else f"Open in a browser: {page}"
-        Console(color=False).say(shown)
-        return 0
     sessions = choose_sessions(data, args.sessions, every=args.all)
     matrix = load_settings(args.config).matrix
     order = [row.name for row in matrix.terrains]
@@ -142,65 +127,3 @@ def _as_json(page: Path, sessions: list[str], missing: list[str]) -> str:
         "notes": numbers["notes"],
     }
     return json.dumps(content, indent=1, ensure_ascii=False)
-
-
-def _stance_sessions(data: Path, names: Sequence[str]) -> list[SessionFolder]:
-    """Return the named sessions if they are of stances, none if they are of pushes.
-
-    Raises:
-        SessionError: there is no such session, or both kinds are named.
-    """
-    from acquisition.errors import SessionError
-    from experiments.session.store import find_session
-
-    sessions = [find_session(data, name) for name in dict.fromkeys(names)]
-    standing = [session for session in sessions if session.is_of_stances]
-    if standing and len(standing) < len(sessions):
-        raise SessionError(
-            f"{standing[0].id} is of stances, others are of pushes.",
-            hint="Report them apart. Nothing was written.",
-        )
-    return standing
-
-
-def _report_stances(sessions: Sequence[SessionFolder], data: Path) -> Path:
-    """Write the page of sessions of stances; return it.
-
-    One session is reported into its own folder, several into `data`/stances.
-
-    Raises:
-        SessionError: no session has a kept stance, or a file is not what it was.
-    """
-    from acquisition.clock import SystemClock
-    from acquisition.errors import SessionError
-    from analysis.report.page import ReportContext
-    from analysis.report.stance_page import StanceGroup, stance_html
-    from experiments.session.data_files import write_text
-    from experiments.session.stance_task import read_stance_task, stance_outcomes
-    from experiments.session.store import iso_utc
-
-    groups: list[StanceGroup] = []
-    for session in sessions:
-        task = read_stance_task(session)
-        outcomes = [
-            outcome for _, group in stance_outcomes(session) for outcome in group
-        ]
-        if task is not None and outcomes:
-            groups.append(
-                StanceGroup(session.terrain, task.name, task.request, outcomes)
-            )
-    if not groups:
-        raise SessionError(f"{', '.join(s.id for s in sessions)}: no kept stances.")
-    count = sum(len(group.outcomes) for group in groups)
-    terrains = dict.fromkeys(group.terrain for group in groups)
-    context = ReportContext(
-        title="Traction " + (sessions[0].id if len(sessions) == 1 else "stances"),
-        subtitle=f"{count} stances on {', '.join(terrains)}",
-        is_simulated=sessions[0].is_simulated,
-        is_foreign=False,
-        generated_utc=iso_utc(SystemClock().utc_ns()),
-    )
-    own = sessions[0].path / "report" if len(sessions) == 1 else data / "stances"
-    own.mkdir(parents=True, exist_ok=True)
-    write_text(own / "index.html", stance_html(context, groups))
-    return own / "index.html"

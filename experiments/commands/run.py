@@ -16,7 +16,6 @@ from experiments.rig.truth_options import add_truth, check_truth, mount_of
 if TYPE_CHECKING:
     from experiments.run.resume import ResumeRequest
     from experiments.run.session import SessionRequest
-    from experiments.session.stance_task import StanceTask
     from experiments.session.unfinished import UnfinishedSession
 
 EXAMPLES = """\
@@ -32,11 +31,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run one session and return the exit code."""
-    return record_session(args)
-
-
-def record_session(args: argparse.Namespace, stance: StanceTask | None = None) -> int:
-    """Run one session of pushes, or of stances; return the exit code."""
     from experiments.operator.console import Console
     from experiments.operator.scripted import choose_operator
     from experiments.rig.rig import FakeOptions
@@ -72,7 +66,6 @@ def record_session(args: argparse.Namespace, stance: StanceTask | None = None) -
         faults=tuple(args.fault),
         can_log=args.can_log,
         foresight=args.foresight,
-        stance=stance,
     )
     unfinished = _make_room(request, is_new=args.new)
     if unfinished is not None:

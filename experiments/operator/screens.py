@@ -183,7 +183,6 @@ class ReadyView:
         table: the kept trials, oldest first.
         given: the newest verdict while it can be taken back; empty afterwards.
         undo_left: how long that is [s].
-        arm: what the arm does.
     """
 
     session: str
@@ -201,14 +200,13 @@ class ReadyView:
     table: tuple[KeptRow, ...] = ()
     given: str = ""
     undo_left: float = 0.0
-    arm: str = "floating"
 
 
 def ready_lines(view: ReadyView, width: int = 80) -> list[str]:
     """Return the screen between two trials for a terminal of `width` characters."""
     left = "" if view.left is None else f" · left about {ceil(view.left / 60)} min"
     lines = [
-        f"ARM: {view.arm}  {view.session} {view.terrain} · trial {view.trial} of "
+        f"ARM: floating  {view.session} {view.terrain} · trial {view.trial} of "
         f"{view.wanted} · kept {view.kept} · rejected {view.rejected}",
         f"Elapsed {_clock(view.elapsed)}{left}",
         *kept_table(view.table, width, _TABLE_ROWS),

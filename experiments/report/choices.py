@@ -115,13 +115,9 @@ def choose_sessions(
         hint = "For example: traction report S012"
         raise SessionError("Name the sessions to report, or use --all.", hint=hint)
     if every:
-        pushed = [s for s in list_sessions(data) if not s.is_of_stances]
-        sessions = [s for s in pushed if s.kept_trials() or _keeps(s)]
+        sessions = [s for s in list_sessions(data) if s.kept_trials() or _keeps(s)]
     else:
         sessions = [find_session(data, name) for name in dict.fromkeys(names)]
-    if standing := [s.id for s in sessions if s.is_of_stances]:
-        what = f"{' '.join(standing)}: sessions of stances have no pushes to report."
-        raise SessionError(what, hint="Leave it out.")
     if not sessions:
         hint = "Record some: traction run S0 --fake --fast"
         raise SessionError(f"There are no kept trials in {data}.", hint=hint)

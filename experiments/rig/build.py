@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition.clock import PERIOD_NS, Clock
+from acquisition.clock import Clock
 from acquisition.control_loop.cycle import Cycle, CycleOutputs
 from acquisition.control_loop.limits import GuardLimits
 from acquisition.devices import WrenchSample, WrenchSensor
@@ -31,7 +31,6 @@ from wam.control.controller import FootController
 from wam.control.friction_compensation import FrictionCompensation
 from wam.control.joint_lock import LockGains
 from wam.control.soft_walls import SoftWalls, Walls
-from wam.control.sole_impedance import SoleImpedance
 from wam.driver.arm import WamArm
 from wam.driver.health import health_metadata
 from wam.driver.puck_properties import known_table
@@ -279,10 +278,6 @@ def build_loop_server(parts: LoopConfig) -> LoopServer:
         SoftWalls(build_walls(parts.rig, model.constants)),
         parts.law.compensation,
     )
-    if parts.is_simulated:  # a foot that stands by itself was never tried on an arm
-        law.impedance = SoleImpedance(
-            model, frame.axes(), np.array(frame.far_end), frame.travel, PERIOD_NS * 1e-9
-        )
     cycle = Cycle(
         parts.arm,
         parts.sensor,

@@ -42,10 +42,8 @@ from wam.model.moments import moments_of_links
 from wam.model.tool import Tool, tool_metadata
 
 if TYPE_CHECKING:
-    from analysis.terrains.contact_law import ContactLaw
     from fakes.serving.puck_server import PuckServer
     from fakes.serving.sensor_server import SensorLine, SensorServer
-    from fakes.world.stance_bed import StanceBed
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,36 +140,6 @@ class SimulatedRig:
         if weight == "shipped":
             return weighed_arm(constants, constants.mus + change)
         return weighed_arm(constants, moments_of_links(constants) + change)
-
-
-def stance_bed(
-    rig: RigSettings,
-    row: TerrainRow,
-    number: tuple[int, int],
-    law: ContactLaw | None = None,
-) -> StanceBed:
-    """Return a bed of a terrain under a foot without an arm, for stances.
-
-    Args:
-        rig: rig.toml, for the foot.
-        row: row of the matrix.
-        number: seed, and trial of that seed.
-        law: whose traction takes the place of the simulated ground's, by that seed.
-
-    Raises:
-        SettingsError: this ground is not simulated.
-    """
-    from fakes.ground.law_ground import LawGround
-    from fakes.ground.terrain import GroundChoice, PlateParameters
-    from fakes.world.stance_bed import StanceBed
-
-    sole, frame = rig.feet[row.foot].simulate, terrain_frame(row)
-    plate = None if sole is None else PlateParameters(**sole.model_dump())
-    choice = GroundChoice(row.stones, row.foot, plate, dict(row.simulate))
-    bed = StanceBed(row.name, choice, frame.incline, frame.travel, number)
-    if law is not None:
-        bed.ground = LawGround(bed.ground, law.begin(number[0]))
-    return bed
 
 
 def wrong_rigs() -> dict[str, str]:

@@ -30,17 +30,8 @@ _ASIDE = frozenset(
 class SimulatedHand:
     """Moves the simulated hand and pendant as the prompts ask."""
 
-    def __init__(
-        self, simulation: SimulationControl, *, lets_stand: bool = False
-    ) -> None:
-        """Follow the prompts of one session.
-
-        Args:
-            simulation: the hand and the pendant.
-            lets_stand: the foot stands by itself; the hand puts it down nowhere.
-        """
+    def __init__(self, simulation: SimulationControl) -> None:
         self._simulation = simulation
-        self._lets_stand = lets_stand
         self._seen: tuple[Prompt, int, int] | None = None
 
     def follow(self, state: PromptState) -> None:
@@ -60,15 +51,9 @@ class SimulatedHand:
             self._simulation.touch(state.trial)
         elif state.prompt is Prompt.READY:
             self._simulation.prepare(state.trial + 1000 * (state.attempt - 1))
-            if self._lets_stand:
-                self._simulation.let_go()
-            else:
-                self._simulation.put_down()
+            self._simulation.put_down()
         elif state.prompt is Prompt.RECORDING:
-            if self._lets_stand:
-                self._simulation.stand()
-            else:
-                self._simulation.push()
+            self._simulation.push()
         elif state.prompt is Prompt.LAY_DOWN:
             self._simulation.take()
         elif state.prompt is Prompt.REVIEW:

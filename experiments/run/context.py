@@ -22,7 +22,6 @@ from experiments.session.journal import Journal
 from experiments.session.photos import Camera
 from experiments.session.reducer import KEEP, REJECT
 from experiments.session.sidecar import TrialName
-from experiments.session.stance_task import StanceTask
 from experiments.session.states import Event
 from experiments.trial.files import SessionMetadata, TrialArchive
 
@@ -94,7 +93,6 @@ class RunServices:
         camera: where photos of the bed come from.
         opened_ns: when it was opened [ns].
         kept_before: how many trials were kept until then.
-        stance: what the foot is to do by itself; None = it is pushed.
     """
 
     console_loop: ConsoleLoop
@@ -109,7 +107,6 @@ class RunServices:
     camera: Camera
     opened_ns: int
     kept_before: int
-    stance: StanceTask | None
 
     @property
     def loop_client(self) -> LoopClient:
@@ -129,12 +126,8 @@ class RunServices:
         return self.elapsed / kept * missing if kept > 0 else None
 
     def await_trial(self) -> None:
-        """Ask for what the arm does until a trial begins.
-
-        It floats in the hand that puts it down; a foot that will stand is held.
-        """
-        is_held = self.stance is not None
-        self.loop_client.request(ArmState.HOLD if is_held else ArmState.FLOAT)
+        """Let the arm float in the hand that puts it down, until a trial begins."""
+        self.loop_client.request(ArmState.FLOAT)
 
     def say(self, text: str) -> None:
         """Print one line."""
@@ -288,7 +281,6 @@ def open_context(
     console_loop: ConsoleLoop,
     metadata: SessionMetadata,
     journal: Journal,
-    stance: StanceTask | None = None,
 ) -> RunContext:
     """Return the context of a session that is opened now."""
     rig, console = console_loop.rig, console_loop.console
@@ -305,7 +297,6 @@ def open_context(
         opened_ns=rig.clock.now_ns(),
         kept_before=len(journal.state.kept),
         camera=camera_of(rig),
-        stance=stance,
     )
 
 

@@ -94,9 +94,8 @@ def ready_view(context: RunContext) -> ReadyView:
     """Return what the screen between two trials shows now, and remember its aim."""
     state, row = context.journal.state, context.rig.row
     folder = context.metadata.folder
-    is_pushed = context.stance is None
     push = context.console_loop.run_aside(lambda: next_push(folder, row))
-    context.state.aim = push.aim if is_pushed else None
+    context.state.aim = push.aim
     return ReadyView(
         session=folder.id,
         terrain=row.name,
@@ -107,13 +106,12 @@ def ready_view(context: RunContext) -> ReadyView:
         elapsed=context.elapsed,
         left=context.time_left,
         reset=row.reset,
-        suggestion=push.text if is_pushed else "",
-        enough=push.enough if is_pushed else "",
+        suggestion=push.text,
+        enough=push.enough,
         ticked=frozenset(context.state.ticked),
         table=kept_rows(folder),
         given=context.state.given.text if context.state.given is not None else "",
         undo_left=context.console_loop.undo_left,
-        arm="floating" if is_pushed else "holding; keep clear of it",
     )
 
 

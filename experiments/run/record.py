@@ -1,7 +1,6 @@
 """One trial on the loop: started, followed, ended, sealed, and what it is worth."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 
 import numpy as np
 
@@ -29,7 +28,6 @@ from experiments.rig.rig import Rig
 from experiments.run.console_loop import TICK
 from experiments.run.context import RunContext, RunServices
 from experiments.run.photo import take_photo
-from experiments.run.stances import follow_stances, stance_lines
 from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.session.sidecar import TrialName, TrialOutcome
 from experiments.session.states import Event
@@ -103,8 +101,6 @@ def record_trial(context: RunContext, name: TrialName) -> TrialOutcome:
         ProcessLostError: a process has died.
     """
     header = trial_header(context.rig, context.metadata, name)
-    if context.stance is not None:
-        header = replace(header, trial={**header.trial, **context.stance.metadata()})
     outcome = TrialOutcome("bug")
     try:
         _record(context, name, header, outcome)
@@ -151,10 +147,7 @@ def _record(
     context.feedback.give(FeedbackSignal.START)
     console_loop.show(recording_screen(context.rig, name.kept, outcome))
     try:
-        if context.stance is None:
-            _follow(context, name, outcome)
-        else:
-            follow_stances(context, context.stance, name, outcome)
+        _follow(context, name, outcome)
     finally:
         console_loop.show(None)
         context.feedback.give(FeedbackSignal.DONE)
@@ -222,10 +215,6 @@ def _end(
         f"{name.kept} {outcome.status} {outcome.seconds:.2f} s · {verified.cycles} "
         "samples · written and verified"
     )
-    if outcome.status == "complete" and context.stance is not None:
-        warnings = [f" {WARNING} {line}" for line in friction]
-        context.say_page([written, *stance_lines(context.stance, outcome), *warnings])
-        return
     if outcome.status == "complete":
         path = context.metadata.folder.trials / f"{name.kept}.mcap"
         review = context.console_loop.run_aside(

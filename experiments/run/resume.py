@@ -25,7 +25,6 @@ from experiments.session.journal import Journal, open_journal
 from experiments.session.kept_files import check_kept
 from experiments.session.lock import session_lock
 from experiments.session.reducer import refusal
-from experiments.session.stance_task import read_stance_task
 from experiments.session.states import Event, SessionPhase
 from experiments.session.store import SessionFolder
 from experiments.session.unfinished import UnfinishedSession
@@ -256,7 +255,6 @@ def _reopen(
         faults=request.faults,
         can_log=request.can_log,
         foresight=request.foresight or _path_of(before, "foresight"),
-        stance=read_stance_task(folder),
     )
     state = journal.state
     console.say(f"session {folder.id}: {len(state.kept)} of {state.wanted} kept")

@@ -11,14 +11,12 @@ from experiments.run.console_loop import ConsoleLoop
 from experiments.run.context import open_context
 from experiments.run.ready import activate, wait_ready
 from experiments.run.record import record_trial
-from experiments.run.stances import StuckFootError
 from experiments.run.stop import ArmFaultError, StopRequestedError, UndoRequestedError
 from experiments.run.tare import prove_mounting, take_end_tare, take_tare
 from experiments.run.verdicts import ask_verdict, await_undo, judge_again
 from experiments.session.data_files import write_text
 from experiments.session.journal import Journal
 from experiments.session.sidecar import TrialName
-from experiments.session.stance_task import StanceTask
 from experiments.session.states import Event
 from experiments.trial.files import SessionMetadata
 
@@ -33,11 +31,9 @@ class SessionRunner:
         console_loop: ConsoleLoop,
         metadata: SessionMetadata,
         journal: Journal,
-        stance: StanceTask | None = None,
     ) -> None:
-        self._context = open_context(console_loop, metadata, journal, stance)
+        self._context = open_context(console_loop, metadata, journal)
         self._faults = 0
-        self._stuck = 0
 
     def run(self, opening: Event, **details: object) -> int:
         """Record until nothing is left to record; return the exit code.
@@ -130,12 +126,7 @@ class SessionRunner:
         wait_ready(context, name)
         context.close_undo()
         outcome = record_trial(context, name)
-        is_stuck = outcome.status != "complete"  # in a stance: nothing to be judged
-        self._stuck = self._stuck + 1 if is_stuck else 0
-        if not is_stuck:
-            ask_verdict(context, name, outcome)
-        elif self._stuck >= FAULTS_IN_A_ROW:
-            raise StuckFootError(self._stuck, context.metadata.folder.id)
+        ask_verdict(context, name, outcome)
 
     def _make_safe(self) -> str:
         """Idle the arm and return its state in words; safe to repeat."""

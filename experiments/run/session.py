@@ -33,13 +33,11 @@ from experiments.rig.simulation import SimulatedHand
 from experiments.run.console_loop import ConsoleLoop
 from experiments.run.context import busy_load
 from experiments.run.runner import SessionRunner
-from experiments.run.stances import check_stances
 from experiments.run.stop import StopFlag, handle_signals
 from experiments.session.data_files import write_json, write_text
 from experiments.session.journal import Journal
 from experiments.session.lock import session_lock
 from experiments.session.recorded_conditions import write_conditions
-from experiments.session.stance_task import StanceTask
 from experiments.session.states import Event
 from experiments.session.store import create_session, session_utc_ns
 from experiments.session.unbegun import clear_unbegun
@@ -69,7 +67,6 @@ class SessionRequest:
         can_log: file that the bus is logged to.
         foresight: terrain database to foresee with; None = that of the study's report,
             where there is one.
-        stance: what the foot is to do by itself; None = it is pushed.
     """
 
     data: Path
@@ -83,7 +80,6 @@ class SessionRequest:
     faults: tuple[str, ...] = ()
     can_log: Path | None = None
     foresight: Path | None = None
-    stance: StanceTask | None = None
 
     @property
     def who(self) -> str:
@@ -122,14 +118,10 @@ def run_session(request: SessionRequest, mode: OpenMode) -> int:
         host_faults = HostFaults(rig)
         faults = plan_faults(request.faults, rig.simulation, host_faults)
         kind = "SIMULATED" if rig.is_simulated else "LIVE RIG"
-        word = "run" if request.stance is None else "stance"
-        console.say(f"traction {word} {request.row.name}        {kind}")
+        console.say(f"traction run {request.row.name}        {kind}")
         differences = _check_conditions(rig_conditions(rig), mode, console)
         if source is not None:
             _foresee(source, rig, console)
-        if request.stance is not None:
-            check_stances(rig, request.stance, request.data)
-            console.say(request.stance.text)
         try:
             page = _check_rig(request, rig, host_faults)
         except UnfitDeviceError as error:
@@ -148,7 +140,7 @@ def run_session(request: SessionRequest, mode: OpenMode) -> int:
                 write_conditions(journal.folder, {**rig_conditions(rig), **sensor})
             metadata = _write_metadata(request, rig, page, journal)
             console_loop = ConsoleLoop(rig, console, operator, stop, hand, faults)
-            runner = SessionRunner(console_loop, metadata, journal, request.stance)
+            runner = SessionRunner(console_loop, metadata, journal)
             code = runner.run(mode.event, **_details(request, mode, differences))
     for plan in faults.plans if faults is not None else ():
         text = plan.to_text()
@@ -161,7 +153,7 @@ def _hand(request: SessionRequest, rig: Rig) -> SimulatedHand | None:
     """Return the hand of a simulated operator, None on a real rig."""
     if rig.simulation is None:
         return None
-    return SimulatedHand(rig.simulation, lets_stand=request.stance is not None)
+    return SimulatedHand(rig.simulation)
 
 
 def _foresight_of(request: SessionRequest, mode: OpenMode) -> ForesightSource | None:
@@ -245,8 +237,6 @@ def _open_journal(
     request.console.say(f"session {folder.id}: {folder.path}")
     write_text(folder.path / "config.toml", rig.settings.rig_text)
     write_text(folder.path / "matrix.toml", rig.settings.matrix_text)
-    if request.stance is not None:
-        request.stance.write(folder)
     return Journal(folder, rig.clock)
 
 

@@ -13,7 +13,7 @@ from experiments.run.context import RunContext, RunServices
 from experiments.run.photo import collect_photo
 from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.session.annotations import LONGEST_TEXT, clean_text
-from experiments.session.sidecar import STANCES, TrialName, TrialOutcome
+from experiments.session.sidecar import TrialName, TrialOutcome
 from experiments.session.states import Event
 from experiments.session.trial_files import add_remark
 
@@ -34,7 +34,7 @@ def ask_verdict(context: RunContext, name: TrialName, outcome: TrialOutcome) -> 
     context.say_keys(Prompt.REVIEW)
     context.state.fault_context = FaultContext(name.kept, prompt=Prompt.REVIEW)
     least = MINIMUM_TRAVEL_SHARE * context.rig.frame.travel
-    is_whole = outcome.displacement >= least or outcome.reason == STANCES
+    is_whole = outcome.displacement >= least
     is_asked = not is_whole  # one that is not whole is rejected by [q] at once
     feet = context.watch_foot()
     while True:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from acquisition.trial_file.verify import VerifiedFile
 
-STANCES = "stances"  # all of them were made
-COMPLETE = frozenset({"travel", "key", "time-limit", STANCES})
+COMPLETE = frozenset({"travel", "key", "time-limit"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,17 +39,14 @@ class TrialOutcome:
     """How a recording ended.
 
     Attributes:
-        reason: "travel", "key", "time-limit", "stances", "interrupted" or a fault's
-            name.
+        reason: "travel", "key", "time-limit", "interrupted" or a fault's name.
         seconds: since the start [s].
         displacement: of the foot along the container [m].
-        stances: those that are over, as plain values; none of a push.
     """
 
     reason: str
     seconds: float = 0.0
     displacement: float = 0.0
-    stances: Sequence[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
 
     @property
     def status(self) -> str:
@@ -63,9 +58,7 @@ def sidecar_of(
     name: TrialName, verified: VerifiedFile | None, outcome: TrialOutcome
 ) -> dict[str, object]:
     """Return the sidecar of an attempt without a verdict; no file where None."""
-    stances = {"stances": list(outcome.stances)} if outcome.stances else {}
     return {
-        **stances,
         "trial": name.kept,
         "attempt": name.attempt,
         "sha256": verified.sha256 if verified else "",

@@ -30,7 +30,7 @@ from experiments.session.data_files import (
     writing,
 )
 
-JOURNAL_FILE, STANCE_FILE = "events.jsonl", "stance.json"
+JOURNAL_FILE = "events.jsonl"
 SUMMARY_FILE = "session.json"  # written after each line of the journal
 FOLDS = ".folds"  # below the data: finished folds, so that a study resumes
 _FOLDER = re.compile(
@@ -72,11 +72,6 @@ class SessionFolder:
     def faults(self) -> Path:
         """Folder of flight records."""
         return self.path / "faults"
-
-    @property
-    def is_of_stances(self) -> bool:
-        """Whether the foot stands in its trials, instead of being pushed."""
-        return is_there(self.path / STANCE_FILE)
 
     def append_event(self, event: Mapping[str, object]) -> int:
         """Append one line to the journal, force it to the disk; return its number.

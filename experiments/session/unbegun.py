@@ -6,12 +6,12 @@ from pathlib import Path
 from acquisition.clock import NS_PER_S
 from acquisition.errors import TractionError
 from experiments.session.lock import LOCK_FILE, owner_of
-from experiments.session.store import STANCE_FILE, SessionFolder, list_sessions
+from experiments.session.store import SessionFolder, list_sessions
 
 # What is written before the first line of the journal.
 _BEFORE = frozenset(
     {"config.toml", "matrix.toml", "diff.patch", "preflight.json", "provenance.json"}
-    | {LOCK_FILE, STANCE_FILE}
+    | {LOCK_FILE}
 )
 _YOUNG_NS = 60 * NS_PER_S  # another process may be about to lock it
 

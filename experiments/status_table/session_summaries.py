@@ -33,7 +33,6 @@ class SessionSummary:
         kept: names of the kept trials whose checksum is right, "T01".
         pushes: how many kept trials tell about the next push.
         rejected: how many attempts were rejected or interrupted.
-        is_of_stances: the foot stands in its trials.
         is_resumable: its journal leaves something to be recorded, or to be put away.
         operator: who recorded it, as session.json has it.
         phase: where it stands, as session.json has it.
@@ -46,7 +45,6 @@ class SessionSummary:
     kept: tuple[str, ...] = ()
     pushes: int = 0
     rejected: int = 0
-    is_of_stances: bool = False
     is_resumable: bool = False
     operator: str = ""
     phase: str = ""
@@ -114,7 +112,6 @@ def _summarise(
             kept=tuple(path.stem for path in kept),
             pushes=len(kept_pushes(folder)),
             rejected=rejected,
-            is_of_stances=folder.is_of_stances,
             is_resumable=is_unfinished(replay(events)),
             operator=str(fields.get("operator", "")),
             phase=str(fields.get("phase", "opening")),

@@ -237,7 +237,7 @@ def _plain(summary: SessionSummary) -> Mapping[str, object]:
 
 
 _COUNTED: Mapping[str, type] = {"pushes": int, "rejected": int}
-_STATED: Mapping[str, type] = {"is_of_stances": bool, "is_resumable": bool}
+_STATED: Mapping[str, type] = {"is_resumable": bool}
 _WORDS: Mapping[str, type] = {"operator": str, "phase": str}
 
 

@@ -124,11 +124,11 @@ def count_rows(
 
 
 def counted_of(seen: Sequence[SeenSession], where: Where) -> list[SeenSession]:
-    """Return the sessions of pushes with these values that can be read."""
+    """Return the sessions with these values that can be read."""
     return [
         s
         for s in seen
-        if s.summary.problem is None and not s.summary.is_of_stances
+        if s.summary.problem is None
         if where.matches(s.facts) and where.matches(recorded_facts(s.folder, where))
     ]
 

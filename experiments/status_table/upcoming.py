@@ -53,7 +53,7 @@ def next_steps(
         if text:
             number = session.folder.id
             steps.append(f"{text} To go on: traction resume {number}{option}")
-    done = [s.folder.terrain for s in own if not s.summary.is_of_stances]
+    done = [s.folder.terrain for s in own]
     asked = {row.name for row in matrix.rows if where.matches(facts_of_row(row))}
     order = [name for name in suggest_order(matrix, done) if name in asked]
     if order:

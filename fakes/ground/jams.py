@@ -124,10 +124,6 @@ class JamSequence:
         """Meet stones that have not borne the foot, at `x` [m]."""
         self._form(x, 0.0)
 
-    def capacity_at(self, F_n: float) -> float:
-        """Return the force that the jam can bear under `F_n` [N]; nothing ages."""
-        return self._capacity(0.0, F_n)
-
     def _capacity(self, dt: float, F_n: float) -> float:
         """Return the force that the jam can bear now [N]."""
         if self._is_loaded:

@@ -71,11 +71,6 @@ class StoneBed:
         """Return the height of the undisturbed bed at `x` [m]."""
         return value_at(self._profile, x)
 
-    def capacity(self, x: float, F_n: float) -> float:
-        """Return the traction that the foot at `x` [m] can be given now [N]."""
-        del x
-        return self._jams.capacity_at(F_n)
-
     def _is_away(self, x: float) -> bool:
         """Whether a lifted foot is far from where it stood: the bed is fresh there."""
         return self._stood_at is not None and abs(x - self._stood_at) >= self.away

@@ -75,10 +75,6 @@ class Plate:
             "b": self._parameters.b,
         }
 
-    def capacity(self, x: float, F_n: float) -> float:
-        """Return the friction that the foot at `x` [m] can be given [N]."""
-        return self._parameters.mu_s * self._level * value_at(self._texture, x) * F_n
-
     def step(self, dt: float, motion: Motion) -> Contact:
         """Advance the bristle by `dt` and return the force."""
         p = self._parameters
@@ -119,10 +115,6 @@ class Terrain(Protocol):
 
     def truth(self) -> dict[str, float]:
         """Return the parameters in force [SI]."""
-        ...
-
-    def capacity(self, x: float, F_n: float) -> float:
-        """Return the traction at which a foot at `x` [m] under `F_n` slips now [N]."""
         ...
 
     def step(self, dt: float, motion: Motion) -> Contact:
@@ -217,10 +209,6 @@ class BesideGround:
     def truth(self) -> dict[str, float]:
         """Return the parameters in force [SI]."""
         return self.ground.truth()
-
-    def capacity(self, x: float, F_n: float) -> float:
-        """Return the traction at which a foot at `x` [m] under `F_n` slips now [N]."""
-        return self.ground.capacity(x, F_n)
 
 
 FREE = 0.045  # from the centre line until the sole's edge meets a plank [m]

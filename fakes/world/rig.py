@@ -301,17 +301,6 @@ class LocalSimulation:
         self.rig.plant.hand.push(self._pace, self.rig.random.hand)
         self.rig.plant.start_truth()
 
-    def stand(self) -> None:
-        """Let the hand let go, and begin to write the truth."""
-        self.rig.plant.hand.let_go()
-        self.rig.plant.start_truth()
-
-    def capacity(self) -> float:
-        """Return the traction that the ground can bear under the foot now [N]."""
-        plant = self.rig.plant
-        F_n = plant.contact_force[2]
-        return self.rig.ground.capacity(plant.sole_x, F_n) if F_n > 0.0 else 0.0
-
     def pendant(self, button: PendantAction) -> None:
         """Press the pendant: "activate", "idle" or "estop"."""
         self.rig.network.pendant(button)

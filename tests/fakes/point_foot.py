@@ -14,16 +14,11 @@ from fakes.ground.terrain import GroundChoice, Terrain, make_terrain
 from fakes.plant.push import HandView, Pace, Push
 from fakes.randomness import trial_generators
 from fakes.sensor.errors import FORCE_ERRORS, SensorErrors
-from fakes.world.stance_bed import (
-    COULOMB,
-    DT,
-    MASS_X,
-    MASS_Z,
-    PERIOD,
-    SUBSTEPS,
-    VISCOUS,
-)
 
+SUBSTEPS, DT = 4, 0.0005
+PERIOD = SUBSTEPS * DT
+MASS_X, MASS_Z = 4.0, 3.5  # the arm's inertia at the foot, with the forearm [kg]
+COULOMB, VISCOUS = 0.5, 2.0  # joint drag seen at the foot: N, N s/m
 GROUNDS = {
     "S0": ("small", "tread", 0.0),
     "S10": ("small", "tread", 10.0),

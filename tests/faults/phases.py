@@ -2,4 +2,3 @@
 
 PHASES = ("preflight", "idle", "tare", "ready", "recording", "review", "end")
 MOVING = "moving"  # the arm by itself, between two poses of a calibration
-STANDING = "standing"  # the arm by itself, its foot pressed on the ground in a stance

@@ -23,7 +23,7 @@ from fakes.pucks.bank import PuckBank
 from fakes.world import plain_world
 from fakes.world.rig import FakeRig, LocalSimulation
 from tests.experiments.program import Done, journal, run_short, sidecar, traction
-from tests.faults.phases import MOVING, STANDING
+from tests.faults.phases import MOVING
 from tests.faults.truth import TruthLog, watch_truth
 from wam.calibration import poses
 
@@ -31,7 +31,6 @@ MS = 1_000_000
 CALIBRATION = "gravity.toml"
 _AFTERWARDS_NS = 500 * MS
 MOVING_SPEED = 0.3  # rad/s; the trapezoid is on its way
-_PUSHING = 2.0  # N; the foot is loaded and pushes
 _FRESH_NS = 5 * MS  # torques older than two cycles are the last ones
 _PROMPTS = {
     "tare": (Prompt.LIFT, 0.9),  # still since 0.6 s, the mean is being taken
@@ -127,16 +126,13 @@ Strike = Callable[[SimulatedScene], None]
 def run_with(inject: Strike, phase: str, config: Path, data: Path) -> Seen:
     """Run a session of one trial in which `inject` comes once, in `phase`.
 
-    While the arm moves by itself, it is a short calibration of gravity; while it stands
-    by itself, a session of one stance.
+    While the arm moves by itself, it is a short calibration of gravity.
     """
     with pytest.MonkeyPatch.context() as patch:
         logs, scenes = watch_truth(patch), _watch(patch)
         _at(patch, phase, scenes, inject)
         if phase == MOVING:
             done = _calibrate(patch, config, data)
-        elif phase == STANDING:
-            done = _stand(data)
         else:
             done = run_short(config, data, "TF", 1)
         _let_the_world_go_on(scenes[0])
@@ -187,14 +183,6 @@ def _calibrate(patch: pytest.MonkeyPatch, config: Path, data: Path) -> Done:
     options = ("--fake", "--fast", "--poses", 3, "--force", "--config", config)
     out = ("--data", data, "--out", data / CALIBRATION)
     return traction("calibrate", "gravity", *options, *out)
-
-
-def _stand(data: Path) -> Done:
-    """Let the foot stand once, in a container of the usual length."""
-    data.mkdir()
-    options = ("--fake", "--fast", "--operator-script", "auto", "--data", data)
-    asked = ("--policy", "constant-mu", "--stances", 1, "--trials", 1, "--seed", 1)
-    return traction("stance", "TF", *asked, *options)
 
 
 def resume(data: Path) -> Done:
@@ -278,10 +266,6 @@ def _at(patch, phase: str, scenes: list[SimulatedScene], inject: Strike) -> None
             if asked.prompt is Prompt.MOVING and abs(qd).max() > MOVING_SPEED:
                 strike_once()
             return usual_answer(operator, asked)
-        if phase == STANDING and asked.prompt is Prompt.RECORDING:
-            if scenes[0].rig.plant.contact_force[0] < -_PUSHING:
-                strike_once()
-            return ""
         prompt, since = _PROMPTS.get(phase, (None, 0.0))
         if asked.prompt is prompt and asked.since > since:
             is_first = not scenes[0].strikes

@@ -18,7 +18,6 @@ FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
         ("trials", 1),
         ("trial_sets", 1),
         ("models", 3),
-        ("gym", 1),
     ],
 )
 def test_examples_of_a_module_print_what_they_say(module, least):
@@ -48,13 +47,3 @@ def test_the_example_of_the_readme_runs_as_it_is(tmp_path, monkeypatch, workplac
     monkeypatch.chdir(tmp_path)
     exec(compile(block, str(page), "exec"), {})
     assert (tmp_path / "T01.pdf").stat().st_size > 1000
-
-
-@pytest.mark.slow
-def test_the_page_for_policies_runs_as_it_is(tmp_path, monkeypatch, capsys):
-    pytest.importorskip("gymnasium")
-    page = ROOT / "docs" / "own-policy.md"
-    (block,) = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
-    monkeypatch.chdir(tmp_path)
-    exec(compile(block, str(page), "exec"), {})
-    assert "slipped" in capsys.readouterr().out

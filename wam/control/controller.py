@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from acquisition.control_loop.details import MotionExcess
-from acquisition.control_loop.law import ControlLaw, SoleGoal
+from acquisition.control_loop.law import ControlLaw
 from acquisition.control_loop.proof import ProofGoal
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import ArmReading, Vector
@@ -21,7 +21,6 @@ from wam.control.position_control import (
 )
 from wam.control.proof import Proof
 from wam.control.soft_walls import SoftWalls
-from wam.control.sole_impedance import SoleImpedance
 from wam.model.arm_model import ArmModel
 from wam.model.gravity import VirtualMass, compensation
 
@@ -49,22 +48,8 @@ class Moving:
         return move_reference(self.path, (now_ns - self.begun_ns) * 1e-9)
 
 
-@dataclass(slots=True, eq=False)
-class Standing:
-    """The mode of an arm in hold whose foot stands by itself.
-
-    Attributes:
-        impedance: of the sole.
-        tau: what it asked for last, beyond gravity [N m], shape (7,).
-    """
-
-    impedance: SoleImpedance
-    tau: Vector
-
-
-# In hold an arm may move or stand by itself, or be in a proof; every other mode is its
-# bare state.
-Mode = ArmState | Moving | Standing | Proof
+# In hold an arm may move by itself or be in a proof; other modes are bare states.
+Mode = ArmState | Moving | Proof
 
 
 class FootController(ControlLaw):
@@ -77,10 +62,7 @@ class FootController(ControlLaw):
     that carries the foot. The virtual mass is ramped to 0 in all but float. Joint 7 is
     locked in all four, and soft walls stand before the stops. In hold the arm can be
     sent somewhere; joint PD then follows the move and keeps the goal until a state is
-    entered, hold included. In hold a foot can also stand by itself (`sole_impedance`).
-
-    Attributes:
-        impedance: of a foot that stands by itself; None = it cannot.
+    entered, hold included.
     """
 
     def __init__(
@@ -102,7 +84,6 @@ class FootController(ControlLaw):
         self._largest = TORQUE_SHARE * limits
         self._mode: Mode = ArmState.IDLE
         self._watch = MotorWatch(model.constants)
-        self.impedance: SoleImpedance | None = None
 
     def enter(self, state: ArmState, reading: ArmReading) -> None:
         """Begin `state`; torques change continuously except for the damping.
@@ -160,30 +141,11 @@ class FootController(ControlLaw):
         self._watch.begin()
         return path.duration
 
-    def stand(self, goal: SoleGoal, reading: ArmReading) -> None:
-        """Let the sole do what `goal` says; joint 7 stays locked. Only in hold.
-
-        Raises:
-            ValueError: the arm does not hold, moves, cannot stand, or `goal` asks for
-                what is beyond bounds.
-        """
-        if self.impedance is None:
-            raise ValueError("this arm does not stand by itself")
-        if isinstance(self._mode, Standing):
-            self.impedance.aim(goal, reading)
-            return
-        if self._mode is not ArmState.HOLD:
-            raise ValueError("a foot stands by itself in hold only")
-        self.impedance.begin(reading)
-        self.impedance.aim(goal, reading)
-        self._hold.release()
-        self._mode = Standing(self.impedance, np.zeros(7))
-
     def prove(self, goal: ProofGoal, reading: ArmReading) -> None:
         """Give the arm what `goal` says and nothing else; only in hold.
 
         Raises:
-            ValueError: the arm does not hold, moves or stands, or `goal` is none.
+            ValueError: the arm does not hold or moves, or `goal` is none.
         """
         if self._mode is not ArmState.HOLD and not self.is_proving():
             raise ValueError("an arm is proved in hold only")
@@ -220,8 +182,6 @@ class FootController(ControlLaw):
         match self._mode:
             case Moving() as move:
                 tau = self._move_torque(move, reading, gravity, lock)
-            case Standing() as stance:
-                tau = self._stance_torque(stance, reading, gravity, lock)
             case ArmState.FLOAT:
                 tau = gravity.copy()
                 tau[LOCKED_JOINT] += lock
@@ -236,8 +196,8 @@ class FootController(ControlLaw):
         return tau, gravity
 
     def is_moving(self) -> bool:
-        """Return whether a move or stance is made, or the goal of one is kept."""
-        return isinstance(self._mode, Moving | Standing)
+        """Return whether a move is made, or its goal is kept."""
+        return isinstance(self._mode, Moving)
 
     def stuck_motor(self) -> int:
         """Return the motor that the move turns in vain, 1-7; 0 = none."""
@@ -275,15 +235,6 @@ class FootController(ControlLaw):
         move.stuck_motor = self._watch.stuck_motor(q, tau - gravity, reading)
         return tau
 
-    def _stance_torque(
-        self, stance: Standing, reading: ArmReading, gravity: Vector, lock: float
-    ) -> Vector:
-        """Return `gravity` and what the sole's impedance asks for [N m], (7,)."""
-        stance.tau = stance.impedance.torque(reading)
-        tau = np.clip(gravity + stance.tau, -self._largest, self._largest)
-        tau[LOCKED_JOINT] = gravity[LOCKED_JOINT] + lock
-        return tau
-
     def _hold_torque(
         self,
         reading: ArmReading,
@@ -319,19 +270,15 @@ class FootController(ControlLaw):
             np.clip(tau, -self._largest, self._largest, out=tau)
 
     def _own_torque(self, reading: ArmReading) -> Vector | None:
-        """Return what a move's spring or a stance gives beyond gravity [N m], (7,).
+        """Return the torque of a move's spring [N m], shape (7,); None without a move.
 
-        The springs of hold begin with it. None where the arm does nothing by itself.
+        The springs of hold begin with it.
         """
-        match self._mode:
-            case Moving() as move:
-                q, _ = move.reference(reading.host_ns)
-                constants = self._model.constants
-                return joint_pd(constants.kp, constants.kd, q - reading.q, np.zeros(7))
-            case Standing() as stance:
-                return stance.tau
-            case _:
-                return None
+        if not isinstance(self._mode, Moving):
+            return None
+        q, _ = self._mode.reference(reading.host_ns)
+        constants = self._model.constants
+        return joint_pd(constants.kp, constants.kd, q - reading.q, np.zeros(7))
 
 
 def _within(tau: float, gravity: float, most: float) -> float:

@@ -1,11 +1,9 @@
 import json
-from dataclasses import astuple
 
 import pytest
 
 from acquisition.clock import PERIOD_NS
 from acquisition.control_loop.faults import Action
-from acquisition.control_loop.law import SoleGoal
 from acquisition.control_loop.loop import Tick
 from acquisition.control_loop.proof import ProofGoal, ProofKind
 from acquisition.control_loop.states import ArmState, ControlStatus
@@ -37,9 +35,6 @@ class Cycle:
 
     def move_to(self, goal, speed):
         self.goals.append((goal, speed))
-
-    def stand(self, goal):
-        self.goals.append(goal)
 
     def prove(self, goal):
         self.goals.append(goal)
@@ -103,13 +98,11 @@ def test_commands_reach_the_cycle_and_are_confirmed(loop):
     assert StatusSlot(loop.shared.status).read().obeyed == number
 
 
-def test_stances_and_proofs_reach_the_cycle(loop):
-    press = SoleGoal(2.0, 10.0, 0.0, 0.0, 0.1)
+def test_proofs_reach_the_cycle(loop):
     ramp = ProofGoal(ProofKind.RAMP, 3, 0.5, 2.0)
-    loop.console.post(CommandKind.STAND, values=astuple(press))
     loop.console.post(CommandKind.PROVE, values=ramp.values)
     loop.run(0.002)
-    assert loop.cycle.goals == [press, ramp]
+    assert loop.cycle.goals == [ramp]
 
 
 def test_the_loop_ends_when_it_is_told_to_leave(loop):

@@ -45,7 +45,7 @@ def test_equal_sources_elsewhere_have_an_equal_digest(copy):
 
 
 def test_what_a_fold_does_not_use_leaves_its_digest(copy):
-    for name in ("figures/style.py", "report/page.py", "stance/policies.py"):
+    for name in ("figures/style.py", "report/page.py"):
         path = copy / "analysis" / name
         path.write_text(path.read_text() + "\n")
     assert code_digest(FOLDS, copy) == code_digest(FOLDS)

@@ -133,5 +133,4 @@ def make_context(data, operator, *, trials=2, **more):
         camera=Camera("", None, 0.0),
         opened_ns=loop.rig.clock.now_ns(),
         kept_before=0,
-        stance=None,
     )

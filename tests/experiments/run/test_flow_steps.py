@@ -69,10 +69,6 @@ def test_the_aim_that_was_shown_is_the_trials(tmp_path, monkeypatch):
     view = ready_view(context)
     assert (view.suggestion, view.enough) == ("slowly", "20 of 20")
     assert context.state.aim is aim
-    context = replace(context, stance=object())  # a stance is not pushed by a person
-    view = ready_view(context)
-    assert (view.suggestion, view.enough) == ("", "")
-    assert context.state.aim is None
 
 
 def test_a_pause_holds_the_arm_and_is_in_the_journal(tmp_path):

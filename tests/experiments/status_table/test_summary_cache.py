@@ -209,7 +209,6 @@ def test_a_cache_that_is_not_its_own_is_ignored(data, tmp_path, hashed, spoil):
         {"kept": ["../T01"]},
         {"pushes": True},
         {"rejected": -1},
-        {"is_of_stances": 1},
         {"more": 1},
         {"phase": None},
     ],
