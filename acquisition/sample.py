@@ -96,28 +96,6 @@ CHANNELS = (
     ),
 )
 
-FORESIGHT_CHANNELS = (
-    ChannelMeaning(
-        "foresight.slip_probability", "1", "terrain", "a slip begins within 200 ms"
-    ),
-    ChannelMeaning(
-        "foresight.break_away_risk",
-        "1",
-        "terrain",
-        "a push from rest slips before this F_t at this F_n",
-    ),
-    ChannelMeaning(
-        "foresight.traction", "N", "terrain", "F_t to expect of a sliding foot"
-    ),
-    ChannelMeaning("foresight.v_t", "m/s", "terrain", "14 ms later than the sample"),
-    ChannelMeaning("foresight.f_t", "N", "terrain", "F_t, 8 ms later than the sample"),
-    ChannelMeaning("foresight.f_n", "N", "terrain", "F_n, 8 ms later than the sample"),
-    ChannelMeaning("foresight.none", "1", "terrain", "none of the known terrains"),
-    ChannelMeaning(
-        "foresight.terrains", "1", "terrain", "probability of each, named in foresight"
-    ),
-)
-
 
 class Sample:
     """One record of the loop, filled in place cycle after cycle.

@@ -39,21 +39,6 @@ float64[3] contact_force  # N, true force of the ground on the foot, wam_base
 float64[3] hand_force  # N, force of the hand on the arm, wam_base
 float64[3] traction  # terrain frame, true: v_t m/s, F_t N, F_n N"""
 
-MOST_TERRAINS = 16  # of /foresight
-FORESIGHT_TEXT = f"""\
-std_msgs/Header header  # stamp = log_time (UTC of the newest sample's cycle start)
-uint64 host_ns  # CLOCK_MONOTONIC at the start of the newest sample's cycle
-uint32 cycle  # number of that cycle
-uint32 since  # cycle at which the filters began anew
-uint32 flags  # see analysis.foresight.ForesightFlag
-float64 slip_probability  # that a slip begins within 200 ms; NaN = not known
-float64 break_away_risk  # that a push from rest slips below this F_t at this F_n
-float64 traction  # N, F_t to expect of a sliding foot
-float64 v_t  # m/s, causal filter, 14 ms late
-float64 f_t  # N, F_t, causal filter, 8 ms late
-float64 f_n  # N, F_n, causal filter, 8 ms late
-float64 none  # that the ground is none of the known terrains
-float64[{MOST_TERRAINS}] terrains  # probability of each, named in metadata foresight"""
 
 TERRAIN_TRACTION_TEXT = """\
 std_msgs/Header header  # stamp = when the database was made
@@ -132,7 +117,6 @@ _DEPENDENCIES = {
 _TEXTS = {
     "traction_msgs/msg/Cycle": CYCLE_TEXT,
     "traction_msgs/msg/Truth": TRUTH_TEXT,
-    "traction_msgs/msg/Foresight": FORESIGHT_TEXT,
     "traction_msgs/msg/CanBatch": CAN_BATCH_TEXT,
     "traction_msgs/msg/TerrainTraction": TERRAIN_TRACTION_TEXT,
     "grid_map_msgs/msg/GridMap": (
@@ -280,12 +264,3 @@ EARLIER_CYCLES = (
     ),
 )
 TRUTH = fixed_layout("traction_msgs/msg/Truth", "wam_base")
-FORESIGHT = fixed_layout("traction_msgs/msg/Foresight", "terrain")
-# Before ROS 2's rule of lower case was kept: viewers refuse that definition.
-EARLIER_FORESIGHTS = (
-    fixed_layout(
-        FORESIGHT.type_name,
-        "terrain",
-        FORESIGHT_TEXT.replace("64 f_t", "64 F_t").replace("64 f_n", "64 F_n"),
-    ),
-)

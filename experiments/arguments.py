@@ -334,12 +334,6 @@ def add_recording(parser: ArgumentParser) -> None:
         "--new", action="store_true", help="close an unfinished session first"
     )
     parser.add_argument(
-        "--foresight",
-        type=Path,
-        metavar="FILE",
-        help="terrain database for foresight (that of report --all)",
-    )
-    parser.add_argument(
         "--can-log", type=Path, metavar="FILE", help="write every CAN frame there"
     )
 

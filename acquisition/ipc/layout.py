@@ -17,7 +17,7 @@ from acquisition.ipc.latest_value import Slot
 from acquisition.ipc.ring_buffer import LayoutType, RingBuffer
 from acquisition.ipc.shared_memory import LINE, SharedMemory, lines
 from acquisition.ipc.shared_sensor import WRENCH_DTYPE
-from acquisition.schema import CYCLE, FORESIGHT
+from acquisition.schema import CYCLE
 
 WRENCH_SLOTS = 32_768  # 6.5 s of the fastest sensor
 
@@ -50,7 +50,6 @@ _SLOTS: Mapping[str, int] = {  # largest value of each [bytes]
     "status": 8192,
     "recorder": 8192,
     "health": 8192,
-    "trial_start": 64,
 }
 _BUFFERS: Mapping[str, tuple[LayoutType, int]] = {  # type and number of records
     "commands": (COMMAND_DTYPE, 256),
@@ -58,7 +57,6 @@ _BUFFERS: Mapping[str, tuple[LayoutType, int]] = {  # type and number of records
     "wrenches": (WRENCH_DTYPE, WRENCH_SLOTS),
     "frames": (FRAME_DTYPE, 32_768),  # 5 s of a bus with 13 frames per cycle
     "timings": (TIMING_DTYPE, 32_768),  # 65 s of cycles
-    "foresight": (FORESIGHT.dtype, 2048),  # 20 s
 }
 _AREAS: Mapping[str, int] = {  # in the order of the memory [bytes]
     "identity": LINE,
@@ -80,9 +78,6 @@ class SharedLayout:
         wrenches: every sample of the wrist sensor.
         frames: every frame of the bus.
         timings: when what happened in each cycle.
-        foresight: what is foreseen (traction_msgs/Foresight).
-        trial_start: where in `cycles` the running trial begins, as text; empty = none
-            runs that is to be foreseen.
         commands: the console's commands to the loop.
         status: state of the loop, newest value.
         recorder: state of the recorder, newest value.
@@ -102,13 +97,11 @@ class SharedLayout:
         self.status = Slot(areas["status"])
         self.recorder = Slot(areas["recorder"])
         self.health = Slot(areas["health"])
-        self.trial_start = Slot(areas["trial_start"])
         self.commands = RingBuffer(areas["commands"], *_BUFFERS["commands"])
         self.cycles = RingBuffer(areas["cycles"], *_BUFFERS["cycles"])
         self.wrenches = RingBuffer(areas["wrenches"], *_BUFFERS["wrenches"])
         self.frames = RingBuffer(areas["frames"], *_BUFFERS["frames"])
         self.timings = RingBuffer(areas["timings"], *_BUFFERS["timings"])
-        self.foresight = RingBuffer(areas["foresight"], *_BUFFERS["foresight"])
 
     @classmethod
     def create(cls) -> "SharedLayout":

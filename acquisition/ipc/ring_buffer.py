@@ -92,16 +92,6 @@ class RingBufferReader:
         """Records that have been written and not read."""
         return self._buffer.written - self._position
 
-    @property
-    def position(self) -> int:
-        """Number of the record that is read next, counted since the start."""
-        return self._position
-
-    def seek(self, position: int) -> None:
-        """Read from record number `position` on, or the oldest that there is."""
-        oldest = max(0, self._buffer.written - self._buffer.slots + 1)
-        self._position = min(max(oldest, position), self._buffer.written)
-
     def rewind(self, records: int) -> None:
         """Go back so that the next read begins `records` records earlier."""
         oldest = max(0, self._buffer.written - self._buffer.slots + 1)

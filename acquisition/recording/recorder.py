@@ -2,7 +2,6 @@
 
 import contextlib
 import json
-from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Protocol
@@ -18,7 +17,6 @@ from acquisition.trial_file.header import TrialHeader
 from acquisition.trial_file.verify import VerifiedFile, verify_file
 from acquisition.trial_file.writer import (
     FLIGHT_TOPICS,
-    FORESIGHT_TOPICS,
     TRIAL_TOPICS,
     TrialWriter,
     publish,
@@ -73,7 +71,6 @@ class Recorder:
     `drain` is called every 20 ms or so.
 
     Attributes:
-        foresee: brings what is foreseen up to date, where that is done in this thread.
         failure: why the last file could not be written; None = nothing failed.
         largest_backlog: cycles that waited at most since the trial began.
     """
@@ -86,13 +83,10 @@ class Recorder:
         self._frames = shared.frames.reader()
         self._writer: TrialWriter | None = None
         self._has_frames = False
-        self._foresight = shared.foresight.reader()
-        self._foreseen_from: int | None = None  # cycle; None = nothing is foreseen
         self._flushed_ns = 0
         self._claim = ExitStack()
         self.largest_backlog = 0
         self.failure: TrialFileError | None = None
-        self.foresee: Callable[[], object] | None = None
 
     @property
     def is_recording(self) -> bool:
@@ -105,8 +99,6 @@ class Recorder:
             raise TrialFileError(path, "another trial is being recorded")
         self._has_frames = header.has_frames
         topics = FLIGHT_TOPICS if self._has_frames else TRIAL_TOPICS
-        if header.foresight:
-            topics = {**topics, **FORESIGHT_TOPICS}
         with ExitStack() as stack:
             stack.enter_context(claimed_folder(path.parent))
             writer = TrialWriter(path, header, topics)
@@ -119,29 +111,10 @@ class Recorder:
         self._cycles.rewind(int(PRE_ROLL * RATE_HZ))
         self._wrenches.rewind(_since(self._shared.wrenches.last(8192), earliest_ns))
         self._frames.rewind(_since(self._shared.frames.last(8192), earliest_ns))
-        self._mark_start(is_foreseen=bool(header.foresight))
         self.largest_backlog = 0
         self._flushed_ns = now_ns
         self.failure = None
         self._writer = writer
-
-    def _mark_start(self, *, is_foreseen: bool) -> None:
-        """Let foresight begin anew where the trial does, and take what it says then."""
-        self._foreseen_from = None
-        if not is_foreseen:
-            return
-        self._foresight.read()
-        start = self._cycles.position
-        first, lost = self._shared.cycles.since(start)
-        if len(first):
-            self._foreseen_from = int(first["cycle"][0])
-        self._shared.trial_start.write(str(start + lost).encode())
-
-    def _end_foresight(self) -> None:
-        """Let foresight rest until the next trial."""
-        if self._foreseen_from is not None:
-            self._foreseen_from = None
-            self._shared.trial_start.write(b"")
 
     def drain(self) -> None:
         """Write what is new and force it to the disk every 0.25 s; show being alive.
@@ -176,7 +149,6 @@ class Recorder:
         self._writer = None
         with self._claim:
             self._write_new(writer)
-            self._end_foresight()
             return seal(writer, stop_reason)
 
     def abandon(self) -> None:
@@ -193,7 +165,6 @@ class Recorder:
         if self._writer is not None:
             self._writer.close_partial()
             self._writer = None
-            self._end_foresight()
             self._claim.close()
 
     def publish_state(self) -> None:
@@ -217,11 +188,6 @@ class Recorder:
         if self._has_frames:
             for batch in _batches(self._frames.read()):
                 writer.write_can(batch)
-        if self._foreseen_from is not None:
-            if self.foresee is not None:
-                self.foresee()
-            seen = self._foresight.read()
-            writer.write_foresight(seen[seen["since"] >= self._foreseen_from])
         writer.counts.lost_in_ring = self._cycles.lost
         if self._clock.now_ns() - self._flushed_ns >= FLUSH_NS:
             writer.flush()

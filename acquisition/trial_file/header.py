@@ -20,7 +20,6 @@ class TrialHeader:
         robot_description: URDF of the arm.
         views_every: every how many cycles the 50 Hz views are written, 0 = never.
         has_frames: the raw frames of the bus are recorded too.
-        foresight: what it foresees with, strings; empty where nothing is foreseen.
     """
 
     trial: Mapping[str, str]
@@ -32,7 +31,6 @@ class TrialHeader:
     rate_hz: int = RATE_HZ
     views_every: int = 10
     has_frames: bool = False
-    foresight: Mapping[str, str] = field(default_factory=dict[str, str])
 
 
 @dataclass(slots=True)

@@ -15,8 +15,6 @@ from acquisition.sample import Record
 from acquisition.schema import (
     CYCLE,
     EARLIER_CYCLES,
-    EARLIER_FORESIGHTS,
-    FORESIGHT,
     TRUTH,
     Layout,
 )
@@ -105,18 +103,6 @@ class TrialReader:
     def truth(self) -> TopicRows:
         """Return all records of `/truth` in order (truth files of simulations)."""
         return self._rows("/truth", TRUTH)
-
-    @property
-    def has_foresight(self) -> bool:
-        """Whether something was foreseen while it was recorded."""
-        return "/foresight" in self.topic_counts()
-
-    def foresight(self) -> TopicRows:
-        """Return all records of `/foresight` in order; empty of a trial without it."""
-        if not self.has_foresight:
-            empty = np.zeros(0, FORESIGHT.dtype)
-            return TopicRows(empty, np.zeros(0, np.uint64), np.zeros(0, np.uint32))
-        return self._rows("/foresight", FORESIGHT, *EARLIER_FORESIGHTS)
 
     def topic_counts(self) -> dict[str, int]:
         """Return the number of messages per topic, from the statistics."""

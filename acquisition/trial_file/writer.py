@@ -12,8 +12,8 @@ from mcap.writer import CompressionType, Writer
 from acquisition.cdr import CdrWriter, encode_log, encode_string
 from acquisition.errors import TrialFileError
 from acquisition.files import publish_file, sync_directory
-from acquisition.sample import CHANNELS, FORESIGHT_CHANNELS, Flag, Record
-from acquisition.schema import CYCLE, FORESIGHT, TRUTH, Layout, schema_text
+from acquisition.sample import CHANNELS, Flag, Record
+from acquisition.schema import CYCLE, TRUTH, Layout, schema_text
 from acquisition.trial_file.header import TrialHeader, WriterCounts
 from acquisition.trial_file.views import VIEW_TOPICS, encode_can_batch, encode_views
 
@@ -30,8 +30,6 @@ TRIAL_TOPICS = {
 }
 TRUTH_TOPIC = "/truth"
 CAN_TOPIC = "/can/raw"
-FORESIGHT_TOPIC = "/foresight"
-FORESIGHT_TOPICS = {FORESIGHT_TOPIC: FORESIGHT.type_name}
 TRUTH_TOPICS = {TRUTH_TOPIC: "traction_msgs/msg/Truth"}
 FLIGHT_TOPICS = {**TRIAL_TOPICS, CAN_TOPIC: "traction_msgs/msg/CanBatch"}
 
@@ -50,12 +48,7 @@ def topics_by_sizes(sizes: Mapping[int, int]) -> Mapping[str, str]:
     numbers = {topic: i for i, topic in enumerate(FLIGHT_TOPICS, 1)}
     if sizes.get(numbers["/cycle"], CYCLE.size) != CYCLE.size:
         return {}
-    topics = TRIAL_TOPICS
-    has_frames = sizes.get(numbers[CAN_TOPIC], FORESIGHT.size) != FORESIGHT.size
-    if has_frames:
-        topics = FLIGHT_TOPICS
-    if sizes.get(len(topics) + 1) == FORESIGHT.size:
-        topics = {**topics, **FORESIGHT_TOPICS}
+    topics = FLIGHT_TOPICS if numbers[CAN_TOPIC] in sizes else TRIAL_TOPICS
     return topics if max(sizes, default=0) <= len(topics) else {}
 
 
@@ -139,10 +132,6 @@ class TrialWriter:
         """Append records of traction_msgs/Truth (truth files only)."""
         self._write_stamped(TRUTH_TOPIC, TRUTH, records)
 
-    def write_foresight(self, records: Record) -> None:
-        """Append records of traction_msgs/Foresight in order; stamps are set here."""
-        self._write_stamped(FORESIGHT_TOPIC, FORESIGHT, records)
-
     def _write_stamped(self, topic: str, layout: Layout, records: Record) -> None:
         """Append records with a `host_ns`, whose UTC becomes stamp and log time."""
         records = records.copy()
@@ -209,16 +198,13 @@ class TrialWriter:
             f"sha256:{name}": hashlib.sha256(content).hexdigest()
             for name, content in header.attachments.items()
         }
-        meanings = (*CHANNELS, *(FORESIGHT_CHANNELS if header.foresight else ()))
-        channels = {c.field: f"{c.unit} in {c.frame}; {c.sign}" for c in meanings}
+        channels = {c.field: f"{c.unit} in {c.frame}; {c.sign}" for c in CHANNELS}
         metadata: dict[str, dict[str, str]] = {
             "trial": {"format_version": FORMAT_VERSION, **header.trial},
             "clock": clock,
             "provenance": {**header.provenance, **digests},
             "channels": channels,
         }
-        if header.foresight:
-            metadata["foresight"] = dict(header.foresight)
         self._describe(metadata)
         for name, content in header.attachments.items():
             self._writer.add_attachment(0, 0, name, "text/plain", content)

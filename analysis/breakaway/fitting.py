@@ -14,7 +14,7 @@ import numpy as np
 
 from analysis.breakaway.censored import CensoredLikelihood, Family
 from analysis.breakaway.model import BREAK_AWAY, SLIDING, BreakAwayModel, PushLaw
-from analysis.breakaway.pushes import FootPush, PushTable
+from analysis.breakaway.pushes import PushTable
 from analysis.breakaway.recorded import (
     BreakAwayOptions,
     BreakAwayTask,
@@ -50,24 +50,6 @@ def fit_break_away(
         options: what a slip is, and how many times trials are resampled.
     """
     return fit_planned(plan_break_away(trials, kinds, options or BreakAwayOptions()))
-
-
-def fit_pushes(
-    pushes: Mapping[str, Sequence[Sequence[FootPush]]],
-    kinds: Mapping[str, str],
-    options: BreakAwayOptions | None = None,
-) -> dict[str, BreakAwayModel]:
-    """Return the break-away model of every terrain whose pushes are given as such.
-
-    As `fit_break_away`, but a terrain off stones of fewer than 15 slips has none.
-    """
-    every = [
-        TerrainPushes(name, tuple(map(tuple, trials)))
-        for name, trials in pushes.items()
-    ]
-    return fit_planned(
-        BreakAwayTask(tuple(every), kinds, options or BreakAwayOptions())
-    )
 
 
 def fit_planned(task: BreakAwayTask) -> dict[str, BreakAwayModel]:

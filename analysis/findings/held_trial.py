@@ -14,7 +14,6 @@ from analysis.data.plausibility import Doubt, doubts_of_record
 from analysis.data.series import TractionSeries
 from analysis.data.tare_bracket import TareBracket
 from analysis.findings.rig_health import RigTrial, health_of
-from analysis.foresight.judged import digest_of
 from ft_sensor.payload import Payload, TerrainFrame
 
 
@@ -31,7 +30,6 @@ class HeldTrial:
         bracket: the tares before and after it; None where one is not known.
         doubts: why it cannot be that of a foot that is pushed along x_T.
         health: of the rig, without what the tares of its session tell.
-        digest: of all that foresight reads of it.
     """
 
     path: Path
@@ -42,7 +40,6 @@ class HeldTrial:
     bracket: TareBracket | None
     doubts: Sequence[Doubt]
     health: RigTrial
-    digest: str
 
     @property
     def name(self) -> str:
@@ -66,7 +63,6 @@ class HeldTrial:
             bracket=trial.bracket,
             doubts=doubts_of_record(trial),
             health=health_of(trial),
-            digest=digest_of(trial),
         )
 
 

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, overload
 from acquisition.worker_processes import available_cores
 from analysis.figures.pictures import Picture
 from analysis.figures.sections import PAGE_ORDER, ReportSection
-from analysis.report.foresight_page import FORESIGHT_KEY, foresight_figure
 from analysis.report.page_model import ReportFigure, ShownNumbers
 from analysis.study.jobs import Store, run_tasks
 from analysis.study.study import Study
@@ -22,7 +21,6 @@ from analysis.study.study import Study
 if TYPE_CHECKING:
     from analysis.figures.spec import FigureSpec
 
-_KEYS = (*PAGE_ORDER, FORESIGHT_KEY)
 _MOST_DRAWING = 4  # processes
 _MANY_TERRAINS = 2  # from which on they pay: the workers are there, of the fits
 DRAWN_TYPES: Mapping[str, type] = {
@@ -47,7 +45,7 @@ def report_figures(
         for figure in run_tasks(draw_figure, FigureTasks(shown), n_jobs)
         if figure is not None
     }
-    return [drawn[key] for key in _KEYS if key in drawn]
+    return [drawn[key] for key in PAGE_ORDER if key in drawn]
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +69,7 @@ class FigureTasks(Sequence[FigureTask]):
 
     def __len__(self) -> int:
         """Return the number of figures."""
-        return len(_KEYS)
+        return len(PAGE_ORDER)
 
     @overload
     def __getitem__(self, index: int) -> FigureTask: ...
@@ -79,14 +77,14 @@ class FigureTasks(Sequence[FigureTask]):
     def __getitem__(self, index: slice) -> list[FigureTask]: ...
     def __getitem__(self, index: int | slice) -> FigureTask | list[FigureTask]:
         """Return a figure with what it shows."""
-        keys = _KEYS[::-1][index]
+        keys = PAGE_ORDER[::-1][index]
         if isinstance(keys, str):
             return FigureTask(self._shown, keys)
         return [FigureTask(self._shown, key) for key in keys]
 
     def outline(self, index: int) -> object:
         """Return the key of the figure."""
-        return _KEYS[::-1][index]
+        return PAGE_ORDER[::-1][index]
 
 
 def draw_figure(task: FigureTask) -> ReportFigure | None:
@@ -99,11 +97,6 @@ def _draw(key: str, shown: ShownNumbers) -> ReportFigure | None:
 
     results, with_pdf = shown.results, shown.with_pdf
     is_simulated = results.study.simulated
-    if key == FORESIGHT_KEY:
-        curves = shown.foresight
-        if curves is None:
-            return None
-        return foresight_figure(curves, is_simulated=is_simulated, with_pdf=with_pdf)
     spec = figure_specs()[key]
     with styled():
         figure = spec.draw(results)

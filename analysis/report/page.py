@@ -6,7 +6,7 @@ The only module that imports jinja2.
 import base64
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +18,7 @@ from analysis.findings.findings import (
     findings_rows,
     plain_findings,
 )
-from analysis.foresight.model import ForesightModel
 from analysis.report.drawing import kept_figures
-from analysis.report.foresight_page import FORESIGHT_KEY
 from analysis.report.further_tables import beyond_tables, look_first_tables
 from analysis.report.page_model import (
     PageSection,
@@ -41,10 +39,8 @@ from analysis.report.paper_tables import (
 )
 from analysis.report.rig_tables import choices, rig_tables
 from analysis.study.fits import to_csv, to_fits, to_plain
-from analysis.study.models import GP_SE, GP_SE_TRIAL
 from analysis.study.store import write_atomic
 from analysis.study.study import Study
-from analysis.terrains.export import database_of
 
 try:
     from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -60,7 +56,7 @@ def write_report(study: Study, out_dir: Path, context: ReportContext) -> Path:
     """Write the report of a study and return the path of its page.
 
     Below `out_dir`: report/index.html, fits.json, fits.csv and figures/*.png, with
-    `context.with_pdf` *.pdf, with foresight terrains.json; each file is replaced whole,
+    `context.with_pdf` *.pdf; each file is replaced whole,
     the page last. Figures that an earlier report left there are removed.
 
     Raises:
@@ -71,11 +67,8 @@ def write_report(study: Study, out_dir: Path, context: ReportContext) -> Path:
     write_atomic(out_dir / "fits.json", fits.encode())
     table = to_csv(study, findings_rows(results))
     write_atomic(out_dir / "fits.csv", table.encode())
-    if context.foresight is not None:
-        text = _database(study, results, context, context.foresight)
-        write_atomic(out_dir / "terrains.json", text.encode())
-    numbers = ShownNumbers(results, context.foresight_curves, context.with_pdf)
-    shown = [*kept_figures(numbers, context.store), *context.figures]
+    numbers = ShownNumbers(results, context.with_pdf)
+    shown = kept_figures(numbers, context.store)
     _file_figures(out_dir / "figures", shown)
     page = out_dir / "report" / "index.html"
     write_atomic(page, render_page(results, shown, context).encode())
@@ -89,30 +82,10 @@ def _file_figures(folder: Path, shown: Sequence[ReportFigure]) -> None:
     for name, content in files.items():
         if content:
             write_atomic(folder / name, content)
-    for key in (*PAGE_ORDER, FORESIGHT_KEY):
+    for key in PAGE_ORDER:
         for name in (f"{key}.png", f"{key}.pdf"):
             if not files.get(name):
                 (folder / name).unlink(missing_ok=True)
-
-
-def _database(
-    study: Study,
-    results: StudyResults,
-    context: ReportContext,
-    foresight: ForesightModel,
-) -> str:
-    """Return the terrain database of a study, with foresight."""
-    asked = study.options.fit.models
-    models = tuple(m for m in (GP_SE, GP_SE_TRIAL) if m in asked) or asked
-    fit = replace(study.options.fit, models=models, draws=0)
-    return database_of(
-        replace(study, options=replace(study.options, fit=fit)),
-        results.identification,
-        context.generated_utc,
-        study.options.n_jobs,
-        context.store,
-        foresight,
-    )
 
 
 def all_numbers(results: StudyResults, context: ReportContext) -> dict[str, Any]:

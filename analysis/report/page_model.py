@@ -9,8 +9,6 @@ from analysis.figures.pictures import Picture
 from analysis.figures.sections import ReportSection
 from analysis.findings.findings import StudyResults
 from analysis.findings.rig_health import RigTrial
-from analysis.foresight.curves import ForesightCurves
-from analysis.foresight.model import ForesightModel
 from analysis.study.jobs import Store
 
 
@@ -80,12 +78,10 @@ class ShownNumbers:
 
     Attributes:
         results: of the study.
-        foresight: on held-out trials; None where nothing was foreseen.
         with_pdf: figures are wanted as PDF, too.
     """
 
     results: StudyResults
-    foresight: ForesightCurves | None = None
     with_pdf: bool = False
 
 
@@ -132,12 +128,9 @@ class ReportContext:
         is_foreign: the tables come from elsewhere, not from this rig.
         generated_utc: when the report was made, as text.
         tables: further tables, each for its section.
-        figures: further figures, each for its section.
         warnings: further warnings, shown first.
         rig: health of the rig by trial.
         further_numbers: further plain values for fits.json, by name.
-        foresight: for a terrain database beside the report; None = none is written.
-        foresight_curves: what a figure shows of it on held-out trials; None = nothing.
         photos: of the bed after the trials.
         with_pdf: figures are filed as PDF, too.
         results: what follows from the study; None = it is computed.
@@ -150,12 +143,9 @@ class ReportContext:
     is_foreign: bool
     generated_utc: str
     tables: Sequence[ReportTable] = field(default=())
-    figures: Sequence[ReportFigure] = field(default=())
     warnings: Sequence[str] = field(default=())
     rig: Sequence[RigTrial] = field(default=())
     further_numbers: Mapping[str, Any] = field(default_factory=dict)
-    foresight: ForesightModel | None = None
-    foresight_curves: ForesightCurves | None = None
     photos: Sequence[BedPhoto] = field(default=())
     with_pdf: bool = False
     results: StudyResults | None = None

@@ -13,7 +13,7 @@ from pydantic import BaseModel
 
 from acquisition.validation import Entries, Many
 from analysis.data.series import Array
-from analysis.foresight.logistic import RidgeLogistic, fit_balanced, squares
+from analysis.terrains.logistic import RidgeLogistic, fit_balanced
 from analysis.terrains.windows import FEATURES, WINDOWS
 
 FLAT_GROUND, ROCKY_GROUND = "flat", "rocky"
@@ -51,24 +51,23 @@ class SurfaceClassifier:
             raise ValueError("a classifier was made for other features")
         if not set(file.models) <= set(WINDOWS):
             raise ValueError("a classifier has other windows")
-        pairs, count = squares(len(FEATURES)), len(FEATURES)
         return cls(
             {
-                size: RidgeLogistic.from_dict({**model, "pairs": pairs}, count)
+                size: RidgeLogistic.from_dict(model, len(FEATURES))
                 for size, model in file.models.items()
             }
         )
 
 
 class _ClassifierFile(BaseModel):
-    """A classifier as it is stored; pairs of a regression are always the squares."""
+    """A classifier as it is stored."""
 
     features: Many[str]
     models: Entries[int, dict[str, Any]]
 
 
 def _plain(model: RidgeLogistic) -> dict[str, list[float]]:
-    """Return a regression as plain numbers; its pairs are always the squares."""
+    """Return a regression as plain numbers."""
     return {
         name: [float(f"{x:.{_DIGITS}g}") for x in getattr(model, name)]
         for name in ("mean", "scale", "weights")

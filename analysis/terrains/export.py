@@ -14,7 +14,6 @@ from analysis.breakaway.recorded import BreakAwayOptions, plan_break_away
 from analysis.data.prepare import PreparedTrial, PrepareOptions
 from analysis.data.samples import SampleTable, TrainingSet
 from analysis.data.series import Array
-from analysis.foresight.model import ForesightModel
 from analysis.study.distribution import SHARES
 from analysis.study.jobs import Batch, Store, Workers, run_batches
 from analysis.study.models import GP_SE, GP_SE_TRIAL, TITLES, FitOptions, ModelFitter
@@ -27,7 +26,6 @@ from analysis.terrains.known import KnownTerrain, TerrainDatabase
 from analysis.terrains.parts import (
     BREAK_AWAY_PART,
     CONTACT_PART,
-    FORESIGHT_PART,
     GENERATOR_PART,
     ROUGHNESS_PART,
     SURFACES_PART,
@@ -95,7 +93,6 @@ def database_of(
     made_utc: str,
     workers: Workers | int | None = None,
     store: Store | None = None,
-    foresight: ForesightModel | None = None,
 ) -> str:
     """Return the text of a terrain database of every terrain of a study.
 
@@ -105,7 +102,6 @@ def database_of(
         made_utc: when.
         workers: where the models are fitted.
         store: results of earlier runs.
-        foresight: what was learnt from the same trials.
 
     Raises:
         SettingsError: no terrain has kept samples.
@@ -152,10 +148,9 @@ def database_of(
         )
         if default in fitted and recogniser in fitted
     }
-    of_all = _of_all(identification)
-    if foresight is not None:
-        of_all[FORESIGHT_PART] = foresight.to_dict()
-    return to_text(TerrainDatabase(known, study.simulated, made_utc, of_all))
+    return to_text(
+        TerrainDatabase(known, study.simulated, made_utc, _of_all(identification))
+    )
 
 
 def _table(forces: Array, axes: tuple[Array, Array]) -> Table:

@@ -5,7 +5,6 @@
                    generator    its `Generator`
                    roughness    {window: least feature `resid` of its own windows}
     of all         surfaces     the `SurfaceClassifier`
-                   foresight    the `ForesightModel`
 
 A part that this program does not know is kept as it is.
 """
@@ -18,13 +17,12 @@ from pydantic import Field, TypeAdapter
 from acquisition.errors import SettingsError
 from acquisition.validation import Entries, first_problem
 from analysis.breakaway.model import BreakAwayModel
-from analysis.foresight.model import ForesightModel
 from analysis.terrains.classifier import SurfaceClassifier
 from analysis.terrains.contact_law import ContactLaw
 from analysis.terrains.generator import Generator
 
 BREAK_AWAY_PART, ROUGHNESS_PART, SURFACES_PART = "break_away", "roughness", "surfaces"
-FORESIGHT_PART, GENERATOR_PART = "foresight", "generator"
+GENERATOR_PART = "generator"
 CONTACT_PART = "contact"
 Parts = Mapping[str, Any]
 _ROUGHNESS = TypeAdapter(Entries[int, Annotated[float, Field(allow_inf_nan=False)]])
@@ -100,21 +98,10 @@ def surfaces_in(parts: Parts) -> SurfaceClassifier | None:
     return SurfaceClassifier.from_dict(parts[SURFACES_PART])
 
 
-def foresight_in(parts: Parts) -> ForesightModel | None:
-    """Return what foresight has learnt, None where it has not.
-
-    Databases of earlier versions have none.
-    """
-    if FORESIGHT_PART not in parts:
-        return None
-    return ForesightModel.from_dict(parts[FORESIGHT_PART])
-
-
 _READERS = {
     BREAK_AWAY_PART: lambda parts: break_away_in(parts, ""),
     CONTACT_PART: lambda parts: contact_in(parts, ""),
     GENERATOR_PART: lambda parts: generator_in(parts, ""),
     ROUGHNESS_PART: roughness_in,
     SURFACES_PART: surfaces_in,
-    FORESIGHT_PART: foresight_in,
 }

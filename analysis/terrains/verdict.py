@@ -15,9 +15,9 @@ import numpy as np
 from analysis.data.prepare import PreparedTrial
 from analysis.data.series import Array
 from analysis.data.terrain_kinds import groups_of
-from analysis.foresight.logistic import RidgeLogistic
 from analysis.terrains.classifier import FLAT_GROUND, ROCKY_GROUND
 from analysis.terrains.known import KnownTerrain, TerrainDatabase
+from analysis.terrains.logistic import RidgeLogistic
 from analysis.terrains.parts import roughness_in, surfaces_in
 from analysis.terrains.recognition import Expert, TerrainScores, score_trial
 from analysis.terrains.windows import RESID, window_features
@@ -168,7 +168,7 @@ class _Known:
         if self.classifier is None:
             rocky, surface = None, scores.likeliest_group(rows, self.surface)
         else:
-            rocky = self.classifier.probability(judged.features.tolist())
+            rocky = float(self.classifier.probabilities(judged.features[None])[0])
             surface = ROCKY_GROUND if rocky > 0.5 else FLAT_GROUND
         return WindowEvidence(
             t=float(judged.trial.smooth.t[judged.trial.indices[rows.stop - 1]]),

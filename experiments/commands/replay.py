@@ -45,12 +45,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--bundle", type=Path, metavar="FILE", help="a file of traction bundle"
     )
-    parser.add_argument(
-        "--foresight",
-        type=Path,
-        metavar="FILE",
-        help="recompute the foresight channel with this terrain database, and compare",
-    )
     add_allow_missing(parser)
     parser.add_argument(
         "--serve",
@@ -68,14 +62,9 @@ def run(args: argparse.Namespace) -> int:
     if args.bundle is not None:
         return _tell_bundle(args)
     is_trial = args.session is not None and args.trial is not None
-    if args.foresight is not None and not is_trial:
+    if args.serve and not is_trial:
         raise SettingsError(
-            "--foresight needs a session and a trial.",
-            hint="For example: traction replay S012 T04 --foresight FILE",
-        )
-    if args.serve and (not is_trial or args.foresight is not None):
-        raise SettingsError(
-            "--serve needs a session and a trial, and no --foresight.",
+            "--serve needs a session and a trial.",
             hint="For example: traction replay S012 T04 --serve",
         )
     if is_trial == (args.can is not None) or (args.session and not args.trial):
@@ -116,8 +105,6 @@ def _show_trial(args: argparse.Namespace) -> int:
     deviations = compare_trial(folder, path)
     if deviations and not args.allow_missing:
         raise kept_data_error(deviations)
-    if args.foresight is not None:
-        return _prove_foresight(path, args.foresight, console)
     if args.serve:
         return _serve_trial(args, path, console)
     play(path, args.speed, SystemClock(), console)
@@ -140,28 +127,6 @@ def _serve_trial(args: argparse.Namespace, path: Path, console: Console) -> int:
             is_over=lambda: stop.count > 0 or console.is_lost,
         )
     return 0
-
-
-def _prove_foresight(path: Path, database: Path, console: Console) -> int:
-    """Say whether the record gives what was foreseen; 0 if bit for bit, 1 if not."""
-    from experiments.report.foresight_replay import replay_foresight
-    from experiments.rig.foresight_source import read_foresight
-
-    replay = replay_foresight(path, read_foresight(database))
-    console.say(
-        f"{path.stem}: {replay.equal} of {replay.recorded} recorded states equal bit "
-        f"for bit, {replay.computed} computed."
-    )
-    if not replay.is_same_source:
-        console.problem("It was recorded with other models than those of the file.")
-    if replay.first_other is not None:
-        console.problem(
-            f"The first state that differs is that of cycle {replay.first_other}."
-        )
-    elif replay.is_same_source and not replay.is_proved:
-        late = replay.computed - replay.recorded
-        console.problem(f"The last {late} states are missing from the record.")
-    return 0 if replay.is_proved else 1
 
 
 def _show_log(args: argparse.Namespace) -> int:

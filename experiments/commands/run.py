@@ -65,7 +65,6 @@ def run(args: argparse.Namespace) -> int:
         console=Console(color=not args.no_color, goes_on=True),
         faults=tuple(args.fault),
         can_log=args.can_log,
-        foresight=args.foresight,
     )
     unfinished = _make_room(request, is_new=args.new)
     if unfinished is not None:
@@ -112,7 +111,6 @@ def _as_reopening(args: argparse.Namespace, request: SessionRequest) -> ResumeRe
         operator=request.operator_name,
         script=args.operator_script,
         can_log=request.can_log,
-        foresight=request.foresight,
         faults=request.faults,
     )
 

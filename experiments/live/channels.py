@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 
 from acquisition.cdr import CdrWriter, encode_string
 from acquisition.clock import NS_PER_S
-from acquisition.schema import FORESIGHT
 from acquisition.settings import parse_toml
 from acquisition.trial_file.views import VIEW_TOPICS, encode_views
 from acquisition.trial_file.writer import TRIAL_TOPICS
 
-TF_TOPIC, FORESIGHT_TOPIC = "/tf", "/foresight"
+TF_TOPIC = "/tf"
 DESCRIPTION_TOPIC, EVENTS_TOPIC = "/robot_description", "/events"
 # As recorded, with the transforms that a recording leaves to its viewer.
 LIVE_TOPICS: Mapping[str, str] = {
@@ -24,7 +23,6 @@ LIVE_TOPICS: Mapping[str, str] = {
     **VIEW_TOPICS,
     TF_TOPIC: "tf2_msgs/msg/TFMessage",
     EVENTS_TOPIC: TRIAL_TOPICS[EVENTS_TOPIC],
-    FORESIGHT_TOPIC: FORESIGHT.type_name,
 }
 PLATE, SENSOR, FOOT, BASE = "wam_tool", "ft_sensor", "foot", "wam_base"
 _Array = NDArray[np.float64]
@@ -125,13 +123,6 @@ class LiveEncoder:
             **encode_views(stamped, t_ns),
             TF_TOPIC: encode_tf([*links, self._sensor, foot], t_ns),
         }
-
-
-def stamped_foresight(record: np.void, t_ns: int) -> bytes:
-    """Return a record of traction_msgs/Foresight with its UTC [ns] as stamp."""
-    stamped = record.copy()
-    stamped["sec"], stamped["nanosec"] = divmod(t_ns, NS_PER_S)
-    return stamped.tobytes()
 
 
 def _number(table: Mapping[str, object], key: str) -> float:

@@ -19,10 +19,8 @@ from acquisition.settings import read_text
 from experiments.live.channels import (
     DESCRIPTION_TOPIC,
     EVENTS_TOPIC,
-    FORESIGHT_TOPIC,
     LIVE_TOPICS,
     LiveEncoder,
-    stamped_foresight,
 )
 from experiments.live.server import HOST, LiveServer, layout_path
 from experiments.operator.console import Console
@@ -55,7 +53,6 @@ class WatchedSession:
         self._shared = shared
         self._offset_ns, _ = utc_offset_ns(clock)
         self._seen = shared.cycles.written
-        self._foreseen = shared.foresight.written
         self._journal = folder.path / "events.jsonl"
         self._size = -1
         self._sent = len(folder.events())
@@ -76,13 +73,7 @@ class WatchedSession:
         if not len(records):
             return None
         t_ns = int(records["host_ns"][0]) + self._offset_ns
-        messages = self._encoder.messages(records[0], t_ns)
-        if self._shared.foresight.written != self._foreseen:
-            self._foreseen = self._shared.foresight.written
-            foreseen = self._shared.foresight.last(1)
-            if len(foreseen):
-                messages[FORESIGHT_TOPIC] = stamped_foresight(foreseen[0], t_ns)
-        return messages, t_ns
+        return self._encoder.messages(records[0], t_ns), t_ns
 
     def events(self, now_ns: int) -> list[tuple[dict[str, bytes], int]]:
         """Return the new entries of the journal, dated now [UTC ns]."""

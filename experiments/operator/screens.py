@@ -1,6 +1,5 @@
 """What the live part of the screen shows, as lines of text; pure."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import ceil
 
@@ -17,60 +16,8 @@ from experiments.operator.graphs import (
 from experiments.operator.keys import STOP_KEYS, screen_keys
 from experiments.operator.prompts import Prompt
 
-_FORESEEN, _WIDEST = 10, 60  # characters of a sparkline
-_PROBABILITY = BarScale(1.0, 0.0, 1.0, "", ".2f")
+_WIDEST = 60  # characters of a sparkline
 _TABLE_ROWS = 10  # of the running table
-
-
-@dataclass(frozen=True, slots=True)
-class ForesightView:
-    """What is foreseen in a running trial; NaN = not known.
-
-    Attributes:
-        slip_probability: that a slip begins within 200 ms, of the last seconds.
-        break_away_risk: of a push from rest to this F_t at this F_n.
-        traction: F_t to expect of a sliding foot [N].
-        terrains: probability of every known terrain by name.
-        none: that it is none of them.
-        state: "slipping", "no contact", "other foot or rig" or ""; of the newest state.
-        is_late: the newest state is older than 0.2 s.
-    """
-
-    slip_probability: NDArray[np.float64]
-    break_away_risk: float
-    traction: float
-    terrains: Mapping[str, float]
-    none: float
-    state: str = ""
-    is_late: bool = False
-
-
-OTHER_RIG_TEXT = "other foot or rig"
-_NAMED = 2  # terrains that are named, the likeliest first
-_SHOWN_SHARE = 0.05  # probability below which a terrain is not named
-
-
-def foresight_line(view: ForesightView) -> str:
-    """Return what is foreseen as one line of the screen of a running trial."""
-    if view.is_late:
-        return "foresight: silent"
-    if view.state == OTHER_RIG_TEXT:
-        return "foresight off: trained on another foot or rig"
-    newest = float(view.slip_probability[-1]) if len(view.slip_probability) else np.nan
-    bars = sparkline(view.slip_probability, _FORESEEN, _PROBABILITY)
-    slip = view.state or f"{newest:.2f}"
-    likeliest = sorted(view.terrains.items(), key=lambda one: -one[1])[:_NAMED]
-    named = [f"{n} {p:.2f}" for n, p in likeliest if p >= _SHOWN_SHARE]
-    if view.none >= _SHOWN_SHARE:
-        named.append(f"none of them {view.none:.2f}")
-    return (
-        f"slip {bars} {slip}   break-away {_number(view.break_away_risk, '.2f')}   "
-        f"expect {_number(view.traction, '.1f')} N   {'  '.join(named) or 'ground ?'}"
-    )
-
-
-def _number(value: float, form: str) -> str:
-    return format(value, form) if np.isfinite(value) else "?"
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +34,6 @@ class RecordingView:
         is_arm_fine: every motor answered in the last cycle.
         is_sensor_fine: the last force sample was fresh and within its range.
         traction: v_t, F_t, F_n of the last seconds [m/s, N, N], shape (n, 3).
-        foresight: what is foreseen; None = nothing is.
         scales: of the bars.
     """
 
@@ -100,7 +46,6 @@ class RecordingView:
     is_arm_fine: bool
     is_sensor_fine: bool
     traction: NDArray[np.float64]
-    foresight: ForesightView | None = None
     scales: LiveScales = field(default_factory=LiveScales)
 
 
@@ -120,7 +65,6 @@ def recording_lines(view: RecordingView, width: int) -> list[str]:
             _bar_line(name, view.traction[:, column], float(newest[column]), width, s)
             for name, column, s in rows
         ),
-        *([] if view.foresight is None else [foresight_line(view.foresight)]),
         screen_keys(Prompt.RECORDING),
         STOP_KEYS,
     ]

@@ -43,7 +43,7 @@ _PERSONAL = frozenset(
     {
         *("operator", "witness", "who", "author"),
         *("note", "notes", "remark", "text"),
-        *("config", "foresight"),
+        "config",
     }
 )
 _OF_VERDICTS = _PERSONAL | {"reason"}

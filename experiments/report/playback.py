@@ -16,10 +16,8 @@ from acquisition.trial_file.reader import TopicRows, TrialReader
 from analysis.data.load import RecordedTrial, load_trial
 from experiments.live.channels import (
     DESCRIPTION_TOPIC,
-    FORESIGHT_TOPIC,
     LIVE_TOPICS,
     LiveEncoder,
-    stamped_foresight,
 )
 from experiments.live.server import HOST, LiveServer, PlaybackWish, layout_path
 from experiments.operator.console import Console
@@ -164,7 +162,7 @@ def serve(
         SettingsError: the port is taken.
     """
     reader = TrialReader(path)
-    rows, foresight = reader.cycles(), reader.foresight()
+    rows = reader.cycles()
     t_ns = rows.log_time.astype(np.int64)
     encoder = LiveEncoder(
         reader.attachments.get("robot.urdf", b"<robot/>").decode(errors="replace"),
@@ -190,7 +188,7 @@ def serve(
                 described = {DESCRIPTION_TOPIC: encoder.description}
                 server.publish(described, player.position(now_ns))
             tick += 1
-            _send(server, player, rows, foresight, encoder, now_ns)
+            _send(server, player, rows, encoder, now_ns)
             clock.sleep_until(now_ns + _SERVE_NS)
     finally:
         server.close()
@@ -200,7 +198,6 @@ def _send(
     server: LiveServer,
     player: _Player,
     rows: TopicRows,
-    foresight: TopicRows,
     encoder: LiveEncoder,
     now_ns: int,
 ) -> None:
@@ -213,11 +210,7 @@ def _send(
     if row <= player.row:
         return
     t_ns = int(player.t_ns[row])
-    messages = encoder.messages(rows.data[row], t_ns)
-    foreseen = int(np.searchsorted(foresight.log_time, t_ns, side="right")) - 1
-    if foreseen >= 0:
-        messages[FORESIGHT_TOPIC] = stamped_foresight(foresight.data[foreseen], t_ns)
-    server.publish(messages, t_ns)
+    server.publish(encoder.messages(rows.data[row], t_ns), t_ns)
     server.tell_time(t_ns)
     player.row = row
     if player.is_at_end():

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache, partial
 from hashlib import blake2b
 from pathlib import Path
 from shutil import disk_usage
@@ -24,8 +23,6 @@ from analysis.findings.covariates import COVARIATE_TYPES, CovariateResult
 from analysis.findings.findings import compute_results
 from analysis.findings.held_trial import HeldTrial, TrialFiles
 from analysis.findings.rig_health import with_tares
-from analysis.foresight.judged import JUDGED_TYPES
-from analysis.foresight.training import fit_foresight
 from analysis.report.covariate_table import covariate_tables
 from analysis.report.drawing import DRAWN_TYPES
 from analysis.report.page_model import BedPhoto, ReportContext
@@ -53,7 +50,6 @@ from experiments.report.cells import (
 from experiments.report.choices import AnalysisChoices, repeat_study
 from experiments.report.commissioned import uncommissioned
 from experiments.report.covariates import columns_tested, recorded_columns
-from experiments.report.foresight import StudyForesight, study_foresight, watched_trials
 from experiments.report.progress import fitting
 from experiments.report.tables import report_tables, summary_table
 from experiments.report.truth_errors import (
@@ -170,7 +166,6 @@ def results_below(data: Path) -> ResultStore:
     """Return the store of results below a folder of data; it grows with the disk."""
     types = {
         **TYPES,
-        **JUDGED_TYPES,
         **DRAWN_TYPES,
         **SAMPLED_TYPES,
         **COVARIATE_TYPES,
@@ -336,7 +331,6 @@ def export_terrains(
         identify_study(study),
         iso_utc(SystemClock().utc_ns()),
         store=results_below(data),
-        foresight=fit_foresight(watched_trials(study, analysed.trials)),
     )
     write_new_text(out, text)
     console.say(f"{len(study.terrains)} terrains: {out}")
@@ -366,8 +360,6 @@ def report_sessions(
     others = repeat_study(study, analysed.files, order.choices.variants, console, store)
     every = [trial for group in trials.values() for trial in group]
     rig = with_tares([trial.health for trial in every], every)
-    findings = cache(partial(compute_results, study, rig, break_away, sampled))
-    foresight = study_foresight(study, trials, break_away, store, findings)
     own = sessions[0].path if len(sessions) == 1 else data / "study"
     tested = columns_tested(
         study,
@@ -376,8 +368,9 @@ def report_sessions(
         console,
         store,
     )
-    context = _context(sessions, order, analysed, foresight, others, tested)
-    context = replace(context, rig=rig, results=findings(), store=store)
+    results = compute_results(study, rig, break_away, sampled)
+    context = _context(sessions, order, analysed, others, tested)
+    context = replace(context, rig=rig, results=results, store=store)
     page = write_report(study, order.out or own, context)
     console.table(*summary_table(study))
     for note in study.groups:
@@ -389,7 +382,6 @@ def _context(
     sessions: Sequence[SessionFolder],
     order: ReportRequest,
     analysed: StudySession,
-    foresight: StudyForesight,
     others: Sequence[tuple[StudyVariant, Study]],
     tested: Sequence[CovariateResult],
 ) -> ReportContext:
@@ -421,13 +413,11 @@ def _context(
             *(side_by_side(choice, study, other) for choice, other in others),
             *covariate_tables(tested),
             *truth_tables(study, trials, analysed.truths),
-            *foresight.tables,
             *report_tables(sessions, trials),
         ],
         further_numbers={
             "what_if": [plain_choice(c, study, other) for c, other in others],
             "covariates": [one.numbers() for one in tested],
-            "foresight": foresight.numbers,
             "left_out": analysed.left_out,
             "matrix": None if forecast is None else plain_forecast(forecast),
         },
@@ -441,7 +431,5 @@ def _context(
             *unsound,
         ],
         photos=[BedPhoto(*photo) for photo in photos],
-        foresight=foresight.model if len(sessions) > 1 else None,
-        foresight_curves=foresight.curves,
         with_pdf=order.with_pdf,
     )

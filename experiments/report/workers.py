@@ -6,7 +6,6 @@ _WORK = (  # what fits and figures need, the first needed first
     "analysis.breakaway.fitting",
     "analysis.study.relatives",
     "analysis.study.store",
-    "analysis.foresight.judged",
     "analysis.terrains.export",
     "analysis.report.page",
     "scipy.signal",

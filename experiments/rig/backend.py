@@ -1,7 +1,7 @@
 """The interface between the console and the devices, in this process or in others."""
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Protocol
 
 from acquisition.clock import Clock
@@ -11,12 +11,9 @@ from acquisition.devices import SafetyMode, WrenchSensor
 from acquisition.ipc.layout import SharedLayout
 from acquisition.ipc.loop_client import LoopClient
 from acquisition.recording.recorder import Recorder, TrialRecording
-from analysis.foresight.model import RigIdentity
 from experiments.rig.arm_operations import ArmOperations
 from experiments.rig.build import LoopConfig, build_loop_server
 from experiments.rig.claim import release
-from experiments.rig.foresight_process import ForesightWorker
-from experiments.rig.foresight_source import ForesightSource
 from wam.bus.link import CanLink
 from wam.driver.arm import WamArm
 from wam.driver.startup import ArmInfo
@@ -60,18 +57,6 @@ class RigBackend(Protocol):
 
     def begin(self) -> None:
         """Let the loop run from here on."""
-        ...
-
-    def start_foresight(
-        self, source: ForesightSource, rig: RigIdentity, along: Sequence[float]
-    ) -> None:
-        """Foresee what trials are about to do, beside the recorder.
-
-        Args:
-            source: what was learnt.
-            rig: foot and rig that are watched.
-            along: x_T in the base frame, three numbers.
-        """
         ...
 
     def grants(self) -> dict[str, list[Grant]]:
@@ -168,13 +153,6 @@ class InProcessBackend:
         loop = Loop(loop_server, self._clock, stats=loop_server.stats)
         self._advance_loop = InlineAdvance(loop, self.recorder)
         self.loop_client.beat()
-
-    def start_foresight(
-        self, source: ForesightSource, rig: RigIdentity, along: Sequence[float]
-    ) -> None:
-        """Foresee in this thread, whenever the recorder drains."""
-        worker = ForesightWorker(self._shared, source.started(rig), along)
-        self.recorder.foresee = worker.step
 
     def grants(self) -> dict[str, list[Grant]]:
         """Return nothing: this thread asks for nothing."""

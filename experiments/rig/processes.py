@@ -1,6 +1,5 @@
 """The rig's backend with one process for each job."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,15 +15,12 @@ from acquisition.ipc.rpc import make_proxy
 from acquisition.ipc.shared_memory import require_ordered_stores
 from acquisition.recording.recorder_process import RemoteRecorder
 from acquisition.simulation import DeviceServer
-from analysis.foresight.model import RigIdentity
 from experiments.rig.arm_lock import ArmLock
 from experiments.rig.arm_operations import ArmOperations
-from experiments.rig.foresight_source import ForesightSource
 from experiments.rig.services import ControlService, SensorService
 from wam.driver.startup import ArmInfo
 
 _CONTROL, _READER = "control", "sensor reader"  # names of processes
-_FORESIGHT = "foresight"
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +72,6 @@ class MultiProcessBackend:
         self._children: dict[str, Child] = {}
         self._reported: set[str] = set()
         loop_core, other_core = choose_cores()
-        self._other_core = other_core
         self._jobs = jobs
         self.fake: Child | None = None
         if jobs.fake is not None:
@@ -142,19 +137,6 @@ class MultiProcessBackend:
         if self._sensor is not None:
             grants[_READER] = self._sensor.grants()
         return grants
-
-    def start_foresight(
-        self, source: ForesightSource, rig: RigIdentity, along: Sequence[float]
-    ) -> None:
-        """Foresee in a process of its own; where it dies the session goes on."""
-        settings: dict[str, Any] = {
-            **source.settings(),
-            "rig": rig.to_dict(),
-            "along": list(along),
-            "core": self._other_core,
-        }
-        self._spawn(_FORESIGHT, "experiments.rig.foresight_process:main", settings)
-        self._reported.add(_FORESIGHT)
 
     @property
     def bus_path(self) -> str:

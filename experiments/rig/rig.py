@@ -11,8 +11,6 @@ from typing import Any
 from acquisition.clock import Clock, SystemClock
 from acquisition.ipc.layout import SharedLayout
 from acquisition.simulation import SimulationControl
-from analysis.data.recorded_factors import tread_of
-from analysis.foresight.model import RigIdentity
 from experiments.arguments import FRICTION, TimeMode
 from experiments.rig.arm_lock import ArmLock
 from experiments.rig.backend import RigBackend
@@ -23,7 +21,6 @@ from experiments.rig.fake import (
     stepped,
     typed_wrongly,
 )
-from experiments.rig.foresight_source import ForesightSource
 from experiments.rig.law_calibrations import (
     LawCalibrations,
     build_law,
@@ -92,7 +89,6 @@ class Rig:
         tared: the same with the bias of the newest tare.
         serials: of the seven pucks, as the preflight read them; None = unknown.
         tared_ns: when that was taken [ns]; 0 = never.
-        foresight: what is foreseen with while trials are recorded; None = nothing.
         frame: where the container stands.
         row: row of the matrix.
         settings: all settings.
@@ -116,7 +112,6 @@ class Rig:
     pace: WallPace | None = None
     serials: tuple[int, ...] | None = None
     tared_ns: int = 0
-    foresight: ForesightSource | None = None
 
     @property
     def is_simulated(self) -> bool:
@@ -127,26 +122,6 @@ class Rig:
     def is_stepped(self) -> bool:
         """Whether time passes only while the loop runs."""
         return self.pace is not None
-
-    @property
-    def identity(self) -> RigIdentity:
-        """Foot and rig, as trials state them."""
-        assert self.model.tool is not None
-        return RigIdentity(
-            simulated="true" if self.is_simulated else "false",
-            tread=tread_of(self.row.foot),
-            effective_mass_kg=repr(self.settings.rig.control.virtual_mass),
-            foot_mass_kg=repr(self.model.tool.foot.mass),
-        )
-
-    def watch_with(self, source: ForesightSource) -> None:
-        """Let a process beside the recorder foresee what trials are about to do.
-
-        On stepped time it is done in this thread.
-        """
-        along: list[float] = self.frame.axes()[0].tolist()
-        self.foresight = source
-        self.backend.start_foresight(source, self.identity, along)
 
 
 def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> Rig:

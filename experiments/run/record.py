@@ -18,12 +18,10 @@ from experiments.operator.feedback import FeedbackSignal
 from experiments.operator.graphs import LiveScales
 from experiments.operator.prompts import Prompt
 from experiments.operator.screens import (
-    ForesightView,
     RecordingView,
     live_line,
     recording_lines,
 )
-from experiments.rig.foresight_view import foresight_view
 from experiments.rig.rig import Rig
 from experiments.run.console_loop import TICK
 from experiments.run.context import RunContext, RunServices
@@ -37,7 +35,6 @@ from experiments.trial.running import kept_traces
 from wam.control.friction_compensation import SWUNG_MOTOR
 
 HISTORY = 5.0  # s of traction in the sparklines
-FORESEEN = 500  # states in the bar of slip probabilities, 5 s
 _ALL_MOTORS = 0x7F << MOTOR_FRESH_SHIFT
 
 
@@ -65,20 +62,11 @@ def recording_screen(
             is_arm_fine=flags & _ALL_MOTORS == _ALL_MOTORS,
             is_sensor_fine=is_sensor_fine,
             traction=np.array(records["traction"]),
-            foresight=_foreseen(rig, int(records["cycle"][-1])),
             scales=scales,
         )
         return recording_lines(view, width)
 
     return lines
-
-
-def _foreseen(rig: Rig, cycle: int) -> ForesightView | None:
-    """Return what is foreseen at a cycle; None where nothing is."""
-    if rig.foresight is None:
-        return None
-    records = rig.shared.foresight.last(FORESEEN)
-    return foresight_view(records, rig.foresight.model.terrains, cycle)
 
 
 LIVE_SECONDS = 5.0  # between two lines of a running trial

@@ -110,7 +110,6 @@ class ResumeRequest:
         operator: name; empty = the one of the session.
         script: of an operator; None = the keyboard.
         can_log: file that the bus is logged to.
-        foresight: terrain database; None = the one of the session.
         faults: to be injected into the simulation.
     """
 
@@ -124,7 +123,6 @@ class ResumeRequest:
     operator: str = ""
     script: str | None = None
     can_log: Path | None = None
-    foresight: Path | None = None
     faults: tuple[str, ...] = ()
 
 
@@ -254,7 +252,6 @@ def _reopen(
         console=console,
         faults=request.faults,
         can_log=request.can_log,
-        foresight=request.foresight or _path_of(before, "foresight"),
     )
     state = journal.state
     console.say(f"session {folder.id}: {len(state.kept)} of {state.wanted} kept")

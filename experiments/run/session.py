@@ -6,11 +6,10 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 from acquisition.errors import TractionError, UnfitDeviceError
-from acquisition.trial_file.data_files import is_there
 from experiments.arguments import data_option
 from experiments.fault_injection.host_faults import HostFaults
 from experiments.fault_injection.plan import plan_faults
-from experiments.operator.console import WARNING, Console
+from experiments.operator.console import Console
 from experiments.operator.prompts import OperatorInput
 from experiments.operator.terminal import keyboard
 from experiments.preflight.conditions import (
@@ -23,11 +22,6 @@ from experiments.preflight.conditions import (
 from experiments.preflight.connecting import connect_rig
 from experiments.preflight.preflight import Preflight, run_preflight
 from experiments.rig.bus_log import logging_bus
-from experiments.rig.foresight_source import (
-    STUDY_DATABASE,
-    ForesightSource,
-    read_foresight,
-)
 from experiments.rig.rig import FakeOptions, Rig
 from experiments.rig.simulation import SimulatedHand
 from experiments.run.console_loop import ConsoleLoop
@@ -65,8 +59,6 @@ class SessionRequest:
         console: where everything is printed.
         faults: to be injected into the simulation, as on the command line.
         can_log: file that the bus is logged to.
-        foresight: terrain database to foresee with; None = that of the study's report,
-            where there is one.
     """
 
     data: Path
@@ -79,7 +71,6 @@ class SessionRequest:
     console: Console
     faults: tuple[str, ...] = ()
     can_log: Path | None = None
-    foresight: Path | None = None
 
     @property
     def who(self) -> str:
@@ -112,7 +103,6 @@ def run_session(request: SessionRequest, mode: OpenMode) -> int:
         SessionError: the conditions are not those of the session.
     """
     console, stop = request.console, StopFlag()
-    source = _foresight_of(request, mode)
     rig = connect_rig(request.settings, request.row, request.fake)
     with logging_bus(rig, request.can_log, console):
         host_faults = HostFaults(rig)
@@ -120,8 +110,6 @@ def run_session(request: SessionRequest, mode: OpenMode) -> int:
         kind = "SIMULATED" if rig.is_simulated else "LIVE RIG"
         console.say(f"traction run {request.row.name}        {kind}")
         differences = _check_conditions(rig_conditions(rig), mode, console)
-        if source is not None:
-            _foresee(source, rig, console)
         try:
             page = _check_rig(request, rig, host_faults)
         except UnfitDeviceError as error:
@@ -154,36 +142,6 @@ def _hand(request: SessionRequest, rig: Rig) -> SimulatedHand | None:
     if rig.simulation is None:
         return None
     return SimulatedHand(rig.simulation)
-
-
-def _foresight_of(request: SessionRequest, mode: OpenMode) -> ForesightSource | None:
-    """Return what the session is foreseen with, None where nothing was learnt yet.
-
-    Raises:
-        SettingsError: the file that was named now cannot be used.
-    """
-    named = request.foresight
-    path = named or request.data / STUDY_DATABASE
-    try:
-        return read_foresight(path) if named or is_there(path) else None
-    except TractionError as error:
-        if named is not None and mode.journal is None:
-            raise
-        # It is in the way of nothing: a trial needs no foresight.
-        request.console.say(f"{WARNING} Foresight is off. {error}")
-        return None
-
-
-def _foresee(source: ForesightSource, rig: Rig, console: Console) -> None:
-    """Begin to foresee; say where it was learnt on another rig."""
-    rig.watch_with(source)
-    console.say(f"foresight: {source.path}, {len(source.model.terrains)} terrains")
-    if not source.model.knows(rig.identity):
-        known = "; ".join(known.text for known in source.model.provenance.rigs)
-        console.say(
-            f"{WARNING} Foresight was trained on another foot or rig and "
-            f"is off. Here: {rig.identity.text}. Trained on: {known}."
-        )
 
 
 def _check_rig(request: SessionRequest, rig: Rig, host_faults: HostFaults) -> Preflight:
@@ -263,7 +221,6 @@ def _details(
         **mode.details,
         "operator": request.who,
         "config": str(request.config.resolve()) if request.config else "",
-        "foresight": str(request.foresight.resolve()) if request.foresight else "",
         "fake": asdict(request.fake) if request.fake is not None else None,
     }
     return {**details, "differences": differences} if differences else details

@@ -13,6 +13,7 @@ from acquisition.recording.recorder import seal
 from acquisition.trial_file.header import TrialHeader
 from acquisition.trial_file.verify import VerifiedFile
 from acquisition.trial_file.writer import FLIGHT_TOPICS, TRUTH_TOPICS, TrialWriter
+from analysis.data.recorded_factors import tread_of
 from experiments import provenance
 from experiments.rig.rig import Rig
 from experiments.session.data_files import write_json
@@ -51,7 +52,7 @@ def collect_metadata(
 
 def trial_header(rig: Rig, details: SessionMetadata, name: TrialName) -> TrialHeader:
     """Return everything that is known about a trial before its first cycle."""
-    row, identity = rig.row, rig.identity.to_dict()
+    row = rig.row
     offset, uncertainty = utc_offset_ns(rig.clock)
     assert rig.model.tool is not None
     trial = {
@@ -61,14 +62,14 @@ def trial_header(rig: Rig, details: SessionMetadata, name: TrialName) -> TrialHe
         "terrain": row.name,
         "incline_deg": repr(row.incline_deg),
         "stone_size": row.stones,
-        "tread": identity["tread"],
-        "effective_mass_kg": identity["effective_mass_kg"],
-        "foot_mass_kg": identity["foot_mass_kg"],
+        "tread": tread_of(row.foot),
+        "effective_mass_kg": repr(rig.settings.rig.control.virtual_mass),
+        "foot_mass_kg": repr(rig.model.tool.foot.mass),
         "gravity_model": rig.settings.rig.gravity.model,
         "friction_compensation": repr(rig.settings.rig.friction.share),
         "operator": details.operator,
         "notes": "",
-        "simulated": identity["simulated"],
+        "simulated": "true" if rig.is_simulated else "false",
         "seed": "" if details.seed is None else str(details.seed),
         "started_utc": iso_utc(rig.clock.utc_ns()),
         "tared_ns": str(rig.tared_ns),
@@ -93,9 +94,6 @@ def trial_header(rig: Rig, details: SessionMetadata, name: TrialName) -> TrialHe
         provenance={**details.provenance, **rig.backend.loop_client.device_metadata()},
         attachments={key: text.encode() for key, text in attachments.items()},
         robot_description=attachments["robot.urdf"],
-        foresight=(
-            {} if rig.foresight is None else rig.foresight.metadata(rig.identity)
-        ),
     )
 
 

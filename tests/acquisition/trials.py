@@ -11,7 +11,6 @@ from acquisition.clock import PERIOD_NS
 from acquisition.sample import Flag
 from acquisition.schema import CYCLE
 from acquisition.trial_file.writer import (
-    FORESIGHT_TOPICS,
     TRIAL_TOPICS,
     TrialHeader,
     TrialWriter,
@@ -23,7 +22,6 @@ ATTACHMENTS = {
     "config.toml": b"[rig]\narm = 'wam7'\n",
     "arm_model.toml": bytes(range(256)) * 20,
 }
-FORESEEN_TOPICS = {**TRIAL_TOPICS, **FORESIGHT_TOPICS}
 MAGIC_BYTES = 8
 FOOTER_BYTES = 29
 DATA_END_BYTES = 13

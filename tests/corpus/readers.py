@@ -37,7 +37,6 @@ from ft_sensor.reading import StreamTiming
 from ft_sensor.serial_line.timestamps import SampleTimestamper
 from ft_sensor.vendors import ati, bota, optoforce, robotous
 from tests.corpus.copied_session import use_lines, use_names
-from tests.corpus.foresight import read_foreseen, read_models
 from tests.corpus.logs import (
     read_definition,
     read_import_record,
@@ -257,8 +256,6 @@ READERS: dict[str, Callable[[bytes, Path], None]] = {
     "terrain": _text(terrain_from_toml),
     "sensor-calibration": _text(lambda text: sensor_from_toml(text, "sensor.toml")),
     "database": _database,
-    "foresight": read_models,
-    "foreseen": read_foreseen,
     "table": _table("trial.csv"),
     "german-table": _table("trial.csv"),
     "preamble-table": _table("trial.csv"),

@@ -3,16 +3,12 @@
 import hashlib
 import io
 import json
-import tempfile
 import zipfile
 from functools import cache
 from importlib import resources
-from pathlib import Path
 
 import numpy as np
 
-from acquisition.schema import FORESIGHT
-from acquisition.trial_file.writer import publish
 from analysis.breakaway.censored import Family
 from analysis.breakaway.model import BREAK_AWAY, BreakAwayModel, PushLaw
 from analysis.data.data_package import TableOrigin
@@ -24,13 +20,6 @@ from ft_sensor.calibration.files import payload_to_toml, terrain_to_toml
 from ft_sensor.calibration.fit import SensorFit
 from ft_sensor.calibration.sensor_file import SensorCalibration, sensor_to_toml
 from ft_sensor.payload import TerrainFrame, payload_of
-from lab.guest.scenarios.foresight import DATABASE
-from tests.acquisition.trials import (
-    FORESEEN_TOPICS,
-    make_cycles,
-    make_header,
-    write_trial,
-)
 from tests.corpus.copied_session import all_lines, all_names
 from tests.corpus.logs import log_samples
 from tests.corpus.readers import PACKAGED, RESULTS, RUNNING
@@ -173,21 +162,6 @@ def _database() -> dict[str, object]:
     }
 
 
-def _foreseen() -> bytes:
-    """Return a trial with a state every fifth cycle."""
-    header = make_header(foresight={"terrains": '["S10", "TF"]', "known_rig": "true"})
-    states = np.frombuffer(bytearray(FORESIGHT.template * 12), FORESIGHT.dtype)
-    states["cycle"] = 1000 + 5 * np.arange(12)
-    states["terrains"][:, :2] = 0.5
-    with tempfile.TemporaryDirectory(prefix="corpus-") as scratch:
-        path = Path(scratch) / "T01.mcap"
-        writer = write_trial(path, make_cycles(60), header, topics=FORESEEN_TOPICS)
-        writer.write_foresight(states)
-        writer.finish("travel")
-        publish(writer)
-        return path.read_bytes()
-
-
 def _npz() -> bytes:
     rows = np.column_stack([np.arange(5.0), np.ones(5), np.ones(5), np.ones(5)])
     file = io.BytesIO()
@@ -271,7 +245,6 @@ def samples() -> dict[str, bytes]:
         "terrain": terrain_to_toml("S10", frame, {"measured": _UTC}),
         "sensor-calibration": _sensor_calibration(),
         "database": json.dumps(_database()),
-        "foresight": DATABASE.read_text(),
         "sidecar": json.dumps(_SIDECAR),
         "session": json.dumps({"kept": ["T01"], "phase": "unfinished"}),
         "german-table": "\ufeff" + _GERMAN,
@@ -289,7 +262,6 @@ def samples() -> dict[str, bytes]:
         "used-session": session_file("/session.json"),
         "used-journal": session_file("/events.jsonl"),
         "used-mcap": session_file("trials/T01.mcap"),
-        "foreseen": _foreseen(),
         "npz": _npz(),
         "parquet": _parquet(),
         "package": _package(),

@@ -9,7 +9,7 @@ from acquisition.ipc.frame_tape import FrameTape
 from acquisition.ipc.layout import ProcessRole, SharedLayout
 from acquisition.ipc.shared_sensor import publish
 from acquisition.recording.recorder import Recorder
-from acquisition.schema import CYCLE, FORESIGHT
+from acquisition.schema import CYCLE
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.recover import recover_file
 from acquisition.trial_file.writer import TrialWriter
@@ -287,57 +287,3 @@ def test_what_was_measured_before_a_trial_is_abandoned_is_on_the_disk(loop_clien
     partial = loop_client.path.with_name(loop_client.path.name + ".partial")
     saved = recover_file(partial).path
     assert TrialReader(saved).cycles().data["cycle"].tolist() == list(range(137))
-
-
-# --- foresight ------------------------------------------------------------------------
-
-
-def foreseen(loop_client, cycle, since):
-    """Put a state into the ring buffer, as the process of foresight does."""
-    record = np.frombuffer(bytearray(FORESIGHT.template), FORESIGHT.dtype)
-    record["cycle"], record["since"] = cycle, since
-    record["host_ns"] = loop_client.clock.now_ns()
-    loop_client.shared.foresight.write(record.tobytes())
-
-
-def start_foreseen(loop_client):
-    header = replace(make_header(), foresight={"sha256": "0"})
-    loop_client.recorder.start(loop_client.path, header)
-
-
-def test_foresight_begins_at_the_first_cycle_of_the_trial(loop_client):
-    loop_client.run(1200)
-    start_foreseen(loop_client)
-    position = int(loop_client.shared.trial_start.read())
-    records, lost = loop_client.shared.cycles.since(position)
-    assert (int(records["cycle"][0]), lost) == (700, 0)
-    loop_client.recorder.abandon()
-
-
-def test_only_what_began_with_the_trial_is_written(loop_client):
-    loop_client.run(1200)
-    foreseen(loop_client, 1195, 100)
-    start_foreseen(loop_client)
-    foreseen(loop_client, 1199, 100)  # under way when the trial began
-    foreseen(loop_client, 705, 700)
-    loop_client.run(20)
-    loop_client.recorder.finish("end")
-    states = TrialReader(loop_client.path).foresight().data
-    assert states["cycle"].tolist() == [705]
-
-
-def test_foresight_rests_after_the_trial(loop_client):
-    loop_client.run(20)
-    start_foreseen(loop_client)
-    loop_client.run(20)
-    loop_client.recorder.finish("end")
-    assert loop_client.shared.trial_start.read() == b""
-
-
-def test_a_trial_that_is_not_foreseen_asks_for_nothing(loop_client):
-    loop_client.run(20)
-    loop_client.start()
-    assert loop_client.shared.trial_start.read() == b""
-    loop_client.run(20)
-    loop_client.recorder.finish("end")
-    assert not TrialReader(loop_client.path).has_foresight

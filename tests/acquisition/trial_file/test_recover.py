@@ -16,14 +16,13 @@ from acquisition.clock import NS_PER_S
 from acquisition.errors import TrialFileError
 from acquisition.recording.recorder import seal
 from acquisition.sample import Flag
-from acquisition.schema import CYCLE, FORESIGHT, TRUTH
+from acquisition.schema import CYCLE, TRUTH
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.recover import LostSpan, recover_file, recovered_path
 from acquisition.trial_file.salvage import SoundRecords, recorded_seconds
 from acquisition.trial_file.verify import verify_file
 from acquisition.trial_file.writer import (
     FLIGHT_TOPICS,
-    FORESIGHT_TOPICS,
     TRIAL_TOPICS,
     TRUTH_TOPICS,
     TrialWriter,
@@ -673,11 +672,8 @@ def test_an_index_of_messages_is_whole_or_said_to_be_broken(tmp_path, index, is_
 
 
 @pytest.mark.parametrize("topics", [TRIAL_TOPICS, FLIGHT_TOPICS, TRUTH_TOPICS])
-@pytest.mark.parametrize("is_foreseen", [False, True])
-def test_topics_are_known_by_the_sizes_of_their_messages(topics, is_foreseen):
-    if is_foreseen and topics is not TRUTH_TOPICS:
-        topics = {**topics, **FORESIGHT_TOPICS}
-    own = {"/cycle": CYCLE.size, "/truth": TRUTH.size, "/foresight": FORESIGHT.size}
+def test_topics_are_known_by_the_sizes_of_their_messages(topics):
+    own = {"/cycle": CYCLE.size, "/truth": TRUTH.size}
     sizes = {i: own.get(topic, 77) for i, topic in enumerate(topics, 1)}
     assert topics_by_sizes(sizes) == topics
 

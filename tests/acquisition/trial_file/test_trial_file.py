@@ -15,7 +15,7 @@ from acquisition.ipc.frame_tape import FRAME_DTYPE
 from acquisition.ipc.shared_sensor import WRENCH_DTYPE
 from acquisition.recording.recorder import seal
 from acquisition.sample import CHANNELS, Flag
-from acquisition.schema import EARLIER_FORESIGHTS, FORESIGHT, TRUTH, schema_text
+from acquisition.schema import TRUTH
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.verify import verify_file
 from acquisition.trial_file.writer import (
@@ -27,7 +27,6 @@ from acquisition.trial_file.writer import (
 from tests.acquisition.ros import decode, messages_of
 from tests.acquisition.trials import (
     ATTACHMENTS,
-    FORESEEN_TOPICS,
     OFFSET_NS,
     PERIOD_NS,
     START_NS,
@@ -485,45 +484,3 @@ def test_the_stored_chunks_have_checksums(trial):
     chunk = span_of(data, 6)
     crc = struct.unpack_from("<I", data, chunk.body + 24)[0]
     assert crc != 0
-
-
-def foreseen(path):
-    """Write a trial with a foresight channel; return its states."""
-    states = np.frombuffer(bytearray(FORESIGHT.template * 4), FORESIGHT.dtype)
-    states["cycle"] = 1000 + 5 * np.arange(4)
-    for k, name in enumerate(("v_t", "f_t", "f_n", "slip_probability")):
-        states[name] = k + 0.25 * np.arange(4)
-    header = make_header(foresight={"terrains": "[]"})
-    writer = write_trial(path, make_cycles(20), header, topics=FORESEEN_TOPICS)
-    writer.write_foresight(states)
-    writer.finish("travel")
-    publish(writer)
-    return states
-
-
-@pytest.mark.parametrize("layout", [FORESIGHT, *EARLIER_FORESIGHTS])
-def test_foresight_of_every_version_is_read_under_the_names_of_today(
-    tmp_path, layout, monkeypatch
-):
-    def text_then(type_name):
-        is_it = type_name == FORESIGHT.type_name
-        return layout.definition if is_it else schema_text(type_name)
-
-    monkeypatch.setattr("acquisition.trial_file.writer.schema_text", text_then)
-    states = foreseen(tmp_path / "T01.mcap")
-    read = TrialReader(tmp_path / "T01.mcap").foresight().data
-    assert read.dtype == FORESIGHT.dtype
-    for name in ("cycle", "v_t", "f_t", "f_n", "slip_probability"):
-        np.testing.assert_array_equal(read[name], states[name])
-
-
-def test_foresight_with_fields_that_no_version_had_is_refused(tmp_path, monkeypatch):
-    def other(type_name):
-        text = schema_text(type_name)
-        is_it = type_name == FORESIGHT.type_name
-        return text.replace("float64 v_t", "float64 speed") if is_it else text
-
-    monkeypatch.setattr("acquisition.trial_file.writer.schema_text", other)
-    foreseen(tmp_path / "T01.mcap")
-    with pytest.raises(TrialFileError, match="/foresight has other fields"):
-        TrialReader(tmp_path / "T01.mcap").foresight()

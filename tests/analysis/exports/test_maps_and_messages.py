@@ -88,7 +88,7 @@ def test_the_package_has_the_messages_of_recordings(tmp_path):
     folder = write(tmp_path, "ros2") / "traction_msgs"
     texts = {p.stem: p.read_text().removesuffix("\n") for p in folder.glob("msg/*.msg")}
     assert texts == message_texts("traction_msgs")
-    assert {"Cycle", "Foresight", "TerrainTraction"} < set(texts)
+    assert {"Cycle", "TerrainTraction"} < set(texts)
     cmake = (folder / "CMakeLists.txt").read_text()
     assert all(f'"msg/{name}.msg"' in cmake for name in texts)
     root = ElementTree.parse(folder / "package.xml").getroot()

@@ -9,13 +9,12 @@ from analysis.figures.curves import caption_gp, draw_tustin_model
 from analysis.figures.errors import draw_cross_bars, draw_cross_map, draw_errors
 from analysis.figures.excerpts import draw_excerpts
 from analysis.figures.pictures import Picture
-from analysis.figures.sections import ReportSection
 from analysis.figures.selection import busiest_window, panels
 from analysis.figures.style import render, styled
 from analysis.figures.surfaces import near_samples
 from analysis.findings.findings import compute_results
 from analysis.report.page import ReportContext, ReportTable, render_page, write_report
-from analysis.report.page_model import ReportFigure, cell_text, number_columns
+from analysis.report.page_model import cell_text, number_columns
 from analysis.report.paper_tables import summary, table_one, verdicts
 from analysis.report.rig_tables import choices
 from analysis.study.fits import to_fits
@@ -45,9 +44,6 @@ class Page(HTMLParser):
 
     def attributes(self, tag):
         return [attrs for name, attrs in self.tags if name == tag]
-
-
-FORESIGHT = Picture("foresight", b"further")
 
 
 def context(**changes):
@@ -172,25 +168,6 @@ def test_a_report_without_pdfs_leaves_none_of_an_earlier_one(
     for link in links:
         assert link.endswith(".png")
         assert (tmp_path / "report" / link).is_file()
-
-
-@pytest.mark.timeout(300)  # two reports on a busy machine
-def test_a_further_figure_stands_on_the_page_until_a_report_has_none(
-    small_study, tmp_path, monkeypatch
-):
-    monkeypatch.setattr(
-        "analysis.figures.style.render", lambda key, *_, **__: Picture(key, b"png")
-    )
-    further = ReportFigure(
-        ReportSection.BEYOND, "Foresight", "Four panels.", "Seen.", FORESIGHT
-    )
-    page = write_report(small_study, tmp_path, context(figures=[further]))
-    assert "Four panels." in page.read_text()
-    file = tmp_path / "figures" / "foresight.png"
-    assert file.read_bytes() == b"further"
-    page = write_report(small_study, tmp_path, context())
-    assert "Four panels." not in page.read_text()
-    assert not file.exists()
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 from analysis.breakaway.fitting import fit_planned
-from analysis.foresight.judged import judge
 from analysis.report.drawing import report_figures
 from analysis.study.crossval import run_fold
 from analysis.study.digests import ROOT, code_digest, source_files
@@ -60,7 +59,6 @@ def test_what_a_fold_does_not_use_leaves_its_digest(copy):
         (run_relatives, "analysis.gp.hierarchy"),
         (fit_planned, "analysis.breakaway.censored"),
         (tabulate, "analysis.study.models"),
-        (judge, "analysis.foresight.signals"),
         (report_figures, "analysis.figures.curves"),  # imported when drawn
         (report_figures, "ft_sensor.payload"),  # through other modules
     ],

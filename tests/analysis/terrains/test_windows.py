@@ -9,7 +9,6 @@ import pytest
 
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.series import TractionSeries
-from analysis.foresight.logistic import fit_balanced
 from analysis.terrains.classifier import (
     FLAT_GROUND,
     ROCKY_GROUND,
@@ -24,6 +23,7 @@ from analysis.terrains.evidence import (
     exclusion_of,
     surface_probabilities,
 )
+from analysis.terrains.logistic import fit_balanced
 from analysis.terrains.recognition import TerrainScores
 from analysis.terrains.verdict import WindowLimits
 from analysis.terrains.windows import (

@@ -6,12 +6,11 @@ import re
 import numpy as np
 import pytest
 
-from acquisition.schema import CYCLE, FORESIGHT, schema_text
+from acquisition.schema import CYCLE, schema_text
 from experiments.live.channels import (
     LIVE_TOPICS,
     ArmFrames,
     LiveEncoder,
-    stamped_foresight,
 )
 from experiments.live.server import layout_path
 from tests.acquisition.ros import decode
@@ -43,18 +42,10 @@ def test_every_field_of_a_cycle_arrives_as_it_was():
 
 
 def test_a_sample_gives_every_topic_that_follows_from_it():
-    rest = {"/robot_description", "/events", "/foresight"}
+    rest = {"/robot_description", "/events"}
     assert set(messages()) == set(LIVE_TOPICS) - rest
     for topic, payload in messages().items():
         decode(LIVE_TOPICS[topic], payload)
-
-
-def test_what_is_foreseen_has_the_stamp_of_its_sample():
-    record = filled(FORESIGHT, 3)
-    message = decode(FORESIGHT.type_name, stamped_foresight(record[0], T_NS))
-    assert message.header.stamp.sec == T_NS // 10**9
-    assert message.f_t == record["f_t"][0]
-    assert list(message.terrains) == record["terrains"][0].tolist()
 
 
 def matrix(transform):
@@ -120,15 +111,14 @@ LAYOUT = json.loads(layout_path().read_text())
 
 @pytest.mark.parametrize("path", list(paths_of(LAYOUT)))
 def test_the_layout_that_is_shipped_plots_fields_that_are_recorded(path):
-    match = re.fullmatch(r"(/\w+)\.(\w+)(?:\[(\d+)\])?", path)
-    layout = {"/cycle": CYCLE, "/foresight": FORESIGHT}[match[1]]
-    shape = layout.dtype[match[2]].shape
-    assert bool(shape) is (match[3] is not None)
-    assert not shape or int(match[3]) < shape[0]
+    match = re.fullmatch(r"/cycle\.(\w+)(?:\[(\d+)\])?", path)
+    shape = CYCLE.dtype[match[1]].shape
+    assert bool(shape) is (match[2] is not None)
+    assert not shape or int(match[2]) < shape[0]
 
 
-def test_the_layout_shows_arm_events_and_a_dozen_series():
+def test_the_layout_shows_arm_events_and_ten_series():
     text = json.dumps(LAYOUT)
     assert all(topic in LIVE_TOPICS for topic in re.findall(r'"(/[\w/]+)"', text))
     assert {"ThreeDee", "Log", "Plot"} <= set(re.findall(r'"panelType": "(\w+)"', text))
-    assert len(list(paths_of(LAYOUT))) >= 12
+    assert len(list(paths_of(LAYOUT))) >= 10

@@ -11,7 +11,7 @@ from acquisition.clock import SystemClock
 from acquisition.errors import LinkError, SettingsError
 from acquisition.ipc.layout import SharedLayout
 from acquisition.ipc.shared_memory import SharedMemory
-from acquisition.schema import CYCLE, FORESIGHT
+from acquisition.schema import CYCLE
 from experiments.live.channels import LIVE_TOPICS
 from experiments.live.server import LiveServer
 from experiments.live.watching import WatchedSession, event_text, find_open, watch
@@ -102,19 +102,7 @@ def test_the_newest_sample_is_shown_once(shared, folder):
     message = decode(CYCLE.type_name, messages["/cycle"])
     assert message.cycle == record["cycle"][0]
     assert abs(t_ns - SystemClock().utc_ns()) < 10**9
-    assert "/foresight" not in messages
     assert session.newest() is None
-
-
-def test_what_is_foreseen_comes_with_its_sample(shared, folder):
-    session = WatchedSession(folder, shared, SystemClock())
-    written(shared, 1)
-    shared.foresight.write(filled(FORESIGHT, 1).tobytes())
-    messages, _ = session.newest()
-    assert "/foresight" in messages
-    written(shared, 2)
-    messages, _ = session.newest()
-    assert "/foresight" not in messages
 
 
 def test_new_entries_of_the_journal_become_events(shared, folder):

@@ -1,12 +1,10 @@
 import tracemalloc
-from dataclasses import replace
 
 import numpy as np
 
 from analysis.data.load import load_trial
 from analysis.findings.held_trial import HeldTrial, TrialFiles
 from analysis.findings.rig_health import summarise_rig, with_tares
-from analysis.foresight.judged import digest_of
 
 MOST_BYTES = 40  # of a cycle: time, velocity, two forces, and what is small
 
@@ -33,14 +31,3 @@ def test_trials_on_disk_are_read_every_time(first_trial):
     files = TrialFiles([HeldTrial.of(load_trial(first_trial))] * 2)
     for _ in range(2):
         assert [trial.path for trial in files] == [first_trial] * 2
-
-
-def test_the_digest_changes_with_what_foresight_reads_and_with_nothing_else(
-    first_trial,
-):
-    trial = load_trial(first_trial)
-    cycles = trial.cycles.copy()
-    cycles["torque_command"][3] += 1.0
-    assert digest_of(replace(trial, cycles=cycles)) == digest_of(trial)
-    cycles["foot_position"][3] += 1e-12
-    assert digest_of(replace(trial, cycles=cycles)) != digest_of(trial)

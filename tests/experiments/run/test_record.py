@@ -20,7 +20,6 @@ def test_missed_are_the_cycles_that_never_came_and_not_the_late_ones():
         backend=SimpleNamespace(loop_client=loop_client),
         settings=load_settings(None),
         frame=SimpleNamespace(travel=0.45),
-        foresight=None,
     )
     lines = recording_screen(rig, "T04", TrialOutcome("", 1.0, 0.1))
     assert "missed 0" in lines(80)[0]

@@ -1,15 +1,13 @@
-"""Ridge logistic regression on standardised features and products of pairs of them.
+"""Ridge logistic regression on standardised features and their squares.
 
-    p = 1 / (1 + exp(-(w0 + w'z + sum over pairs of w_ij z_i z_j)))
+    p = 1 / (1 + exp(-(w0 + w'z + v'z^2)))
 
 The fit is Newton's method on the log loss plus a ridge, a step halved until nothing is
-lost. `probability` of one row is plain floats in a fixed order: the same bits wherever
-it runs.
+lost.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import exp
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -24,9 +22,7 @@ _STEPS, _HALVINGS = 25, 14
 _CONVERGED = 1e-4
 _SMALL = 1e-9
 _LARGEST_NUMBER = 1e9  # of a stored number
-_MOST_PAIRS = 600
 
-Pairs = Annotated[Many[tuple[int, int]], Field(max_length=_MOST_PAIRS)]
 _Number = Annotated[
     float, Field(ge=-_LARGEST_NUMBER, le=_LARGEST_NUMBER, allow_inf_nan=False)
 ]
@@ -40,60 +36,28 @@ class RidgeLogistic:
     Attributes:
         mean: of the features, shape (n,).
         scale: their standard deviations, shape (n,).
-        pairs: features that are multiplied, (i, i) is a square; shape (k, 2).
-        weights: bias, features, pairs; shape (1 + n + k,).
+        weights: bias, features, squares; shape (1 + 2 n,).
     """
 
     mean: Many[_Number]
     scale: Many[_Scale]
-    pairs: Pairs
     weights: Many[_Number]
 
-    def probability(self, features: Sequence[float]) -> float:
-        """Return the probability of one row of features, shape (n,)."""
-        weights = iter(self.weights)
-        z: list[float] = []
-        logit = next(weights)
-        for value, mean, scale in zip(features, self.mean, self.scale, strict=True):
-            step = (value - mean) / scale
-            step = (
-                _CLIPPED_AT
-                if step > _CLIPPED_AT
-                else -_CLIPPED_AT
-                if step < -_CLIPPED_AT
-                else step
-            )
-            z.append(step)
-            logit += next(weights) * step
-        for (i, j), weight in zip(self.pairs, weights, strict=True):
-            logit += weight * z[i] * z[j]
-        if logit > _LARGEST_LOGIT:
-            logit = _LARGEST_LOGIT
-        elif logit < -_LARGEST_LOGIT:
-            logit = -_LARGEST_LOGIT
-        return 1.0 / (1.0 + exp(-logit))
-
     def probabilities(self, features: Array) -> Array:
-        """Return those of many rows, shape (m,); equal but for the last digits.
+        """Return the probability of every row of features, shape (m,).
 
         Args:
             features: shape (m, n).
         """
-        design = _design(
-            features, np.array(self.mean), np.array(self.scale), self.pairs
-        )
+        design = _design(features, np.array(self.mean), np.array(self.scale))
         return _logistic(design @ np.array(self.weights))
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the regression as plain values; floats keep all their digits."""
-        return _PLAIN.dump_python(self, mode="json")
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any], count: int) -> "RidgeLogistic":
         """Return the regression of plain values.
 
         Args:
-            content: as of `to_dict`.
+            content: mean, scale and weights.
             count: number of features that it has to be for.
 
         Raises:
@@ -107,9 +71,7 @@ class RidgeLogistic:
         Raises:
             ValueError: it is not for `count` features.
         """
-        if any(not 0 <= k < count for pair in self.pairs for k in pair):
-            raise ValueError("a regression multiplies features that there are not")
-        sizes = {"mean": count, "scale": count, "weights": 1 + count + len(self.pairs)}
+        sizes = {"mean": count, "scale": count, "weights": 1 + 2 * count}
         for name, size in sizes.items():
             if len(getattr(self, name)) != size:
                 raise ValueError(f"{name} of a regression is not {size} numbers")
@@ -120,7 +82,7 @@ _PLAIN = TypeAdapter(RidgeLogistic)
 
 
 def fit_logistic(
-    features: Array, truth: np.ndarray, weight: Array, pairs: Pairs, ridge: float = 1.0
+    features: Array, truth: np.ndarray, weight: Array, ridge: float = 1.0
 ) -> RidgeLogistic:
     """Return the regression of rows; both answers have to occur.
 
@@ -128,7 +90,6 @@ def fit_logistic(
         features: shape (m, n).
         truth: whether the row is positive, shape (m,).
         weight: what a row counts, shape (m,).
-        pairs: features that are multiplied.
         ridge: penalty of every weight but the bias.
 
     Raises:
@@ -137,7 +98,7 @@ def fit_logistic(
     if not 0 < int(truth.sum()) < truth.size:
         raise ValueError("only one answer occurs")
     mean, scale = features.mean(axis=0), features.std(axis=0) + _SMALL
-    design = _design(features, mean, scale, pairs)
+    design = _design(features, mean, scale)
     penalty = np.full(design.shape[1], ridge)
     penalty[0] = _SMALL
     loss = _Loss(design, truth.astype(np.bool_), weight, penalty)
@@ -151,7 +112,7 @@ def fit_logistic(
             break
     columns = (mean, scale, iterate.w)
     plain_mean, plain_scale, plain_w = (tuple(c.tolist()) for c in columns)
-    return RidgeLogistic(plain_mean, plain_scale, pairs, plain_w)
+    return RidgeLogistic(plain_mean, plain_scale, plain_w)
 
 
 def fit_balanced(
@@ -173,27 +134,16 @@ def fit_balanced(
     truth = np.concatenate([np.full(len(part), kind) for part, kind in filled])
     share = float(truth.mean())
     balance = np.where(truth, 0.5 / share, 0.5 / (1.0 - share)) * new
-    return fit_logistic(X, truth, balance, squares(X.shape[1]))
-
-
-def squares(count: int) -> Pairs:
-    """Return every feature with itself."""
-    return tuple((k, k) for k in range(count))
-
-
-def all_pairs(chosen: Sequence[int]) -> Pairs:
-    """Return every pair of the chosen features, squares included."""
-    return tuple((i, j) for at, i in enumerate(chosen) for j in chosen[at:])
+    return fit_logistic(X, truth, balance)
 
 
 def _logistic(logit: Array) -> Array:
     return 1.0 / (1.0 + np.exp(-np.clip(logit, -_LARGEST_LOGIT, _LARGEST_LOGIT)))
 
 
-def _design(features: Array, mean: Array, scale: Array, pairs: Pairs) -> Array:
+def _design(features: Array, mean: Array, scale: Array) -> Array:
     z = np.clip((features - mean) / scale, -_CLIPPED_AT, _CLIPPED_AT)
-    products = [z[:, i] * z[:, j] for i, j in pairs]
-    return np.column_stack([np.ones(len(z)), z, *products])
+    return np.column_stack([np.ones(len(z)), z, z * z])
 
 
 class _Iterate(NamedTuple):
