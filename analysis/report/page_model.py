@@ -86,21 +86,6 @@ class ShownNumbers:
 
 
 @dataclass(frozen=True, slots=True)
-class BedPhoto:
-    """A photo of the bed after a trial, small.
-
-    Attributes:
-        title: session and trial.
-        caption: when it was taken, its file and checksum.
-        jpeg: the picture.
-    """
-
-    title: str
-    caption: str
-    jpeg: bytes
-
-
-@dataclass(frozen=True, slots=True)
 class PageSection:
     """One section of the page with everything in it.
 
@@ -131,7 +116,6 @@ class ReportContext:
         warnings: further warnings, shown first.
         rig: health of the rig by trial.
         further_numbers: further plain values for fits.json, by name.
-        photos: of the bed after the trials.
         with_pdf: figures are filed as PDF, too.
         results: what follows from the study; None = it is computed.
         store: results of earlier reports; None = everything is computed.
@@ -146,7 +130,6 @@ class ReportContext:
     warnings: Sequence[str] = field(default=())
     rig: Sequence[RigTrial] = field(default=())
     further_numbers: Mapping[str, Any] = field(default_factory=dict)
-    photos: Sequence[BedPhoto] = field(default=())
     with_pdf: bool = False
     results: StudyResults | None = None
     store: Store | None = None

@@ -90,23 +90,6 @@ class StudyAction:
     results: Sequence[str]
 
 
-@dataclass(frozen=True, slots=True)
-class PublishedPhoto:
-    """A photo of the bed.
-
-    Attributes:
-        path: of the photo, below the crate.
-        recording: of its trial, below the crate.
-        attempt: session and attempt, e.g. S012/T04.
-        taken_utc: when, ISO 8601.
-    """
-
-    path: str
-    recording: str
-    attempt: str
-    taken_utc: str
-
-
 def is_publication(path: Path) -> bool:
     """Return whether `path` is a folder that `traction publish` wrote."""
     return (path / METADATA).is_file() or (path / SUMS).is_file()
@@ -117,7 +100,6 @@ def crate_text(
     about: "Credits",
     recordings: Sequence[RecordingAction],
     study: StudyAction,
-    photos: Sequence[PublishedPhoto] = (),
 ) -> str:
     """Return `ro-crate-metadata.json` for everything that lies in `folder`.
 
@@ -126,7 +108,6 @@ def crate_text(
         about: who publishes what under which licence.
         recordings: an action for each.
         study: the action that made the results.
-        photos: of the bed, each with its trial.
 
     Raises:
         TrialFileError: a file cannot be read.
@@ -135,8 +116,6 @@ def crate_text(
     builder.add_root(about)
     for recording in recordings:
         builder.add_recording(recording)
-    for photo in photos:
-        builder.add_photo(photo, about.licence.url)
     builder.add_study(study)
     return builder.text()
 
@@ -193,14 +172,6 @@ class _CrateBuilder:
             endTime=end,
             agent=self._person(f"#operator-{_slug(operator)}", operator),
         )
-
-    def add_photo(self, photo: PublishedPhoto, licence: str) -> None:
-        """Describe a photo of the bed: its trial, its time, its licence."""
-        file = self.files[photo.path]
-        file["description"] = f"Bed after {photo.attempt}, before it was reset."
-        file["about"] = self.files[photo.recording]
-        file["dateCreated"] = photo.taken_utc
-        file["license"] = self.crate.dereference(licence)
 
     def add_study(self, study: StudyAction) -> None:
         """Describe how the results came about."""

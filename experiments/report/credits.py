@@ -213,7 +213,7 @@ def licence_text(about: Credits) -> str:
     """Return which licence holds for what."""
     return (
         "# Licences\n\n"
-        f"The recordings, photos, tables, figures and texts of this folder: "
+        f"The recordings, tables, figures and texts of this folder: "
         f"{about.licence.name} ({about.licence.id}), {about.licence.url}\n\n"
         f"They were made with {about.software}, which is under the MIT licence and not "
         "part of this folder.\n"
@@ -232,7 +232,7 @@ def readme_text(about: Credits, terrains: Sequence[str], trials: int) -> str:
 
 | file | content |
 |---|---|
-| `sessions/` | sessions: trials as MCAP (ROS 2), photos of the bed, settings, journal |
+| `sessions/` | sessions: trials as MCAP (ROS 2), settings, journal |
 | `tables/` | the kept trials as CSV, `datapackage.json` (Frictionless) beside them |
 | `results/` | report, fitted models (`fits.json`, `fits.csv`), figures |
 | `ro-crate-metadata.json` | RO-Crate 1.1, profile Process Run Crate 0.5 |

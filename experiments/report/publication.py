@@ -11,7 +11,6 @@ from importlib import metadata
 from pathlib import Path
 
 from acquisition.clock import SystemClock
-from acquisition.errors import TrialFileError
 from acquisition.extras import require_extra
 from acquisition.trial_file.data_files import list_folder, open_data
 from analysis.data.load import RecordedTrial, load_trial
@@ -20,7 +19,6 @@ from experiments.operator.console import WARNING, Console
 from experiments.report.checksums import SUMS, write_sums
 from experiments.report.crate import (
     METADATA,
-    PublishedPhoto,
     RecordingAction,
     StudyAction,
     crate_text,
@@ -37,7 +35,6 @@ from experiments.report.credits import (
 from experiments.report.export import export_sessions, make_empty
 from experiments.report.sessions import ReportRequest, report_sessions
 from experiments.session.data_files import reading, write_new
-from experiments.session.photos import PhotoError, kept_photo
 from experiments.session.store import SessionFolder, iso_utc
 
 SESSIONS, TABLES, RESULTS = "sessions", "tables", "results"
@@ -46,7 +43,6 @@ TABLE = f"{RESULTS}/fits.csv"
 _RECORDINGS = ("trials", "rejected")
 _FOLDERS = ("", *_RECORDINGS)  # of a session; faults/ stays
 _LEFT = (".lock", ".tmp", ".partial")
-_PHOTO = ".photo."  # is copied if it is what was taken
 _SETTINGS = ("config.toml", "matrix.toml")
 
 
@@ -94,7 +90,6 @@ def publish_sessions(
     require_extra("publish")
     make_empty(to)
     copies = [_copy_session(session, to / SESSIONS) for session in sessions]
-    photos = _copy_photos(sessions, copies, to, console)
     trials = {path: load_trial(path) for s in copies for path in s.kept_trials()}
     export_sessions(copies, to / TABLES, "csv", console)
     (to / RESULTS).mkdir()
@@ -111,10 +106,10 @@ def publish_sessions(
         inputs=[str(path.relative_to(to)) for path in trials],
         results=[TABLE, f"{RESULTS}/fits.json", f"{RESULTS}/report/index.html"],
     )
-    text = crate_text(to, about, recordings, study, photos)
+    text = crate_text(to, about, recordings, study)
     write_new(to / METADATA, text.encode())
     write_sums(to)
-    _say(to, trials.values(), len(photos), console)
+    _say(to, trials.values(), console)
 
 
 def _write_texts(
@@ -146,46 +141,12 @@ def _copy_session(session: SessionFolder, to: Path) -> SessionFolder:
         source, target = session.path / name, copy.path / name
         target.mkdir(parents=True, exist_ok=True)
         for path in list_folder(source):
-            if path.name.endswith(_LEFT) or _PHOTO in path.name or path.is_dir():
+            if path.name.endswith(_LEFT) or path.is_dir():
                 continue
             with reading(path), os.fdopen(open_data(path), "rb") as file:
                 content = file.read()
             write_new(target / path.name, content)
     return copy
-
-
-def _copy_photos(
-    sessions: Sequence[SessionFolder],
-    copies: Sequence[SessionFolder],
-    to: Path,
-    console: Console,
-) -> list[PublishedPhoto]:
-    """Copy the photos that are as they were taken; name those that are not."""
-    photos: list[PublishedPhoto] = []
-    for session, copy in zip(sessions, copies, strict=True):
-        for name in _RECORDINGS:
-            for sidecar in list_folder(session.path / name, "T*.json"):
-                attempt = f"{session.id}/{sidecar.stem}"
-                try:
-                    photo = kept_photo(sidecar)
-                except (PhotoError, TrialFileError) as error:
-                    what = f"{attempt}: its photo of the bed {error}."
-                    console.problem(f"{WARNING} {what} It is not published.")
-                    continue
-                recording = copy.path / name / f"{sidecar.stem}.mcap"
-                if photo is None or not recording.is_file():
-                    continue
-                path = recording.with_name(photo.name)
-                write_new(path, photo.content)
-                photos.append(
-                    PublishedPhoto(
-                        path=str(path.relative_to(to)),
-                        recording=str(recording.relative_to(to)),
-                        attempt=attempt,
-                        taken_utc=photo.taken_utc,
-                    )
-                )
-    return photos
 
 
 def _credits(
@@ -212,7 +173,6 @@ def _recording(to: Path, path: Path, trial: RecordedTrial) -> RecordingAction:
     folder = path.parent.parent
     settings = [folder / name for name in _SETTINGS if (folder / name).is_file()]
     results = [path, path.with_suffix(".json")]
-    results += list_folder(path.parent, f"{path.stem}{_PHOTO}*")
     return RecordingAction(
         name=trial.name,
         terrain=trial.terrain,
@@ -240,19 +200,12 @@ def _environment(code: Mapping[str, str]) -> str:
     )
 
 
-def _say(
-    to: Path, trials: Collection[RecordedTrial], photos: int, console: Console
-) -> None:
+def _say(to: Path, trials: Collection[RecordedTrial], console: Console) -> None:
     names = sorted({t.metadata["trial"].get("operator", "") for t in trials} - {""})
     console.say(f"{len(trials)} trials published in {to}; checksums in {SUMS}.")
     if names:
         console.say(
             f"{WARNING} The recordings name who pushed: {', '.join(names)}. Do they "
             "agree to be published?"
-        )
-    if photos:
-        console.say(
-            f"{WARNING} {photos} {'photo' if photos == 1 else 'photos'} of the bed "
-            "published as taken, with what the camera wrote into it (place, device)."
         )
     console.say(f"To check: traction verify {to}; to compute again: add --rebuild.")

@@ -25,7 +25,7 @@ from analysis.findings.held_trial import HeldTrial, TrialFiles
 from analysis.findings.rig_health import with_tares
 from analysis.report.covariate_table import covariate_tables
 from analysis.report.drawing import DRAWN_TYPES
-from analysis.report.page_model import BedPhoto, ReportContext
+from analysis.report.page_model import ReportContext
 from analysis.report.what_if import StudyVariant
 from analysis.report.what_if_tables import plain_choice, side_by_side
 from analysis.study.jobs import Shard
@@ -58,7 +58,6 @@ from experiments.report.truth_errors import (
     truth_tables,
 )
 from experiments.session.data_files import write_new_text
-from experiments.session.photos import photos_of
 from experiments.session.store import FOLDS, SessionFolder, iso_utc
 from experiments.settings.matrix import MatrixSettings
 
@@ -399,7 +398,6 @@ def _context(
         for trial in group
         for name, unit in stated_factors(trial.metadata["trial"]).units.items()
     }
-    photos, unsound = photos_of(sessions)
     count = sum(len(group) for group in trials.values())
     return ReportContext(
         title="Traction " + (sessions[0].id if len(sessions) == 1 else "study"),
@@ -428,8 +426,6 @@ def _context(
             *order.missing,
             *analysed.left_out,
             *analysed.doubts,
-            *unsound,
         ],
-        photos=[BedPhoto(*photo) for photo in photos],
         with_pdf=order.with_pdf,
     )

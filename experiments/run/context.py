@@ -19,7 +19,6 @@ from experiments.rig.rig import Rig
 from experiments.run.console_loop import ConsoleLoop
 from experiments.run.stop import ArmFaultError, StopFlag
 from experiments.session.journal import Journal
-from experiments.session.photos import Camera
 from experiments.session.reducer import KEEP, REJECT
 from experiments.session.sidecar import TrialName
 from experiments.session.states import Event
@@ -53,8 +52,6 @@ class FlowState:
         page: the newest review, line by line; of `say_page`.
         last_recorded: the newest trial that no tare has followed yet; set by `record`,
             taken by `tare`.
-        trial_began_utc_ns: when the newest trial began [UTC ns], by this computer; of
-            `record`.
         is_last: no trial begins after this one; of `ready` and `verdicts`.
         estimate: expected duration, as of the first kept trial [s]; of
             `update_estimate`.
@@ -68,7 +65,6 @@ class FlowState:
     fault_context: FaultContext = field(default_factory=FaultContext)
     page: tuple[str, ...] = ()
     last_recorded: TrialName | None = None
-    trial_began_utc_ns: int = 0
     is_last: bool = False
     estimate: float | None = None
     aim: Aim | None = None
@@ -90,7 +86,6 @@ class RunServices:
         journal: events and state.
         archive: the trials' files.
         feedback: sounds and speech.
-        camera: where photos of the bed come from.
         opened_ns: when it was opened [ns].
         kept_before: how many trials were kept until then.
     """
@@ -104,7 +99,6 @@ class RunServices:
     journal: Journal
     archive: TrialArchive
     feedback: OperatorFeedback
-    camera: Camera
     opened_ns: int
     kept_before: int
 
@@ -296,12 +290,4 @@ def open_context(
         feedback=build_feedback(rig.settings.rig.operator, console),
         opened_ns=rig.clock.now_ns(),
         kept_before=len(journal.state.kept),
-        camera=camera_of(rig),
     )
-
-
-def camera_of(rig: Rig) -> Camera:
-    """Return the camera of rig.toml; its folder is one below that of rig.toml."""
-    wanted = rig.settings.rig.camera
-    folder = rig.settings.folder / wanted.folder if wanted.folder else None
-    return Camera(wanted.command, folder, wanted.seconds)

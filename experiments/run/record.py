@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from acquisition.clock import RATE_HZ, SystemClock
+from acquisition.clock import RATE_HZ
 from acquisition.control_loop.faults import Action
 from acquisition.control_loop.states import ArmState
 from acquisition.errors import TractionError, TrialFileError
@@ -25,7 +25,6 @@ from experiments.operator.screens import (
 from experiments.rig.rig import Rig
 from experiments.run.console_loop import TICK
 from experiments.run.context import RunContext, RunServices
-from experiments.run.photo import take_photo
 from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.session.sidecar import TrialName, TrialOutcome
 from experiments.session.states import Event
@@ -128,7 +127,6 @@ def _record(
         details["reset"] = [step for n, step in steps if n in context.state.ticked]
         context.state.ticked.clear()
     context.append(Event.TRIAL_STARTED, **details)
-    context.state.trial_began_utc_ns = SystemClock().utc_ns()
     recorder.start(path, header)
     recorder.event(20, "operator", "trial started")
     context.loop_client.watch_trial(is_recording=True)
@@ -214,7 +212,6 @@ def _end(
         traces = review.trace_lines(kept, name.kept, context.console.width)
         context.say_page([written, *lines, *warnings, *traces])
         archive.write_sidecar(name, verified, outcome, review)
-        take_photo(context, name)
         return
     context.say(written)
     context.reject(name, f"interrupted: {outcome.reason}")

@@ -10,7 +10,6 @@ from experiments.operator.keys import NOTE_KEYS, REJECT_REASONS, KeyAction, key_
 from experiments.operator.prompts import Prompt
 from experiments.operator.scripted import NO_PERSONS
 from experiments.run.context import RunContext, RunServices
-from experiments.run.photo import collect_photo
 from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.session.annotations import LONGEST_TEXT, clean_text
 from experiments.session.sidecar import TrialName, TrialOutcome
@@ -66,13 +65,11 @@ def _apply_key(context: RunContext, name: TrialName, key: str) -> bool:
     """
     action = key_action(Prompt.REVIEW, key)
     if action is KeyAction.KEEP:
-        collect_photo(context, name)
         context.record_verdict(Event.TRIAL_KEPT, name, "")
         context.open_undo(name, "", is_kept=True)
         return True
     if action is KeyAction.REDO:
         reason = REJECT_REASONS[key[1:]]
-        collect_photo(context, name)
         context.reject(name, reason)
         context.open_undo(name, reason, is_kept=False)
         return True

@@ -24,8 +24,7 @@ from experiments.session.store import SessionFolder
 if TYPE_CHECKING:
     from analysis.next_push.records import PushRecord
 
-PHOTO_SUFFIXES = (".photo.jpg", ".photo.png")
-_SUFFIXES = (".mcap", ".truth.mcap", *PHOTO_SUFFIXES)
+_SUFFIXES = (".mcap", ".truth.mcap")
 _VERDICTS: Mapping[str, str] = {
     Event.TRIAL_KEPT: KEEP,
     Event.TRIAL_REJECTED: REJECT,

@@ -1,9 +1,8 @@
 """What may stand in rig.toml."""
 
-import shlex
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
 from acquisition.clock import RATE_HZ
 from acquisition.control_loop.limits import GuardLimits
@@ -334,35 +333,6 @@ class OperatorSection(SettingsSection):
     double_tap: bool = Field(default=False, strict=True, examples=[False])
 
 
-class CameraSection(SettingsSection):
-    """Where the photo of the bed after each trial comes from.
-
-    Attributes:
-        command: takes it and writes JPEG or PNG to the file that `{path}` stands for,
-            if there is one.
-        folder: where a camera or a person drops files, a path from the folder of
-            rig.toml. The newest since the trial began is taken at the verdict.
-        seconds: the command may take so long.
-    """
-
-    command: str = Field(default="", examples=["fswebcam --no-banner {path}"])
-    folder: str = Field(default="", max_length=4096, examples=["photos"])
-    seconds: Annotated[Number, Usual(0.0, 30.0, "s")] = Field(
-        default=10.0, gt=0, le=60, examples=[10]
-    )
-
-    @field_validator("command")
-    @classmethod
-    def _has_path(cls, command: str) -> str:
-        try:
-            words = shlex.split(command)
-        except ValueError as error:
-            raise ValueError(f"a command with an odd quote ({error})") from error
-        if words and not any("{path}" in word for word in words):
-            raise ValueError("a command without {path}, the file to be written")
-        return command
-
-
 class RigSettings(SettingsSection):
     """Everything in rig.toml."""
 
@@ -379,7 +349,6 @@ class RigSettings(SettingsSection):
     friction: FrictionSettings = FrictionSettings()
     loop: LoopSection = LoopSection()
     operator: OperatorSection = OperatorSection()
-    camera: CameraSection = CameraSection()
     safety: SafetySection = _POWER_UP
 
     @model_validator(mode="after")

@@ -9,22 +9,17 @@ import sys
 from pathlib import Path
 
 import pytest
-from PIL import Image
 
 from acquisition.errors import SettingsError
 from experiments.report.crate import (
     METADATA,
-    PublishedPhoto,
     RecordingAction,
     StudyAction,
     crate_text,
 )
 from experiments.report.credits import LICENCES, Author, Credits
 from experiments.report.rebuilding import compare_tables
-from experiments.session.photos import add_photo
-from experiments.session.sidecar import TrialName
-from experiments.session.store import find_session
-from tests.experiments.program import digest, only_session, traction
+from tests.experiments.program import digest, traction
 
 ROOT = Path(__file__).parents[3]
 VALIDATOR = ROOT / ".venv-crate" / "bin" / "python"
@@ -32,7 +27,7 @@ AUTHOR = ("--author", "Doe, Jane <0000-0002-1825-0097>", "--licence", "CC-BY-4.0
 PROFILE = "https://w3id.org/ro/wfrun/process/0.5"
 
 
-RECORDED = ("T01.mcap", "T02.mcap", "T01.photo.jpg")
+RECORDED = ("T01.mcap", "T02.mcap")
 
 
 def entities(text):
@@ -77,9 +72,7 @@ def small_crate(tmp_path_factory):
         inputs=["T01.mcap", "T02.mcap"],
         results=["fits.csv"],
     )
-    taken = "2027-03-14T10:15:00+00:00"
-    photos = [PublishedPhoto("T01.photo.jpg", "T01.mcap", "S001/T01", taken)]
-    text = crate_text(folder, about, recordings, study, photos)
+    text = crate_text(folder, about, recordings, study)
     (folder / METADATA).write_text(text)
     return folder
 
@@ -112,15 +105,6 @@ def test_every_recording_is_an_action_with_tool_times_and_files(small_crate):
     assert second["instrument"]["@id"].startswith("urn:uuid:")
     mentioned = {entity["@id"] for entity in found["./"]["mentions"]}
     assert mentioned == {"#trial-S001-T01", "#trial-S001-T02", "#study"}
-
-
-def test_a_photo_names_its_trial_its_time_and_its_licence(small_crate):
-    photo = entities((small_crate / METADATA).read_text())["T01.photo.jpg"]
-    assert photo["about"] == {"@id": "T01.mcap"}
-    assert photo["license"] == {"@id": LICENCES["CC0-1.0"].url}
-    assert photo["dateCreated"] == "2027-03-14T10:15:00+00:00"
-    assert photo["encodingFormat"] == "image/jpeg"
-    assert "S001/T01" in photo["description"]
 
 
 # --- results compared -----------------------------------------------------------------
@@ -207,39 +191,10 @@ def published(recorded, tmp_path_factory):
     folder = tmp_path_factory.mktemp("published")
     data, to = folder / "data", folder / "crate"
     shutil.copytree(recorded.data, data)
-    session = only_session(data)
-    taken = find_session(data, session.name)
-    add_photo(taken, TrialName(1, 1), bed(1), 1_800_000_000_000_000_000, "command")
-    add_photo(taken, TrialName(2, 1), bed(2), 1_800_000_100_000_000_000, "folder")
-    (session / "trials" / "T02.photo.png").write_bytes(bed(3))
     done = traction("publish", "S001", "--to", to, *AUTHOR, "--data", data)
     assert done.code == 0
     assert "name who pushed: auto" in done.out
-    assert "1 photo of the bed" in done.out
-    assert "S001/T02: its photo of the bed is not the one that was taken" in done.err
     return to
-
-
-def bed(seed):
-    """Return a photo, JPEG for the first one."""
-    out = io.BytesIO()
-    Image.new("RGB", (64, 48), (seed, 80, 70)).save(out, "JPEG" if seed == 1 else "PNG")
-    return out.getvalue()
-
-
-@pytest.mark.slow
-def test_a_photo_is_published_with_its_trial_and_a_changed_one_is_not(published):
-    (photo,) = published.rglob("*.photo.*")
-    assert photo.read_bytes() == bed(1)
-    found = entities((published / METADATA).read_text())
-    name, recording = (
-        str(path.relative_to(published))
-        for path in (photo, photo.with_name("T01.mcap"))
-    )
-    assert found[name]["sha256"] == digest(photo)
-    assert found[name]["about"] == {"@id": recording}
-    assert found[name]["license"] == {"@id": LICENCES["CC-BY-4.0"].url}
-    assert {"@id": name} in found["#trial-S001-T01"]["result"]
 
 
 @pytest.mark.slow
@@ -249,9 +204,7 @@ def test_a_publication_is_as_it_was_written(published):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "name", ["T02.mcap", "fits.csv", METADATA, "README.md", "T01.photo.jpg"]
-)
+@pytest.mark.parametrize("name", ["T02.mcap", "fits.csv", METADATA, "README.md"])
 def test_one_changed_byte_of_a_publication_is_named(published, tmp_path, name):
     copy = tmp_path / "crate"
     shutil.copytree(published, copy)
@@ -267,7 +220,7 @@ def test_one_changed_byte_of_a_publication_is_named(published, tmp_path, name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["T02.mcap", "T02.json", "fits.csv", "T01.photo.jpg"])
+@pytest.mark.parametrize("name", ["T02.mcap", "T02.json", "fits.csv"])
 def test_a_file_taken_out_with_its_checksum_is_missed(published, tmp_path, name):
     copy = tmp_path / "crate"
     shutil.copytree(published, copy)

@@ -15,7 +15,6 @@ from experiments.run.console_loop import ConsoleLoop
 from experiments.run.context import RunContext
 from experiments.run.stop import StopFlag
 from experiments.session.journal import Journal
-from experiments.session.photos import Camera
 from experiments.session.states import Event
 from experiments.session.store import create_session
 from experiments.trial.files import SessionMetadata
@@ -130,7 +129,6 @@ def make_context(data, operator, *, trials=2, **more):
         journal=journal,
         archive=SimpleNamespace(),
         feedback=SimpleNamespace(),
-        camera=Camera("", None, 0.0),
         opened_ns=loop.rig.clock.now_ns(),
         kept_before=0,
     )
