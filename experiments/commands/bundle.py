@@ -1,11 +1,11 @@
-"""traction bundle: one file that tells others what happened in a session."""
+"""traction bundle: a session's small files, its logs and versions in one archive."""
 
 import argparse
 from pathlib import Path
 
 EXAMPLES = """\
   traction bundle S012                      S012.bundle.zip in this folder
-  traction bundle S012 --redact bus.log     a log of the bus with it, no names"""
+  traction bundle S012 bus.log              a log of the bus with it"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -20,11 +20,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--to", type=Path, metavar="FILE", help="the bundle (SESSION.bundle.zip)"
-    )
-    parser.add_argument(
-        "--redact",
-        action="store_true",
-        help="hide names and notes; leave out what may hold them",
     )
 
 
@@ -41,12 +36,15 @@ def run(args: argparse.Namespace) -> int:
         raise SettingsError(
             f"There is no file {', '.join(missing)}.", hint="Nothing was written."
         )
-    to = args.to or Path(f"{folder.id}.bundle.zip")
-    contents = write_bundle(folder, to, args.others, is_redacted=args.redact)
     console = Console(color=not args.no_color)
+    console.say(
+        f"{WARNING} The bundle contains the names and notes of the people in this "
+        "session. Pass it on only if they agree."
+    )
+    to = args.to or Path(f"{folder.id}.bundle.zip")
+    contents = write_bundle(folder, to, args.others)
     for name, why in contents.left_out.items():
         console.say(f"{WARNING} left out: {name} ({why})")
     size = to.stat().st_size / 1e6
     console.say(f"{len(contents.files)} files, {size:.1f} MB: {to}")
-    console.say(f"It is shown by: traction replay --bundle {to}")
     return 0

@@ -1,4 +1,4 @@
-"""traction replay: a trial shown again; a bus log, or a bundle, in words."""
+"""traction replay: a trial shown again, or a bus log in words."""
 
 from __future__ import annotations
 
@@ -18,7 +18,6 @@ EXAMPLES = """\
 
 _LEFT_OUT = 6  # exit code
 _MOST_TOLD = 5  # malformed lines
-_UNDER = " " * 12  # what a line of a bundle goes on with
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -42,9 +41,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="a bus log of --can-log, or of candump -L",
     )
-    parser.add_argument(
-        "--bundle", type=Path, metavar="FILE", help="a file of traction bundle"
-    )
     add_allow_missing(parser)
     parser.add_argument(
         "--serve",
@@ -59,8 +55,6 @@ def run(args: argparse.Namespace) -> int:
     """Show a trial or a bus log and return the exit code."""
     from acquisition.errors import SettingsError
 
-    if args.bundle is not None:
-        return _tell_bundle(args)
     is_trial = args.session is not None and args.trial is not None
     if args.serve and not is_trial:
         raise SettingsError(
@@ -73,22 +67,6 @@ def run(args: argparse.Namespace) -> int:
             hint="For example: traction replay S012 T04, or traction replay --can FILE",
         )
     return _show_trial(args) if is_trial else _show_log(args)
-
-
-def _tell_bundle(args: argparse.Namespace) -> int:
-    """Say what a bundle tells; return the exit code."""
-    from acquisition.errors import SettingsError
-    from experiments.operator.console import Console
-    from experiments.report.bundle_story import read_bundle, story
-
-    if args.session is not None or args.can is not None:
-        raise SettingsError(
-            "--bundle stands alone.", hint="For example: traction replay --bundle FILE"
-        )
-    console = Console(color=not args.no_color)
-    for line in story(read_bundle(args.bundle)):
-        console.say(line, indent=_UNDER)
-    return 0
 
 
 def _show_trial(args: argparse.Namespace) -> int:

@@ -15,7 +15,6 @@ from acquisition.trial_file.recover import recover_file
 from analysis.data.tables import load_tables
 from analysis.terrains import database as terrain_db
 from experiments.operator.scripted import ScriptedOperator
-from experiments.report.bundle_story import read_bundle, story
 from experiments.report.checksums import SUMS, changed_files
 from experiments.report.rebuilding import compare_tables
 from experiments.rig.law_calibrations import build_compensation
@@ -186,13 +185,6 @@ def _bus_log(data: bytes, _: Path) -> None:
         raise problems[0]
 
 
-def _bundle(data: bytes, folder: Path) -> None:
-    path = folder / "S001.bundle.zip"
-    path.write_bytes(data)
-    for line in story(read_bundle(path)):
-        assert line.isprintable()
-
-
 def _frames(data: bytes, _: Path) -> None:
     """Read frames of every length out of `data`, by every decoder."""
     for start in range(0, len(data), 10):
@@ -281,7 +273,6 @@ READERS: dict[str, Callable[[bytes, Path], None]] = {
     "used-mcap": _used("trials/T01.mcap"),
     "journal-lines": use_lines,
     "session-names": use_names,
-    "bundle": _bundle,
     "log-bag": read_log("log.bag"),
     "log-mcap": read_log("log.mcap"),
     "log-db3": read_log("log.db3"),

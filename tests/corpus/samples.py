@@ -3,7 +3,6 @@
 import hashlib
 import io
 import json
-import zipfile
 from functools import cache
 from importlib import resources
 
@@ -212,23 +211,6 @@ def _stream() -> bytes:
     return bytes(data)
 
 
-def _bundle() -> bytes:
-    """Return a small archive of what a session did, stored, not compressed."""
-    manifest = {
-        "schema": 1,
-        "session": "S001",
-        "left_out": {"faults/T01.flight.mcap": "is larger than 64 MB"},
-        "last_seconds": {"T01": [{"t": -0.2, "F_n": 3.5, "mode": 2, "late": 0}]},
-    }
-    checks = {"checks": [{"mark": "!", "name": "bus", "text": "off"}]}
-    with io.BytesIO() as buffer:
-        with zipfile.ZipFile(buffer, "w") as archive:
-            archive.writestr("bundle.json", json.dumps(manifest))
-            archive.writestr("preflight.json", json.dumps(checks))
-            archive.writestr("events.jsonl", _JOURNAL)
-        return buffer.getvalue()
-
-
 @cache
 def samples() -> dict[str, bytes]:
     """Return a sound input for every reader, by its name."""
@@ -267,7 +249,6 @@ def samples() -> dict[str, bytes]:
         "package": _package(),
         "sums": _sums(),
         "results": RESULTS.encode(),
-        "bundle": _bundle(),
         "script": _SCRIPT,
         "poses": _POSES,
         "presses": _PRESSES,
