@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from experiments.session.kept_files import Deviation
     from experiments.session.store import SessionFolder
     from experiments.settings.matrix import MatrixSettings
-    from experiments.status_table.summary_cache import StatusMatrix
     from experiments.status_table.table import MatrixRow
     from experiments.status_table.where import Where
 
@@ -26,19 +25,11 @@ EXAMPLES = """\
 _HEADER = ("terrain", "kind", "kept", "trials", "rejected", "sessions")
 _LOOK_NS = 1_000_000_000
 _NOT_AS_KEPT = 6  # exit code
-_SHIPPED = Path(__file__).parents[1] / "data"
-_LARGEST = 1_000_000  # bytes of a settings file
-_FILES = ("rig.toml", "matrix.toml")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `status`."""
     parser.add_argument("--json", action="store_true", help="as JSON")
-    parser.add_argument(
-        "--fresh",
-        action="store_true",
-        help="read every file again, whatever is known of it from before",
-    )
     parser.add_argument(
         "--where",
         default="",
@@ -56,7 +47,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the table, counted from files whose checksum is right."""
     from experiments.operator.console import Console
-    from experiments.status_table.summary_cache import SummaryCache, cache_path
+    from experiments.settings.load import load_settings
+    from experiments.status_table.session_summaries import Checksums
     from experiments.status_table.table import (
         count_rows,
         find_deviations,
@@ -65,19 +57,20 @@ def run(args: argparse.Namespace) -> int:
     from experiments.status_table.upcoming import enough_lines, next_steps
     from experiments.status_table.where import parse_where
 
-    cache = SummaryCache(None if args.fresh else cache_path(args.data))
-    matrix = cache.matrix(_settings_texts(args.config), lambda: _matrix(args.config))
-    rows = matrix.rows
+    matrix = load_settings(args.config).matrix
+    digest = Checksums()
     where = parse_where(args.where, _factors(args, matrix))
     console = Console(color=not args.no_color)
 
     def look() -> StatusTable:
-        seen = see_sessions(args.data, where, cache)
-        cache.save()
-        lines = count_rows(seen, rows, where)
-        known, terrains = [s.folder for s in seen], {row.name for row in rows}
+        seen = see_sessions(args.data, where, digest)
+        lines = count_rows(seen, matrix, where)
+        known, terrains = (
+            [s.folder for s in seen],
+            {row.name for row in matrix.terrains},
+        )
         kinds = {line.is_simulated for line in lines if line.sessions} or {False}
-        steps = enough_lines(seen, rows, where)
+        steps = enough_lines(seen, matrix.terrains, where)
         for kind in sorted(kinds):
             steps += next_steps(args.data, seen, matrix, where, is_simulated=kind)
         notes = table_notes(args.data, known, terrains, where, lines)
@@ -172,34 +165,12 @@ def _show(table: StatusTable, console: Console, *, is_json: bool) -> int:
     return _NOT_AS_KEPT if table.deviations else 0
 
 
-def _settings_texts(config: Path | None) -> list[bytes] | None:
-    """Return the contents of the settings files, None where one cannot be read."""
-    texts = [(_SHIPPED / name).read_bytes() for name in _FILES]
-    for path in [] if config is None else [config, config.with_name(_FILES[1])]:
-        try:
-            if not path.exists():
-                texts.append(b"")
-            elif path.is_file() and path.stat().st_size <= _LARGEST:
-                texts.append(path.read_bytes())
-            else:
-                return None
-        except OSError:
-            return None
-    return texts
-
-
-def _matrix(config: Path | None) -> MatrixSettings:
-    from experiments.settings.load import load_settings
-
-    return load_settings(config).matrix
-
-
-def _factors(args: argparse.Namespace, matrix: StatusMatrix) -> list[str]:
+def _factors(args: argparse.Namespace, matrix: MatrixSettings) -> list[str]:
     """Return the factors of the matrix, and of recorded sessions where one is asked."""
     from experiments.session.store import list_sessions
     from experiments.status_table.session_summaries import recorded_factors
 
-    names = dict.fromkeys(name for row in matrix.rows for name in row.factors)
+    names = dict.fromkeys(name for row in matrix.terrains for name in row.factors)
     if args.where:
         for folder in list_sessions(args.data):
             names |= dict.fromkeys(recorded_factors(folder))

@@ -38,7 +38,6 @@ from experiments.session.unbegun import clear_unbegun
 from experiments.settings.load import Settings
 from experiments.settings.matrix import TerrainRow
 from experiments.status_table.session_summaries import glance_sessions
-from experiments.status_table.summary_cache import matrix_of
 from experiments.status_table.upcoming import next_steps
 from experiments.status_table.where import Where
 from experiments.trial.files import SessionMetadata, collect_metadata
@@ -236,7 +235,7 @@ def _print_next(request: SessionRequest, journal: Journal, code: int) -> None:
     request.console.say(f"Complete. Next: traction report {name}{data}")
     request.console.say(f"It writes {journal.folder.path / 'report' / 'index.html'}")
     is_simulated = journal.folder.is_simulated
-    matrix = matrix_of(request.settings.matrix)
+    matrix = request.settings.matrix
     try:
         seen = glance_sessions(request.data)
         steps = next_steps(

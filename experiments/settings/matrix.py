@@ -110,7 +110,7 @@ class Design(SettingsSection):
         block_by: keys of the cells that are hard to change: those alike are done in
             one go.
         repeat_blocks: how often all cells are recorded again, on another day.
-        seed: of the draws.
+        seed: of the random order.
     """
 
     order: Literal["randomised", "rows", "blocked"] = "randomised"

@@ -1,13 +1,9 @@
-"""What the status table needs of one session, and a sign that its files changed."""
+"""What the status table needs of one session."""
 
 from __future__ import annotations
 
-import os
-import stat
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
-from hashlib import blake2b
 from typing import TYPE_CHECKING
 
 from acquisition.errors import TrialFileError
@@ -21,7 +17,6 @@ if TYPE_CHECKING:
     from experiments.session.store import SessionFolder
     from experiments.status_table.where import Where
 
-_FOLDERS = ("", "trials", "rejected", "faults")
 _FACTORS = "terrain.factors."  # before the name of a condition
 
 
@@ -75,21 +70,51 @@ class SeenSession:
         return {**facts_of(self.folder), "operator": self.summary.operator}
 
 
-def summarise(folder: SessionFolder) -> SessionSummary:
-    """Return what a session is; kept trials are held against their checksums."""
-    from experiments.session.data_files import sha256_of
+class Checksums:
+    """Checksums of files, computed again only where a file has changed on the disk.
 
-    return _summarise(folder, cache(sha256_of))
+    Whoever follows the sessions looks at them every second.
+    """
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[str, int, int, int, int], str] = {}
+
+    def __call__(self, path: Path) -> str:
+        """Return the SHA-256 of a file.
+
+        Raises:
+            TrialFileError: it cannot be read.
+        """
+        from experiments.session.data_files import reading, sha256_of
+
+        with reading(path):
+            state = path.stat(follow_symlinks=False)
+        key = (
+            str(path),
+            state.st_ino,
+            state.st_size,
+            state.st_mtime_ns,
+            state.st_ctime_ns,
+        )
+        if key not in self._known:
+            self._known[key] = sha256_of(path)
+        return self._known[key]
 
 
 def glance(folder: SessionFolder) -> SessionSummary:
-    """Return the same without checksums: no trial counts as kept or as changed."""
-    return _summarise(folder, None)
+    """Return a session without checksums: no trial counts as kept or as changed."""
+    return summarise(folder, None)
 
 
-def _summarise(
+def summarise(
     folder: SessionFolder, digest: Callable[[Path], str] | None
 ) -> SessionSummary:
+    """Return what a session is; kept trials are held against their checksums.
+
+    Args:
+        folder: the session.
+        digest: computes the checksum of a file; None = no checksum is computed.
+    """
     from experiments.session.data_files import read_json
     from experiments.session.kept_files import (
         compare_kept,
@@ -158,38 +183,3 @@ def recorded_facts(folder: SessionFolder, where: Where) -> dict[str, Value]:
         for name in (prefix + key for prefix in prefixes)
         if name in stated
     }
-
-
-def signature_of(folder: Path) -> tuple[str, int]:
-    """Return a digest of the state of every file of a session, and its newest change.
-
-    Of every entry of the folder and of trials/, rejected/ and faults/ it has the name,
-    kind, size, inode, links and the times of the last change of content and of inode.
-    The kernel sets the latter, no program can. What changes the bytes behind the back
-    of the file system has no sign: a disk that rots, a block device written to.
-
-    Returns:
-        The digest, and the newest of all these times [ns since 1970].
-
-    Raises:
-        OSError: a folder cannot be listed.
-    """
-    digest, newest = blake2b(digest_size=16), 0
-    for name in _FOLDERS:
-        path = os.path.join(folder, name)  # noqa: PTH118 - a thousand times
-        try:
-            status = os.stat(path, follow_symlinks=False)  # noqa: PTH116
-        except FileNotFoundError:
-            continue
-        states = [(name, status)]
-        if stat.S_ISDIR(status.st_mode):
-            with os.scandir(path) as entries:
-                states += [(e.name, e.stat(follow_symlinks=False)) for e in entries]
-        for entry, s in sorted(states, key=lambda state: state[0]):
-            newest = max(newest, s.st_mtime_ns, s.st_ctime_ns)
-            text = (
-                f"{entry}\0{s.st_mode} {s.st_size} {s.st_mtime_ns} {s.st_ctime_ns} "
-                f"{s.st_dev} {s.st_ino} {s.st_nlink}\0"
-            )
-            digest.update(text.encode("utf-8", "surrogateescape"))
-    return digest.hexdigest(), newest

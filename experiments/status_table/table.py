@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -10,7 +10,9 @@ from experiments.session.store import list_sessions
 from experiments.status_table.session_summaries import (
     SeenSession,
     facts_of,
+    glance,
     recorded_facts,
+    summarise,
 )
 from experiments.status_table.where import Where
 
@@ -19,24 +21,26 @@ if TYPE_CHECKING:
 
     from analysis.data.terrain_kinds import Value
     from experiments.session.kept_files import Deviation
-    from experiments.status_table.summary_cache import StatusRow, SummaryCache
+    from experiments.settings.matrix import MatrixSettings, TerrainRow
 
 EVERYTHING = Where()
 
 
-def see_sessions(data: Path, where: Where, cache: SummaryCache) -> list[SeenSession]:
-    """Return all sessions below `data`, each read once, oldest number first.
+def see_sessions(
+    data: Path, where: Where, digest: Callable[[Path], str]
+) -> list[SeenSession]:
+    """Return all sessions below `data`, oldest number first.
 
     Args:
         data: the data folder.
-        where: checksums are needed only of sessions with these values.
-        cache: what is known of sessions that have not changed.
+        where: checksums are computed only of sessions with these values.
+        digest: computes the checksum of a file.
     """
     seen: list[SeenSession] = []
     for folder in list_sessions(data):
         is_asked = where.matches(facts_of(folder))
-        look = cache.summary if is_asked else cache.glance
-        seen.append(SeenSession(folder, look(folder)))
+        summary = summarise(folder, digest) if is_asked else glance(folder)
+        seen.append(SeenSession(folder, summary))
     return _counted_once(seen)
 
 
@@ -100,26 +104,28 @@ class MatrixRow:
 
 def count_rows(
     seen: Sequence[SeenSession],
-    rows: Sequence[StatusRow],
+    matrix: MatrixSettings,
     where: Where = EVERYTHING,
 ) -> list[MatrixRow]:
     """Return a line per terrain of the matrix, live first, simulated where there is.
 
     Args:
         seen: the sessions.
-        rows: the terrains.
+        matrix: the terrains, and how often each is recorded.
         where: only terrains and sessions of which these hold.
     """
     sessions = counted_of(seen, where)
     lines: list[MatrixRow] = []
-    for row in rows:
+    blocks = 1 + matrix.design.repeat_blocks
+    for row in matrix.terrains:
         if not where.matches(facts_of_row(row)):
             continue
         for is_simulated in (False, True):
             own = [s for s in sessions if is_of(s, row, is_simulated=is_simulated)]
             is_wanted = not is_simulated and where.matches({"kind": "live"})
             if own or (is_wanted and not {"session", "operator"} & where.keys):
-                lines.append(_line(row, own, is_simulated=is_simulated))
+                wanted = row.trials * blocks
+                lines.append(_line(row, own, wanted, is_simulated=is_simulated))
     return lines
 
 
@@ -133,7 +139,7 @@ def counted_of(seen: Sequence[SeenSession], where: Where) -> list[SeenSession]:
     ]
 
 
-def is_of(session: SeenSession, row: StatusRow, *, is_simulated: bool) -> bool:
+def is_of(session: SeenSession, row: TerrainRow, *, is_simulated: bool) -> bool:
     """Return whether a session is of this terrain, and live or simulated as asked."""
     folder = session.folder
     return folder.terrain == row.name and folder.is_simulated is is_simulated
@@ -153,7 +159,7 @@ def find_deviations(seen: Sequence[SeenSession], where: Where) -> list[Deviation
     return list(dict.fromkeys(found))
 
 
-def facts_of_row(row: StatusRow) -> dict[str, Value]:
+def facts_of_row(row: TerrainRow) -> dict[str, Value]:
     """Return what conditions can ask of a row of the matrix."""
     fixed = {"terrain": row.name, "stones": row.stones, "incline_deg": row.incline_deg}
     more = {"foot": row.foot, "push_deg": float(row.push_deg), "place": row.place}
@@ -161,7 +167,11 @@ def facts_of_row(row: StatusRow) -> dict[str, Value]:
 
 
 def _line(
-    row: StatusRow, sessions: Sequence[SeenSession], *, is_simulated: bool
+    row: TerrainRow,
+    sessions: Sequence[SeenSession],
+    wanted: int,
+    *,
+    is_simulated: bool,
 ) -> MatrixRow:
     kept = [name for s in sessions for name in s.summary.kept]
     names = [f"T{number:02d}" for number in range(1, row.trials + 1)]
@@ -169,7 +179,7 @@ def _line(
         terrain=row.name,
         is_simulated=is_simulated,
         kept=len(kept),
-        wanted=row.trials * row.blocks,
+        wanted=wanted,
         rejected=sum(s.summary.rejected for s in sessions),
         sessions=tuple(s.folder.id for s in sessions),
         trials=tuple(kept.count(name) for name in names),

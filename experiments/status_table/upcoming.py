@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
 import os
 import random
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from acquisition.errors import TrialFileError
@@ -20,17 +18,15 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from analysis.data.terrain_kinds import Value
+    from experiments.settings.matrix import MatrixSettings, TerrainRow
     from experiments.status_table.session_summaries import SeenSession
-    from experiments.status_table.summary_cache import StatusMatrix, StatusRow
     from experiments.status_table.where import Where
-
-_DRAWS = 400  # orders
 
 
 def next_steps(
     data: Path,
     seen: Sequence[SeenSession],
-    matrix: StatusMatrix,
+    matrix: MatrixSettings,
     where: Where,
     *,
     is_simulated: bool,
@@ -54,10 +50,10 @@ def next_steps(
             number = session.folder.id
             steps.append(f"{text} To go on: traction resume {number}{option}")
     done = [s.folder.terrain for s in own]
-    asked = {row.name for row in matrix.rows if where.matches(facts_of_row(row))}
+    asked = {row.name for row in matrix.terrains if where.matches(facts_of_row(row))}
     order = [name for name in suggest_order(matrix, done) if name in asked]
     if order:
-        steps.append(f"{_ORDERS[matrix.order]}: {_listed(order)}")
+        steps.append(f"{_ORDERS[matrix.design.order]}: {_listed(order)}")
     return steps
 
 
@@ -96,7 +92,7 @@ def _left(session: SeenSession) -> str:
 
 
 def enough_lines(
-    seen: Sequence[SeenSession], rows: Sequence[StatusRow], where: Where
+    seen: Sequence[SeenSession], rows: Sequence[TerrainRow], where: Where
 ) -> list[str]:
     """Return the terrains whose kept trials are enough for their target.
 
@@ -119,148 +115,43 @@ def enough_lines(
     return [text for text in lines if text]
 
 
-def _enough(own: Sequence[SeenSession], row: StatusRow) -> str:
+def _enough(own: Sequence[SeenSession], row: TerrainRow) -> str:
     from experiments.session.kept_files import enough_of
 
     return enough_of([s.folder for s in own], row)
 
 
-def suggest_order(matrix: StatusMatrix, done: Sequence[str]) -> list[str]:
-    """Return the terrains still to be recorded in a good order.
+def suggest_order(matrix: MatrixSettings, done: Sequence[str]) -> list[str]:
+    """Return the terrains still to be recorded, in the random order of the matrix.
 
-    A foot that wears, a sensor that drifts and a person who learns change with time.
-    If the inclines came in rising order, these could not be told from the incline. So
-    of many random orders that one is taken in which the factors go least with the
-    position in the whole sequence. What is hard to change is done in one go; cells that
-    are recorded again come when all have been recorded as often.
+    A foot that wears, a sensor that drifts and a person who learns change with time;
+    in rising order of inclines these could not be told from the incline. The seed of
+    the matrix decides the order. What is hard to change is done in one go, begun with
+    that of the last session; cells that are recorded again come when all have been
+    recorded as often.
 
     Args:
         matrix: the matrix.
         done: names of the terrains recorded so far, oldest first.
     """
-    rows = {row.name: row for row in matrix.rows}
+    rows = {row.name: row for row in matrix.terrains}
     begun = [name for name in done if name in rows]
-    times = Counter(begun)
-    least = min((times[name] for name in rows), default=0)
-    rest = [
-        name
-        for name, row in rows.items()
-        if times[name] == least and least < row.blocks
-    ]
-    if not rest or matrix.order == "rows":
-        return rest
-    columns = _columns([*begun, *rest], factor_columns(matrix), len(begun))
-    dice = random.Random(matrix.seed)
-    blocks = _blocks(matrix, rest, begun)
-    orders = [_drawn(dice, blocks) for _ in range(_DRAWS)]
-    return min(
-        orders,
-        key=lambda order: max((c.correlation(order) for c in columns), default=0),
-    )
+    times, design = Counter(begun), matrix.design
+    least = min(times[name] for name in rows)
+    if least > design.repeat_blocks:
+        return []
+    order = list(rows)
+    if design.order != "rows":
+        random.Random(design.seed + least).shuffle(order)
+    if design.order == "blocked":
+        hard = {name: _hard(row, design.block_by) for name, row in rows.items()}
+        first = [hard[begun[-1]]] if begun else []
+        blocks = list(dict.fromkeys([*first, *(hard[name] for name in order)]))
+        order.sort(key=lambda name: blocks.index(hard[name]))
+    return [name for name in order if times[name] == least]
 
 
-def _blocks(
-    matrix: StatusMatrix, rest: Sequence[str], begun: Sequence[str]
-) -> list[list[str]]:
-    """Return the terrains by what is hard to change; that of the last one first."""
-    if matrix.order != "blocked":
-        return [list(rest)]
-    facts = {row.name: facts_of_row(row) for row in matrix.rows}
-
-    def hard(name: str) -> tuple[Value, ...]:
-        return tuple(facts[name].get(key) for key in matrix.block_by)
-
-    blocks: dict[tuple[Value, ...], list[str]] = {}
-    if begun and any(hard(name) == hard(begun[-1]) for name in rest):
-        blocks[hard(begun[-1])] = []
-    for name in rest:
-        blocks.setdefault(hard(name), []).append(name)
-    is_open = bool(begun) and hard(begun[-1]) in blocks
-    first = blocks.pop(hard(begun[-1])) if is_open else []
-    return [first, *blocks.values()]
-
-
-def _drawn(dice: random.Random, blocks: Sequence[Sequence[str]]) -> list[str]:
-    """Return a random order; the first block stays the first."""
-    first, *others = blocks
-    shuffled = dice.sample(others, len(others))
-    return [
-        name for block in (first, *shuffled) for name in dice.sample(block, len(block))
-    ]
-
-
-def confounding(order: Sequence[str], factors: Mapping[str, Sequence[float]]) -> float:
-    """Return the largest |correlation| of a factor with the position in `order`."""
-    columns = _columns(order, factors, 0)
-    return max((column.correlation(order) for column in columns), default=0.0)
-
-
-@dataclass(frozen=True, slots=True)
-class _Column:
-    """One factor of the terrains in a sequence whose beginning is fixed.
-
-    Attributes:
-        centred: the factor less its mean, by the name of the terrain.
-        size: its spread times that of the positions in the sequence.
-        positions: those that are still to be filled, less the mean of all.
-        begun: sum of the products of position and factor at the beginning.
-    """
-
-    centred: Mapping[str, float]
-    size: float
-    positions: Sequence[float]
-    begun: float
-
-    def correlation(self, order: Sequence[str]) -> float:
-        """Return |correlation| with the position if the rest comes in this order."""
-        own = [p * self.centred[n] for p, n in zip(self.positions, order, strict=True)]
-        return abs(math.fsum((self.begun, *own))) / self.size
-
-
-def _columns(
-    order: Sequence[str], factors: Mapping[str, Sequence[float]], begun: int
-) -> list[_Column]:
-    """Return the factors that vary; the first `begun` terrains keep their positions."""
-    count = len(order)
-    positions = [position - (count - 1) / 2 for position in range(count)]
-    squares = math.fsum(p * p for p in positions)
-    columns: list[_Column] = []
-    for values in zip(*(factors[name] for name in order), strict=True):
-        mean = math.fsum(values) / count
-        centred = [value - mean for value in values]
-        size = math.sqrt(math.fsum(c * c for c in centred) * squares)
-        if size > 0.0:
-            pairs = zip(positions[:begun], centred[:begun], strict=True)
-            first = math.fsum(p * c for p, c in pairs)
-            named = dict(zip(order, centred, strict=True))
-            columns.append(_Column(named, size, positions[begun:], first))
-    return columns
-
-
-def factor_columns(matrix: StatusMatrix) -> dict[str, tuple[float, ...]]:
-    """Return what tells the terrains apart as numbers, by name; all equally long.
-
-    A number is itself, or its logarithm; a word is 0 or 1 for every level but the
-    first, and so is whether a number applies.
-    """
-    facts = [
-        {**facts_of_row(row), "terrain": None, "place": None} for row in matrix.rows
-    ]
-    if "d50" in facts[0]:  # says the same as the size of the stones
-        facts = [{**each, "stones": None} for each in facts]
-    columns: list[list[float]] = []
-    for key in facts[0]:
-        values = [each[key] for each in facts]
-        words = list(dict.fromkeys(v for v in values if not isinstance(v, float)))
-        is_mixed = len(words) < len(set(values))
-        columns += [
-            [float(value == word) for value in values]
-            for word in (words if is_mixed else words[1:])
-        ]
-        numbers = [v for v in values if isinstance(v, float)]
-        if numbers:
-            scale = math.log if key in matrix.logs else float
-            mean = math.fsum(map(scale, numbers)) / len(numbers)
-            columns.append([scale(v) if isinstance(v, float) else mean for v in values])
-    names = [row.name for row in matrix.rows]
-    return dict(zip(names, zip(*columns, strict=True), strict=True))
+def _hard(row: TerrainRow, block_by: Sequence[str]) -> tuple[Value, ...]:
+    """Return what is hard to change of a terrain."""
+    facts = facts_of_row(row)
+    return tuple(facts.get(key) for key in block_by)

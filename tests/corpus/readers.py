@@ -26,7 +26,7 @@ from experiments.session.store import list_sessions
 from experiments.session.unfinished import find_unfinished
 from experiments.settings.load import load_settings
 from experiments.settings.rig import FrictionSettings
-from experiments.status_table.summary_cache import SummaryCache, row_of
+from experiments.status_table.session_summaries import Checksums
 from experiments.status_table.table import count_rows, see_sessions
 from experiments.status_table.where import Where
 from experiments.tools.pendant import read_script
@@ -84,8 +84,8 @@ def _session(folder: Path, name: str, data: bytes, journal: bytes = b"") -> None
     (path / "events.jsonl").write_bytes(journal)
     (path / name).write_bytes(data)
     find_unfinished(folder)
-    rows = [row_of(row) for row in load_settings(None).matrix.terrains]
-    count_rows(see_sessions(folder, Where(), SummaryCache()), rows)
+    matrix = load_settings(None).matrix
+    count_rows(see_sessions(folder, Where(), Checksums()), matrix)
     (session,) = list_sessions(folder)
     with session_lock(session):
         recover_session(open_journal(session, SystemClock()))

@@ -13,9 +13,6 @@ from acquisition.clock import SystemClock
 from analysis.data.load import load_trial
 from experiments.session.annotations import parse_trial
 from experiments.session.reducer import replay
-from experiments.settings.load import load_settings
-from experiments.status_table.summary_cache import matrix_of
-from experiments.status_table.upcoming import confounding, factor_columns, suggest_order
 from tests.experiments.program import (
     digest,
     journal,
@@ -280,23 +277,3 @@ def test_the_board_is_followed_until_ctrl_c(recorded, config, monkeypatch):
     assert done.code == 0
     assert done.out.count("terrain") == 1 + done.out.count("Next terrains")
     assert "██········" in done.out
-
-
-def test_the_suggested_order_does_not_go_with_time():
-    matrix = matrix_of(load_settings(None).matrix)
-    names = [row.name for row in matrix.rows]
-    order = suggest_order(matrix, [])
-    factors = factor_columns(matrix)
-    assert order == ["B0", "S15", "TF", "S10", "Tf", "B15", "B10", "S0"]
-    assert sorted(order) == sorted(names)
-    # as listed the plates come last; a good order has next to no trend
-    assert confounding(order, factors) < 0.25
-    assert confounding(names, factors) > 0.6
-
-
-def test_what_was_recorded_is_not_suggested_again():
-    matrix = matrix_of(load_settings(None).matrix)
-    assert set(suggest_order(matrix, ["S0", "B15", "S0"])) == {
-        *("S10", "S15", "B0", "B10", "TF", "Tf"),
-    }
-    assert suggest_order(matrix, [row.name for row in matrix.rows]) == []

@@ -5,12 +5,9 @@ import itertools
 import pytest
 
 from acquisition.errors import SettingsError
-from experiments.status_table.summary_cache import StatusMatrix, StatusRow
-from experiments.status_table.upcoming import (
-    factor_columns,
-    next_steps,
-    suggest_order,
-)
+from experiments.settings.load import load_settings
+from experiments.settings.matrix import Design
+from experiments.status_table.upcoming import next_steps, suggest_order
 from experiments.status_table.where import parse_where
 
 FACTS = {"d50": 19.0, "moisture": "wet", "load": None, "incline_deg": -10.0}
@@ -50,20 +47,26 @@ def test_what_is_no_condition_is_refused(text):
         parse_where(text, ("d50", "moisture"))
 
 
-def cell(name, foot="tread", blocks=1, **factors):
-    return StatusRow(
-        *(name, "small", 0.0, foot, 3, "small", "grid"), factors=factors, blocks=blocks
-    )
-
-
-def matrix(order, blocks=1, **details):
+def matrix(order="randomised", **details):
+    """Return a matrix of three feet on stones of three sizes, dry and wet."""
+    shipped = load_settings(None).matrix
     rows = tuple(
-        cell(f"{foot[0]}{d:g}{wet[0]}", foot, blocks, d50=float(d), moisture=wet)
+        shipped.terrains[0].model_copy(
+            update={
+                "name": f"{foot[0]}{d:g}{wet[0]}",
+                "foot": foot,
+                "factors": {"d50": float(d), "moisture": wet},
+            }
+        )
         for foot in ("tread", "bare", "round")
         for d in (10, 19, 37)
         for wet in ("dry", "wet")
     )
-    return StatusMatrix(rows, order, **details)
+    design = Design(order=order, **details)
+    return shipped.model_copy(update={"terrains": rows, "design": design})
+
+
+NAMES = [row.name for row in matrix().terrains]
 
 
 def test_only_what_was_asked_for_is_suggested(tmp_path):
@@ -75,16 +78,26 @@ def test_only_what_was_asked_for_is_suggested(tmp_path):
 
 
 def test_rows_come_as_they_stand():
-    names = [row.name for row in matrix("rows").rows]
-    assert suggest_order(matrix("rows"), []) == names
-    assert suggest_order(matrix("rows"), ["t10d"]) == names[1:]
+    assert suggest_order(matrix("rows"), []) == NAMES
+    assert suggest_order(matrix("rows"), ["t10d"]) == NAMES[1:]
+
+
+def test_the_seed_decides_the_order_and_what_is_recorded_leaves_it():
+    order = suggest_order(matrix(seed=1), [])
+    assert sorted(order) == sorted(NAMES)
+    assert order != NAMES
+    assert suggest_order(matrix(seed=1), []) == order
+    assert suggest_order(matrix(seed=2), []) != order
+    done = [order[3], order[0], "not of this matrix"]
+    rest = [name for name in order if name not in done]
+    assert suggest_order(matrix(seed=1), done) == rest
 
 
 def test_blocks_are_done_in_one_go():
     blocked = matrix("blocked", block_by=("foot",))
     order = suggest_order(blocked, [])
     feet = [name[0] for name in order]
-    assert sorted(order) == sorted(row.name for row in blocked.rows)
+    assert sorted(order) == sorted(NAMES)
     assert sum(a != b for a, b in itertools.pairwise(feet)) == 2
     begun = suggest_order(blocked, ["r19w"])
     assert [name[0] for name in begun[:5]] == ["r"] * 5
@@ -92,16 +105,9 @@ def test_blocks_are_done_in_one_go():
 
 
 def test_cells_come_again_when_all_were_recorded():
-    twice = matrix("randomised", blocks=2)
-    names = [row.name for row in twice.rows]
-    assert len(suggest_order(twice, names[:-1])) == 1
-    again = suggest_order(twice, names)
-    assert sorted(again) == sorted(names)
-    assert suggest_order(twice, [*names, *names]) == []
-
-
-def test_numbers_and_words_become_columns():
-    columns = factor_columns(matrix("randomised", logs=("d50",)))
-    # foot: two of three levels; ln d50; moisture: one of two; the rest is constant
-    spread = {tuple(c) for c in zip(*columns.values(), strict=True) if len(set(c)) > 1}
-    assert len(spread) == 4
+    twice = matrix(repeat_blocks=1)
+    assert len(suggest_order(twice, NAMES[:-1])) == 1
+    again = suggest_order(twice, NAMES)
+    assert sorted(again) == sorted(NAMES)
+    assert again != suggest_order(twice, [])
+    assert suggest_order(twice, [*NAMES, *NAMES]) == []
