@@ -40,21 +40,6 @@ float64[3] hand_force  # N, force of the hand on the arm, wam_base
 float64[3] traction  # terrain frame, true: v_t m/s, F_t N, F_n N"""
 
 
-TERRAIN_TRACTION_TEXT = """\
-std_msgs/Header header  # stamp = when the database was made
-string name  # of the terrain in the database
-string model  # that gave the forces
-bool simulated  # the trials were simulated
-uint32 trials
-float64[] shares  # of the quantiles, increasing
-float64[] load_axis  # N, normal forces F_n of the table
-float64[] velocity_axis  # m/s, slip velocities v_t of the table
-float64[] forces  # N, F_t by share, then by F_n, then by v_t
-float64 mu  # sliding coefficient per episode, median over the window below
-float64[2] mu_band  # its 5 and 95 % points
-float64[2] load_window  # N
-float64[2] velocity_window  # m/s"""
-
 CAN_BATCH_TEXT = """\
 std_msgs/Header header
 uint64[] t_ns  # CLOCK_MONOTONIC per frame
@@ -103,27 +88,12 @@ _DEPENDENCIES = {
     "geometry_msgs/Pose": (
         "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation"
     ),
-    "std_msgs/MultiArrayDimension": "string label\nuint32 size\nuint32 stride",
-    "std_msgs/MultiArrayLayout": (
-        "std_msgs/MultiArrayDimension[] dim\nuint32 data_offset"
-    ),
-    "std_msgs/Float32MultiArray": ("std_msgs/MultiArrayLayout layout\nfloat32[] data"),
-    "grid_map_msgs/GridMapInfo": (
-        "float64 resolution\nfloat64 length_x\nfloat64 length_y\n"
-        "geometry_msgs/Pose pose"
-    ),
 }
 
 _TEXTS = {
     "traction_msgs/msg/Cycle": CYCLE_TEXT,
     "traction_msgs/msg/Truth": TRUTH_TEXT,
     "traction_msgs/msg/CanBatch": CAN_BATCH_TEXT,
-    "traction_msgs/msg/TerrainTraction": TERRAIN_TRACTION_TEXT,
-    "grid_map_msgs/msg/GridMap": (
-        "std_msgs/Header header\ngrid_map_msgs/GridMapInfo info\nstring[] layers\n"
-        "string[] basic_layers\nstd_msgs/Float32MultiArray[] data\n"
-        "uint16 outer_start_index\nuint16 inner_start_index"
-    ),
     "traction_msgs/msg/WrenchBatch": WRENCH_BATCH_TEXT,
     "rcl_interfaces/msg/Log": LOG_TEXT,
     "sensor_msgs/msg/JointState": (
@@ -151,16 +121,6 @@ _SCALARS = {
 }
 _FIELD = re.compile(r"^(?P<type>[\w/]+)(\[(?P<count>\d+)\])?\s+(?P<name>\w+)$")
 ENCAPSULATION = b"\x00\x01\x00\x00"  # CDR, little endian
-
-
-def message_texts(package: str) -> dict[str, str]:
-    """Return the definitions of a package's messages by name, as they are here."""
-    prefix = f"{package}/msg/"
-    return {
-        name.removeprefix(prefix): text
-        for name, text in _TEXTS.items()
-        if name.startswith(prefix)
-    }
 
 
 def schema_text(type_name: str) -> str:

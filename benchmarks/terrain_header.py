@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from analysis.exports.folder import target_files
-from analysis.exports.source import ExportOptions, TerrainExport
+from analysis.exports.source import TerrainExport
 from analysis.terrains.database import load, to_text
 from tests.analysis.exports.stepped import stepped_database
 
@@ -173,8 +173,7 @@ def main() -> None:
             path.write_text(to_text(stepped_database()))
         digest = hashlib.sha256(path.read_bytes()).hexdigest()
         for is_float in (False, True):
-            options = ExportOptions(is_float=is_float)
-            export = TerrainExport.of(load(path), digest, "0", options=options)
+            export = TerrainExport.of(load(path), digest, "0", is_float=is_float)
             size = len(target_files("c", export)["traction_terrains.h"])
             kind = "float" if is_float else "double"
             print(f"{kind}, {len(export.terrains)} terrains, {size / 1e3:.0f} kB")

@@ -1,6 +1,5 @@
-"""Terrains of a database for other programs: controllers, simulators, maps.
+"""Terrains of a database for other programs: a C99 header, ONNX graphs.
 
-Begin with `source`: what is exported. `profile` makes one number per episode out of a
-terrain, `targets` has a module for every program that reads it, `folder` puts what a
-target writes together with its README and where it comes from.
+Begin with `source`: what is exported. `targets` has a module for every format,
+`folder` puts what a target writes together with its README and where it comes from.
 """

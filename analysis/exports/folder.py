@@ -83,12 +83,11 @@ def target_files(name: str, export: TerrainExport) -> dict[str, bytes]:
 
 
 def _readme(target: ExportTarget, export: TerrainExport) -> str:
-    spread = "the trial's level" if export.options.spread == "episode" else "all rows"
     known = ", ".join(t.identifier for t in export.terrains)
     lines = (
         f"# {target.title}",
         f"{export.origin}.",
-        f"Terrains: {known}. Spread of friction: {spread}.",
+        f"Terrains of the database: {known}.",
         "Forces in N, velocities in m/s. Holds for the foot, the inclines and the "
         "range measured; not anisotropic.",
         *target.about(export),

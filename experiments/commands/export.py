@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from experiments.arguments import add_allow_missing, add_seed, number_within
+from experiments.arguments import add_allow_missing, add_seed
 
 if TYPE_CHECKING:
     from experiments.operator.console import Console
@@ -18,26 +18,7 @@ EXAMPLES = """\
 _NOTHING = "Nothing was written."
 # Options that belong to one use; each is None or False where it is not given.
 _OF_TRIALS = ("format", "standard_rate")
-_OF_TARGETS = (
-    "terrain",
-    "model",
-    "spread",
-    "float",
-    "grid",
-    "resolution",
-    "required",
-    "load",
-    "sole_area",
-)
-
-_ONLY_FOR = {  # the one target that has an option
-    "float": "c",
-    "grid": "gridmap",
-    "resolution": "gridmap",
-    "required": "gridmap",
-    "load": "gridmap",
-    "sole_area": "chrono",
-}
+_OF_TARGETS = ("terrain", "model", "float")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -82,50 +63,14 @@ def _add_targets(parser: argparse.ArgumentParser) -> None:
         "--for",
         dest="targets",
         metavar="NAME,..",
-        help=f"controllers, simulators and maps: {', '.join(target_names())}",
+        help=f"formats of controllers: {', '.join(target_names())}",
     )
     group.add_argument(
         "--terrain", metavar="NAME,..", help="terrains of the database (all)"
     )
     group.add_argument("--model", metavar="NAME", help="one of its models (default)")
     group.add_argument(
-        "--spread",
-        choices=("episode", "all"),
-        help="what simulators draw once an episode: the trial's level (episode), or "
-        "what changes within a trial too (all)",
-    )
-    group.add_argument(
         "--float", action="store_true", help="single precision in C (double)"
-    )
-    group.add_argument(
-        "--grid",
-        type=Path,
-        metavar="FILE",
-        help="CSV with the terrain of every cell of the map (one patch of each)",
-    )
-    group.add_argument(
-        "--resolution",
-        type=number_within(0.001, 100, "a length 0.001..100 m, e.g. 0.1"),
-        metavar="M",
-        help="side of a cell of the map in m (0.1)",
-    )
-    group.add_argument(
-        "--required",
-        type=number_within(0, 1000, "a force 0..1000 N, e.g. 4"),
-        metavar="N",
-        help="traction in N that slip_risk of the map is for (4)",
-    )
-    group.add_argument(
-        "--load",
-        type=number_within(0, 1000, "a force 0..1000 N, e.g. 5"),
-        metavar="N",
-        help="normal force of the map in N (5)",
-    )
-    group.add_argument(
-        "--sole-area",
-        type=number_within(1e-6, 1, "an area up to 1 m2, e.g. 0.002"),
-        metavar="M2",
-        help="area of the sole, without which chrono has no cohesion [m2]",
     )
 
 
@@ -204,37 +149,26 @@ def _is_given(args: argparse.Namespace, name: str) -> bool:
 def _export_for(args: argparse.Namespace, console: Console) -> int:
     from acquisition.errors import SettingsError
     from analysis.exports.folder import parse_targets
-    from analysis.exports.source import ExportOptions
     from experiments.report.terrain_targets import TargetRequest, export_for
 
-    asked = {
-        "spread": args.spread,
-        "is_float": args.float or None,
-        "required": args.required,
-        "load": args.load,
-        "resolution": args.resolution,
-        "sole_area": args.sole_area,
-    }
     targets, names = parse_targets(args.targets), _names(args.terrain)
     if args.terrain is not None and not names:
         raise SettingsError(
             f"--terrain {args.terrain:.80} names no terrain.",
             hint=f"Leave it out for all of them. {_NOTHING}",
         )
-    for name, target in _ONLY_FOR.items():
-        if _is_given(args, name) and target not in targets:
-            raise SettingsError(
-                f"--{name.replace('_', '-')} is for {target}, which is not in --for.",
-                hint=f"Leave it out, or add {target}. {_NOTHING}",
-            )
+    if args.float and "c" not in targets:
+        raise SettingsError(
+            "--float is for c, which is not in --for.",
+            hint=f"Leave it out, or add c. {_NOTHING}",
+        )
     request = TargetRequest(
         database=args.terrain_db,
         targets=targets,
         to=args.to,
         terrains=names,
         model=args.model or "",
-        options=ExportOptions(**{k: v for k, v in asked.items() if v is not None}),
-        grid=args.grid,
+        is_float=args.float,
     )
     export_for(request, console)
     return 0

@@ -45,7 +45,7 @@ def _sections(export: TerrainExport) -> list[str]:
 
 
 def _head(export: TerrainExport) -> str:
-    real, bits = ("float", 23) if export.options.is_float else ("double", 52)
+    real, bits = ("float", 23) if export.is_float else ("double", 52)
     shares = export.terrains[0].table.shares
     listed = "\n".join(
         f"   traction_{t.identifier}_..: {shown(t.name)}, {t.known.trials} trials"
@@ -105,7 +105,7 @@ def _constants(export: TerrainExport) -> str:
 
     table = export.terrains[0].table
     normal = ndtr(np.linspace(0.0, _NORMAL_END, _NORMAL_POINTS))
-    is_float = export.options.is_float
+    is_float = export.is_float
     return "\n".join(
         [
             _array("traction_shares", np.array(table.shares), is_float),
@@ -119,7 +119,7 @@ def _constants(export: TerrainExport) -> str:
 
 
 def _terrain(terrain: ExportedTerrain, export: TerrainExport) -> str:
-    name, is_float = f"traction_{terrain.identifier}", export.options.is_float
+    name, is_float = f"traction_{terrain.identifier}", export.is_float
     values = np.array(terrain.table.forces).transpose(1, 2, 0)
     known = terrain.known
     recogniser = known.tables[known.recogniser or known.default]

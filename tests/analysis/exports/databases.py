@@ -6,7 +6,7 @@ import numpy as np
 
 from analysis.breakaway.censored import Family
 from analysis.breakaway.model import BREAK_AWAY, SLIDING, BreakAwayModel, PushLaw
-from analysis.exports.source import ExportOptions, TerrainExport
+from analysis.exports.source import TerrainExport
 from analysis.study.distribution import SHARES, NewTrialPrediction
 from analysis.terrains.database import to_text
 from analysis.terrains.known import KnownTerrain, TerrainDatabase
@@ -95,13 +95,12 @@ def database(*, is_simulated=True, names=("S0", "TF")):
     return TerrainDatabase({t.name: t for t in known}, is_simulated, UTC)
 
 
-def export(*, is_simulated=True, names=("S0", "TF"), model="", **options):
+def export(*, is_simulated=True, names=("S0", "TF"), is_float=False):
     return TerrainExport.of(
         database(is_simulated=is_simulated, names=names),
         DIGEST,
         "1.2.3",
-        model=model,
-        options=ExportOptions(**options),
+        is_float=is_float,
     )
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.exports.folder import target_files
-from analysis.exports.source import ExportOptions, TerrainExport
+from analysis.exports.source import TerrainExport
 from analysis.exports.targets.c import HEADER
 from analysis.terrains.contact_law import BEFORE, Draw
 from analysis.terrains.generator import BEFORE as BEFORE_PATH
@@ -188,9 +188,7 @@ def test_the_ground_compiles_as_cpp(header):
 
 
 def test_single_precision_compiles_and_follows(tmp_path):
-    made = TerrainExport.of(
-        stepped_database(), DIGEST, "1.2.3", options=ExportOptions(is_float=True)
-    )
+    made = TerrainExport.of(stepped_database(), DIGEST, "1.2.3", is_float=True)
     (tmp_path / HEADER).write_bytes(target_files("c", made)[HEADER])
     rows = pushes()[:400]
     found = answered(tmp_path, CONTACT, rows, 3)

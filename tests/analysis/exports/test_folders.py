@@ -2,7 +2,6 @@
 
 import json
 import re
-from xml.etree import ElementTree
 
 import pytest
 
@@ -25,27 +24,26 @@ def target(request):
     return request.param
 
 
-def test_the_nine_are_there():
-    nine = "c,onnx,jax,mjx,mjlab,isaaclab,chrono,gridmap,ros2"
-    assert set(parse_targets(nine)) == set(target_names())
+def test_both_are_there():
+    assert set(parse_targets("c,onnx")) == set(target_names())
 
 
-TENTH = """
+THIRD = """
 from analysis.exports.folder import ExportTarget
 
 TARGET = ExportTarget(
-    "A tenth", lambda e: {"a.txt": e.origin.encode()}, lambda e: ("What it is.",) * 6
+    "A third", lambda e: {"a.txt": e.origin.encode()}, lambda e: ("What it is.",) * 6
 )
 """
 
 
-def test_a_tenth_target_is_one_file(tmp_path, monkeypatch):
+def test_a_third_target_is_one_file(tmp_path, monkeypatch):
     from analysis.exports import targets
 
-    (tmp_path / "tenth.py").write_text(TENTH)
+    (tmp_path / "third.py").write_text(THIRD)
     monkeypatch.setattr(targets, "__path__", [*targets.__path__, str(tmp_path)])
-    assert parse_targets("c,tenth") == ("c", "tenth")
-    made = target_files("tenth", export())
+    assert parse_targets("c,third") == ("c", "third")
+    made = target_files("third", export())
     assert set(made) == {"a.txt", "README.md", "source.json"}
     assert made["README.md"].count(b"\n") == 10
 
@@ -75,24 +73,18 @@ def test_the_source_is_complete(target):
 
 def test_simulated_trials_are_named_in_every_artefact(target):
     for path, content in target_files(target, export()).items():
-        if path.endswith((".msg", "CMakeLists.txt")):
-            continue  # definitions of any recording, simulated or not
         assert b"simulated" in content.lower(), path
     for path, content in target_files(target, export(is_simulated=False)).items():
-        if path.endswith((".msg", "CMakeLists.txt")):
-            continue
         assert b"SIMULATED trials" not in content, path
 
 
 def test_hostile_names_stay_harmless(target):
     for path, content in target_files(target, export(names=HOSTILE)).items():
         assert re.fullmatch(r"[A-Za-z0-9_]+([./][A-Za-z0-9_]+)*", path)
-        if path.endswith((".h", ".py", ".md")):
+        if path.endswith((".h", ".md")):
             text = content.decode()
             assert "#error ]]" not in text
             assert "rm -rf)`" not in text
-        if path.endswith(".xml"):
-            ElementTree.fromstring(content)
 
 
 def test_hostile_names_keep_their_own_in_data(target):

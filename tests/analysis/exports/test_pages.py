@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from analysis.terrains.database import load
 from tests.analysis.exports.compiled import FLAGS, build
-from tests.analysis.exports.databases import database
+from tests.analysis.exports.databases import database, database_file
 from tests.analysis.exports.written import write
 
 DOCS = Path(__file__).parents[3] / "docs"
@@ -33,9 +34,9 @@ def test_the_loop_of_the_controllers_page_bears_the_risk_it_says(folder):
     )
     asked = [float(line) for line in done.stdout.split()]
     models = [known.from_rest for known in database().terrains.values()]
-    for load, force in zip((5.0, 9.0), asked, strict=False):
+    for F_n, force in zip((5.0, 9.0), asked, strict=False):
         risks = [
-            sum(m.slip_risk(f, load).risk for m in models) / 2
+            sum(m.slip_risk(f, F_n).risk for m in models) / 2
             for f in (force, force + 0.11)
         ]
         assert risks[0] <= 0.05 + 1e-5
@@ -70,3 +71,13 @@ def test_the_example_in_cpp_prints_medians(folder):
     for name, known in database().terrains.items():
         median = known.predict(3.5, 0.05).median
         assert float(lines[name]) == pytest.approx(median, abs=1e-3)
+
+
+def test_the_example_for_simulators_gives_coefficients(tmp_path, monkeypatch):
+    database_file(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    found = {}
+    exec(block("controller.md", "python"), found)
+    known = load(tmp_path / "terrains.json").terrain("S0")
+    assert found["sliding"] == known.predict(5.0, 0.05).median / 5.0
+    assert known.slip_risk(5.0 * found["static"], 5.0).risk == pytest.approx(0.5)
