@@ -3,7 +3,7 @@
     python -m benchmarks.terrain_header [--terrain-db FILE] [--runs 9]
 
 Exports the database (without one: two terrains made here, 24 x 20 points, one with a
-contact law and a generator of six experts), compiles it with cc -std=c99 -O2 and asks
+generator of six experts), compiles it with cc -std=c99 -O2 and asks
 at random points inside the tables. Each figure is the median of the runs.
 """
 
@@ -51,8 +51,6 @@ int main(void)
     traction_real out[TRACTION_SHARES], p, sum = 0;
     traction_belief belief;
     traction_random random = {1, 0};
-    traction_real x = 0;
-    traction_jam jam;
     traction_path path;
     clock_t begin;
     for (i = 0; i < POINTS; i++) {
@@ -86,16 +84,6 @@ int main(void)
             sum += traction_evidence(&traction_all, &belief, F_n[i], v_t[i], F_t[i]);
     printf("%f ", since(begin));
     begin = clock();
-    for (k = 0; k < ROUNDS && one->contact; k++)
-        for (i = 0; i < POINTS; i++) {
-            x = i ? x + 0.001 * v_t[i] : 0.0;
-            if (i == 0)
-                traction_contact_begin(&jam);
-            sum += traction_contact_step(one->contact, &jam, 0.001, x, v_t[i], F_n[i],
-                                         &draws[i], &p) + p;
-        }
-    printf("%f ", since(begin));
-    begin = clock();
     for (k = 0; k < ROUNDS && one->generator; k++)
         for (i = 0; i < POINTS; i++) {
             if (i == 0)
@@ -117,7 +105,6 @@ _QUERIES = (
     "risk sliding",
     "risk from rest",
     "evidence, all terrains",
-    "step of the contact law",
     "step of the generator",
     "draws of a step",
 )
@@ -180,7 +167,6 @@ def main() -> None:
             made = measured_in_c(export, args.runs, folder)
             known = export.terrains[0].known
             left_out = {
-                "step of the contact law": not known.has_contact,
                 "step of the generator": not known.has_generator,
             }
             for name, nanoseconds in zip(_QUERIES, made, strict=True):

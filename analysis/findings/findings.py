@@ -42,11 +42,9 @@ from analysis.findings.trends import (
 from analysis.study.fits import CsvRow
 from analysis.study.models import GP_SE, TUSTIN
 from analysis.study.study import Study
-from analysis.terrains.contact_fit import fit_contact_law
-from analysis.terrains.contact_law import ContactLaw
 from analysis.terrains.generator_check import SampledTrials
 from analysis.terrains.identify import Identification, identify_study
-from analysis.terrains.process_rows import every_process_trial, process_trials
+from analysis.terrains.process_rows import every_process_trial
 from analysis.terrains.process_scores import least_drop
 
 RESIDUAL_MODELS = (TUSTIN, GP_SE)
@@ -71,7 +69,6 @@ class StudyResults:
         rig: health of the rig by trial; empty for tables from elsewhere.
         claims: the paper's statements; empty for one terrain.
         mobilised: how a terrain takes up a load and lets it go, by its name.
-        laws: contact laws of terrains that have one.
         sampled: samples of a generator against trials left out, by terrain.
     """
 
@@ -91,7 +88,6 @@ class StudyResults:
     mobilised: Mapping[str, Mobilisation] = field(
         default_factory=dict[str, Mobilisation]
     )
-    laws: Mapping[str, ContactLaw] = field(default_factory=dict[str, ContactLaw])
     sampled: Mapping[str, SampledTrials] = field(
         default_factory=dict[str, SampledTrials]
     )
@@ -147,7 +143,6 @@ def _compute(
         rig=rig,
         claims=paper_claims(gather_evidence(study, identification, noise)),
         mobilised=_mobilised(study),
-        laws=_laws(study),
     )
 
 
@@ -161,14 +156,6 @@ def _mobilised(study: Study) -> dict[str, Mobilisation]:
         for name, result in study.terrains.items()
     }
     return {name: one for name, one in found.items() if one is not None}
-
-
-def _laws(study: Study) -> dict[str, ContactLaw]:
-    found = {
-        name: fit_contact_law(process_trials(result.trials), study.options.fit.seed)
-        for name, result in study.terrains.items()
-    }
-    return {name: law for name, law in found.items() if law is not None}
 
 
 _DIGITS = 5  # of the surfaces in fits.json
@@ -190,7 +177,6 @@ def plain_findings(results: StudyResults) -> dict[str, Any]:
             | {"straight_share": found.straight}
             for name, found in results.mobilised.items()
         },
-        "contact": {name: law.to_dict() for name, law in results.laws.items()},
         "trends": {
             name: {key: _trend(trend) for key, trend in trends.items()}
             for name, trends in results.trends.items()

@@ -1,15 +1,10 @@
 """Tables of the report about the ground as a process: its events, and their samples."""
 
-from collections.abc import Callable, Mapping
-from math import exp
-
 from analysis.figures.sections import ReportSection
 from analysis.findings.findings import StudyResults
 from analysis.findings.mobilisation import Mobilisation
 from analysis.report.page_model import ReportTable
-from analysis.terrains.contact_fit import constant_friction
 from analysis.terrains.loadings import Interval90
-from analysis.terrains.process_rows import process_trials
 
 _COLUMNS = {  # of the table of events: unit and scale of every value
     "initial stiffness": ("N/m", 1.0, 0),
@@ -22,29 +17,9 @@ _COLUMNS = {  # of the table of events: unit and scale of every value
 }
 
 
-_NUMBERS: Mapping[str, tuple[str, Callable[[float], float], int]] = {
-    "level": ("capacity [N]", exp, 1),
-    "load": ("its exponent of F_n", float, 2),
-    "spread": ("sd of its log", float, 2),
-    "stiffness": ("stiffness [N/m]", exp, 0),
-    "stiffness_spread": ("sd of its log", float, 2),
-    "run": ("run-out, scale [mm]", lambda way: 1e3 * way, 1),
-    "run_shape": ("its Weibull shape", float, 2),
-    "mu": ("skin friction", float, 2),
-    "viscosity": ("viscosity [N s/m]", float, 1),
-    "partial_rate": ("partial drops [1/m]", float, 0),
-    "partial_share": ("their share", float, 2),
-    "creep": ("creep [mm/s]", lambda speed: 1e3 * speed, 1),
-}  # of the table of contact laws: heading, what is shown, digits
-
-
 def process_tables(results: StudyResults) -> list[ReportTable]:
     """Return the tables of events and of samples; one without rows is left out."""
-    tables = [
-        mobilisation_table(results),
-        contact_table(results),
-        sampled_table(results),
-    ]
+    tables = [mobilisation_table(results), sampled_table(results)]
     return [table for table in tables if table.rows]
 
 
@@ -69,38 +44,6 @@ def mobilisation_table(results: StudyResults) -> ReportTable:
         "distribution. Capacity over load: F_t/F_n at the peaks, median. In brackets "
         "the 90% interval for the value of as many other trials of the same ground, "
         "from trials drawn again. K is identifiable where loadings bend.",
-        section=ReportSection.BEYOND,
-    )
-
-
-def contact_table(results: StudyResults) -> ReportTable:
-    """Return the contact law of every terrain, beside constant friction."""
-    rows = []
-    for name, law in results.laws.items():
-        friction = constant_friction(
-            process_trials(results.study.terrains[name].trials)
-        )
-        rows.append(
-            [
-                name,
-                f"{law.trials}, {law.releases}",
-                *(
-                    _ends(law.intervals[key], change, digits)
-                    for key, (_, change, digits) in _NUMBERS.items()
-                ),
-                f"{friction:.2f}",
-            ]
-        )
-    units = [unit for unit, _, _ in _NUMBERS.values()]
-    return ReportTable(
-        name="Contact law",
-        header=("terrain", "trials, releases", *units, "constant friction"),
-        rows=rows,
-        note="A law with state for a foot that a simulator moves: stones jam, stretch, "
-        "creep, give way in part and let go. In brackets the 90% interval for the "
-        "value of as many other trials of the same ground. Constant friction: median "
-        "of F_t/F_n of a foot that slides, all that a coefficient holds; with it a "
-        "foot hardly ever slips. Plates have no law: nothing jams on them.",
         section=ReportSection.BEYOND,
     )
 
@@ -145,11 +88,7 @@ def sampled_table(results: StudyResults) -> ReportTable:
 
 def _shown(key: str, interval: Interval90) -> str:
     _, scale, digits = _COLUMNS[key]
-    return _ends(interval, lambda x: scale * x, digits)
-
-
-def _ends(interval: Interval90, change: Callable[[float], float], digits: int) -> str:
-    value, low, high = (f"{change(x):.{digits}f}" for x in interval)
+    value, low, high = (f"{scale * x:.{digits}f}" for x in interval)
     return f"{value} ({low} to {high})"
 
 

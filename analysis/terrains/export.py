@@ -18,14 +18,12 @@ from analysis.study.distribution import SHARES
 from analysis.study.jobs import Batch, Store, Workers, run_batches
 from analysis.study.models import GP_SE, GP_SE_TRIAL, TITLES, FitOptions, ModelFitter
 from analysis.study.study import Study
-from analysis.terrains.contact_fit import ContactTask, contact_law_of
 from analysis.terrains.database import to_text
 from analysis.terrains.generator_fit import GeneratorTask, generator_of
 from analysis.terrains.identify import Identification
 from analysis.terrains.known import KnownTerrain, TerrainDatabase
 from analysis.terrains.parts import (
     BREAK_AWAY_PART,
-    CONTACT_PART,
     GENERATOR_PART,
     ROUGHNESS_PART,
     SURFACES_PART,
@@ -112,15 +110,11 @@ def database_of(
         GeneratorTask.of(study.terrains[name].trials, kinds[name], seed)
         for name in (task.terrain for task in tasks)
     ]
-    touched = [
-        ContactTask.of(study.terrains[task.terrain].trials, seed) for task in tasks
-    ]
     batches = [
         Batch(generator_of, sampled),
-        Batch(contact_law_of, touched),
         Batch(tabulate, tasks),
     ]
-    generators, laws, tables = run_batches(batches, workers, store=store)
+    generators, tables = run_batches(batches, workers, store=store)
     models, from_rest = study.options.fit.models, break_away_of(study, store)
     default = next((m for m in (GP_SE_TRIAL, GP_SE) if m in models), models[0])
     recogniser = GP_SE if GP_SE in models else default
@@ -139,13 +133,9 @@ def database_of(
             default=default,
             titles={name: TITLES[name] for name in fitted},
             recogniser=recogniser,
-            parts=_parts(
-                from_rest.get(task.terrain), identification, task, generator, law
-            ),
+            parts=_parts(from_rest.get(task.terrain), identification, task, generator),
         )
-        for task, fitted, generator, law in zip(
-            tasks, tables, generators, laws, strict=True
-        )
+        for task, fitted, generator in zip(tasks, tables, generators, strict=True)
         if default in fitted and recogniser in fitted
     }
     return to_text(
@@ -192,7 +182,6 @@ def _parts(
     identification: Identification | None,
     task: TableTask,
     generator: Mapping[str, Any],
-    law: Mapping[str, Any],
 ) -> dict[str, Any]:
     """Return what the database says of a terrain besides its tables."""
     parts: dict[str, Any] = {}
@@ -200,8 +189,6 @@ def _parts(
         parts[BREAK_AWAY_PART] = from_rest.to_dict()
     if generator:
         parts[GENERATOR_PART] = generator
-    if law:
-        parts[CONTACT_PART] = law
     if identification is not None:
         parts[ROUGHNESS_PART] = _finite(
             {

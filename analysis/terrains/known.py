@@ -17,15 +17,12 @@ from analysis.breakaway.model import BreakAwayModel
 from analysis.data.series import Array
 from analysis.data.terrain_kinds import Value
 from analysis.study.metrics import Prediction
-from analysis.terrains.contact_law import ContactLaw
 from analysis.terrains.generator import Generator, SampledTraction
 from analysis.terrains.parts import (
     BREAK_AWAY_PART,
-    CONTACT_PART,
     GENERATOR_PART,
     Parts,
     break_away_in,
-    contact_in,
     generator_in,
 )
 from analysis.terrains.points import points_of
@@ -148,22 +145,6 @@ class KnownTerrain:
             SettingsError: it cannot be sampled.
         """
         return generator_in(self.parts, self.name)
-
-    @property
-    def contact(self) -> ContactLaw:
-        """What it gives a foot that a simulator moves, step by step; read anew.
-
-        `known.contact.begin(seed).step(dt, x, v, F_n)` is F_t [N].
-
-        Raises:
-            SettingsError: there is none, as of plates.
-        """
-        return contact_in(self.parts, self.name)
-
-    @property
-    def has_contact(self) -> bool:
-        """Whether it has a contact law."""
-        return CONTACT_PART in self.parts
 
     @property
     def has_generator(self) -> bool:

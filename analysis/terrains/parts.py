@@ -1,7 +1,6 @@
 """What a database knows of terrains besides their tables: named parts, as plain values.
 
     of a terrain   break_away   its `BreakAwayModel`
-                   contact      its `ContactLaw`
                    generator    its `Generator`
                    roughness    {window: least feature `resid` of its own windows}
     of all         surfaces     the `SurfaceClassifier`
@@ -18,12 +17,10 @@ from acquisition.errors import SettingsError
 from acquisition.validation import Entries, first_problem
 from analysis.breakaway.model import BreakAwayModel
 from analysis.terrains.classifier import SurfaceClassifier
-from analysis.terrains.contact_law import ContactLaw
 from analysis.terrains.generator import Generator
 
 BREAK_AWAY_PART, ROUGHNESS_PART, SURFACES_PART = "break_away", "roughness", "surfaces"
 GENERATOR_PART = "generator"
-CONTACT_PART = "contact"
 Parts = Mapping[str, Any]
 _ROUGHNESS = TypeAdapter(Entries[int, Annotated[float, Field(allow_inf_nan=False)]])
 
@@ -57,21 +54,6 @@ def break_away_in(parts: Parts, terrain: str) -> BreakAwayModel:
     return BreakAwayModel.from_dict(parts[BREAK_AWAY_PART])
 
 
-def contact_in(parts: Parts, terrain: str) -> ContactLaw:
-    """Return the contact law of a terrain.
-
-    Raises:
-        SettingsError: there is none.
-    """
-    if CONTACT_PART not in parts:
-        raise SettingsError(
-            f"{terrain}: there is no contact law.",
-            hint="It needs whole trials, three or more, on stones that jam and let go "
-            "20 times. Of a plate its friction says as much: predict.",
-        )
-    return ContactLaw.from_dict(parts[CONTACT_PART])
-
-
 def generator_in(parts: Parts, terrain: str) -> Generator:
     """Return what samples the traction of a terrain along a motion.
 
@@ -100,7 +82,6 @@ def surfaces_in(parts: Parts) -> SurfaceClassifier | None:
 
 _READERS = {
     BREAK_AWAY_PART: lambda parts: break_away_in(parts, ""),
-    CONTACT_PART: lambda parts: contact_in(parts, ""),
     GENERATOR_PART: lambda parts: generator_in(parts, ""),
     ROUGHNESS_PART: roughness_in,
     SURFACES_PART: surfaces_in,

@@ -191,8 +191,15 @@ def make_terrain(
     return StoneBed(choice.bed(), incline, rng)
 
 
-class BesideGround:
-    """A ground and something beside it: what is not changed is the ground's."""
+FREE = 0.045  # from the centre line until the sole's edge meets a plank [m]
+_RIM = 0.04  # height of the planks above the plane [m]
+_PLANK_K = 5000.0  # N/m
+_PLANK_B = 2.0 * 0.4 * math.sqrt(_PLANK_K * DAMPING_MASS)  # N s/m
+_PLANK_MU = 0.3  # of a foot that slips along them
+
+
+class Container:
+    """A ground between two planks; both push, neither pulls."""
 
     def __init__(self, ground: Terrain) -> None:
         self.ground = ground
@@ -209,17 +216,6 @@ class BesideGround:
     def truth(self) -> dict[str, float]:
         """Return the parameters in force [SI]."""
         return self.ground.truth()
-
-
-FREE = 0.045  # from the centre line until the sole's edge meets a plank [m]
-_RIM = 0.04  # height of the planks above the plane [m]
-_PLANK_K = 5000.0  # N/m
-_PLANK_B = 2.0 * 0.4 * math.sqrt(_PLANK_K * DAMPING_MASS)  # N s/m
-_PLANK_MU = 0.3  # of a foot that slips along them
-
-
-class Container(BesideGround):
-    """A ground between two planks; both push, neither pulls."""
 
     def step(self, dt: float, motion: Motion) -> Contact:
         """Advance the ground by `dt` [s]; return what it and the planks do."""

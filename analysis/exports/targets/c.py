@@ -1,4 +1,4 @@
-"""A C99 header: quantiles, risks, belief over terrains, contact law and generator."""
+"""A C99 header: quantiles, risks, belief over terrains and generator."""
 
 from importlib import resources
 
@@ -11,11 +11,8 @@ from analysis.exports.folder import ExportTarget, Files
 from analysis.exports.names import shown
 from analysis.exports.rest import REST_POINTS, rest_distances, rest_risks
 from analysis.exports.source import ExportedTerrain, TerrainExport
-from analysis.terrains import contact_law, generator
-from analysis.terrains.contact_law import ContactNumbers
+from analysis.terrains import generator
 from analysis.terrains.generator import Generator
-from analysis.terrains.loadings import LEAST_LOAD
-from analysis.terrains.process_scores import STONES_DROP
 from analysis.terrains.recognition import TAU
 from analysis.terrains.table import Table, TractionEstimates, normal_scores
 
@@ -86,15 +83,6 @@ typedef {real} traction_real;
 #define TRACTION_MOST_EXPERTS {generator.MOST_EXPERTS}
 #define TRACTION_KNOTS {len(generator.KNOTS)}
 #define TRACTION_BEFORE {generator.BEFORE} /* steps of a path before its first sample */
-#define TRACTION_FULL_LOAD {contact_law.FULL_LOAD!r} /* N */
-#define TRACTION_LEAST_LOAD {LEAST_LOAD!r} /* N */
-#define TRACTION_LEAST_DROP {STONES_DROP!r} /* N, of a partial drop */
-#define TRACTION_DAMPING {contact_law.DAMPING!r} /* N s/m of a jam */
-#define TRACTION_CREEP_LOAD {contact_law.CREEP_LOAD!r}
-#define TRACTION_SKIN_SPEED {contact_law.SKIN_SPEED!r} /* m/s */
-#define TRACTION_TOUCH {contact_law.TOUCH!r} /* N */
-#define TRACTION_ALOFT {contact_law.ALOFT!r} /* s, after which a foot stands anew */
-#define TRACTION_FIRST_FORCE {contact_law.FIRST_FORCE!r} /* N */
 #define TRACTION_UNIFORM_SHIFT {64 - bits}
 #define TRACTION_PER_UNIFORM (1.0 / {2**bits}.0)
 """
@@ -132,10 +120,7 @@ def _terrain(terrain: ExportedTerrain, export: TerrainExport) -> str:
     if known.has_from_rest:
         parts.append(_rest(name, known.from_rest, is_float))
         rest = f"&{name}_from_rest"
-    law = sampled = "0"
-    if known.has_contact:
-        parts.append(_contact(name, known.contact.numbers, is_float))
-        law = f"&{name}_contact"
+    sampled = "0"
     if known.has_generator:
         parts.append(_generator(name, known.generator, is_float))
         sampled = f"&{name}_generator"
@@ -149,7 +134,6 @@ static const traction_terrain {name}_terrain = {{
     {{{grid}, {name}_moments}},
     {_number(known.rho, is_float)},
     {rest},
-    {law},
     {sampled},
 }};
 
@@ -204,16 +188,6 @@ def _rest(name: str, model: BreakAwayModel, is_float: bool) -> str:
             *(f"    {value}," for value in values),
             "};\n",
         ]
-    )
-
-
-def _contact(name: str, numbers: ContactNumbers, is_float: bool) -> str:
-    values = (
-        f"    {_number(value, is_float)}, /* {key} */"
-        for key, value in numbers._asdict().items()
-    )
-    return "\n".join(
-        [f"static const traction_contact {name}_contact = {{", *values, "};\n"]
     )
 
 
@@ -322,16 +296,15 @@ def _about(export: TerrainExport) -> tuple[str, str, str, str, str, str]:
         f"Measured: F_n {loads[0]:g}..{loads[-1]:g} N, v_t {speeds[0]:g}.."
         f"{speeds[-1]:g} m/s. Codes: 0 inside, 1 clamped, -1 not finite.",
         "`traction_evidence(&set, &belief, F_n, v_t, F_t)` every 10 ms of sliding, "
-        "`traction_posterior` for the terrains. Stepped: `traction_contact_step`, of "
-        f"{_having(export, 'has_contact')}; `traction_sample_step`, of "
-        f"{_having(export, 'has_generator')}.",
+        "`traction_posterior` for the terrains. Stepped: `traction_sample_step`, of "
+        f"{_sampled(export)}.",
         "cc -std=c99 -pedantic -Wall -Wextra -Werror -ffreestanding -O2 -c yours.c",
     )
 
 
-def _having(export: TerrainExport, what: str) -> str:
-    """Return the names of the terrains that have a part, for people."""
-    names = [shown(t.name) for t in export.terrains if getattr(t.known, what)]
+def _sampled(export: TerrainExport) -> str:
+    """Return the names of the terrains that can be sampled, for people."""
+    names = [shown(t.name) for t in export.terrains if t.known.has_generator]
     return ", ".join(names) or "none"
 
 

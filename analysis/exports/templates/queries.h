@@ -20,33 +20,6 @@ typedef struct {
     const traction_real *risk;
 } traction_rest;
 
-/* The law of a foot that a simulator moves; its equations stand at
-   traction_contact_step. */
-typedef struct {
-    traction_real level; /* log of the capacity at 3.5 N or more [log N] */
-    traction_real load; /* exponent of F_n in it below that */
-    traction_real spread; /* sd of its log */
-    traction_real stiffness; /* log of it [log N/m] */
-    traction_real stiffness_spread; /* sd of that */
-    traction_real run; /* scale of the run-out [m] */
-    traction_real run_shape; /* of its Weibull distribution */
-    traction_real mu; /* skin friction */
-    traction_real viscosity; /* [N s/m] */
-    traction_real partial_rate; /* partial drops over way [1/m] */
-    traction_real partial_share; /* mean share of what is above 1.5 N that one takes */
-    traction_real creep; /* speed at the capacity [m/s] */
-} traction_contact;
-
-/* What it remembers; begins with traction_contact_begin. */
-typedef struct {
-    int is_jammed;
-    traction_real anchor; /* where the stones are not stretched [m] */
-    traction_real capacity; /* at 3.5 N or more, of the jam or of the next one [N] */
-    traction_real stiffness; /* [N/m] */
-    traction_real engage_at; /* where the next jam begins [m] */
-    traction_real aloft; /* time in the air [s] */
-} traction_jam;
-
 /* Random numbers of one step: two uniform in (0, 1], two normal. */
 typedef struct {
     traction_real u0;
@@ -94,7 +67,6 @@ typedef struct {
     traction_table moments; /* of the recogniser: mean and sd [N] */
     traction_real rho; /* of its residual, from one sample to the next */
     const traction_rest *rest; /* 0 = not known, as the following ones */
-    const traction_contact *contact;
     const traction_generator *generator;
 } traction_terrain;
 
@@ -438,109 +410,6 @@ static inline void traction_draw_next(traction_random *random, traction_draw *dr
     draw->u0 = traction_uniform(random);
     draw->u1 = traction_uniform(random);
     traction_normals(random, &draw->z0, &draw->z1);
-}
-
-/* Before the first touch. */
-static inline void traction_contact_begin(traction_jam *jam)
-{
-    jam->is_jammed = 0;
-    jam->anchor = (traction_real)0;
-    jam->capacity = (traction_real)1;
-    jam->stiffness = (traction_real)1;
-    jam->engage_at = (traction_real)0;
-    jam->aloft = (traction_real)TRACTION_ALOFT;
-}
-
-/* What a jam of this capacity bears under F_n [N]. */
-static inline traction_real traction_contact_capacity(const traction_contact *law,
-                                                      traction_real capacity,
-                                                      traction_real F_n)
-{
-    traction_real load = traction_clip(F_n, (traction_real)TRACTION_LEAST_LOAD,
-                                       (traction_real)TRACTION_FULL_LOAD);
-    return capacity
-           * traction_power(load / (traction_real)TRACTION_FULL_LOAD, law->load);
-}
-
-static inline void traction_contact_new(const traction_contact *law, traction_jam *jam,
-                                        const traction_draw *draw)
-{
-    jam->capacity = traction_exp_any(law->level + law->spread * draw->z0);
-    jam->stiffness
-        = traction_exp_any(law->stiffness + law->stiffness_spread * draw->z1);
-}
-
-static inline traction_real traction_contact_free(const traction_contact *law,
-                                                  traction_real v, traction_real skin)
-{
-    traction_real share = v / (traction_real)TRACTION_SKIN_SPEED;
-    return skin * traction_clip(share, -1, 1) + law->viscosity * v;
-}
-
-/* Advance a foot at x [m] with v [m/s] under F_n [N] by dt [s]; F_t [N] is against x.
-   A millisecond or less follows a jam. Stones jam, stretch, creep, give way in part
-   and let go. 0, or -1 where an argument is not finite or the law is not known: F_t is
-   0 then, and nothing has changed. */
-static inline int traction_contact_step(const traction_contact *law, traction_jam *jam,
-                                        traction_real dt, traction_real x,
-                                        traction_real v, traction_real F_n,
-                                        const traction_draw *draw, traction_real *F_t)
-{
-    traction_real skin, k, P, F;
-    *F_t = (traction_real)0;
-    if (!law || !traction_is_finite(dt) || !traction_is_finite(x)
-        || !traction_is_finite(v) || !traction_is_finite(F_n))
-        return -1;
-    if (F_n <= (traction_real)TRACTION_TOUCH) {
-        jam->is_jammed = 0;
-        jam->aloft += dt;
-        return 0;
-    }
-    if (jam->aloft >= (traction_real)TRACTION_ALOFT) {
-        traction_contact_new(law, jam, draw);
-        jam->engage_at = x;
-    }
-    jam->aloft = (traction_real)0;
-    skin = law->mu * F_n;
-    k = jam->stiffness;
-    if (!jam->is_jammed) {
-        traction_real first = skin < (traction_real)TRACTION_FIRST_FORCE
-                                  ? skin
-                                  : (traction_real)TRACTION_FIRST_FORCE;
-        if (x < jam->engage_at) {
-            *F_t = traction_contact_free(law, v, skin);
-            return 0;
-        }
-        jam->anchor = v > 0 ? x - first / k : x;
-    }
-    P = traction_contact_capacity(law, jam->capacity, F_n);
-    if (x > jam->anchor) {
-        traction_real load = k * (x - jam->anchor) / P;
-        load = load < 1 ? load : (traction_real)1;
-        jam->anchor += law->creep * dt
-                       * traction_exp((load - 1) / (traction_real)TRACTION_CREEP_LOAD);
-    }
-    F = k * (x - jam->anchor);
-    jam->is_jammed = 1;
-    if (F < -skin) {
-        F = -skin;
-        jam->anchor = x + skin / k;
-    } else if (F > P) {
-        traction_contact_new(law, jam, draw);
-        jam->is_jammed = 0;
-        jam->engage_at
-            = x
-              + law->run * traction_power(-traction_log(draw->u1), 1 / law->run_shape);
-        *F_t = traction_contact_free(law, v, skin);
-        return 0;
-    } else if (F > (traction_real)TRACTION_LEAST_DROP
-               && draw->u0 < law->partial_rate * v * dt) {
-        F -= (traction_real)TRACTION_LEAST_DROP;
-        F -= F * traction_power(draw->u1, 1 / law->partial_share - 1);
-        jam->anchor = x - F / k;
-    }
-    *F_t = F > 0 ? F + (traction_real)TRACTION_DAMPING * v : F;
-    return 0;
 }
 
 static inline traction_real traction_drift(const traction_real *drift, traction_real v)

@@ -1,4 +1,4 @@
-"""The ground in C, stepped: the contact law and the generator are those of Python."""
+"""The ground in C, stepped: the generator is that of Python."""
 
 import subprocess
 
@@ -8,40 +8,12 @@ import pytest
 from analysis.exports.folder import target_files
 from analysis.exports.source import TerrainExport
 from analysis.exports.targets.c import HEADER
-from analysis.terrains.contact_law import BEFORE, Draw
-from analysis.terrains.generator import BEFORE as BEFORE_PATH
-from analysis.terrains.generator import Draws
+from analysis.terrains.generator import BEFORE, Draws
 from tests.analysis.exports.compiled import FLAGS, build
 from tests.analysis.exports.databases import DIGEST
-from tests.analysis.exports.stepped import LAW, generators, pushes, stepped_database
+from tests.analysis.exports.stepped import generators, stepped_database
 from tests.analysis.terrains.test_generator import trial_of
 
-CONTACT = """
-#include <stdio.h>
-#include "traction_terrains.h"
-
-int main(void)
-{
-    double in[8];
-    traction_jam jam;
-    traction_contact_begin(&jam);
-    while (fread(in, sizeof in, 1, stdin) == 1) {
-        traction_draw draw;
-        traction_real F_t;
-        double sent[3];
-        draw.u0 = in[4];
-        draw.u1 = in[5];
-        draw.z0 = in[6];
-        draw.z1 = in[7];
-        sent[2] = traction_contact_step(traction_list[WHICH]->contact, &jam, in[0],
-                                        in[1], in[2], in[3], &draw, &F_t);
-        sent[0] = F_t;
-        sent[1] = jam.is_jammed;
-        fwrite(sent, sizeof sent, 1, stdout);
-    }
-    return 0;
-}
-"""
 SAMPLE = """
 #include <stdio.h>
 #include "traction_terrains.h"
@@ -104,39 +76,13 @@ def answered(folder, code, rows, columns, which=0):
     return np.frombuffer(done.stdout, "<f8").reshape(-1, columns)
 
 
-def test_a_step_of_the_law_is_that_of_python(header):
-    rows = pushes()
-    found = answered(header, CONTACT, rows, 3)
-    state, expected, jammed = BEFORE, [], []
-    for row in rows.tolist():
-        F_t, state = LAW.step(state, *row[:4], Draw(*row[4:]))
-        expected.append(F_t)
-        jammed.append(state.is_jammed)
-    assert np.abs(found[:, 0] - expected).max() <= 1e-9
-    assert np.array_equal(found[:, 1], jammed)
-    assert not found[:, 2].any()
-    letting_go = np.flatnonzero(np.diff(found[:, 1]) < 0)
-    assert letting_go.size > 10
-    assert 0.1 < np.mean(jammed) < 0.9
-
-
-def test_a_law_refuses_what_is_not_finite_and_what_it_does_not_know(header):
-    rows = pushes()[:4]
-    rows[1, 3] = np.nan
-    found = answered(header, CONTACT, rows, 3)
-    assert found[:, 2].tolist() == [0.0, -1.0, 0.0, 0.0]
-    assert found[1, 0] == 0.0
-    without = answered(header, CONTACT, pushes()[:3], 3, which=1)
-    assert without[:, 2].tolist() == [-1.0] * 3
-
-
 @pytest.mark.parametrize("which", [0, 1])
 def test_a_step_of_the_generator_is_that_of_python(header, which):
     generator, motion = generators()[which], trial_of(20)
     draws = Draws.of(5, 1, motion.F_n.size, generator.trials)
     (expected,) = generator.run([(motion.F_n, motion.v_t)], draws)
     F_n, v_t = (
-        np.concatenate([np.full(BEFORE_PATH, values[0]), values])
+        np.concatenate([np.full(BEFORE, values[0]), values])
         for values in (motion.F_n, motion.v_t)
     )
     u, z = (
@@ -144,7 +90,7 @@ def test_a_step_of_the_generator_is_that_of_python(header, which):
         for each in (draws.uniform, draws.normal)
     )
     found = answered(header, SAMPLE, np.column_stack([F_n, v_t, u, z]), 2, which)
-    forces = found[BEFORE_PATH:, 0] + generator.between * draws.level[0]
+    forces = found[BEFORE:, 0] + generator.between * draws.level[0]
     assert np.abs(forces - expected[0]).max() <= 1e-9
     outside = ~generator.bands.covers_many(F_n, v_t)
     assert np.array_equal(found[:, 1], outside.astype(float))
@@ -185,15 +131,3 @@ def test_draws_are_uniform_normal_and_those_of_the_seed(header):
 def test_the_ground_compiles_as_cpp(header):
     code = f'#include "{HEADER}"\nint main() {{ return TRACTION_BEFORE != 50; }}'
     build(header, code, "-std=c++11", "-pedantic", "-Wall", "-Werror", suffix="cc")
-
-
-def test_single_precision_compiles_and_follows(tmp_path):
-    made = TerrainExport.of(stepped_database(), DIGEST, "1.2.3", is_float=True)
-    (tmp_path / HEADER).write_bytes(target_files("c", made)[HEADER])
-    rows = pushes()[:400]
-    found = answered(tmp_path, CONTACT, rows, 3)
-    state, expected = BEFORE, []
-    for row in rows.tolist():
-        F_t, state = LAW.step(state, *row[:4], Draw(*row[4:]))
-        expected.append(F_t)
-    assert np.median(np.abs(found[:, 0] - expected)) < 1e-3
