@@ -4,16 +4,10 @@ import pytest
 from analysis.breakaway.censored import Family
 from analysis.breakaway.fitting import BreakAwayOptions, fit_break_away
 from analysis.breakaway.model import BREAK_AWAY, SLIDING
+from analysis.breakaway.pushes import find_pushes
+from analysis.breakaway.survival import pit_distance, pit_limit
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.series import TractionSeries
-from studies.breakaway_scores import (
-    Predicted,
-    calibration_error,
-    censoring_weights,
-    from_rest,
-    main,
-    score,
-)
 from tests.analysis.breakaway.pushed import Law, pushed_trials
 
 KINDS = {"S0": "small", "B0": "big", "TF": "flat"}
@@ -128,50 +122,16 @@ def test_the_family_is_the_one_that_predicts_trials_left_out(law, family):
     assert known.family is family
 
 
-# --- scores ---------------------------------------------------------------------------
-
-
 def test_trials_left_out_are_predicted_with_honest_risks(stones):
-    result = score(from_rest(stones, KINDS))
-    assert result.slips > 60
-    assert result.pit < result.pit_limit
-    assert result.calibration_error < 0.06  # 0.03 is for 360 slips
-    base = score([_with_base_rate(p) for p in from_rest(stones, KINDS)])
-    assert result.brier < base.brier
-
-
-def _with_base_rate(predicted):
-    return Predicted(
-        predicted.terrain, predicted.push, np.full(predicted.risks.size, 0.5), 0.5
-    )
-
-
-def test_scores_without_censoring_are_the_plain_ones():
-    peak, is_held = np.array([3.0, 6.0, 9.0]), np.zeros(3, dtype=bool)
-    weights, is_below = censoring_weights(peak, is_held, np.array([5.0, 9.5]))
-    assert weights.tolist() == [[1.0, 1.0]] * 3
-    assert is_below.tolist() == [[1.0, 1.0], [0.0, 1.0], [0.0, 1.0]]
-
-
-def test_weights_make_up_for_pushes_that_held():
-    rng = np.random.default_rng(1)
-    strength, limit = rng.weibull(3.0, 20_000) * 8.0, rng.uniform(2.0, 20.0, 20_000)
-    peak, is_held = np.minimum(strength, limit), limit < strength
-    weights, is_below = censoring_weights(peak, is_held, np.array([7.0]))
-    seen = (weights * is_below).sum() / weights.sum()
-    assert seen == pytest.approx((strength < 7.0).mean(), abs=0.015)
-
-
-def test_a_prediction_that_is_always_off_has_that_calibration_error():
-    is_below = (np.arange(1000) % 10 < 3).astype(float)[:, None]
-    weights = np.ones((1000, 1))
-    assert calibration_error(np.full((1000, 1), 0.3), is_below, weights) < 1e-9
-    off = calibration_error(np.full((1000, 1), 0.45), is_below, weights)
-    assert off == pytest.approx(0.15)
-
-
-@pytest.mark.shared_data
-@pytest.mark.long
-@pytest.mark.timeout(1200)
-def test_recorded_stones_meet_their_figures(shared_data):
-    assert main([str(shared_data / "rehearsal_trials.npz")]) == 0
+    risks, is_held = [], []
+    for k in range(8):
+        others = {n: [*group[:k], *group[k + 1 :]] for n, group in stones.items()}
+        models = fit_break_away(others, KINDS, BreakAwayOptions(draws=0))
+        for name, group in stones.items():
+            pushes = find_pushes(group[k])
+            peaks, loads = np.array([(p.peak, p.F_n) for p in pushes]).T
+            risks += models[name].risks(peaks, loads).tolist()
+            is_held += [p.is_held for p in pushes]
+    slips = is_held.count(False)
+    assert slips > 60
+    assert pit_distance(np.array(risks), np.array(is_held)) < pit_limit(slips)

@@ -34,7 +34,6 @@ from analysis.terrains.windows import (
     window_features,
     windows_of,
 )
-from studies.terrain_scores import main
 
 
 def record(rough=0.3, seed=0, rows=4000):
@@ -308,10 +307,3 @@ def test_a_window_is_out_where_it_is_too_smooth_or_strains_too_much(
 ):
     assert WindowLimits(-2.0, 3.0).exclude(roughness, strain) is is_out
     assert not WindowLimits().exclude(roughness, strain)
-
-
-@pytest.mark.shared_data
-@pytest.mark.long
-@pytest.mark.timeout(1200)
-def test_recorded_terrains_meet_their_figures(shared_data):
-    assert main([str(shared_data / "rehearsal_trials.npz")]) == 0
