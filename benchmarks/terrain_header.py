@@ -2,9 +2,9 @@
 
     python -m benchmarks.terrain_header [--terrain-db FILE] [--runs 9]
 
-Exports the database (without one: two terrains made here, 24 x 20 points, one with a
-generator of six experts), compiles it with cc -std=c99 -O2 and asks
-at random points inside the tables. Each figure is the median of the runs.
+Exports the database (without one: two terrains made here, 24 x 20 points), compiles it
+with cc -std=c99 -O2 and asks at random points inside the tables. Each figure is the
+median of the runs.
 """
 
 import argparse
@@ -22,7 +22,7 @@ import numpy as np
 from analysis.exports.folder import target_files
 from analysis.exports.source import TerrainExport
 from analysis.terrains.database import load, to_text
-from tests.analysis.exports.stepped import stepped_database
+from tests.analysis.exports.databases import database
 
 _PROGRAM = """
 #include <stdio.h>
@@ -32,7 +32,6 @@ _PROGRAM = """
 
 enum { POINTS = 4096, ROUNDS = 500 };
 static traction_real F_t[POINTS], F_n[POINTS], v_t[POINTS];
-static traction_draw draws[POINTS];
 
 static volatile traction_real kept[TRACTION_SHARES];
 
@@ -50,14 +49,11 @@ int main(void)
     int n = one->forces.loads, m = one->forces.speeds, i, j, k;
     traction_real out[TRACTION_SHARES], p, sum = 0;
     traction_belief belief;
-    traction_random random = {1, 0};
-    traction_path path;
     clock_t begin;
     for (i = 0; i < POINTS; i++) {
         F_n[i] = loads[0] + uniform() * (loads[n - 1] - loads[0]);
         v_t[i] = speeds[0] + uniform() * (speeds[m - 1] - speeds[0]);
         F_t[i] = uniform() * 10.0;
-        traction_draw_next(&random, &draws[i]);
     }
     begin = clock();
     for (k = 0; k < ROUNDS; k++)
@@ -82,20 +78,6 @@ int main(void)
     for (k = 0; k < ROUNDS; k++)
         for (i = 0; i < POINTS; i++)
             sum += traction_evidence(&traction_all, &belief, F_n[i], v_t[i], F_t[i]);
-    printf("%f ", since(begin));
-    begin = clock();
-    for (k = 0; k < ROUNDS && one->generator; k++)
-        for (i = 0; i < POINTS; i++) {
-            if (i == 0)
-                traction_sample_begin(one->generator, &path, F_n[0], v_t[0]);
-            sum += traction_sample_step(one->generator, &path, F_n[i], v_t[i],
-                                        draws[i].u0, draws[i].z0, &p) + p;
-        }
-    printf("%f ", since(begin));
-    begin = clock();
-    for (k = 0; k < ROUNDS; k++)
-        for (i = 0; i < POINTS; i++)
-            traction_draw_next(&random, &draws[i]);
     printf("%f\\n", since(begin));
     return sum == 0.5;
 }
@@ -105,8 +87,6 @@ _QUERIES = (
     "risk sliding",
     "risk from rest",
     "evidence, all terrains",
-    "step of the generator",
-    "draws of a step",
 )
 
 
@@ -157,7 +137,7 @@ def main() -> None:
         path = args.terrain_db
         if path is None:
             path = folder / "terrains.json"
-            path.write_text(to_text(stepped_database()))
+            path.write_text(to_text(database()))
         digest = hashlib.sha256(path.read_bytes()).hexdigest()
         for is_float in (False, True):
             export = TerrainExport.of(load(path), digest, "0", is_float=is_float)
@@ -165,13 +145,7 @@ def main() -> None:
             kind = "float" if is_float else "double"
             print(f"{kind}, {len(export.terrains)} terrains, {size / 1e3:.0f} kB")
             made = measured_in_c(export, args.runs, folder)
-            known = export.terrains[0].known
-            left_out = {
-                "step of the generator": not known.has_generator,
-            }
             for name, nanoseconds in zip(_QUERIES, made, strict=True):
-                if left_out.get(name):
-                    continue
                 print(f"  {name:24}{nanoseconds:8.0f} ns")
         print(
             f"Python, all shares        {measured_in_python(export, args.runs):8.0f} ns"

@@ -12,7 +12,6 @@
     rest = tr.fit_break_away(tables)        # before a foot at rest slips
     known = tr.load_terrains("terrains.json")
     session = tr.simulate("S0", trials=10)  # as `traction run --fake --fast` does
-    known.terrain("S0").sample(F_n, v_t, seed=1)  # a motion, a row every 10 ms
 
 SI units throughout: forces in N, velocities in m/s; v_t and F_t are positive in
 ordinary slip, F_n in compression. Begin with `loading`, then `models`.

@@ -38,7 +38,6 @@ PAGE_ORDER = (
     "calibration",
     "shares",
     "noise",
-    "sampled",
     "break_away",
     "break_away_risk",
     "confusion_terrains",

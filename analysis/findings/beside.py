@@ -1,7 +1,6 @@
-"""A study, and what its report needs beside the models: fitted in the same time."""
+"""A study, and the break-away models of its trials: fitted in the same time."""
 
-from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
 
 from analysis.breakaway.model import BreakAwayModel
 from analysis.data.series import TractionSeries
@@ -15,54 +14,8 @@ from analysis.study.study import (
     run_study_shard,
 )
 from analysis.terrains.export import break_away_batch
-from analysis.terrains.generator_check import (
-    SampledTrials,
-    generator_tasks,
-    judge_generator,
-)
 
 Recorded = Mapping[str, Sequence[TractionSeries]]
-
-
-class FittedBeside(NamedTuple):
-    """What was fitted beside the models of a study.
-
-    Attributes:
-        break_away: models of break-away, by terrain that has one.
-        sampled: samples of a generator against trials left out, by terrain.
-    """
-
-    break_away: Mapping[str, BreakAwayModel]
-    sampled: Mapping[str, SampledTrials]
-
-
-class _Beside:
-    """The tasks beside a study, and what comes of them."""
-
-    def __init__(self, trials: Recorded, seed: int) -> None:
-        self._kinds = {
-            name: terrain_kind(name, [series.stones for series in recorded])
-            for name, recorded in trials.items()
-        }
-        self._seed = seed
-        self._sampled: Sequence[str] = ()
-
-    def batches(self, prepared: Prepared) -> list[Batch]:
-        tasks = generator_tasks(prepared, self._kinds, self._seed)
-        self._sampled = list(tasks)
-        return [
-            Batch(judge_generator, list(tasks.values())),
-            break_away_batch(prepared, self._kinds, self._seed),
-        ]
-
-    def fitted(
-        self,
-        judged: Sequence[SampledTrials | None],
-        break_away: Sequence[Mapping[str, BreakAwayModel]],
-    ) -> FittedBeside:
-        pairs = zip(self._sampled, judged, strict=True)
-        sampled = {name: found for name, found in pairs if found is not None}
-        return FittedBeside(break_away[0], sampled)
 
 
 def run_whole_study(
@@ -71,17 +24,16 @@ def run_whole_study(
     simulated: bool,
     progress: Progress | None = None,
     store: Store | None = None,
-) -> tuple[Study, FittedBeside]:
-    """Return the study of `run_study`, and what its report needs beside it.
+) -> tuple[Study, Mapping[str, BreakAwayModel]]:
+    """Return the study of `run_study`, and the break-away models by terrain.
 
     Raises:
         SettingsError: there is no trial at all.
     """
-    beside = _Beside(trials, options.fit.seed)
-    study, (judged, break_away) = run_study_beside(
-        beside.batches, trials, options, simulated, progress, store
+    study, ((break_away,),) = run_study_beside(
+        _break_away(trials, options), trials, options, simulated, progress, store
     )
-    return study, beside.fitted(judged, break_away)
+    return study, break_away
 
 
 def run_whole_study_shard(
@@ -96,5 +48,16 @@ def run_whole_study_shard(
     Raises:
         SettingsError: there is no trial at all.
     """
-    beside = _Beside(trials, options.fit.seed)
-    return run_study_shard(trials, options, shard, store, progress, beside.batches)
+    beside = _break_away(trials, options)
+    return run_study_shard(trials, options, shard, store, progress, beside)
+
+
+def _break_away(
+    trials: Recorded, options: StudyOptions
+) -> Callable[[Prepared], list[Batch]]:
+    """Return what gives the task of break-away from the prepared trials."""
+    kinds = {
+        name: terrain_kind(name, [series.stones for series in recorded])
+        for name, recorded in trials.items()
+    }
+    return lambda prepared: [break_away_batch(prepared, kinds, options.fit.seed)]

@@ -21,19 +21,20 @@ import numpy as np
 from acquisition.errors import TractionError
 from analysis.data.prepare import PreparedTrial
 from analysis.data.samples import SampleTable, TrainingSet
-from analysis.data.series import Array
+from analysis.data.series import Array, Indices
+from analysis.data.terrain_kinds import FLAT
 from analysis.gp.kernels import SquaredExponential
 from analysis.study.crossval import fold_groups
 from analysis.study.jobs import Store, Workers, run_tasks
 from analysis.study.models import FitOptions
 from analysis.study.new_trial import FAMILIES, LEAST_GAIN, NORMAL, NewTrialFit
-from analysis.terrains.process_scores import falls
 
 WAY = "way"  # since the last drop: from F_t and v_t of any trial
 SPAN = 0.2  # s over which changes are held against those of F_t
 REPEATED = 0.3  # share of the changes that is that of F_t, from which on it repeats it
 FEWEST = 3  # trials
 
+_STONES_DROP, _PLATE_DROP = 1.5, 0.4  # N between two extremes of the force
 _FOLDS = 10
 _STREAM = 4_000_000  # apart from folds, terrain fits, components
 _LEVEL = 0.975  # one end of a 95 % interval
@@ -307,3 +308,43 @@ def way_since_drop(trial: PreparedTrial, least: float) -> Array:
     last = np.zeros(x.size)
     last[known] = x[known]
     return (x - np.maximum.accumulate(last))[trial.indices]
+
+
+def least_drop(kind: str) -> float:
+    """Return the fall of force [N] that makes a drop on a kind of terrain."""
+    return _PLATE_DROP if kind == FLAT else _STONES_DROP
+
+
+def falls(F: Array, least: float) -> tuple[Indices, Indices]:
+    """Return peak and floor of every fall between alternating extremes.
+
+    Args:
+        F: forces [N], shape (T,).
+        least: between two extremes [N].
+
+    Returns:
+        Samples of the peaks and of the floors, each of shape (number of falls,).
+    """
+    steps = np.sign(np.diff(F))
+    turning = np.flatnonzero(steps[1:] * steps[:-1] <= 0.0) + 1
+    rows = np.concatenate([[0], turning, [F.size - 1]])
+    peaks: list[int] = []
+    floors: list[int] = []
+    high = low = int(rows[0])
+    is_rising = True
+    values = F.tolist()
+    for k in rows.tolist():
+        if is_rising:
+            if values[k] > values[high]:
+                high = k
+            elif values[high] - values[k] >= least:
+                peaks.append(high)
+                low, is_rising = k, False
+        elif values[k] < values[low]:
+            low = k
+        elif values[k] - values[low] >= least:
+            floors.append(low)
+            high, is_rising = k, True
+    if len(floors) < len(peaks):
+        floors.append(low)
+    return np.array(peaks, dtype=int), np.array(floors, dtype=int)

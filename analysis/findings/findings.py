@@ -1,7 +1,7 @@
 """Everything a report shows, computed once for tables, figures and files."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,6 @@ from analysis.findings.break_away import (
     TerrainBreakAway,
     break_away_findings,
 )
-from analysis.findings.mobilisation import Mobilisation, mobilisation_of
 from analysis.findings.new_trial_bands import (
     HeldOutShares,
     held_out_shares,
@@ -42,10 +41,7 @@ from analysis.findings.trends import (
 from analysis.study.fits import CsvRow
 from analysis.study.models import GP_SE, TUSTIN
 from analysis.study.study import Study
-from analysis.terrains.generator_check import SampledTrials
 from analysis.terrains.identify import Identification, identify_study
-from analysis.terrains.process_rows import every_process_trial
-from analysis.terrains.process_scores import least_drop
 
 RESIDUAL_MODELS = (TUSTIN, GP_SE)
 
@@ -68,8 +64,6 @@ class StudyResults:
         coverage: of velocity and load by the samples.
         rig: health of the rig by trial; empty for tables from elsewhere.
         claims: the paper's statements; empty for one terrain.
-        mobilised: how a terrain takes up a load and lets it go, by its name.
-        sampled: samples of a generator against trials left out, by terrain.
     """
 
     study: Study
@@ -85,19 +79,12 @@ class StudyResults:
     coverage: Sequence[CoverageMap]
     rig: Sequence[RigTrial]
     claims: Sequence[PaperClaim]
-    mobilised: Mapping[str, Mobilisation] = field(
-        default_factory=dict[str, Mobilisation]
-    )
-    sampled: Mapping[str, SampledTrials] = field(
-        default_factory=dict[str, SampledTrials]
-    )
 
 
 def compute_results(
     study: Study,
     rig: Sequence[RigTrial] = (),
     break_away: Mapping[str, BreakAwayModel] | None = None,
-    sampled: Mapping[str, SampledTrials] | None = None,
 ) -> StudyResults:
     """Return what follows from a study; of models only those of break-away are fit.
 
@@ -105,13 +92,11 @@ def compute_results(
         study: the study.
         rig: health of the rig by trial.
         break_away: models of break-away by terrain; None = they are fitted here.
-        sampled: of `analysis.terrains.generator_check`, by terrain; None = of none.
     """
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1):  # small matrices: more threads lose time
-        found = _compute(study, rig, break_away)
-        return replace(found, sampled=sampled or {})
+        return _compute(study, rig, break_away)
 
 
 def _compute(
@@ -142,20 +127,7 @@ def _compute(
         coverage=coverages(study, edges),
         rig=rig,
         claims=paper_claims(gather_evidence(study, identification, noise)),
-        mobilised=_mobilised(study),
     )
-
-
-def _mobilised(study: Study) -> dict[str, Mobilisation]:
-    found = {
-        name: mobilisation_of(
-            every_process_trial(result.trials),
-            least_drop(result.kind),
-            study.options.fit.seed,
-        )
-        for name, result in study.terrains.items()
-    }
-    return {name: one for name, one in found.items() if one is not None}
 
 
 _DIGITS = 5  # of the surfaces in fits.json
@@ -171,11 +143,6 @@ def plain_findings(results: StudyResults) -> dict[str, Any]:
         "noise": {summary.terrain: _noise(summary) for summary in results.noise},
         "new_trial": {
             shares.terrain: plain_shares(shares) for shares in results.shares
-        },
-        "mobilisation": {
-            name: {key: one._asdict() for key, one in found.values.items()}
-            | {"straight_share": found.straight}
-            for name, found in results.mobilised.items()
         },
         "trends": {
             name: {key: _trend(trend) for key, trend in trends.items()}
@@ -195,9 +162,6 @@ def plain_findings(results: StudyResults) -> dict[str, Any]:
             "trend means, slope, slope_error, spread": TREND_UNITS,
             "residual quantiles, bias, sd": "N",
             "autocorrelation_samples": "kept samples",
-            "initial stiffness": "N/m",
-            "mobilisation way, run-out, way between drops": "m",
-            "drop": "N",
             "F_n": "N",
             "v_t": "m/s",
             "mean": "N",

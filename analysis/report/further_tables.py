@@ -12,7 +12,6 @@ from analysis.findings.trends import MEAN_FORCE, MEAN_LOAD, TRACTION_RATIO, Tren
 from analysis.report.new_trial_tables import new_trial_tables
 from analysis.report.page_model import ReportTable
 from analysis.report.paper_tables import with_error
-from analysis.report.process_tables import process_tables
 from analysis.report.terrain_tables import terrain_tables
 from analysis.study.metrics import (
     PairedComparison,
@@ -46,7 +45,6 @@ def beyond_tables(results: StudyResults) -> list[ReportTable]:
         *(paired_table(study, key, unit) for key, unit in _MEASURES),
         noise_table(results),
         *new_trial_tables(results),
-        *process_tables(results),
         lag_table(study),
         *terrain_tables(results),
         trend_table(results),

@@ -336,7 +336,7 @@ def family_counts(models: Sequence[NewTrialModel]) -> Mapping[str, int]:
     return {family: chosen.count(family) for family in FAMILIES}
 
 
-def spread_trials(count: int) -> Indices:
+def _spread_trials(count: int) -> Indices:
     """Return at most 30 of so many trials, spread evenly over their order."""
     wanted = min(count, MOST_TRIALS)
     return np.round(np.linspace(0, count - 1, wanted)).astype(int)
@@ -350,7 +350,7 @@ def spread_rows(lengths: Sequence[int], count: int) -> Indices:
         count: of rows that are wanted.
     """
     starts = np.concatenate([[0], np.cumsum(lengths)])
-    trials = spread_trials(len(lengths))
+    trials = _spread_trials(len(lengths))
     each = max(count // trials.size, 1)
     middles = (np.arange(each) + 0.5) / each
     rows = [starts[k] + np.floor(middles * lengths[k]).astype(int) for k in trials]

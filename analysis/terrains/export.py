@@ -15,16 +15,14 @@ from analysis.data.prepare import PreparedTrial, PrepareOptions
 from analysis.data.samples import SampleTable, TrainingSet
 from analysis.data.series import Array
 from analysis.study.distribution import SHARES
-from analysis.study.jobs import Batch, Store, Workers, run_batches
+from analysis.study.jobs import Batch, Store, Workers, run_batches, run_tasks
 from analysis.study.models import GP_SE, GP_SE_TRIAL, TITLES, FitOptions, ModelFitter
 from analysis.study.study import Study
 from analysis.terrains.database import to_text
-from analysis.terrains.generator_fit import GeneratorTask, generator_of
 from analysis.terrains.identify import Identification
 from analysis.terrains.known import KnownTerrain, TerrainDatabase
 from analysis.terrains.parts import (
     BREAK_AWAY_PART,
-    GENERATOR_PART,
     ROUGHNESS_PART,
     SURFACES_PART,
 )
@@ -105,16 +103,7 @@ def database_of(
         SettingsError: no terrain has kept samples.
     """
     axes, tasks = _tasks(study)
-    kinds, seed = study.kinds, study.options.fit.seed
-    sampled = [
-        GeneratorTask.of(study.terrains[name].trials, kinds[name], seed)
-        for name in (task.terrain for task in tasks)
-    ]
-    batches = [
-        Batch(generator_of, sampled),
-        Batch(tabulate, tasks),
-    ]
-    generators, tables = run_batches(batches, workers, store=store)
+    tables = run_tasks(tabulate, tasks, workers, store=store)
     models, from_rest = study.options.fit.models, break_away_of(study, store)
     default = next((m for m in (GP_SE_TRIAL, GP_SE) if m in models), models[0])
     recogniser = GP_SE if GP_SE in models else default
@@ -133,9 +122,9 @@ def database_of(
             default=default,
             titles={name: TITLES[name] for name in fitted},
             recogniser=recogniser,
-            parts=_parts(from_rest.get(task.terrain), identification, task, generator),
+            parts=_parts(from_rest.get(task.terrain), identification, task),
         )
-        for task, fitted, generator in zip(tasks, tables, generators, strict=True)
+        for task, fitted in zip(tasks, tables, strict=True)
         if default in fitted and recogniser in fitted
     }
     return to_text(
@@ -181,14 +170,11 @@ def _parts(
     from_rest: BreakAwayModel | None,
     identification: Identification | None,
     task: TableTask,
-    generator: Mapping[str, Any],
 ) -> dict[str, Any]:
     """Return what the database says of a terrain besides its tables."""
     parts: dict[str, Any] = {}
     if from_rest is not None:
         parts[BREAK_AWAY_PART] = from_rest.to_dict()
-    if generator:
-        parts[GENERATOR_PART] = generator
     if identification is not None:
         parts[ROUGHNESS_PART] = _finite(
             {

@@ -17,13 +17,10 @@ from analysis.breakaway.model import BreakAwayModel
 from analysis.data.series import Array
 from analysis.data.terrain_kinds import Value
 from analysis.study.metrics import Prediction
-from analysis.terrains.generator import Generator, SampledTraction
 from analysis.terrains.parts import (
     BREAK_AWAY_PART,
-    GENERATOR_PART,
     Parts,
     break_away_in,
-    generator_in,
 )
 from analysis.terrains.points import points_of
 from analysis.terrains.table import SlipRisk, Table, TractionEstimate, TractionEstimates
@@ -117,39 +114,6 @@ class KnownTerrain:
             SettingsError: a value is negative or no finite number, or it is not known.
         """
         return self.from_rest.slip_risk(required, F_n)
-
-    def sample(
-        self, F_n: ArrayLike, v_t: ArrayLike, seed: int, n: int = 1
-    ) -> SampledTraction:
-        """Return traction that a new trial may show along a motion.
-
-        The same seed gives the same forces, and path k is the same for every n.
-
-        Args:
-            F_n: normal force [N] every 10 ms, shape (T,), or one number.
-            v_t: slip velocity [m/s], shape (T,).
-            seed: of the draws, 0 or more.
-            n: number of paths.
-
-        Raises:
-            SettingsError: it cannot be sampled, or the motion is none.
-        """
-        loads, speeds = points_of(F_n, v_t)
-        return self.generator.sample(loads, speeds, seed, n)
-
-    @property
-    def generator(self) -> Generator:
-        """What samples its traction along a motion; read anew every time.
-
-        Raises:
-            SettingsError: it cannot be sampled.
-        """
-        return generator_in(self.parts, self.name)
-
-    @property
-    def has_generator(self) -> bool:
-        """Whether it can be sampled."""
-        return GENERATOR_PART in self.parts
 
     @property
     def has_from_rest(self) -> bool:

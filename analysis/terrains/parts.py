@@ -1,7 +1,6 @@
 """What a database knows of terrains besides their tables: named parts, as plain values.
 
     of a terrain   break_away   its `BreakAwayModel`
-                   generator    its `Generator`
                    roughness    {window: least feature `resid` of its own windows}
     of all         surfaces     the `SurfaceClassifier`
 
@@ -17,10 +16,8 @@ from acquisition.errors import SettingsError
 from acquisition.validation import Entries, first_problem
 from analysis.breakaway.model import BreakAwayModel
 from analysis.terrains.classifier import SurfaceClassifier
-from analysis.terrains.generator import Generator
 
 BREAK_AWAY_PART, ROUGHNESS_PART, SURFACES_PART = "break_away", "roughness", "surfaces"
-GENERATOR_PART = "generator"
 Parts = Mapping[str, Any]
 _ROUGHNESS = TypeAdapter(Entries[int, Annotated[float, Field(allow_inf_nan=False)]])
 
@@ -54,20 +51,6 @@ def break_away_in(parts: Parts, terrain: str) -> BreakAwayModel:
     return BreakAwayModel.from_dict(parts[BREAK_AWAY_PART])
 
 
-def generator_in(parts: Parts, terrain: str) -> Generator:
-    """Return what samples the traction of a terrain along a motion.
-
-    Raises:
-        SettingsError: it is not known.
-    """
-    if GENERATOR_PART not in parts:
-        raise SettingsError(
-            f"{terrain}: its traction cannot be sampled.",
-            hint="Record four whole trials or more and export them again.",
-        )
-    return Generator.from_dict(parts[GENERATOR_PART])
-
-
 def roughness_in(parts: Parts) -> dict[int, float]:
     """Return the least roughness by window [kept samples], empty where not known."""
     return _ROUGHNESS.validate_python(parts.get(ROUGHNESS_PART, {}))
@@ -82,7 +65,6 @@ def surfaces_in(parts: Parts) -> SurfaceClassifier | None:
 
 _READERS = {
     BREAK_AWAY_PART: lambda parts: break_away_in(parts, ""),
-    GENERATOR_PART: lambda parts: generator_in(parts, ""),
     ROUGHNESS_PART: roughness_in,
     SURFACES_PART: surfaces_in,
 }

@@ -112,7 +112,7 @@ def run(args: argparse.Namespace) -> int:
     fit = FitOptions(bounds=choices.bounds, seed=args.seed, models=choices.models)
     options = StudyOptions(choices.prepare, fit=fit, scheduler=args.scheduler)
     with fitting(console) as progress:
-        study, beside = run_whole_study(trials, options, is_simulated, progress)
+        study, break_away = run_whole_study(trials, options, is_simulated, progress)
     require_samples(study)
     others = repeat_study(study, trials, choices.variants, console)
     found = columns_tested(study, tested, columns, console)
@@ -132,9 +132,7 @@ def run(args: argparse.Namespace) -> int:
             "covariates": [one.numbers() for one in found],
         },
         with_pdf=args.pdf,
-        results=compute_results(
-            study, break_away=beside.break_away, sampled=beside.sampled
-        ),
+        results=compute_results(study, break_away=break_away),
     )
     page = write_report(study, args.to, context)
     for note in study.groups:

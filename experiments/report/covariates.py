@@ -11,11 +11,11 @@ from analysis.findings.covariates import (
     CovariateResult,
     CovariateRows,
     covariate_results,
+    least_drop,
 )
 from analysis.findings.held_trial import TrialFiles
 from analysis.study.jobs import Store, Workers
 from analysis.study.study import Study
-from analysis.terrains.process_scores import least_drop
 from experiments.operator.console import WARNING, Console
 
 KNOWN = (*RECORDED, WAY)  # of recordings

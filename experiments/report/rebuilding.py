@@ -69,7 +69,7 @@ def rebuild(folder: Path, console: Console) -> TableComparison:
     results = compute_results(
         analysed.study,
         with_tares([t.health for t in trials], trials),
-        analysed.beside.break_away,
+        analysed.break_away,
     )
     again = to_csv(analysed.study, findings_rows(results))
     return compare_tables(_text(folder / TABLE), again)

@@ -1,6 +1,6 @@
 """From sessions to a report: the trials, their study and the page."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from hashlib import blake2b
 from pathlib import Path
@@ -10,15 +10,12 @@ import numpy as np
 
 from acquisition.clock import SystemClock
 from acquisition.errors import SessionError, SettingsError, TrialFileError
+from analysis.breakaway.model import BreakAwayModel
 from analysis.data.load import load_trial
 from analysis.data.plausibility import summed_up
 from analysis.data.recorded_factors import stated_factors
 from analysis.data.series import TractionSeries
-from analysis.findings.beside import (
-    FittedBeside,
-    run_whole_study,
-    run_whole_study_shard,
-)
+from analysis.findings.beside import run_whole_study, run_whole_study_shard
 from analysis.findings.covariates import COVARIATE_TYPES, CovariateResult
 from analysis.findings.findings import compute_results
 from analysis.findings.held_trial import HeldTrial, TrialFiles
@@ -38,7 +35,6 @@ from analysis.study.models import (
 from analysis.study.store import MOST_BYTES, TYPES, ResultStore
 from analysis.study.study import Study, StudyOptions
 from analysis.terrains.export import database_of
-from analysis.terrains.generator_check import SAMPLED_TYPES
 from analysis.terrains.identify import identify_study
 from experiments.operator.console import Console
 from experiments.report.cells import (
@@ -138,14 +134,14 @@ class StudySession:
 
     Attributes:
         study: the result.
-        beside: what was fitted beside it.
+        break_away: models of break-away, by terrain that has one.
         trials: the kept trials by terrain, in the matrix's order.
         left_out: recordings that are not in it, and why.
         truths: how far trials are from their truth files, by path of the trial.
     """
 
     study: Study
-    beside: FittedBeside
+    break_away: Mapping[str, BreakAwayModel]
     trials: dict[str, list[HeldTrial]]
     left_out: list[str]
     truths: dict[Path, TruthErrors]
@@ -166,7 +162,6 @@ def results_below(data: Path) -> ResultStore:
     types = {
         **TYPES,
         **DRAWN_TYPES,
-        **SAMPLED_TYPES,
         **COVARIATE_TYPES,
     }
     free = disk_usage(data).free if data.is_dir() else 0
@@ -243,10 +238,10 @@ def study_sessions(
     """
     given = StudyInputs.of(sessions, data, order, console, fit)
     with fitting(console) as progress:
-        study, beside = run_whole_study(
+        study, break_away = run_whole_study(
             given.series, given.options, given.is_simulated, progress, given.store
         )
-    return StudySession(study, beside, given.trials, given.left_out, given.truths)
+    return StudySession(study, break_away, given.trials, given.left_out, given.truths)
 
 
 def fit_shard(
@@ -355,7 +350,6 @@ def report_sessions(
     analysed = study_sessions(sessions, data, order, console, _fit_options(order))
     study, trials = analysed.study, analysed.trials
     store = results_below(data)
-    break_away, sampled = analysed.beside
     others = repeat_study(study, analysed.files, order.choices.variants, console, store)
     every = [trial for group in trials.values() for trial in group]
     rig = with_tares([trial.health for trial in every], every)
@@ -367,7 +361,7 @@ def report_sessions(
         console,
         store,
     )
-    results = compute_results(study, rig, break_away, sampled)
+    results = compute_results(study, rig, analysed.break_away)
     context = _context(sessions, order, analysed, others, tested)
     context = replace(context, rig=rig, results=results, store=store)
     page = write_report(study, order.out or own, context)

@@ -1,4 +1,4 @@
-"""A C99 header: quantiles, risks, belief over terrains and generator."""
+"""A C99 header: quantiles, risks and belief over terrains."""
 
 from importlib import resources
 
@@ -11,8 +11,6 @@ from analysis.exports.folder import ExportTarget, Files
 from analysis.exports.names import shown
 from analysis.exports.rest import REST_POINTS, rest_distances, rest_risks
 from analysis.exports.source import ExportedTerrain, TerrainExport
-from analysis.terrains import generator
-from analysis.terrains.generator import Generator
 from analysis.terrains.recognition import TAU
 from analysis.terrains.table import Table, TractionEstimates, normal_scores
 
@@ -42,7 +40,7 @@ def _sections(export: TerrainExport) -> list[str]:
 
 
 def _head(export: TerrainExport) -> str:
-    real, bits = ("float", 23) if export.is_float else ("double", 52)
+    real = "float" if export.is_float else "double"
     shares = export.terrains[0].table.shares
     listed = "\n".join(
         f"   traction_{t.identifier}_..: {shown(t.name)}, {t.known.trials} trials"
@@ -78,13 +76,6 @@ typedef {real} traction_real;
 #define TRACTION_NORMAL_PER_UNIT {(_NORMAL_POINTS - 1) / _NORMAL_END!r}
 #define TRACTION_REST_POINTS {REST_POINTS}
 #define TRACTION_SAMPLES_AS_ONE {TAU!r} /* samples of a belief that count as one */
-#define TRACTION_FEATURES {generator.FEATURES}
-#define TRACTION_GATES {generator.GATES}
-#define TRACTION_MOST_EXPERTS {generator.MOST_EXPERTS}
-#define TRACTION_KNOTS {len(generator.KNOTS)}
-#define TRACTION_BEFORE {generator.BEFORE} /* steps of a path before its first sample */
-#define TRACTION_UNIFORM_SHIFT {64 - bits}
-#define TRACTION_PER_UNIFORM (1.0 / {2**bits}.0)
 """
 
 
@@ -101,7 +92,6 @@ def _constants(export: TerrainExport) -> str:
             _array("traction_F_n", np.array(table.F_n), is_float),
             _array("traction_v_t", np.array(table.v_t), is_float),
             _array("traction_normal_table", normal, is_float),
-            _array("traction_knots", np.array(generator.KNOTS), is_float),
         ]
     )
 
@@ -120,10 +110,6 @@ def _terrain(terrain: ExportedTerrain, export: TerrainExport) -> str:
     if known.has_from_rest:
         parts.append(_rest(name, known.from_rest, is_float))
         rest = f"&{name}_from_rest"
-    sampled = "0"
-    if known.has_generator:
-        parts.append(_generator(name, known.generator, is_float))
-        sampled = f"&{name}_generator"
     loads, speeds = len(terrain.table.F_n), len(terrain.table.v_t)
     grid = f"{loads}, {speeds}, traction_F_n, traction_v_t"
     parts.append(
@@ -134,7 +120,6 @@ static const traction_terrain {name}_terrain = {{
     {{{grid}, {name}_moments}},
     {_number(known.rho, is_float)},
     {rest},
-    {sampled},
 }};
 
 static inline int {name}_quantiles(traction_real F_n, traction_real v_t,
@@ -185,37 +170,6 @@ def _rest(name: str, model: BreakAwayModel, is_float: bool) -> str:
         [
             _array(f"{name}_rest_table", rest_risks(model), is_float),
             f"static const traction_rest {name}_from_rest = {{",
-            *(f"    {value}," for value in values),
-            "};\n",
-        ]
-    )
-
-
-def _generator(name: str, model: Generator, is_float: bool) -> str:
-    experts, bands = model.experts, model.bands
-    arrays = {
-        "weights": experts.weights,
-        "sd": experts.sd,
-        "gate": experts.gate,
-        "centre": experts.centre,
-        "per_scale": 1.0 / experts.scale,
-        "drift": model.drift,
-        "band_loads": np.array(bands.F_n),
-        "band_speeds": np.array(bands.v_t),
-        "bands": np.array(bands.forces).transpose(1, 2, 0),
-    }
-    axes = f"{name}_sample_band_loads, {name}_sample_band_speeds"
-    values = (
-        str(model.size),
-        str(model.freedom),
-        *(f"{name}_sample_{key}" for key in list(arrays)[:6]),
-        f"{{{len(bands.F_n)}, {len(bands.v_t)}, {axes}, {name}_sample_bands}}",
-        *(_number(x, is_float) for x in (model.between, model.least, model.most)),
-    )
-    return "\n".join(
-        [
-            *(_array(f"{name}_sample_{k}", v, is_float) for k, v in arrays.items()),
-            f"static const traction_generator {name}_generator = {{",
             *(f"    {value}," for value in values),
             "};\n",
         ]
@@ -296,16 +250,9 @@ def _about(export: TerrainExport) -> tuple[str, str, str, str, str, str]:
         f"Measured: F_n {loads[0]:g}..{loads[-1]:g} N, v_t {speeds[0]:g}.."
         f"{speeds[-1]:g} m/s. Codes: 0 inside, 1 clamped, -1 not finite.",
         "`traction_evidence(&set, &belief, F_n, v_t, F_t)` every 10 ms of sliding, "
-        "`traction_posterior` for the terrains. Stepped: `traction_sample_step`, of "
-        f"{_sampled(export)}.",
+        "`traction_posterior` for the terrains.",
         "cc -std=c99 -pedantic -Wall -Wextra -Werror -ffreestanding -O2 -c yours.c",
     )
-
-
-def _sampled(export: TerrainExport) -> str:
-    """Return the names of the terrains that can be sampled, for people."""
-    names = [shown(t.name) for t in export.terrains if t.known.has_generator]
-    return ", ".join(names) or "none"
 
 
 TARGET = ExportTarget("Terrains for a controller in C or C++", _files, _about)

@@ -14,7 +14,6 @@ from analysis.data.series import TractionSeries
 from analysis.study.metrics import Prediction
 from analysis.study.models import GP_SE, TUSTIN, FitOptions, ModelFitter
 from analysis.study.study import StudyOptions, run_study
-from analysis.terrains import generator_fit
 from analysis.terrains.database import load
 from analysis.terrains.export import TableTask, database_of, training_set
 from analysis.terrains.identify import Confusion, identify_study
@@ -62,11 +61,7 @@ def found(study):
 @pytest.fixture(scope="module")
 def path(study, found, tmp_path_factory):
     path = tmp_path_factory.mktemp("db") / "terrains.json"
-    with pytest.MonkeyPatch.context() as patch:
-        # nobody asks for a generator here, and one of each terrain takes seconds
-        patch.setattr(generator_fit, "_FEWEST", 5)
-        text = database_of(study, found, "2027-01-15T08:00:00Z", 1)
-    path.write_text(text)
+    path.write_text(database_of(study, found, "2027-01-15T08:00:00Z", 1))
     return path
 
 
