@@ -130,7 +130,6 @@ TESTS = {
     "experiments/session/reducer.py": ("tests/experiments/session/test_reducer.py",),
     "experiments/session/kept_files.py": (
         "tests/experiments/session/test_witnesses.py",
-        "tests/experiments/trial/test_next_push.py",
     ),
     "experiments/report/checksums.py": _PUBLISHED,
     "experiments/report/witnesses.py": _PUBLISHED,

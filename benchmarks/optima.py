@@ -67,7 +67,7 @@ def examine(task: FoldTask) -> list[RawRecord]:
     found = [RawRecord(fold, TUSTIN, -sse, -min(sse, best), is_missed, 0, 0.0)]
     training = TrainingSet(task.training, task.lengths, chosen)
     trial, order = training.trial_of()[chosen], np.argsort(chosen)
-    trials = TrialRows(trial[order], np.zeros(trial.size))
+    trials = TrialRows(trial[order])
     for name, (part, _) in FITS.items():
         kernel, r = KERNELS[part], rows.outputs[name]
         alone = Likelihood(kernel, ConstantNoise(), rows.X, r)

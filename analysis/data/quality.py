@@ -16,12 +16,7 @@ _SPEED_WORDS = (
     "at 0.05 to 0.2 m/s",
     "faster than 0.2 m/s",
 )
-_LOAD_WORDS = (
-    "hardly pressing",
-    "pressing lightly",
-    "pressing harder",
-    "pressing hard",
-)
+_LOAD_WORDS = ("below 2 N", "at 2 to 5 N", "above 5 N", "above 10 N")
 # What people can do: the extremes come by themselves in slips and at lift-off.
 _AIMS = ((1, 1), (1, 2), (2, 1), (2, 2), (0, 1), (0, 2))
 JOINT7_WARNING = 0.020  # motion of the locked joint that is reported [rad]
@@ -67,18 +62,18 @@ def coverage(trials: Sequence[PreparedTrial]) -> CoverageGrid:
     return CoverageGrid(counts)
 
 
-def suggest(grid: CoverageGrid) -> str:
-    """Return how the next push should be, in words; empty when nothing is missing.
+def thinnest(grid: CoverageGrid) -> str:
+    """Return the cell with fewest samples, in words; empty when none is thin.
 
-    Of the cells that a person can aim at, the emptiest one below 2 % of the samples.
+    Of the cells that a person can aim at, if it has less than 2 % of the samples.
     """
     shares = grid.shares
     if not grid.counts.sum():
         return ""
-    emptiest = min(_AIMS, key=lambda cell: shares[cell])
-    if shares[emptiest] >= ENOUGH:
+    thin = min(_AIMS, key=lambda cell: shares[cell])
+    if shares[thin] >= ENOUGH:
         return ""
-    return f"{_SPEED_WORDS[emptiest[0]]}, {_LOAD_WORDS[emptiest[1]]}"
+    return f"{_SPEED_WORDS[thin[0]]}, {_LOAD_WORDS[thin[1]]}"
 
 
 def share_below(trials: Sequence[PreparedTrial], F_n: float) -> float:

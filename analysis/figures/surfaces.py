@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.data.quality import ENOUGH, coverage, thinnest
 from analysis.data.series import Array
 from analysis.figures.sections import ReportSection
 from analysis.figures.selection import representatives
@@ -114,12 +115,18 @@ def draw_coverage(results: StudyResults) -> Figure | None:
 
 
 def caption_coverage(results: StudyResults) -> str:
-    """State what the coverage map leaves out."""
+    """State what the coverage map leaves out, and where a terrain has few samples."""
     outside = sum(cells.outside for cells in results.coverage)
     total = outside + sum(float(cells.counts.sum()) for cells in results.coverage)
+    thin = [
+        f"{name} {words}"
+        for name, result in results.study.terrains.items()
+        if (words := thinnest(coverage(result.trials)))
+    ]
+    listed = f" Below {ENOUGH:.0%} of its samples: {'; '.join(thin)}." if thin else ""
     return (
         f"Where the models have seen samples; white cells hold none. {outside} of "
-        f"{total:.0f} samples lie beyond the axis of load."
+        f"{total:.0f} samples lie beyond the axis of load.{listed}"
     )
 
 

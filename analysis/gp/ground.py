@@ -161,7 +161,7 @@ class GroundRows:
 
     def blocks(self) -> list[slice]:
         """Return the rows of every trial."""
-        return TrialRows(self.trial, np.zeros(self.trial.size)).blocks()
+        return TrialRows(self.trial).blocks()
 
 
 class Resemblance:

@@ -2,16 +2,15 @@
 
 To the covariance of rows i, j of the same trial (E_ij = 1, otherwise 0) are added
 
-    sc^2 E_ij                           a level of its own in every trial
-    sp^2 E_ij f_i f_j                   a level in proportion to f = F_n / mean |F_n|
-    so^2 E_ij exp(-|t_i - t_j| / tau)   an Ornstein-Uhlenbeck process along the trial
+    sc^2 E_ij           a level of its own in every trial
+    sp^2 E_ij f_i f_j   a level in proportion to f = F_n / mean |F_n|
 
 (a mixed model, Laird and Ware 1982; Rasmussen and Williams 2006, section 2.7, for
 components in the covariance). A new trial shares nothing with the rows fitted to: its
-predicted mean is that of the kernel alone, and all components add to its variance.
+predicted mean is that of the kernel alone, and both components add to its variance.
 
-The components are a `Noise`: theta is that of the noise within a trial, then log sc,
-log sp, log so and log tau of those that are there.
+The components are a `Noise`: theta is that of the noise within a trial, then log sc
+and log sp of those that are there.
 """
 
 from collections.abc import Callable, Sequence
@@ -24,10 +23,8 @@ import numpy as np
 from analysis.data.series import Array, Indices
 from analysis.gp.noise import ConstantNoise, Noise
 
-_EFFECT, _DRIFT = 0.3, 0.5  # sc or sp, and so, over sd(y) that a search starts with
-_TAU = 0.5  # s that it starts with
+_EFFECT = 0.3  # sc or sp over sd(y) that a search starts with
 _SPAN = (-6.0, 1.0)  # of the logarithm of a component over sd(y)
-_TAUS = (0.02, 20.0)  # s
 
 
 class TrialRows(NamedTuple):
@@ -35,15 +32,13 @@ class TrialRows(NamedTuple):
 
     Attributes:
         trial: number of the trial of every row, shape (n,).
-        t: time of every row in its trial [s], shape (n,).
     """
 
     trial: Indices
-    t: Array
 
     def take(self, rows: slice) -> "TrialRows":
         """Return a part of the rows."""
-        return TrialRows(self.trial[rows], self.t[rows])
+        return TrialRows(self.trial[rows])
 
     def blocks(self) -> list[slice]:
         """Return the rows of every trial."""
@@ -73,14 +68,12 @@ class TrialNoise:
         within: noise of single rows.
         has_level: every trial has a level of its own (sc).
         has_ratio: every trial has a level in proportion to F_n (sp).
-        has_drift: the residual is correlated along a trial (so, tau).
         load: f at the standardised F_n z is load[0] + load[1] z.
     """
 
     within: Noise = ConstantNoise()  # noqa: RUF009 - it is frozen and has no fields
     has_level: bool = True
     has_ratio: bool = False
-    has_drift: bool = False
     load: tuple[float, float] = (1.0, 0.0)
 
     @property
@@ -95,13 +88,12 @@ class TrialNoise:
             theta: hyperparameters of this noise.
             X: standardised inputs, shape (n, d).
         """
-        within, shared = self._split(theta)
-        _, _, so, _ = self._components(shared)
-        return self.within.variance(within, X) + self.trial_variance(theta, X) + so**2
+        within, _ = self._split(theta)
+        return self.within.variance(within, X) + self.trial_variance(theta, X)
 
     def trial_variance(self, theta: Array, X: Array) -> Array:
         """Return the part that is the same for a whole trial, sc^2 + sp^2 f^2, (n,)."""
-        sc, sp, _, _ = self._components(self._split(theta)[1])
+        sc, sp = self._components(self._split(theta)[1])
         return sc**2 + (sp * self._relative_load(X)) ** 2
 
     def evaluate(
@@ -123,10 +115,7 @@ class TrialNoise:
             trials: where these rows come from.
         """
         f = self._relative_load(X)
-        parts = [
-            (rows, f[rows], np.abs(trials.t[rows, None] - trials.t[rows]))
-            for rows in trials.blocks()
-        ]
+        parts = [(rows, f[rows]) for rows in trials.blocks()]
         return lambda theta: self._shared_at(theta, parts)
 
     def log_prior(self, theta: Array) -> tuple[float, Array]:
@@ -136,61 +125,49 @@ class TrialNoise:
         return prior, np.concatenate([slope, np.zeros(shared.size)])
 
     def start(self, sd_y: float) -> Array:
-        """Return a start: sc = sp = 0.3 sd(y), so = 0.5 sd(y), tau = 0.5 s."""
-        sizes = [_EFFECT * sd_y, _EFFECT * sd_y, _DRIFT * sd_y, _TAU]
+        """Return a start: sc = sp = 0.3 sd(y)."""
+        sizes = [_EFFECT * sd_y, _EFFECT * sd_y]
         shared = np.log(np.array(sizes))[self._present()]
         return np.concatenate([self.within.start(sd_y), shared])
 
     def bounds(self, sd_y: float) -> Array:
-        """Return the logarithms of sc, sp, so within log sd(y) + [-6, 1], of tau."""
-        sizes = [np.log(sd_y) + np.array(_SPAN)] * 3
-        shared = np.array([*sizes, np.log(_TAUS)])[self._present()]
+        """Return the logarithms of sc and sp within log sd(y) + [-6, 1]."""
+        sizes = [np.log(sd_y) + np.array(_SPAN)] * 2
+        shared = np.array(sizes)[self._present()]
         return np.vstack([self.within.bounds(sd_y), shared])
 
     def _shared_at(
-        self, theta: Array, parts: Sequence[tuple[slice, Array, Array]]
+        self, theta: Array, parts: Sequence[tuple[slice, Array]]
     ) -> SharedAt:
-        sc, sp, so, tau = self._components(self._split(theta)[1])
-        blocks = [(rows, sc**2 + sp**2 * (f * f[:, None])) for rows, f, _ in parts]
-        drifts: list[Array] = []
-        if self.has_drift:
-            drifts = [so**2 * np.exp(-gap / tau) for _, _, gap in parts]
-            blocks = [
-                (rows, block + drift)
-                for (rows, block), drift in zip(blocks, drifts, strict=True)
-            ]
+        sc, sp = self._components(self._split(theta)[1])
+        blocks = [(rows, sc**2 + sp**2 * (f * f[:, None])) for rows, f in parts]
 
         def contract(W: Array) -> Array:
-            sums = np.zeros(4)
-            for rows, f, _ in parts:
+            sums = np.zeros(2)
+            for rows, f in parts:
                 inside = W[rows, rows]
-                sums[:2] += inside.sum(), f @ inside @ f
-            for (rows, _, gap), drift in zip(parts, drifts, strict=self.has_drift):
-                along = W[rows, rows] * drift
-                sums[2:] += along.sum(), (along * gap).sum()
-            slope = sums * [2.0 * sc**2, 2.0 * sp**2, 2.0, 1.0 / tau]
+                sums += inside.sum(), f @ inside @ f
+            slope = sums * [2.0 * sc**2, 2.0 * sp**2]
             padding = np.zeros(len(self.within.names))
             return np.concatenate([padding, slope[self._present()]])
 
         return SharedAt(blocks, contract)
 
     def _shared_names(self) -> list[str]:
-        names = ("log_sc", "log_sp", "log_so", "log_tau")
+        names = ("log_sc", "log_sp")
         return [names[k] for k in np.flatnonzero(self._present())]
 
     def _present(self) -> np.ndarray:
-        """Return which of sc, sp, so and tau are there, shape (4,)."""
-        return np.array(
-            [self.has_level, self.has_ratio, self.has_drift, self.has_drift]
-        )
+        """Return which of sc and sp are there, shape (2,)."""
+        return np.array([self.has_level, self.has_ratio])
 
     def _split(self, theta: Array) -> tuple[Array, Array]:
         count = len(self.within.names)
         return theta[:count], theta[count:]
 
     def _components(self, shared: Array) -> Array:
-        """Return (sc, sp, so, tau), 0 for a component that is not there, tau 1 s."""
-        values = np.array([0.0, 0.0, 0.0, 1.0])
+        """Return (sc, sp), 0 for a component that is not there."""
+        values = np.zeros(2)
         values[self._present()] = np.exp(shared)
         return values
 

@@ -194,7 +194,7 @@ class NewTrialFit:
         self._rows = training.rows.take(self._chosen)
         self._trial = training.trial_of()
         label = self._trial[self._chosen]
-        self._trials = TrialRows(label, np.zeros(label.size))
+        self._trials = TrialRows(label)
         self._left_out = [
             np.flatnonzero(self._trial == k)[::_THIN] for k in np.unique(label)
         ]

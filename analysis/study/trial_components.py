@@ -146,7 +146,7 @@ def fit_components(task: ComponentsTask) -> TrialComponents | None:
             F_t[chosen],
             SquaredExponential(),
             TrialNoise(ConstantNoise()),
-            trials=TrialRows(label, np.zeros(label.size)),
+            trials=TrialRows(label),
         )
     except TractionError:
         return None

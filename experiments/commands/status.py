@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
         find_deviations,
         see_sessions,
     )
-    from experiments.status_table.upcoming import enough_lines, next_steps
+    from experiments.status_table.upcoming import next_steps
     from experiments.status_table.where import parse_where
 
     matrix = load_settings(args.config).matrix
@@ -65,12 +65,10 @@ def run(args: argparse.Namespace) -> int:
     def look() -> StatusTable:
         seen = see_sessions(args.data, where, digest)
         lines = count_rows(seen, matrix, where)
-        known, terrains = (
-            [s.folder for s in seen],
-            {row.name for row in matrix.terrains},
-        )
+        known = [s.folder for s in seen]
+        terrains = {row.name for row in matrix.terrains}
         kinds = {line.is_simulated for line in lines if line.sessions} or {False}
-        steps = enough_lines(seen, matrix.terrains, where)
+        steps: list[str] = []
         for kind in sorted(kinds):
             steps += next_steps(args.data, seen, matrix, where, is_simulated=kind)
         notes = table_notes(args.data, known, terrains, where, lines)

@@ -122,8 +122,7 @@ class ReadyView:
         left: how long the missing ones will take [s]; None = not known yet.
         reset: what is to be done to the terrain before each trial.
         ticked: numbers of the steps of `reset` that are done, from 1.
-        suggestion: of the next push; empty if there is none.
-        enough: why there are enough trials; empty if there are not.
+        thin: cell of speed and load that the kept trials leave thin; empty for none.
         table: the kept trials, oldest first.
         given: the newest verdict while it can be taken back; empty afterwards.
         undo_left: how long that is [s].
@@ -138,8 +137,7 @@ class ReadyView:
     elapsed: float
     left: float | None
     reset: tuple[str, ...]
-    suggestion: str
-    enough: str = ""
+    thin: str
     ticked: frozenset[int] = frozenset()
     table: tuple[KeptRow, ...] = ()
     given: str = ""
@@ -159,10 +157,8 @@ def ready_lines(view: ReadyView, width: int = 80) -> list[str]:
         boxes = enumerate(view.reset, 1)
         steps = (f"{n} {'☑' if n in view.ticked else '☐'} {s}" for n, s in boxes)
         lines.append("Reset (its digit ticks a step):  " + "  ".join(steps))
-    if view.suggestion:
-        lines.append(f"Suggested next: {view.suggestion}")
-    if view.enough:
-        lines.append(f"Enough: {view.enough}")
+    if view.thin:
+        lines.append(f"Thin so far: {view.thin}")
     if view.given and view.undo_left > 0.0:
         lines.append(f"{view.given}.  [u]ndo ({ceil(view.undo_left)} s)")
     return lines

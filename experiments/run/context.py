@@ -7,7 +7,6 @@ from acquisition.control_loop.faults import GuardVerdict
 from acquisition.control_loop.states import ArmState
 from acquisition.errors import TractionError
 from acquisition.ipc.loop_client import LoopClient
-from analysis.next_push.records import Aim
 from experiments.messages import REPORT, ComputerLoad, FaultContext, fault_text
 from experiments.operator.console import Console
 from experiments.operator.feedback import OperatorFeedback, build_feedback
@@ -55,7 +54,6 @@ class FlowState:
         is_last: no trial begins after this one; of `ready` and `verdicts`.
         estimate: expected duration, as of the first kept trial [s]; of
             `update_estimate`.
-        aim: of the push that was suggested last, None where there was none; of `ready`.
         ticked: numbers of the steps of the reset that were ticked; of `ready`, cleared
             by `record`.
         given: the newest verdict, None before the first or after it was taken back; of
@@ -67,7 +65,6 @@ class FlowState:
     last_recorded: TrialName | None = None
     is_last: bool = False
     estimate: float | None = None
-    aim: Aim | None = None
     ticked: set[int] = field(default_factory=set[int])
     given: GivenVerdict | None = None
 

@@ -17,7 +17,7 @@ from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.run.verdicts import take_note
 from experiments.session.sidecar import TrialName
 from experiments.session.states import Event
-from experiments.trial.quality import next_push, review_trial
+from experiments.trial.quality import review_trial, thin_so_far
 from experiments.trial.running import kept_rows
 
 PATIENCE = 120.0  # how long a person may take to activate the arm [s]
@@ -91,11 +91,10 @@ def wait_ready(context: RunContext, name: TrialName) -> None:
 
 
 def ready_view(context: RunContext) -> ReadyView:
-    """Return what the screen between two trials shows now, and remember its aim."""
+    """Return what the screen between two trials shows now."""
     state, row = context.journal.state, context.rig.row
     folder = context.metadata.folder
-    push = context.console_loop.run_aside(lambda: next_push(folder, row))
-    context.state.aim = push.aim
+    thin = context.console_loop.run_aside(lambda: thin_so_far(folder))
     return ReadyView(
         session=folder.id,
         terrain=row.name,
@@ -106,8 +105,7 @@ def ready_view(context: RunContext) -> ReadyView:
         elapsed=context.elapsed,
         left=context.time_left,
         reset=row.reset,
-        suggestion=push.text,
-        enough=push.enough,
+        thin=thin,
         ticked=frozenset(context.state.ticked),
         table=kept_rows(folder),
         given=context.state.given.text if context.state.given is not None else "",

@@ -203,9 +203,7 @@ def _end(
     )
     if outcome.status == "complete":
         path = context.metadata.folder.trials / f"{name.kept}.mcap"
-        review = context.console_loop.run_aside(
-            lambda: review_trial(path, context.state.aim)
-        )
+        review = context.console_loop.run_aside(lambda: review_trial(path))
         lines = [f" {m} {text}" for m, text in review.lines(archive.kept_ratios())]
         warnings = [f" {WARNING} {line}" for line in friction]
         kept = kept_traces(context.metadata.folder)

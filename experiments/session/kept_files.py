@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, cast
+from typing import Any, cast
 
 from acquisition.errors import SessionError, TrialFileError
 from acquisition.trial_file.data_files import is_there, list_folder
@@ -19,12 +17,8 @@ from experiments.session.store import JOURNAL_FILE, SUMMARY_FILE, SessionFolder
 from experiments.session.trial_files import (
     decision_of,
     find_sidecar,
-    kept_pushes,
     kept_sidecars,
 )
-
-if TYPE_CHECKING:
-    from analysis.next_push.stopping import Stopping
 
 _NAMED = 6  # deviations in one message
 _Facts = Mapping[str, Any]
@@ -275,58 +269,3 @@ def _changed(size: int, before: object) -> str:
     if type(before) is not int or size == before:
         return "is changed: its checksum is wrong"
     return f"is changed: {size} bytes, {before} were kept"
-
-
-class WantedRow(Protocol):
-    """A row of the matrix, of which so many trials are wanted."""
-
-    @property
-    def name(self) -> str:
-        """Name of the terrain."""
-        ...
-
-    @property
-    def trials(self) -> int:
-        """How many trials are wanted."""
-        ...
-
-    @property
-    def kind(self) -> str:
-        """Kind of the terrain."""
-        ...
-
-    @property
-    def target(self) -> str:
-        """What the trials are to tell most about."""
-        ...
-
-
-def enough_of(sessions: Sequence[SessionFolder], row: WantedRow) -> str:
-    """Return why the kept trials of a terrain are enough for its target, "" if not.
-
-    Nothing is said, nor computed, where as many are kept as the matrix wants.
-
-    Args:
-        sessions: those of the terrain, oldest first.
-        row: the terrain.
-    """
-    texts = [json.dumps(push.plain()) for s in sessions for push in kept_pushes(s)]
-    if len(texts) >= row.trials:
-        return ""
-    stopping = _stopping(tuple(texts), row.kind, row.target)
-    if stopping is None or not stopping.is_enough:
-        return ""
-    return (
-        f"{row.name}: enough after {stopping.trials}: {stopping.text}; "
-        f"{row.trials} are wanted."
-    )
-
-
-@lru_cache(maxsize=64)
-def _stopping(texts: tuple[str, ...], kind: str, target: str) -> Stopping | None:
-    from analysis.next_push.records import PushRecord
-    from analysis.next_push.stopping import stopping_of
-
-    records = [PushRecord.from_plain(json.loads(text)) for text in texts]
-    known = [record for record in records if record is not None]
-    return stopping_of(known, kind, target)

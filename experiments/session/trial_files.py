@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 from acquisition.errors import TrialFileError
 from acquisition.trial_file.data_files import is_there, list_folder
@@ -20,9 +20,6 @@ from experiments.session.reducer import KEEP, REJECT
 from experiments.session.sidecar import TrialName
 from experiments.session.states import Event
 from experiments.session.store import SessionFolder
-
-if TYPE_CHECKING:
-    from analysis.next_push.records import PushRecord
 
 _SUFFIXES = (".mcap", ".truth.mcap")
 _VERDICTS: Mapping[str, str] = {
@@ -140,18 +137,6 @@ def kept_sidecars(folder: SessionFolder) -> list[dict[str, Any]]:
     """Return the sidecars of the trials kept so far, in the order of their numbers."""
     sidecars = [read_json(path) for path in list_folder(folder.trials, "T*.json")]
     return [sidecar for sidecar in sidecars if sidecar.get("verdict") == KEEP]
-
-
-def kept_pushes(folder: SessionFolder) -> list[PushRecord]:
-    """Return what kept trials tell about the next push.
-
-    None at all where one of them has no such record: a trial of an older version.
-    """
-    from analysis.next_push.records import PushRecord
-
-    records = [PushRecord.from_plain(s.get("push")) for s in kept_sidecars(folder)]
-    known = [record for record in records if record is not None]
-    return known if len(known) == len(records) else []
 
 
 def add_remark(folder: SessionFolder, name: TrialName, text: str, who: str) -> str:

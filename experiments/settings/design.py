@@ -34,7 +34,6 @@ from experiments.settings.matrix import (
     MatrixSettings,
     PlaceName,
     Push,
-    Target,
     Tasks,
     TerrainRow,
     Travel,
@@ -93,7 +92,6 @@ class _Cell(SettingsSection):
     travel: Travel | None = Field(default=None, examples=[0.45])
     trials: Trials = Field(default=10, examples=[10])
     reset: Tasks = RESET
-    target: Target = "grid"
     start_q: Angles | None = None
     calibration: File | None = None
 
@@ -333,7 +331,6 @@ class _Resolver:
             travel=travel,
             trials=cell.trials,
             reset=cell.reset,
-            target=cell.target,
             calibration=cell.calibration or place.calibration,
             stones=self._stones(cell, factors, table),
             incline_deg=self._incline(cell, place, table),

@@ -37,7 +37,6 @@ FootName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,15}$")]
 CellName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9+-]{0,23}$")]
 GroundWord = Literal["stones", "plate", "fine"]
 Push = Literal[0, 180]
-Target = Literal["grid", "corner", "break-away"]
 _Text = Annotated[str, Field(min_length=1, max_length=60, pattern=r"^[^\x00-\x1f]+$")]
 Tasks = Annotated[tuple[_Text, ...], Field(min_length=1, max_length=9)]
 RESET = ("rake", "level", "foot at the far end")
@@ -124,8 +123,7 @@ class Design(SettingsSection):
 class _Row(SettingsSection):
     """What rows of either version have.
 
-    `reset`: what a person does to the terrain before every trial. `target`: what the
-    trials are to tell most about.
+    `reset`: what a person does to the terrain before every trial.
     """
 
     name: CellName = Field(examples=["S10"])
@@ -137,7 +135,6 @@ class _Row(SettingsSection):
     reset: Tasks = Field(
         default=RESET, examples=[["rake", "level", "foot at the far end"]]
     )
-    target: Target = Field(default="grid", examples=["corner"])
     calibration: File | None = Field(default=None, examples=["terrain_S10.toml"])
 
 

@@ -84,7 +84,6 @@ def _cell(row: TerrainRow) -> str:
         "trials": row.trials,
         "start_q": None if row.start_q is None else list(row.start_q),
         "reset": list(row.reset) if row.reset != RESET else None,
-        "target": row.target if row.target != "grid" else None,
         "calibration": row.calibration,
     }
     return "\n[[cells]]\n" + _lines(values)

@@ -26,7 +26,6 @@ class SessionSummary:
 
     Attributes:
         kept: names of the kept trials whose checksum is right, "T01".
-        pushes: how many kept trials tell about the next push.
         rejected: how many attempts were rejected or interrupted.
         is_resumable: its journal leaves something to be recorded, or to be put away.
         operator: who recorded it, as session.json has it.
@@ -38,7 +37,6 @@ class SessionSummary:
     """
 
     kept: tuple[str, ...] = ()
-    pushes: int = 0
     rejected: int = 0
     is_resumable: bool = False
     operator: str = ""
@@ -123,7 +121,6 @@ def summarise(
     )
     from experiments.session.lock import owner_of
     from experiments.session.reducer import replay
-    from experiments.session.trial_files import kept_pushes
     from experiments.session.unfinished import is_unfinished
 
     deviations = tuple(compare_kept(folder, digest)) if digest else ()
@@ -135,7 +132,6 @@ def summarise(
         fields = read_json(folder.path / SUMMARY_FILE)
         return SessionSummary(
             kept=tuple(path.stem for path in kept),
-            pushes=len(kept_pushes(folder)),
             rejected=rejected,
             is_resumable=is_unfinished(replay(events)),
             operator=str(fields.get("operator", "")),

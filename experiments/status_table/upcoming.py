@@ -1,4 +1,4 @@
-"""What comes next: sessions to be resumed, terrains that have enough, a good order."""
+"""What comes next: sessions to be resumed, and a good order of terrains."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from acquisition.errors import TrialFileError
 from experiments.arguments import data_option
 from experiments.session.lock import owner_of
-from experiments.status_table.table import counted_of, facts_of_row, is_of
+from experiments.status_table.table import facts_of_row
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -89,36 +89,6 @@ def _left(session: SeenSession) -> str:
         unfinished = inspect_session(session.folder)
         return "" if unfinished is None else unfinished.text()
     return ""
-
-
-def enough_lines(
-    seen: Sequence[SeenSession], rows: Sequence[TerrainRow], where: Where
-) -> list[str]:
-    """Return the terrains whose kept trials are enough for their target.
-
-    Nothing is said, nor read, of one of which as many are kept as are wanted.
-
-    Args:
-        seen: the sessions.
-        rows: the terrains and their targets.
-        where: only these, as in `count_rows`.
-    """
-    lines: list[str] = []
-    sessions = counted_of(seen, where)
-    for row in rows:
-        if not where.matches(facts_of_row(row)):
-            continue
-        for is_simulated in (False, True):
-            own = [s for s in sessions if is_of(s, row, is_simulated=is_simulated)]
-            if 0 < sum(s.summary.pushes for s in own) < row.trials:
-                lines.append(_enough(own, row))
-    return [text for text in lines if text]
-
-
-def _enough(own: Sequence[SeenSession], row: TerrainRow) -> str:
-    from experiments.session.kept_files import enough_of
-
-    return enough_of([s.folder for s in own], row)
 
 
 def suggest_order(matrix: MatrixSettings, done: Sequence[str]) -> list[str]:

@@ -249,8 +249,6 @@ class TrialArchive:
         if review is not None:
             details |= {"ratio": review.known_ratio, "coverage": review.counts.tolist()}
             details |= review.plain()
-            if review.push is not None:
-                details["push"] = review.push.plain()
         write_json(self.metadata.folder.trials / f"{name.kept}.json", details)
 
     def kept_ratios(self) -> list[float]:

@@ -1,6 +1,6 @@
 """The quality gate: what a trial is worth, while the terrain can still be seen.
 
-And what the next push should be, by what the kept ones know.
+And which cell of speed and load the kept ones leave thin.
 """
 
 from collections.abc import Mapping, Sequence
@@ -26,15 +26,12 @@ from analysis.data.quality import (
     CoverageGrid,
     coverage,
     quick_ratio,
-    suggest,
+    thinnest,
 )
-from analysis.next_push.advice import advise
-from analysis.next_push.records import Aim, PushRecord, push_record
 from experiments.operator.console import BAD, GOOD, WARNING
 from experiments.operator.graphs import WayTrace, trace_lines
 from experiments.session.store import SessionFolder
-from experiments.session.trial_files import kept_pushes, kept_sidecars
-from experiments.settings.matrix import TerrainRow
+from experiments.session.trial_files import kept_sidecars
 from experiments.trial.running import plain_trace, traces_of
 
 STALE_SHARE = 0.01  # of the cycles
@@ -62,7 +59,6 @@ class Review:
         counts: samples per speed and load, shape (4, 4), see analysis.data.quality.
         doubts: why velocity and forces cannot be right; empty if they can.
         lag: how late the forces are; None where the trial does not show it.
-        push: what the choice of the next push needs; None with too few samples.
         v_t: median velocity of the kept samples [m/s]; NaN without any.
         traces: F_t and v_t over the way along the container.
     """
@@ -79,7 +75,6 @@ class Review:
     counts: NDArray[np.int64]
     doubts: tuple[Doubt, ...] = ()
     lag: ForceLag | None = None
-    push: PushRecord | None = None
     v_t: float = np.nan
     traces: tuple[WayTrace, ...] = ()
 
@@ -167,12 +162,8 @@ class Review:
         return WARNING if is_odd else GOOD, words
 
 
-def review_trial(path: Path, aim: Aim | None = None) -> Review:
+def review_trial(path: Path) -> Review:
     """Return what the finished file says about the trial.
-
-    Args:
-        path: of the file.
-        aim: what the push was aimed at.
 
     Raises:
         TrialFileError: it cannot be read.
@@ -198,7 +189,6 @@ def review_trial(path: Path, aim: Aim | None = None) -> Review:
         counts=covered.counts,
         doubts=(*doubts_of(prepared), *doubts_of_record(trial)),
         lag=prepared.lag,
-        push=push_record(prepared, aim),
         v_t=_median_speed(prepared),
         traces=traces_of(trial),
     )
@@ -209,45 +199,12 @@ def _median_speed(prepared: PreparedTrial) -> float:
     return float(np.median(speeds)) if len(speeds) else np.nan
 
 
-@dataclass(frozen=True, slots=True)
-class NextPush:
-    """What is said about the next push.
-
-    Attributes:
-        text: how it should be, and why; empty where nothing is missing.
-        enough: why there are enough trials; empty where there are not.
-        aim: where it is aimed at; None where nobody is asked for an aim.
-    """
-
-    text: str
-    enough: str = ""
-    aim: Aim | None = None
-
-
-def next_push(folder: SessionFolder, row: TerrainRow) -> NextPush:
-    """Return how the next push of a session should be, and whether there are enough.
-
-    The push that teaches most; the emptiest cell where that is not known.
-
-    Args:
-        folder: of the session.
-        row: its terrain.
-    """
-    advice = advise(kept_pushes(folder), row.kind, row.target)
-    if advice is None:
-        return NextPush(_emptiest(folder))
-    enough = ""
-    if advice.stopping is not None and advice.stopping.is_enough:
-        enough = f"{advice.stopping.text}; {row.trials} are wanted"
-    return NextPush(advice.text, enough, advice.aim)
-
-
-def _emptiest(folder: SessionFolder) -> str:
-    """Return the cell of speed and load that the kept trials leave emptiest."""
+def thin_so_far(folder: SessionFolder) -> str:
+    """Return the cell of speed and load that a session's kept trials leave thin."""
     counts = np.zeros(CELLS, np.int64)
     for sidecar in kept_sidecars(folder):
         counts += cells_of(sidecar.get("coverage"))
-    return suggest(CoverageGrid(counts))
+    return thinnest(CoverageGrid(counts))
 
 
 def cells_of(value: object) -> NDArray[np.int64]:

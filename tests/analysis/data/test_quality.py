@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from analysis.data.quality import CoverageGrid, coverage, quick_ratio, suggest
+from analysis.data.quality import CoverageGrid, coverage, quick_ratio, thinnest
 
 
 class Trial:
@@ -25,24 +25,33 @@ def test_speed_counts_in_both_directions():
     assert coverage([Trial([-0.3], [1.0])]).counts[3, 0] == 1
 
 
-def test_the_emptiest_cell_a_person_can_aim_at_is_suggested():
+def test_the_thinnest_cell_a_person_can_aim_at_is_named():
     counts = np.full((4, 4), 100)
-    counts[1, 2] = 1
-    assert suggest(CoverageGrid(counts)) == "slower than 0.05 m/s, pressing harder"
+    counts[1, 2], counts[2, 1] = 1, 2
+    assert thinnest(CoverageGrid(counts)) == "slower than 0.05 m/s, above 5 N"
 
 
-def test_nothing_is_suggested_when_every_aim_is_covered():
-    assert suggest(CoverageGrid(np.full((4, 4), 100))) == ""
+@pytest.mark.parametrize(("held", "is_thin"), [(19, True), (20, False)])
+def test_a_cell_is_thin_below_two_percent_of_the_samples(held, is_thin):
+    counts = np.zeros((4, 4), int)
+    for cell in ((1, 1), (2, 1), (2, 2), (0, 1), (0, 2)):
+        counts[cell] = 100
+    counts[1, 2], counts[3, 0] = held, 1000 - 500 - held
+    assert (thinnest(CoverageGrid(counts)) != "") is is_thin
 
 
-def test_cells_nobody_can_aim_at_are_not_asked_for():
+def test_nothing_is_thin_when_every_aim_is_covered():
+    assert thinnest(CoverageGrid(np.full((4, 4), 100))) == ""
+
+
+def test_cells_nobody_can_aim_at_are_not_thin():
     counts = np.full((4, 4), 100)
     counts[3, 3] = counts[0, 0] = 0
-    assert suggest(CoverageGrid(counts)) == ""
+    assert thinnest(CoverageGrid(counts)) == ""
 
 
-def test_without_a_trial_nothing_is_suggested():
-    assert suggest(coverage([])) == ""
+def test_without_a_trial_nothing_is_thin():
+    assert thinnest(coverage([])) == ""
 
 
 def test_the_quick_ratio_is_the_slope_of_traction_over_load():

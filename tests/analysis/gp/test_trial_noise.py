@@ -13,15 +13,14 @@ from analysis.gp.trial_noise import TrialNoise, TrialRows
 
 SE = SquaredExponential(2)
 LEVEL = TrialNoise()
-EVERYTHING = TrialNoise(LogLinearNoise(2), True, True, True, (1.0, 0.4))
+EVERYTHING = TrialNoise(LogLinearNoise(2), True, True, (1.0, 0.4))
 
 
 def drawn(trials, rows, seed=0):
     """Return inputs, outputs and trials of so many rows of each of the trials."""
     rng = np.random.default_rng(seed)
     X, y = rng.normal(size=(trials * rows, 2)), rng.normal(size=trials * rows)
-    t = np.tile(np.cumsum(rng.uniform(0.1, 0.5, rows)), trials)
-    return X, y, TrialRows(np.repeat(np.arange(trials), rows), t)
+    return X, y, TrialRows(np.repeat(np.arange(trials), rows))
 
 
 @pytest.mark.parametrize("kernel", [SE, Arcsine(2), Arcsine(2, as_printed=True)])
@@ -30,7 +29,7 @@ def test_gradient_agrees_with_differences(kernel, rows):
     X, y, trials = drawn(5, rows)
     likelihood = Likelihood(kernel, EVERYTHING, X, y, trials)
     shape = np.linspace(0.3, -0.2, len(kernel.names))
-    theta = np.concatenate([shape, [-0.5, 0.2, -0.1, -0.3, -0.6, -0.2, 0.1]])
+    theta = np.concatenate([shape, [-0.5, 0.2, -0.1, -0.3, -0.6]])
     slope = likelihood(theta)[1]
     h = 1e-5  # the error of a central difference is of order h^2
     for k, step in enumerate(h * np.eye(theta.size)):
@@ -42,14 +41,13 @@ def test_likelihood_has_the_closed_form_of_a_mixed_model():
     from scipy.stats import multivariate_normal
 
     X, y, trials = drawn(4, 5)
-    sc, sp, so, tau = 0.7, 0.4, 0.5, 0.8
-    theta = np.concatenate([[0.1, 0.2, -0.3], np.log([0.6, sc, sp, so, tau])])
-    noise = TrialNoise(ConstantNoise(), True, True, True, (1.0, 0.4))
+    sc, sp = 0.7, 0.4
+    theta = np.concatenate([[0.1, 0.2, -0.3], np.log([0.6, sc, sp])])
+    noise = TrialNoise(ConstantNoise(), True, True, (1.0, 0.4))
     same = (trials.trial[:, None] == trials.trial).astype(float)
     f = 1.0 + 0.4 * X[:, 0]
-    gap = np.abs(trials.t[:, None] - trials.t)
     C = SE.matrix(theta[:3], X, X) + 0.6**2 * np.eye(y.size)
-    C += same * (sc**2 + sp**2 * np.outer(f, f) + so**2 * np.exp(-gap / tau))
+    C += same * (sc**2 + sp**2 * np.outer(f, f))
     expected = multivariate_normal(np.zeros(y.size), C).logpdf(y)
     found = Likelihood(SE, noise, X, y, trials).value(theta)
     assert found == pytest.approx(expected, rel=1e-10)
@@ -57,33 +55,31 @@ def test_likelihood_has_the_closed_form_of_a_mixed_model():
 
 def test_likelihood_gradient_and_prediction_agree_with_scikit_learn():
     from sklearn.gaussian_process import GaussianProcessRegressor
-    from sklearn.gaussian_process.kernels import RBF, ConstantKernel, Matern
+    from sklearn.gaussian_process.kernels import RBF, ConstantKernel
     from sklearn.gaussian_process.kernels import WhiteKernel as White
 
     X, y, trials = drawn(6, 8, seed=3)
     any_, same = 1e9, 1e-3  # lengths: a column that does not count; one that must agree
-    known = np.column_stack([X, trials.trial, trials.t])
-    smooth = ConstantKernel(1.3**2) * RBF([0.9, 1.7, any_, any_])
-    level = ConstantKernel(0.6**2) * RBF([any_, any_, same, any_])
-    drift = ConstantKernel(0.5**2) * RBF([any_, any_, same, any_])
-    drift *= Matern([any_, any_, any_, 0.8], nu=0.5)
+    known = np.column_stack([X, trials.trial])
+    smooth = ConstantKernel(1.3**2) * RBF([0.9, 1.7, any_])
+    level = ConstantKernel(0.6**2) * RBF([any_, any_, same])
     theirs = GaussianProcessRegressor(
-        smooth + level + drift + White(0.4**2), alpha=1e-300, optimizer=None
+        smooth + level + White(0.4**2), alpha=1e-300, optimizer=None
     ).fit(known, y)
     value, gradient = theirs.log_marginal_likelihood(
         theirs.kernel_.theta, eval_gradient=True
     )
-    noise = TrialNoise(ConstantNoise(), has_drift=True)
-    theta = np.log([1.3, 0.9, 1.7, 0.4, 0.6, 0.5, 0.8])
+    noise = TrialNoise(ConstantNoise())
+    theta = np.log([1.3, 0.9, 1.7, 0.4, 0.6])
     lml, slope = Likelihood(SE, noise, X, y, trials)(theta)
     assert lml == pytest.approx(value, rel=1e-10)
-    # theirs: sf^2, l1, l2, -, -, sc^2, 4 of E, so^2, 4 of E, -, -, -, tau, sn^2
-    indices_of_ours = [0, 1, 2, 19, 5, 10, 18]
-    factors = [2.0, 1.0, 1.0, 2.0, 2.0, 2.0, 1.0]  # ours is by sf, theirs by sf^2
+    # theirs: sf^2, l1, l2, -, sc^2, 3 of E, sn^2
+    indices_of_ours = [0, 1, 2, 8, 4]
+    factors = [2.0, 1.0, 1.0, 2.0, 2.0]  # ours is by sf, theirs by sf^2
     np.testing.assert_allclose(slope, gradient[indices_of_ours] * factors, rtol=1e-6)
 
     at = np.random.default_rng(1).normal(size=(5, 2))
-    new = np.column_stack([at, np.full(5, 99.0), np.zeros(5)])  # a trial of its own
+    new = np.column_stack([at, np.full(5, 99.0)])  # a trial of its own
     mean, sd = theirs.predict(new, return_std=True)
     C = np.linalg.inv(theirs.kernel_(known))
     ours, variance = GaussianProcess(
@@ -142,7 +138,7 @@ def test_rows_left_out_are_predicted_by_the_others():
     y = np.random.default_rng(9).normal(0, 1.0, 6)[trials.trial] + X[:, 0]
     model = fit_gp(X, y, SE, LEVEL, trials=trials)
     keep = trials.trial != 2
-    others = TrialRows(trials.trial[keep], trials.t[keep])
+    others = TrialRows(trials.trial[keep])
     without = model.given(X[keep], y[keep], others)
     # nothing of the trial left out is in it: its own rows change nothing
     changed = np.where(keep, y, 99.0)

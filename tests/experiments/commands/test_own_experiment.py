@@ -177,7 +177,6 @@ def test_the_shipped_matrices_are_the_same_cells_in_the_newer_form(tmp_path):
             "incline_deg",
             "trials",
             "reset",
-            "target",
             "kind",
             "stones",
         ):

@@ -50,15 +50,9 @@ def ready(**changed):
         "elapsed": 760.0,
         "left": 1773.0,
         "reset": ("rake", "level"),
-        "suggestion": "slower than 0.05 m/s, pressing harder",
+        "thin": "slower than 0.05 m/s, above 5 N",
     }
     return ReadyView(**(values | changed))
-
-
-def test_enough_trials_are_said_below_the_suggestion():
-    told = "two more trials would move the grid by 0.4 N, trials differ by 1.2 N"
-    assert f"Enough: {told}" == ready_lines(ready(enough=told))[-1]
-    assert not [line for line in ready_lines(ready()) if line.startswith("Enough")]
 
 
 def test_a_running_trial_shows_time_way_cadence_and_newest_forces():
@@ -153,15 +147,15 @@ def test_a_sparkline_has_its_width_whatever_the_numbers(values, width):
 
 
 def test_the_ready_screen_tells_where_the_session_stands():
-    top, clock, reset, suggestion = ready_lines(ready())
+    top, clock, reset, thin = ready_lines(ready())
     assert top == ("ARM: floating  S012 S10 · trial 4 of 10 · kept 3 · rejected 1")
     assert clock == "Elapsed 12:40 · left about 30 min"
     assert reset == "Reset (its digit ticks a step):  1 ☐ rake  2 ☐ level"
-    assert suggestion == "Suggested next: slower than 0.05 m/s, pressing harder"
+    assert thin == "Thin so far: slower than 0.05 m/s, above 5 N"
 
 
 def test_before_the_first_trial_nothing_is_guessed():
-    _, clock = ready_lines(ready(left=None, reset=(), suggestion=""))
+    _, clock = ready_lines(ready(left=None, reset=(), thin=""))
     assert clock == "Elapsed 12:40"
 
 

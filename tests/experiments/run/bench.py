@@ -115,9 +115,7 @@ def make_context(data, operator, *, trials=2, **more):
     journal = Journal(folder, loop.rig.clock)
     journal.append(Event.STARTED, terrain="TF", trials=trials)
     journal.append(Event.ACTIVATED)
-    loop.rig.row = SimpleNamespace(
-        name="TF", reset=(), kind="flat", target="grid", trials=trials
-    )
+    loop.rig.row = SimpleNamespace(name="TF", reset=(), trials=trials)
     loop.rig.frame = SimpleNamespace(travel=0.4)
     return RunContext(
         console_loop=loop,

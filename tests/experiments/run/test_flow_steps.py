@@ -61,14 +61,10 @@ def test_quit_twice_ends_at_once(tmp_path):
         wait_ready(context, FIRST)
 
 
-def test_the_aim_that_was_shown_is_the_trials(tmp_path, monkeypatch):
-    aim = object()
-    told = SimpleNamespace(text="slowly", enough="20 of 20", aim=aim)
-    monkeypatch.setattr(ready, "next_push", lambda folder, row: told)
+def test_the_thin_cell_is_shown(tmp_path, monkeypatch):
+    monkeypatch.setattr(ready, "thin_so_far", lambda folder: "slowly")
     context = make_context(tmp_path, Keys())
-    view = ready_view(context)
-    assert (view.suggestion, view.enough) == ("slowly", "20 of 20")
-    assert context.state.aim is aim
+    assert ready_view(context).thin == "slowly"
 
 
 def test_a_pause_holds_the_arm_and_is_in_the_journal(tmp_path):

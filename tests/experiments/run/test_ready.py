@@ -7,8 +7,7 @@ import pytest
 
 from acquisition.devices import SafetyMode
 from analysis.data.load import load_trial
-from analysis.next_push.advice import advise
-from analysis.next_push.records import PushRecord
+from analysis.data.quality import CoverageGrid, thinnest
 from experiments.operator.prompts import Prompt, PromptState
 from experiments.operator.scripted import ScriptedOperator
 from experiments.session.reducer import replay
@@ -113,28 +112,16 @@ def test_the_last_trial_is_announced(scripted):
     assert text in scripted.done.out.splitlines()
 
 
-# --- the suggestion -----------------------------------------------------------------
+# --- what is thin -------------------------------------------------------------------
 
 
-def test_the_next_push_is_suggested_from_the_kept_trials(recorded):
-    """What one push has left unknown is what the next one is asked for."""
+def test_what_the_kept_trials_leave_thin_is_said(recorded):
     lines = recorded.done.out.splitlines()
     first = lines.index(RESET)
-    (suggested,) = [line for line in lines if line.startswith("Suggested next: ")]
-    assert lines.index(suggested) > first + 2  # not before there is a kept trial
-    kept = sidecar(recorded.folder / "trials" / "T01.mcap")["push"]
-    advice = advise([PushRecord.from_plain(kept)], "flat", "grid")
-    assert suggested == f"Suggested next: {advice.text}"
-
-
-def test_a_trial_keeps_the_aim_that_was_suggested_before_it(recorded):
-    first, second = (
-        sidecar(recorded.folder / "trials" / f"{name}.mcap")["push"]
-        for name in ("T01", "T02")
-    )
-    assert first["aim"] is None  # nothing was known yet
-    advice = advise([PushRecord.from_plain(first)], "flat", "grid")
-    assert second["aim"] == list(advice.aim)
+    (said,) = [line for line in lines if line.startswith("Thin so far: ")]
+    assert lines.index(said) > first + 2  # not before there is a kept trial
+    kept = sidecar(recorded.folder / "trials" / "T01.mcap")["coverage"]
+    assert said == f"Thin so far: {thinnest(CoverageGrid(np.array(kept)))}"
 
 
 def test_the_coverage_of_a_trial_is_in_its_sidecar(recorded):

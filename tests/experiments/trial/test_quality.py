@@ -1,3 +1,4 @@
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -7,7 +8,8 @@ from acquisition.sample import Flag
 from acquisition.trial_file.reader import TrialReader
 from analysis.data.lag import ForceLag
 from experiments.operator.console import GOOD, WARNING
-from experiments.trial.quality import review_trial
+from experiments.session.store import SessionFolder
+from experiments.trial.quality import review_trial, thin_so_far
 from tests.disturbances.rewriting import rewrite
 
 
@@ -103,3 +105,31 @@ def test_a_force_that_comes_late_is_shown_with_its_offset(first_trial):
 
 def test_a_plate_does_not_show_when_the_force_came(first_trial):
     assert "force" not in review_trial(first_trial).lines()[0][1]
+
+
+# --- what is thin -------------------------------------------------------------------
+
+SPARSE = [[0, 0, 0, 0], [0, 900, 3, 0], [0, 900, 900, 0], [0, 0, 0, 0]]
+FULL = [[0, 900, 900, 0], [0, 0, 900, 0], [0, 0, 0, 0], [0, 0, 0, 0]]
+
+
+def session(folder, *coverages, verdict="keep"):
+    """Return a session whose sidecars have these coverages."""
+    (folder / "trials").mkdir()
+    for k, coverage in enumerate(coverages, 1):
+        details = {"verdict": verdict, "coverage": coverage}
+        (folder / "trials" / f"T{k:02d}.json").write_text(json.dumps(details))
+    return SessionFolder(folder, "S001", "S0", is_simulated=False)
+
+
+def test_the_samples_of_all_kept_trials_are_counted(tmp_path):
+    (tmp_path / "one").mkdir()
+    one = session(tmp_path / "one", [[0, 9, 9, 0], *SPARSE[1:]])
+    assert thin_so_far(one) == "slower than 0.05 m/s, above 5 N"
+    assert thin_so_far(session(tmp_path, SPARSE, FULL)) == ""
+
+
+def test_rejected_and_damaged_trials_count_nothing(tmp_path):
+    (tmp_path / "rejected").mkdir()
+    assert thin_so_far(session(tmp_path / "rejected", SPARSE, verdict="reject")) == ""
+    assert thin_so_far(session(tmp_path, [[1, 2]], "none", None)) == ""
