@@ -20,7 +20,7 @@ from benchmarks.rows import BenchRow
 TRIALS = Path(__file__).parents[2] / "shared" / "data" / "rehearsal_trials.npz"
 _TERRAINS = ("S0", "TF")
 _SUBREAPER = 36  # of prctl(2)
-# goals; that of a study is for a search by SciPy, with generators and relatives
+# goals; that of a study is for a search by SciPy
 _DEMO_S, _AGAIN_S, _STUDY_S = 30.0, 4.0, 100.0
 
 

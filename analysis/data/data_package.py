@@ -44,7 +44,6 @@ class TableOrigin(BaseModel):
         incline_deg: of the plane [degrees].
         factors: what else is known of terrain and foot, by name; None = does not
             apply.
-        logs: numbers among the factors that are compared by their logarithm.
         force_age: how much older than the joints the forces are [s].
         simulated: the devices were simulated.
         recording: SHA-256 of the recorded trial, or of the log it was imported from.
@@ -61,7 +60,6 @@ class TableOrigin(BaseModel):
     stones: str = Field(default="", max_length=60)
     incline_deg: float | None = Field(default=None, ge=-90, le=90)
     factors: dict[str, Any] = Field(default_factory=dict[str, Any], max_length=MOST)
-    logs: tuple[str, ...] = Field(default=(), max_length=MOST)
     force_age: float = Field(default=0.0, ge=-1, le=1)
     simulated: bool = False
     recording: str = Field(default="", max_length=64)

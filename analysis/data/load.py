@@ -129,7 +129,6 @@ class RecordedTrial:
             stones=self.stones,
             incline_deg=float(np.degrees(self.frame.incline)),
             factors=self.factors.values,
-            logs=self.factors.logs,
             units=self.factors.units,
             stamped_lag=self.stamped_lag,
             is_simulated=self.is_simulated,

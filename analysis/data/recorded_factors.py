@@ -18,12 +18,10 @@ class StatedFactors(NamedTuple):
     Attributes:
         values: by name; None = does not apply.
         units: of numbers, by name; "" = none.
-        logs: numbers that are compared by their logarithm.
     """
 
     values: dict[str, Value]
     units: dict[str, str]
-    logs: frozenset[str]
 
 
 def foot_of(tread: str) -> str:
@@ -50,9 +48,7 @@ def stated_factors(trial: Mapping[str, str]) -> StatedFactors:
     known = {**values, FOOT: foot[:LONGEST]} if foot else values
     texts = _parsed(trial.get("factor_units", ""))
     units = {k: v[:LONGEST] for k, v in texts.items() if isinstance(v, str)}
-    logs = _parsed(trial.get("factor_scales", ""))
-    is_log = frozenset(name for name, scale in logs.items() if scale == "log")
-    return StatedFactors(known, units, is_log)
+    return StatedFactors(known, units)
 
 
 def checked_factors(values: Mapping[str, Any]) -> dict[str, Value]:

@@ -37,7 +37,6 @@ class TractionSeries:
         incline_deg: of the plane along the push [degrees]; None where it is not known.
         factors: what else is known of the terrain and the foot, by name; None = does
             not apply.
-        logs: numbers among the factors that are compared by their logarithm.
         units: of numbers among the factors, by name.
         stamped_lag: how much older than the velocity the forces are by their own time
             stamps [s]; 0 where they have none.
@@ -64,7 +63,6 @@ class TractionSeries:
     stones: str = ""
     incline_deg: float | None = None
     factors: Mapping[str, Value] = field(default_factory=dict[str, Value])
-    logs: frozenset[str] = frozenset()
     units: Mapping[str, str] = field(default_factory=dict[str, str])
     stamped_lag: float = 0.0
     is_prepared: bool = False

@@ -205,7 +205,6 @@ class _TableForm:
             stones=self.stones.get(terrain, origin.stones),
             incline_deg=origin.incline_deg,
             factors=origin.factors,
-            logs=frozenset(origin.logs),
             stamped_lag=origin.force_age,
             is_prepared=table.is_prepared,
             is_simulated=origin.simulated or table.is_simulated is True,

@@ -19,7 +19,7 @@ FINE, STONES = "fine", "stones"  # below 2 mm; stones of unknown size
 STONE_SIZES: Mapping[str, str] = {"small": SMALL, "big": BIG, "none": FLAT}
 SIZE_BY_WORD: Mapping[str, float] = {"small": 19.0, "big": 37.0}  # d50 [mm]
 FINEST_STONES = 2.0  # mm
-_MILLIMETRES = re.compile(r"(\d{1,4}(?:\.\d{1,6})?) mm")
+_MILLIMETRES = re.compile(r"\d{1,4}(?:\.\d{1,6})? mm")
 PAPER_KINDS: Mapping[str, str] = {
     **dict.fromkeys(("S0", "S10", "S15"), SMALL),
     **dict.fromkeys(("B0", "B10", "B15"), BIG),
@@ -60,12 +60,6 @@ def ground_of(d50: float | None) -> str:
     if d50 is None:
         return "plate"
     return FINE if d50 < FINEST_STONES else STONES
-
-
-def grain_size(kind: str) -> float | None:
-    """Return the grain size of a kind [mm], None where it has none or none is known."""
-    found = _MILLIMETRES.fullmatch(kind)
-    return float(found[1]) if found else SIZE_BY_WORD.get(kind)
 
 
 def _stated(word: str) -> str:
@@ -130,7 +124,11 @@ def kind_title(kind: str) -> str:
 
 def is_stony(kind: str) -> bool:
     """Whether the ground is of stones, of whatever size."""
-    return kind == STONES or grain_size(kind) is not None
+    return (
+        kind == STONES
+        or kind in SIZE_BY_WORD
+        or _MILLIMETRES.fullmatch(kind) is not None
+    )
 
 
 def surface_of(kind: str) -> str:

@@ -1,19 +1,13 @@
 """Tables of the report about a trial that nobody has recorded yet."""
 
-from collections.abc import Sequence
-
-import numpy as np
-
 from analysis.figures.sections import ReportSection
 from analysis.findings.findings import StudyResults
 from analysis.report.page_model import ReportTable
-from analysis.study.all_ground import Dissipation
-from analysis.study.metrics import Score, compare
+from analysis.study.metrics import compare
 from analysis.study.models import GP_SE_NOISE, GP_SE_TRIAL
 from analysis.study.new_trial import NewTrialModel, family_counts
-from analysis.study.relatives import RelativesOutcome
 from analysis.study.study import Study
-from analysis.study.terrain_fit import TerrainResult, mean_of
+from analysis.study.terrain_fit import mean_of
 from analysis.study.trial_components import TrialComponents
 
 _LEAST = (
@@ -26,7 +20,6 @@ def new_trial_tables(results: StudyResults) -> list[ReportTable]:
     tables = [
         family_table(results.study),
         worth_table(results.study),
-        relatives_table(results.study),
         oracle_table(results),
     ]
     return [table for table in tables if table.rows]
@@ -115,64 +108,6 @@ def worth_table(study: Study) -> ReportTable:
     )
 
 
-def relatives_table(study: Study) -> ReportTable:
-    """Return what other terrains tell about one, with and without three own trials."""
-    rows = [
-        [
-            name,
-            ", ".join(outcome.relatives) or "none",
-            f"{_mean(outcome.joint, 'nlpd'):.3f}",
-            f"{_mean(outcome.alone, 'nlpd'):.3f}",
-            _all_own(study.terrains[name], outcome),
-            "relatives" if outcome.uses_relatives else "own trials alone",
-            f"{_mean(outcome.unseen, 'nlpd'):.3f}",
-            f"{_mean(outcome.unseen, 'coverage90'):.1%}",
-            _below_zero(outcome.dissipation),
-        ]
-        for name, outcome in study.relatives.items()
-    ]
-    return ReportTable(
-        name="Transfer from other terrains",
-        header=(
-            "terrain",
-            "relatives",
-            "NLPD of 3 trials and relatives [nat]",
-            "of 3 trials alone",
-            "of all its other trials",
-            "used",
-            "never recorded: NLPD",
-            "coverage of its 90% band",
-            "below 0 N: force, measured force, samples",
-        ),
-        rows=rows,
-        note="One Gaussian process over all terrains: a shared form, a deviation by "
-        "stones, incline and terrain, a level of every trial. Three trials of a "
-        "terrain and all other terrains predict its other trials; beside it the model "
-        "of the three alone and that of all trials but the one predicted. Without any "
-        "own trial the terrain counts as never recorded. The last column is how far "
-        "the prediction keeps to F_t v_t ≥ 0 in forward slip. "
-        + few_relatives(list(study.relatives.values())),
-        section=ReportSection.BEYOND,
-    )
-
-
-def few_relatives(outcomes: Sequence[RelativesOutcome]) -> str:
-    """Return where relatives are too few, as a sentence; empty where nowhere."""
-    few = [outcome for outcome in outcomes if outcome.has_few]
-    if not few:
-        return ""
-    listed = "; ".join(
-        f"{outcome.terrain} ({', '.join(outcome.relatives) or 'none'}: "
-        f"{'used' if outcome.uses_relatives else 'own trials alone are better'})"
-        for outcome in few
-    )
-    return (
-        f"Too few related terrains to estimate how far they differ: {listed}. There "
-        "the three trials, each left out in turn, decide whether relatives are used, "
-        "and a band of a terrain never recorded rests on the prior."
-    )
-
-
 def oracle_table(results: StudyResults) -> ReportTable:
     """Return bands of a new trial beside those that assume no distribution."""
     rows = [
@@ -195,22 +130,6 @@ def oracle_table(results: StudyResults) -> ReportTable:
         "calibrated. A 95% band needs at least nineteen trials.",
         section=ReportSection.BEYOND,
     )
-
-
-def _mean(scores: Sequence[Score], key: str) -> float:
-    return float(np.mean([getattr(score, key) for score in scores]))
-
-
-def _all_own(result: TerrainResult, outcome: RelativesOutcome) -> str:
-    """Return the NLPD of the terrain's own folds on the trials predicted."""
-    nlpd = result.scores(GP_SE_TRIAL, "nlpd")
-    mean = mean_of([nlpd[k] for k in outcome.tested])
-    return "–" if mean is None else f"{mean:.3f}"
-
-
-def _below_zero(dissipation: Dissipation) -> str:
-    shares = (dissipation.latent, dissipation.predicted, dissipation.measured)
-    return ", ".join(f"{share:.1%}" for share in shares)
 
 
 def _between(components: TrialComponents) -> str:

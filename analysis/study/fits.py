@@ -30,8 +30,6 @@ _OTHER_UNITS = {
     "coverage95": "1",
     "standard_errors": "unit of the measure",
     "cross": "N",
-    "relatives: nlpd, inner_nlpd": "nat",
-    "relatives: coverage90, below_zero": "1",
     "components: between, within, measurement": "N",
     "components: tau, seconds": "s",
     "components: gain": "nat",
@@ -72,9 +70,6 @@ def to_fits(study: Study) -> dict[str, Any]:
             for name, result in study.terrains.items()
         },
         "cross": {model: study.cross(model) for model in study.options.fit.models},
-        "relatives": {
-            name: outcome.numbers() for name, outcome in study.relatives.items()
-        },
         "units": UNITS | _OTHER_UNITS,
         "options": asdict(study.options),
         "notes": list(study.notes),

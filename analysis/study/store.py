@@ -33,18 +33,15 @@ from analysis.breakaway.censored import Family
 from analysis.breakaway.model import BreakAwayModel, PushLaw
 from analysis.data.samples import SampleTable
 from analysis.gp import noise, trial_noise
-from analysis.gp.ground import Ground
 from analysis.gp.kernels import KERNELS
 from analysis.gp.regression import GaussianProcess
 from analysis.gp.search import Start
-from analysis.study.all_ground import Dissipation, TerrainRows
 from analysis.study.crossval import FoldResult, ModelFold
 from analysis.study.digests import code_digest, value_digest
 from analysis.study.metrics import Score
 from analysis.study.models import GpModel, TustinModel
 from analysis.study.new_trial import FamilyChoice, LevelSpread, NewTrialModel
 from analysis.study.noise_selection import NoiseChoice, TailedNoise
-from analysis.study.relatives import RelativesOutcome
 from analysis.study.skew import ShapeMap
 from analysis.study.terrain_fit import PooledTustinFit
 from analysis.study.trial_components import TrialComponents
@@ -63,13 +60,11 @@ TYPES = KERNELS | {
     kind.__name__: kind
     for kind in (
         BreakAwayModel,
-        Dissipation,
         Family,
         FamilyChoice,
         FoldResult,
         GaussianProcess,
         GpModel,
-        Ground,
         Interval,
         LevelSpread,
         ModelFold,
@@ -78,13 +73,11 @@ TYPES = KERNELS | {
         PooledTustinFit,
         Profiles,
         PushLaw,
-        RelativesOutcome,
         SampleTable,
         Score,
         ShapeMap,
         Start,
         TailedNoise,
-        TerrainRows,
         TrialComponents,
         TustinModel,
         noise.ConstantNoise,

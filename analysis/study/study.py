@@ -18,7 +18,7 @@ from analysis.data.prepare import (
 from analysis.data.quality import PULLED, PULLED_WARNING
 from analysis.data.samples import SampleTable
 from analysis.data.series import TractionSeries
-from analysis.data.terrain_kinds import terrain_incline, terrain_kind
+from analysis.data.terrain_kinds import Value, terrain_incline, terrain_kind
 from analysis.study.crossval import (
     FoldResult,
     Prepared,
@@ -37,13 +37,6 @@ from analysis.study.jobs import (
 )
 from analysis.study.metrics import standard_error
 from analysis.study.models import NEW_TRIAL, FitOptions
-from analysis.study.relatives import (
-    RelativesOutcome,
-    factors_of,
-    grounds_of,
-    plan_relatives,
-    run_relatives,
-)
 from analysis.study.terrain_fit import (
     PooledTustinFit,
     TerrainResult,
@@ -103,7 +96,6 @@ class Study:
         terrains: results by terrain, in the order given.
         notes: what could not be done, and why.
         warnings: what a reader should doubt.
-        relatives: what other terrains tell about one, by its name.
     """
 
     simulated: bool
@@ -111,7 +103,6 @@ class Study:
     terrains: Mapping[str, TerrainResult]
     notes: tuple[str, ...]
     warnings: tuple[str, ...]
-    relatives: Mapping[str, RelativesOutcome] = field(default_factory=dict)
 
     @property
     def kinds(self) -> dict[str, str]:
@@ -206,7 +197,7 @@ def run_study_beside(
     """
     plan = _Plan.of(trials, options, beside)
     prepared, notes = plan.prepared, list(plan.notes)
-    *found, folds, outcomes, fitted, wholes = run_batches(
+    *found, folds, fitted, wholes = run_batches(
         plan.batches, Workers(options.n_jobs, options.scheduler), progress, store
     )
     done = zip(plan.apart, fitted, strict=True)
@@ -218,11 +209,7 @@ def run_study_beside(
     }
     doubtful = (*_contradictions(trials), *notes_of_tables(trials))
     warnings = (*doubtful, *_all_warnings(results, options))
-    relatives = {
-        outcome.terrain: outcome for outcome in outcomes if outcome is not None
-    }
-    study = Study(simulated, options, results, tuple(notes), warnings, relatives)
-    return study, found
+    return Study(simulated, options, results, tuple(notes), warnings), found
 
 
 def run_study_shard(
@@ -284,11 +271,9 @@ class _Plan:
         further = _further(trials)
         notes += _notes_on_inputs(further)
         apart = [] if further else _apart(prepared, options.fit)
-        relatives = plan_relatives(prepared, grounds_of(trials), options.fit)
         batches = (
             *beside(prepared),  # first: they are longer than a fit
             Batch(run_fold, tasks),
-            Batch(run_relatives, relatives),
             Batch(fit_components, apart),
             Batch(fit_terrain, _wholes(prepared, options)),
         )
@@ -313,9 +298,21 @@ def _result(
         whole=whole,
         components=components,
         incline_deg=terrain_incline(terrain, [s.incline_deg for s in recorded]),
-        factors=factors_of(recorded),
+        factors=_factors(recorded),
         units={n: unit for series in recorded for n, unit in series.units.items()},
     )
+
+
+def _factors(recorded: Sequence[TractionSeries]) -> dict[str, Value]:
+    """Return the factors that the recordings of a terrain state alike.
+
+    One that they contradict each other in does not apply.
+    """
+    found: dict[str, Value] = {}
+    for series in recorded:
+        for name, value in series.factors.items():
+            found[name] = value if found.get(name, value) == value else None
+    return found
 
 
 def _require_trials(trials: Mapping[str, Sequence[TractionSeries]]) -> None:
@@ -347,7 +344,7 @@ def _notes_on_inputs(further: Sequence[str]) -> list[str]:
     return [
         f"Inputs beside F_n and v_t: {names}. Curves and surfaces over F_n and v_t "
         "show them at their means; the constant force and Tustin's law have no place "
-        "for them. Not fitted: the model of all terrains, and the spread of trials."
+        "for them. Not fitted: the spread of trials."
     ]
 
 

@@ -65,8 +65,7 @@ def run(args: argparse.Namespace) -> int:
     console = PageRecorder() if args.json else Console(color=not args.no_color)
     data = Path(args.data)
     sessions = choose_sessions(data, args.sessions, every=args.all)
-    matrix = load_settings(args.config).matrix
-    order = [row.name for row in matrix.terrains]
+    order = [row.name for row in load_settings(args.config).matrix.terrains]
     missing = tell_missing(sessions, console, allow_missing=args.allow_missing)
     wanted = ReportRequest(
         order,
@@ -78,7 +77,6 @@ def run(args: argparse.Namespace) -> int:
         if args.covariate is None
         else parse_covariates(args.covariate, KNOWN),
         with_pdf=args.pdf,
-        matrix=matrix,
     )
     if args.shard:
         fit_shard(sessions, data, wanted, console, Shard(*args.shard))

@@ -234,7 +234,6 @@ def _write_trial(
         stones=trial.stones,
         incline_deg=series.incline_deg,
         factors=dict(series.factors),
-        logs=tuple(sorted(series.logs)),
         force_age=series.stamped_lag,
         simulated=trial.is_simulated,
         recording=recording,

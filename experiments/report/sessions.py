@@ -37,12 +37,7 @@ from analysis.study.study import Study, StudyOptions
 from analysis.terrains.export import database_of
 from analysis.terrains.identify import identify_study
 from experiments.operator.console import Console
-from experiments.report.cells import (
-    cells_table,
-    forecast_of,
-    forecast_table,
-    plain_forecast,
-)
+from experiments.report.cells import cells_table
 from experiments.report.choices import AnalysisChoices, repeat_study
 from experiments.report.commissioned import uncommissioned
 from experiments.report.covariates import columns_tested, recorded_columns
@@ -55,7 +50,6 @@ from experiments.report.truth_errors import (
 )
 from experiments.session.data_files import write_new_text
 from experiments.session.store import FOLDS, SessionFolder, iso_utc
-from experiments.settings.matrix import MatrixSettings
 
 _SHARE_OF_DISK = 4  # one part in so many of what is free may be results
 EXPORTED = (*PAPER_MODELS, GP_SE_TRIAL)
@@ -74,7 +68,6 @@ class ReportRequest:
         covariates: names of columns that are tested.
         out: folder of the report; None = that of the session, or `data`/study.
         with_pdf: figures are wanted as PDF, too.
-        matrix: whose cells are forecast; None = none.
     """
 
     terrains: Sequence[str]
@@ -85,7 +78,6 @@ class ReportRequest:
     covariates: Sequence[str] = ()
     out: Path | None = None
     with_pdf: bool = False
-    matrix: MatrixSettings | None = None
 
     def sorted(self, names: Iterable[str]) -> list[str]:
         """Return `names` in the matrix's order, others last by name."""
@@ -380,12 +372,6 @@ def _context(
 ) -> ReportContext:
     """Return what the report shows beyond the study."""
     study, trials = analysed.study, analysed.trials
-    series = {name: [t.series for t in group] for name, group in trials.items()}
-    forecast = (
-        forecast_of(study, series, order.matrix)
-        if order.matrix is not None and len(sessions) > 1
-        else None
-    )
     units = {
         name: unit
         for group in trials.values()
@@ -401,7 +387,6 @@ def _context(
         generated_utc=iso_utc(SystemClock().utc_ns()),
         tables=[
             *cells_table(study, units),
-            *([] if forecast is None else [forecast_table(forecast)]),
             *(side_by_side(choice, study, other) for choice, other in others),
             *covariate_tables(tested),
             *truth_tables(study, trials, analysed.truths),
@@ -411,7 +396,6 @@ def _context(
             "what_if": [plain_choice(c, study, other) for c, other in others],
             "covariates": [one.numbers() for one in tested],
             "left_out": analysed.left_out,
-            "matrix": None if forecast is None else plain_forecast(forecast),
         },
         warnings=[
             *uncommissioned(

@@ -55,7 +55,7 @@ class DesignFactor(SettingsSection):
         name: the key of the cells that states it.
         unit: of a number; "" = none.
         kind: a number, or one of `levels`.
-        scale: on which numbers are compared by the joint model.
+        scale: on which numbers are compared.
         levels: the words that a cell may state.
         words: what a word means, for people.
     """
@@ -198,11 +198,6 @@ class TerrainRow(_Row):
         if isinstance(stated, float | int):
             return float(stated)
         return SIZE_BY_WORD.get(self.stones)
-
-    @property
-    def slope_deg(self) -> float:
-        """Incline along the push, positive downhill [degrees]."""
-        return -self.incline_deg if self.push_deg == 180 else self.incline_deg
 
     def as_container(self) -> "TerrainRow":
         """Return it as its container stands, whichever way it is crossed."""

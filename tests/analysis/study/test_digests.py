@@ -11,7 +11,6 @@ from analysis.breakaway.fitting import fit_planned
 from analysis.report.drawing import report_figures
 from analysis.study.crossval import run_fold
 from analysis.study.digests import ROOT, code_digest, source_files
-from analysis.study.relatives import run_relatives
 from analysis.study.terrain_fit import fit_terrain
 from analysis.study.trial_components import fit_components
 from analysis.terrains.export import tabulate
@@ -56,7 +55,6 @@ def test_what_a_fold_does_not_use_leaves_its_digest(copy):
         (run_fold, "analysis.gp.regression"),
         (fit_terrain, "analysis.tustin.model"),
         (fit_components, "analysis.data.series"),
-        (run_relatives, "analysis.gp.hierarchy"),
         (fit_planned, "analysis.breakaway.censored"),
         (tabulate, "analysis.study.models"),
         (report_figures, "analysis.figures.curves"),  # imported when drawn

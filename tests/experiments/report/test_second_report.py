@@ -15,7 +15,6 @@ from tests.experiments.program import only_session, traction
 COMPUTED = (  # two trials have no components, and nothing is nothing to keep
     (analysis.study.study, "run_fold"),
     (analysis.study.study, "fit_terrain"),
-    (analysis.study.study, "run_relatives"),
     (analysis.terrains.export, "fit_planned"),
     (analysis.report.drawing, "report_figures"),
 )

@@ -79,13 +79,7 @@ def test_a_cross_is_every_combination(load):
     assert len(names) == len(set(names)) == 24
     assert names[0] == "G12dt-2"
     assert names[-1] == "G37wb+2"
-    assert matrix.terrains[-1].slope_deg == 2.0
-
-
-def test_a_push_away_from_the_base_goes_up_what_was_down(load):
-    more = CELL.replace("place", "push_deg = 180\nincline_deg = 2\nplace")
-    (row,) = load(FACTORS + more).matrix.terrains
-    assert (row.incline_deg, row.slope_deg) == (2.0, -2.0)
+    assert matrix.terrains[-1].incline_deg == 2.0
 
 
 def test_words_multiply_what_is_simulated(load):
