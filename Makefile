@@ -10,7 +10,7 @@ WHEEL := build/wheel
 # many short programs are started: compiled once, whatever the shell asks for
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test docs wheel lock lab lab-page lint types contracts crate-validator sbom release man clean
+.PHONY: demo test docs wheel lock lab lint types contracts crate-validator sbom release man clean
 
 $(STAMP): pyproject.toml constraints.txt
 	@echo "Setting up $(VENV) (a few minutes the first time) ..."
@@ -54,9 +54,6 @@ wheel: $(STAMP)  ## built, installed in an environment of its own, a session run
 
 lab: $(STAMP)  ## the program beside the real kernel's drivers, in an emulated machine
 	$(BIN)/python -m lab
-
-lab-page: $(STAMP)  ## the same, and docs/lab.md
-	$(BIN)/python -m lab --write docs/lab.md
 
 lint: $(STAMP)  ## ruff: lint and format
 	$(BIN)/ruff check .

@@ -1,10 +1,9 @@
 """All benchmarks, one table: what, today, goal, met or not.
 
-    python -m benchmarks [--only NAME ...] [--write]
+    python -m benchmarks [--only NAME ...]
 
 Each benchmark runs in a process of its own, one after the other, with the program's
-settings of linear algebra. `--write` puts the table into docs/measured.md, between its
-marks.
+settings of linear algebra.
 """
 
 import argparse
@@ -20,8 +19,6 @@ from benchmarks.rows import BenchRow
 from benchmarks.surroundings import surroundings
 
 ROOT = Path(__file__).parents[1]
-PAGE = ROOT / "docs" / "measured.md"
-BEGIN, END = "<!-- python -m benchmarks -->", "<!-- end of the table -->"
 NAMES = (
     "lockstep",
     "fit",
@@ -70,24 +67,10 @@ def table_of(found: dict[str, list[BenchRow]]) -> str:
     return "\n".join(lines)
 
 
-def with_table(page: str, text: str) -> str:
-    """Return the page with `text` between its marks.
-
-    Raises:
-        ValueError: the page has no marks.
-    """
-    before, begin, rest = page.partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not begin or not end:
-        raise ValueError("the page has no marks for the table")
-    return f"{before}{BEGIN}\n{text}\n{END}{after}"
-
-
 def main() -> int:
-    """Run, print and write."""
+    """Run and print."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--only", nargs="+", choices=NAMES, default=NAMES)
-    parser.add_argument("--write", action="store_true", help=f"into {PAGE.name}")
     parser.add_argument("--inside", choices=NAMES, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.inside:
@@ -99,10 +82,7 @@ def main() -> int:
         found[name] = run_one(name)
         for row in found[name]:
             print("  ".join(row.cells()), flush=True)
-    text = f"\n{surroundings(PEERS)}\n\n{table_of(found)}\n"
-    print(text)
-    if arguments.write:
-        PAGE.write_text(with_table(PAGE.read_text(), text))
+    print(f"\n{surroundings(PEERS)}\n\n{table_of(found)}\n")
     return 0
 
 

@@ -16,7 +16,7 @@ myst_enable_extensions = ["attrs_inline"]
 myst_heading_anchors = 3
 html_theme = "furo"
 html_title = "Traction"
-exclude_patterns = ["_build", "licences.md"]
+exclude_patterns = ["_build"]
 autodoc2_packages = [
     {"path": "../traction", "module": "traction"},
     {

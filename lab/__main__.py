@@ -16,12 +16,7 @@ from lab import initramfs, report
 from lab.follower import PANICKED, Follower
 from lab.guest.scenarios.registry import ALL, Scenario, chosen
 from lab.kernel import fetch_kernel
-from lab.machine import (
-    Machine,
-    Sockets,
-    emulator_version,
-    processor_name,
-)
+from lab.machine import Machine, Sockets
 from lab.requirements import LabError, install_line, missing_packages, program
 from lab.results import ScenarioResult
 
@@ -59,12 +54,6 @@ def parser() -> argparse.ArgumentParser:
     options.add_argument(
         "--check", action="store_true", help="say what is missing and end"
     )
-    options.add_argument(
-        "--write",
-        type=Path,
-        metavar="FILE",
-        help="the table of a full run, e.g. docs/lab.md",
-    )
     options.add_argument("--cache", type=Path, default=CACHE, metavar="FOLDER")
     options.add_argument(
         "--machines",
@@ -85,9 +74,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     names = {scenario.name for scenario in ALL}
     if unknown := [name for name in options.only if name not in names]:
         print(f"--only {unknown[0]!r} is none of: {', '.join(sorted(names))}")
-        return 2
-    if options.write and (options.short or options.only):
-        print("--write belongs to a full run.")
         return 2
     scenarios = chosen(options.only, is_short=options.short)
     if options.list:
@@ -115,18 +101,8 @@ def _run(scenarios: Sequence[Scenario], options: argparse.Namespace) -> int:
     parts = shares(scenarios, options.machines)
     results = run_machines(parts, options.cache, is_shown=options.console)
     wall = (_CLOCK.now_ns() - start_ns) / NS_PER_S
+    print(report.cycle_words(results))
     print(report.summary(results, wall))
-    if options.write:
-        what = {scenario.name: scenario.what for scenario in scenarios}
-        conditions = report.Conditions(
-            fetch_kernel(options.cache).release,
-            emulator_version(),
-            processor_name(),
-            len(parts),
-            wall,
-        )
-        page = report.page(results, what, conditions)
-        options.write.write_text(page, encoding="utf-8")
     return 0 if all(result.verdict.is_fine for result in results) else 1
 
 

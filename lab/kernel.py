@@ -38,12 +38,10 @@ class Kernel:
     Attributes:
         image: the file to boot.
         modules: files of the modules to load, in this order.
-        release: its name.
     """
 
     image: Path
     modules: tuple[Path, ...]
-    release: str
 
 
 def image_package(depends: str) -> str:
@@ -73,7 +71,7 @@ def fetch_kernel(cache: Path) -> Kernel:
         folder = _unpack(cache)
     release = folder.name.removeprefix("linux-image-")
     image = _unpacked(folder / "boot" / f"vmlinuz-{release}", folder / "vmlinux")
-    return Kernel(image, _load_order(folder, release), release)
+    return Kernel(image, _load_order(folder, release))
 
 
 def _unpacked(packed: Path, plain: Path) -> Path:

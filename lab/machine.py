@@ -76,24 +76,6 @@ def command(kernel: Kernel, initramfs: Path, sockets: Sockets, proxy: int) -> li
     ]
 
 
-def emulator_version() -> str:
-    """Return the name and version of the emulator."""
-    line = subprocess.run(
-        [program("qemu-system-x86_64"), "--version"],
-        capture_output=True,
-        text=True,
-        check=True,
-    ).stdout.partition("(")[0]
-    return line.replace("emulator version", "").strip()
-
-
-def processor_name() -> str:
-    """Return what the host's processor calls itself, and how many there are."""
-    lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    names = [line.partition(":")[2] for line in lines if line.startswith("model name")]
-    return f"{os.cpu_count()} x {next(iter(names), ' unknown').strip()}"
-
-
 def _options(*pairs: tuple[str, str]) -> list[str]:
     """Return options, each with its value, as words of a command."""
     return [word for pair in pairs for word in pair]

@@ -1,6 +1,6 @@
 """The licences of everything that is installed with Traction, as a table.
 
-python tests/licences.py > docs/licences.md
+python -m tests.licences
 """
 
 import re
@@ -8,13 +8,14 @@ from importlib import metadata
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
+CONSTRAINTS = ROOT / "constraints.txt"
 _PIN = re.compile(r"^([A-Za-z0-9._-]+)==([^\s;]+)")
 _LONGEST = 60  # of a licence's name; beyond that a package gives its whole text
 HEAD = """\
 # Licences of the dependencies
 
 What `make test` installs, in the versions of `constraints.txt`, and the licence that
-each package declares of itself. Made by `python tests/licences.py > docs/licences.md`.
+each package declares of itself.
 
 | package | version | licence |
 |---|---|---|"""
@@ -27,8 +28,11 @@ def pins(text: str) -> dict[str, str]:
 
 
 def licence_of(package: str) -> str:
-    """Return what the metadata of an installed package say, or which file does."""
-    fields = metadata.metadata(package)
+    """Return what a package's metadata say, or which file does."""
+    try:
+        fields = metadata.metadata(package)
+    except metadata.PackageNotFoundError:  # of another Python
+        return "not installed"
     expression = fields.get("License-Expression", "")
     classified = [
         line.rpartition(" :: ")[2]
@@ -43,14 +47,17 @@ def licence_of(package: str) -> str:
     return expression or ", ".join(classified) or short or in_file
 
 
-def table(text: str) -> list[str]:
-    """Return the table for the pins in `text`."""
-    rows = [
-        f"| {package} | {version} | {licence_of(package)} |"
-        for package, version in sorted(pins(text).items(), key=lambda p: p[0].lower())
-    ]
-    return [HEAD, *rows]
+def table(text: str) -> list[tuple[str, str, str]]:
+    """Return package, version and licence of each pin in `text`."""
+    packages = sorted(pins(text).items(), key=lambda pin: pin[0].lower())
+    return [(package, version, licence_of(package)) for package, version in packages]
+
+
+def main() -> None:
+    """Print the table in Markdown."""
+    rows = [f"| {' | '.join(row)} |" for row in table(CONSTRAINTS.read_text())]
+    print("\n".join([HEAD, *rows]))  # noqa: T201
 
 
 if __name__ == "__main__":
-    print("\n".join(table((ROOT / "constraints.txt").read_text())))  # noqa: T201
+    main()

@@ -4,7 +4,7 @@ import importlib.util
 
 import pytest
 
-from benchmarks.__main__ import NAMES, PAGE, table_of, with_table
+from benchmarks.__main__ import NAMES, table_of
 from benchmarks.rows import BenchRow
 from benchmarks.scale import exponent, folds_of, rows_of
 
@@ -53,18 +53,9 @@ def test_growth_beyond_linear_is_not_met():
     assert verdicts["`status` grows as sessions to the power of"] == "met"
 
 
-def test_the_table_goes_between_its_marks_and_again():
-    page = PAGE.read_text()
+def test_a_row_stands_in_the_table_with_its_benchmark():
     text = table_of({"scale": [BenchRow("x", 1.0, "s", 2.0)]})
-    once = with_table(page, text)
-    assert "| x | 1 s | ≤ 2 s | met | scale |" in once
-    assert with_table(once, text) == once
-    assert with_table(once, "").count("| x |") == 0
-
-
-def test_a_page_without_marks_is_refused():
-    with pytest.raises(ValueError, match="no marks"):
-        with_table("# Measured", "")
+    assert "| x | 1 s | ≤ 2 s | met | scale |" in text
 
 
 def test_every_benchmark_is_there():

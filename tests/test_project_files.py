@@ -50,7 +50,7 @@ def test_commands_and_pages_named_for_programs_are_there():
     names = re.findall(r"\]\(([^)]+)\)", text)
     assert names
     assert all((ROOT / name).is_file() for name in names)
-    modules = re.findall(r"tests\.([a-z.]+)", text)
+    modules = re.findall(r"tests\.([a-z_.]+)", text)
     for module in modules:
         path = ROOT / "tests" / module.rstrip(".").replace(".", "/")
         assert path.with_suffix(".py").is_file() or (path / "__main__.py").is_file()

@@ -11,7 +11,7 @@ it did before it was found is read from the recordings of C8 to C11: energy of t
 speed and travel of the sole, by the positions as believed.
 
 `--keep FILE` writes each ending into a table and passes over those that stand there, so
-that a catalogue that takes hours can be gone on with; `wrong_rigs_page` prints it.
+that a catalogue that takes hours can be gone on with.
 """
 
 import argparse
@@ -72,14 +72,6 @@ class Ending:
     energy: float = 0.0
     travel: float = 0.0
     speed: float = 0.0
-
-    @property
-    def words(self) -> str:
-        """Where and how it ended, in a word or two."""
-        if not self.step:
-            return "passed"
-        kind = "warned" if self.is_warned else "refused" if self.is_refused else ""
-        return f"{self.step} {kind}".strip()
 
     def row(self, name: str, seed: int, friction: float) -> str:
         """Return it as a line below `HEAD`; "sound" is the name of a sound rig."""

@@ -1,46 +1,42 @@
-"""What docs/faults.md promises for a fault in a phase, as exit codes."""
+"""Exit codes that the fault matrix promises for a fault in a phase."""
 
-from pathlib import Path
+from collections.abc import Mapping
 
-from lab.guest.commands import ScenarioError, require
+from lab.guest.commands import require
+from tests.faults.expected import TABLE, End
+from tests.faults.moving import MOVING_CELLS
+from tests.faults.phases import MOVING, PHASES
+from tests.faults.processes import TABLE as PROCESSES
 
-PAGE = Path(__file__).parents[2] / "docs" / "faults.md"
-# Exit codes by how a cell ends; -9 where the console itself was killed. A session that
-# is not activated ends with 3 when the arm is to become active, with 4 at the prompt.
-_CODES = {
-    "nothing happens": {0},
-    "refused, nothing created": {3},
-    "not activated, resumed": {3, 4},
-    "trial interrupted and redone": {0},
-    "session ends, resumed": {4},
-    "ends; the arm is idle without it, resumed": {-9},
-    "the arm stops, nothing is written": {4},
+# -9 where the console itself was killed. A session that is not activated ends with 3
+# when the arm is to become active, with 4 at the prompt.
+_CODES: Mapping[End, frozenset[int]] = {
+    End.COMPLETE: frozenset({0}),
+    End.REFUSED: frozenset({3}),
+    End.NOT_ACTIVATED: frozenset({3, 4}),
+    End.REDONE: frozenset({0}),
+    End.ENDED: frozenset({4}),
+    End.KILLED: frozenset({-9}),
+    End.UNMEASURED: frozenset({4}),
 }
 
 
-def promise(fault: str, phase: str) -> str:
-    """Return the cell of a fault and a phase, without its note.
+def hold_to(fault: str, phase: str, code: int) -> None:
+    """Raise ScenarioError unless the exit code is what the matrix promises.
 
-    Raises:
-        ScenarioError: the page has no such cell.
+    Args:
+        fault: of the matrix, e.g. "interface-down".
+        phase: in which it came, e.g. "recording".
+        code: exit code of the program.
     """
-    return promised(PAGE.read_text(encoding="utf-8"), fault, phase)
+    promised = _end(fault, phase)
+    require(
+        code in _CODES[promised],
+        f"{fault} in {phase}: exit code {code}, promised: {promised.value}",
+    )
 
 
-def promised(page: str, fault: str, phase: str) -> str:
-    """Return the same of a text; the first table that has the phase counts."""
-    phases: list[str] = []
-    for line in page.splitlines():
-        cells = [cell.strip() for cell in line.strip("| ").split("|")]
-        if cells[0] == "fault":
-            phases = cells
-        elif cells[0] == f"`{fault}`" and phase in phases:
-            return cells[phases.index(phase)].partition(" [")[0]
-    raise ScenarioError(f"docs/faults.md has no {fault} in {phase}")
-
-
-def hold_to(promise: str, code: int) -> None:
-    """Raise ScenarioError unless an exit code is what a cell of the page means."""
-    if promise not in _CODES:
-        raise ScenarioError(f"no exit code is known for {promise!r}")
-    require(code in _CODES[promise], f"exit code {code}, promised: {promise}")
+def _end(fault: str, phase: str) -> End:
+    if phase == MOVING:
+        return MOVING_CELLS[fault].end
+    return {**TABLE, **PROCESSES}[fault][PHASES.index(phase)].end

@@ -1,8 +1,8 @@
-"""`python -m tests.borders > docs/borders.md` writes the table of borders."""
+"""`python -m tests.borders` prints the table of borders."""
 
 import sys
 
-from tests.borders.page import page
+from tests.borders.table import text
 
 if __name__ == "__main__":
-    sys.stdout.write(page())
+    sys.stdout.write(text())

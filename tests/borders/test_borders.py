@@ -1,13 +1,12 @@
-"""Nothing foreign is read wrongly or in silence; the page says what happens."""
+"""Nothing foreign is read wrongly or in silence; the table says what happens."""
 
 import resource
 import warnings
-from pathlib import Path
 
 import pytest
 
-from tests.borders.page import SUBJECTS, page
 from tests.borders.row import Outcome
+from tests.borders.table import SUBJECTS, text
 
 MOST_KB = 500_000  # that a row may add to the most memory ever held
 ROWS = [(subject, row) for subject, rows in SUBJECTS.items() for row in rows]
@@ -43,6 +42,6 @@ def test_no_row_stands_there_twice():
     assert len({row.given for _, row in ROWS}) == len(ROWS)
 
 
-def test_the_printed_table_is_the_tested_one():
-    written = Path(__file__).parents[2] / "docs" / "borders.md"
-    assert written.read_text() == page()
+def test_the_printed_table_has_every_row():
+    printed = [line for line in text().splitlines() if line.startswith("| ")]
+    assert len(printed) == len(ROWS) + 2 * len(SUBJECTS)

@@ -1,8 +1,8 @@
-"""`python -m tests.disturbances > docs/disturbances.md` measures it anew."""
+"""`python -m tests.disturbances` measures and prints the table of disturbances."""
 
 import sys
 
-from tests.disturbances.page import page
+from tests.disturbances.table import text
 
 if __name__ == "__main__":
-    sys.stdout.write(page())
+    sys.stdout.write(text())

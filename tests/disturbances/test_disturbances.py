@@ -1,7 +1,5 @@
 """No disturbance of a trial passes in silence, unless a number says it is harmless."""
 
-from pathlib import Path
-
 import pytest
 
 from tests.disturbances.measure import recorded_trial, see_recording, see_table
@@ -30,10 +28,3 @@ def test_a_disturbed_table_is_refused_flagged_or_harmless(row):
 @pytest.mark.parametrize("row", RECORDINGS, ids=lambda row: row.name)
 def test_a_disturbed_recording_is_refused_flagged_or_harmless(row, source):
     check(row, see_recording(row, source))
-
-
-def test_the_page_names_every_row():
-    text = (Path(__file__).parents[2] / "docs" / "disturbances.md").read_text()
-    listed = [line.split("|")[1:3] for line in text.splitlines() if line[:2] == "| "]
-    named = {(name.strip(), outcome.strip()) for name, outcome in listed}
-    assert {(row.name, row.outcome.value) for row in (*TABLES, *RECORDINGS)} <= named

@@ -1,6 +1,6 @@
-"""Print the fault matrix as tables in Markdown: `python -m tests.faults`."""
+"""Print the fault matrix and the hazards, in Markdown: `python -m tests.faults`."""
 
-from tests.faults import choice
+from tests.faults import choice, hazards
 from tests.faults.bounds import BOUND_PHASES, COLUMNS, PrintedBound, read_bounds
 from tests.faults.expected import TABLE, Cell, End
 from tests.faults.moving import MOVING_CELLS
@@ -13,8 +13,7 @@ HEAD = """\
 
 The result of each fault that `--fault` can raise, and of signals and killed processes,
 in each phase of a session; and, in the last column, while the arm moves by itself from
-pose to pose of a calibration. Made by `python -m tests.faults > docs/faults.md`; the
-tests in `tests/faults` hold the program against it.
+pose to pose of a calibration.
 """
 TRUTH = """
 ## True motion of the arm
@@ -113,11 +112,11 @@ def _words(
     )
 
 
-def page() -> str:
-    """Return docs/faults.md."""
+def text() -> str:
+    """Return all tables."""
     parts = [HEAD, *lines(), choice.HEAD, *choice.choice_lines(), TRUTH]
-    return "\n".join([*parts, *truth_lines()]) + "\n"
+    return "\n".join([*parts, *truth_lines(), *hazards.hazard_lines()]) + "\n"
 
 
 if __name__ == "__main__":
-    print(page(), end="")  # noqa: T201
+    print(text(), end="")  # noqa: T201

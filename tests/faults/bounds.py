@@ -1,8 +1,8 @@
 """Measured bounds of every fault: `python -m tests.faults.bounds [PART OF A NAME]`.
 
 Where the arm is driven by a person's push and where it moves by itself. They lie in
-bounds.json beside this module, so that pages are made without a run; the matrix holds
-its cells against them. A run takes about ten minutes.
+bounds.json beside this module, so that tables are printed without a run; the
+matrix holds its cells against them. A run takes about ten minutes.
 """
 
 import json

@@ -1,5 +1,5 @@
 # ruff: noqa: E501 - a table that is read row by row
-"""The rows of docs/hazards.md: (hazard, cause, detection, reaction, faults, bound, tests)."""
+"""The rows of the table of hazards: (hazard, cause, detection, reaction, faults, bound, tests)."""
 
 _MATRIX = "tests/faults/test_matrix.py::test_a_fault_comes_to_what_the_table_says"
 _GUARD = "tests/acquisition/control_loop/test_guard.py::"

@@ -1,7 +1,6 @@
 """What can become dangerous, as data: every signal and every way it can be wrong.
 
-`python -m tests.faults.hazards > docs/hazards.md` prints it; what is measured comes
-from bounds.json.
+`python -m tests.faults` prints it; what is measured comes from bounds.json.
 """
 
 from dataclasses import dataclass
@@ -13,19 +12,15 @@ from tests.faults.expected import NOTHING
 from tests.faults.hazard_rows import ROWS
 from tests.faults.truth import is_within
 
-HEAD = """\
+HEAD = """
 # Hazards
 
-For every signal: the hazard when it is lost, stuck, drifting,
-implausible or late; how it is detected, the reaction, the bound until then,
-and the test. "not detected" is stated with what bounds the hazard.
-Made by `python -m tests.faults.hazards > docs/hazards.md`. Bounds are the worst of the
-recording of a trial and of a move by the arm itself, measured on the simulated arm
-(docs/faults.md): largest joint speed as a share of the joint's limit, travel of the
-sole within 0.5 s, force of the motors on the person who holds the sole. "As without it"
-stands where that is not more than what is measured when nothing happens at all. Below
-a signal stand the steps of [the first day](first-day.md) that prove it on the arm
-itself.
+For every signal: the hazard when it is lost, stuck, drifting, implausible or late; how
+it is detected, the reaction, the bound until then, and the test. Bounds are the worst
+of the recording of a trial and of a move by the arm itself, measured on the simulated
+arm: largest joint speed as a share of the joint's limit, travel of the sole within
+0.5 s, force of the motors on the person who holds the sole. "As without it" stands
+where that is not more than what is measured when nothing happens at all.
 """
 _S = ProofStep
 # Steps of `traction commission` by the signal that they prove sound on the arm at hand.
@@ -60,7 +55,7 @@ class Mode(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Hazard:
-    """A row of the page.
+    """A row of the table.
 
     Attributes:
         signal: whose it is.
@@ -126,8 +121,8 @@ def _largest(bounds: list[PrintedBound]) -> str:
     )
 
 
-def page() -> str:
-    """Return docs/hazards.md."""
+def hazard_lines() -> list[str]:
+    """Return the tables, signal by signal."""
     lines = [HEAD]
     signal = ""
     for row in hazards():
@@ -141,8 +136,7 @@ def page() -> str:
         cells = (row.mode.value, row.hazard, cause, row.detection, row.reaction)
         lines.append(f"| {' | '.join((*cells, measured(row), tests))} |")
     blind = sum(row.detection.startswith("not detected") for row in hazards())
-    lines += ["", f"{len(hazards())} rows, {blind} of them not detected."]
-    return "\n".join(lines) + "\n"
+    return [*lines, "", f"{len(hazards())} rows, {blind} of them not detected."]
 
 
 def _proofs(signal: str) -> list[str]:
@@ -154,6 +148,3 @@ def _proofs(signal: str) -> list[str]:
 _COLUMNS = ("how", "hazard", "cause", "detected by", "reaction", "bound", "test")
 _TITLES = f"| {' | '.join(_COLUMNS)} |"
 _RULE = "|---" * len(_COLUMNS) + "|"
-
-if __name__ == "__main__":
-    print(page(), end="")  # noqa: T201

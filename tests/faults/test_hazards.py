@@ -1,6 +1,7 @@
-"""The table of hazards is whole, names tests that exist, and is the printed one."""
+"""The table of hazards is whole and names tests that exist."""
 
 import ast
+import re
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,6 @@ from tests.faults.hazards import (
     Mode,
     hazards,
     measured,
-    page,
 )
 
 ROOT = Path(__file__).parents[2]
@@ -49,8 +49,11 @@ def test_every_signal_of_the_arm_is_proved_by_steps_that_are_done():
     assert all(set(steps) <= set(WORK) and steps for steps in PROOFS.values())
 
 
-def test_the_printed_hazards_are_those_of_the_table():
-    assert (ROOT / "docs" / "hazards.md").read_text() == page()
+def test_the_page_of_hazards_has_every_signal():
+    page = (ROOT / "docs" / "hazards.md").read_text().lower()
+    headed = " ".join(re.findall(r"^\*\*.*", page, re.MULTILINE))
+    signals = {signal.lower().removesuffix(" heartbeat") for signal in SIGNALS}
+    assert {signal for signal in signals if signal not in headed} == set()
 
 
 def test_every_signal_is_wrong_in_every_way():

@@ -37,13 +37,6 @@ def test_an_unknown_scenario_is_refused_with_those_that_are_known(capsys):
     assert all(scenario.name in out for scenario in ALL)
 
 
-@pytest.mark.parametrize("also", [["--short"], ["--only", ALL[0].name]])
-def test_the_page_is_written_by_a_full_run_only(tmp_path, also):
-    path = tmp_path / "lab.md"
-    assert program.main(["--write", str(path), *also]) == 2
-    assert not path.exists()
-
-
 def test_the_list_names_scenarios_without_any_package(monkeypatch, capsys):
     monkeypatch.setattr(program, "missing_packages", lambda: ["kmod"])
     assert program.main(["--list"]) == 0
@@ -77,7 +70,7 @@ def test_the_machine_has_read_only_files_and_two_cards_on_one_bus(
 ):
     monkeypatch.setattr("lab.machine.program", lambda name: f"/usr/bin/{name}")
     sockets = Sockets(*(tmp_path / name for name in "abc"))
-    kernel = Kernel(tmp_path / "vmlinux", (), "6.1")
+    kernel = Kernel(tmp_path / "vmlinux", ())
     words = command(kernel, tmp_path / "initramfs", sockets, 9)
     assert any("path=/," in word and "readonly=on" in word for word in words)
     cards = [word for word in words if word.startswith("kvaser_pci")]

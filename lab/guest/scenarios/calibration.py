@@ -6,7 +6,7 @@ from lab.guest.commands import Program, require
 from lab.guest.commissioned import take_as_commissioned
 from lab.guest.machine_room import CAN, MachineRoom
 from lab.guest.network import set_up
-from lab.guest.promises import hold_to, promise
+from lab.guest.promises import hold_to
 from lab.guest.scenarios.bus import Figures, figure
 from lab.guest.scenarios.recording import served_arm
 from lab.guest.sessions import LedSession
@@ -34,7 +34,7 @@ def gravity(room: MachineRoom) -> Figures:
     cut = _moving(room, arm)
     cut.program.run_on(_INTO_MOVE)
     room.shell.run(f"ip link set {CAN} down")
-    hold_to(promise("interface-down", "moving"), cut.program.wait(_PATIENCE))
+    hold_to("interface-down", "moving", cut.program.wait(_PATIENCE))
     require(not file.exists(), "a calibration was written")
     set_up(room.shell, CAN)
     arm.press("mend\n")

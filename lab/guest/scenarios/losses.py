@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from lab.guest.machine_room import CAN, MachineRoom
 from lab.guest.monitor import CARD, Monitor
 from lab.guest.network import NET, set_up
-from lab.guest.promises import hold_to, promise
+from lab.guest.promises import hold_to
 from lab.guest.scenarios.bus import Figures, figure
 from lab.guest.scenarios.recording import PATIENCE, served_arm
 from lab.guest.sessions import (
@@ -42,7 +42,7 @@ def _to_review(session: LedSession) -> None:
     session.review()
 
 
-# How to come to each phase of docs/faults.md, in the order in which they are visited.
+# How to come to each phase of the fault matrix, in the order in which they are visited.
 PHASES: dict[str, Callable[[LedSession], None]] = {
     "idle": LedSession.wait_idle,
     "tare": _to_tare,
@@ -62,7 +62,7 @@ def link_down_in_every_phase(room: MachineRoom) -> Figures:
         come_to(session)
         _take_down(room)
         code = session.program.wait(PATIENCE)
-        hold_to(promise(_DOWN, phase), code)
+        hold_to(_DOWN, phase, code)
         figures[phase] = str(code)
         _bring_up(room)
         session = resume(room, arm)
@@ -70,7 +70,7 @@ def link_down_in_every_phase(room: MachineRoom) -> Figures:
     session.keep()  # the last tare is asked for
     _take_down(room)
     code = session.program.wait(PATIENCE)
-    hold_to(promise(_DOWN, "end"), code)
+    hold_to(_DOWN, "end", code)
     _bring_up(room)
     require_rejected(room, _REJECTED)
     verify_kept(room, 1)
@@ -94,7 +94,7 @@ class Loss:
     """Something that is lost in a trial.
 
     Attributes:
-        fault: its row of docs/faults.md.
+        fault: its row of the fault matrix.
         cut: takes it away.
         mend: brings it back.
     """
@@ -136,7 +136,7 @@ def _lose(room: MachineRoom, losses: tuple[Loss, ...]) -> Figures:
         _to_recording(session)
         loss.cut(session)
         code = session.program.wait(PATIENCE)
-        hold_to(promise(loss.fault, "recording"), code)
+        hold_to(loss.fault, "recording", code)
         output += session.program.output
         loss.mend()
         session = resume(room, arm)

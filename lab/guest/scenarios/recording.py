@@ -3,7 +3,7 @@
 from lab.guest.commands import Program
 from lab.guest.machine_room import CAN, FAR_CAN, MachineRoom
 from lab.guest.network import clear, disturb, queue_length, set_up_both
-from lab.guest.promises import hold_to, promise
+from lab.guest.promises import hold_to
 from lab.guest.scenarios.bus import Figures, figure
 from lab.guest.sessions import begin, cycle_figures, require_rejected, verify_kept
 from lab.guest.ways import farthest, way_of
@@ -64,7 +64,7 @@ def bad_adapter(room: MachineRoom) -> Figures:
     code = session.ended()
     clear(room.shell, FAR_CAN)
     for fault in ("reply-late", "reply-lost-some"):
-        hold_to(promise(fault, "recording"), code)
+        hold_to(fault, "recording", code)
     verify_kept(room, 2)
     require_rejected(room, 0)
     slow = figure(page, r"7 positions after ([^,]+, \d+ incomplete)")

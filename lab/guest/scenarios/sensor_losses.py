@@ -4,7 +4,7 @@ from lab.guest.commands import Program, wait
 from lab.guest.machine_room import MachineRoom, line_port
 from lab.guest.monitor import ADAPTER, Monitor
 from lab.guest.network import set_up_both
-from lab.guest.promises import hold_to, promise
+from lab.guest.promises import hold_to
 from lab.guest.scenarios.bus import Figures
 from lab.guest.scenarios.recording import PATIENCE
 from lab.guest.scenarios.serial_line import MAKES, PORT, write_make
@@ -40,7 +40,7 @@ def lost_and_back(room: MachineRoom) -> Figures:
         session.record()
         session.keep()
         # As `ft-stale` ends, which comes back by itself like these two.
-        hold_to(promise("ft-stale", "recording"), session.ended())
+        hold_to("ft-stale", "recording", session.ended())
     finally:
         monitor.close()
     verify_kept(room, 1)

@@ -1,4 +1,4 @@
-"""The table of disturbances as a page, measured when it is made."""
+"""The table of disturbances, measured when it is printed."""
 
 from tests.disturbances.measure import Seen, recorded_trial, see_recording, see_table
 from tests.disturbances.rows import RECORDINGS, TABLES, Outcome
@@ -8,14 +8,13 @@ HEAD = """\
 
 What can be wrong with a trial although no fault is raised, and the result.
 Nothing passes silently: it is refused, flagged with its likely cause, or harmless,
-and then a number says how harmless. Made by
-`python -m tests.disturbances > docs/disturbances.md`; held by `tests/disturbances`.
+and then a number says how harmless.
 """
 _LONGEST = 160  # characters of what was said
 
 
-def page() -> str:
-    """Return the page."""
+def text() -> str:
+    """Return the table in Markdown."""
     tables = [(row.name, see_table(row)) for row in TABLES]
     with recorded_trial() as path:
         recordings = [(row.name, see_recording(row, path)) for row in RECORDINGS]

@@ -1,4 +1,4 @@
-"""The table of borders as a page: what is given, and what happens."""
+"""The table of borders: what is given, and what happens."""
 
 from tests.borders.calls import CALLS
 from tests.borders.formats import FORMATS
@@ -19,13 +19,12 @@ HEAD = """\
 # Borders
 
 What other programs and people give to this one, and what happens: it is read exactly,
-read exactly and flagged by name, or refused with its cause. Made by
-`python -m tests.borders > docs/borders.md`; every row is held by `tests/borders`.
+read exactly and flagged by name, or refused with its cause.
 """
 
 
-def page() -> str:
-    """Return the page."""
+def text() -> str:
+    """Return the table in Markdown."""
     count = sum(len(rows) for rows in SUBJECTS.values())
     lines = [HEAD, f"{count} rows.", ""]
     for subject, rows in SUBJECTS.items():
