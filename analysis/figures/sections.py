@@ -12,7 +12,6 @@ class ReportSection(Enum):
     BEYOND = "Beyond the paper"
     FRICTION = "Friction of the drives"
     LOADS = "Load limits by joint friction"
-    COMMISSIONING = "Steps of the commissioning"
     HEALTH = "Rig health"
     REACH = "Measurement limits"
     IMPORTED = "Imported"

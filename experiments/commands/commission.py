@@ -16,7 +16,6 @@ from experiments.rig.truth_options import check_truth, mount_of
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from experiments.commissioning.record import Commissioning
     from experiments.commissioning.steps import ProofStep
     from experiments.operator.console import Console
     from experiments.operator.prompts import OperatorInput
@@ -60,13 +59,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="judge the recordings again, no device is touched",
     )
     parser.add_argument(
-        "--beside",
-        type=Path,
-        metavar="FILE",
-        help="earlier commissioning.json that the page draws the values beside (the "
-        "last signed one)",
-    )
-    parser.add_argument(
         "--moved",
         action="store_true",
         help="the arm or its table was moved or bolted again: all steps are stale",
@@ -76,30 +68,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="a drive cable was tensioned or replaced: C5 to C11 are stale",
     )
-    parser.add_argument(
-        "--accept",
-        metavar="STEP",
-        help="two persons accept what failed in this step, e.g. C6; nothing is started",
-    )
-    parser.add_argument(
-        "--reason", metavar="TEXT", help="why, with --accept (asked at a terminal)"
-    )
     parser.add_argument("--operator", metavar="NAME", help="who does it (login name)")
-    parser.add_argument("--witness", metavar="NAME", help="who stands by")
     add_arm(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Do the steps that are due and return the exit code."""
-    from acquisition.extras import require_extra
-    from experiments.operator.console import WARNING, Console
+    from experiments.operator.console import Console
     from experiments.operator.scripted import choose_operator
     from experiments.proving.guide import RecordFolder, recheck
-    from experiments.proving.signing import accept_failed, sign_end
     from experiments.rig.rig import FakeOptions
     from experiments.settings.load import load_settings
 
-    require_extra("report")  # the page of what was measured
     check_truth(args)
     steps = _steps(args)
     friction = friction_share(args)
@@ -107,18 +87,8 @@ def run(args: argparse.Namespace) -> int:
     console = Console(color=not args.no_color)
     folder = _folder(settings, is_fake=args.fake)
     files = RecordFolder.open(folder, is_simulated=args.fake)
-    earlier = _earlier(args.beside, folder)
     if args.recheck:
-        is_sound = recheck(files, console)
-        _write_page(files, earlier, console, _offers(settings, files))
-        return 0 if is_sound else 6
-    terrain = settings.row(args.terrain or settings.matrix.terrains[0].name).name
-    if args.accept:
-        persons = (args.operator or "", args.witness or "")
-        why = args.reason or ""
-        accept_failed(files, args.accept, terrain, persons, why, console)
-        _write_page(files, earlier, console, _offers(settings, files))
-        return 0
+        return 0 if recheck(files, console) else 6
     operator = choose_operator(args.operator_script, is_fake=args.fake)
     fake: FakeOptions | None = None
     if args.fake:
@@ -131,22 +101,38 @@ def run(args: argparse.Namespace) -> int:
             mount=mount_of(args),
             wrong=args.wrong,
         )
-    persons = (args.operator or operator.who, args.witness or "")
+    who = args.operator or operator.who
     kind = "SIMULATED" if args.fake else "LIVE RIG"
     console.say(f"traction commission        {kind} · {files.folder}")
     if args.fake:
         console.say("Simulated hands and pendant do what is asked, at [space].")
     if args.daily:
-        return _daily(args, settings, fake, files, persons, console, operator)
+        return _daily(args, settings, fake, files, who, console, operator)
     _note_changes(args, files)
-    code = _sittings(args, settings, fake, steps, files, persons, console, operator)
-    offers = _offers(settings, files)
-    for text in offers:
-        console.say(f" {WARNING} {text}")
+    code = _sittings(args, settings, fake, steps, files, who, console, operator)
     if code == 0:
-        sign_end(files, terrain, persons, offers, console)
-    _write_page(files, earlier, console, offers)
+        _say_end(files, settings.row(_terrain(args, settings)).name, console)
     return code
+
+
+def _terrain(args: argparse.Namespace, settings: Settings) -> str:
+    """Return the terrain whose container C13 looks at."""
+    return args.terrain or settings.matrix.terrains[0].name
+
+
+def _say_end(files: RecordFolder, terrain: str, console: Console) -> None:
+    """Say what is left to do, or that the arm is commissioned."""
+    from experiments.commissioning.gate import lacks
+    from experiments.commissioning.record import NAME
+    from experiments.proving.work import WORK
+
+    last = max(done.ended for done in files.record.steps)
+    lacking = {lack.step for lack in lacks(files.record, {}, last, terrain)}
+    missing = [step for step in WORK if step in lacking]
+    if missing:
+        console.say(f"Still to do: {', '.join(missing)}.")
+    else:
+        console.say(f"Every step is sound: {files.folder / NAME}.")
 
 
 def _note_changes(args: argparse.Namespace, files: RecordFolder) -> None:
@@ -163,58 +149,13 @@ def _note_changes(args: argparse.Namespace, files: RecordFolder) -> None:
             files.tell(name, now)
 
 
-def _offers(settings: Settings, files: RecordFolder) -> list[str]:
-    """Return what C6 and C7 offer as values of rig.toml."""
-    from math import radians
-
-    from experiments.proving.offers import Mounted, offers_of
-
-    sensor = settings.rig.ft_sensor
-    foot = settings.matrix.terrains[0].foot
-    mounted = Mounted(foot, sensor.height, radians(sensor.angle_deg))
-    return offers_of(files.recordings(), mounted)
-
-
-def _earlier(given: Path | None, folder: Path) -> Commissioning | None:
-    """Return the record that the page draws the values beside; None = there is none.
-
-    Raises:
-        SettingsError: `given` is no record.
-    """
-    from acquisition.errors import SettingsError
-    from experiments.commissioning.record import newest_kept, read_record
-
-    path = given or newest_kept(folder)
-    record = read_record(path) if path is not None else None
-    if given is not None and record is None:
-        raise SettingsError(f"There is no file {given}.", hint="Nothing was started.")
-    return record
-
-
-def _write_page(
-    files: RecordFolder,
-    earlier: Commissioning | None,
-    console: Console,
-    offers: Sequence[str],
-) -> None:
-    from experiments.commissioning.gate import lacks
-    from experiments.report.commissioning import write_page
-
-    if not files.record.steps:
-        return
-    last = max(done.ended for done in files.record.steps)
-    lacking = [lack.text for lack in lacks(files.record, {}, last)]
-    page = write_page(files.folder, files.record, lacking, earlier, offers)
-    console.say(f"Page: {page}")
-
-
 def _sittings(
     args: argparse.Namespace,
     settings: Settings,
     fake: FakeOptions | None,
     steps: Sequence[ProofStep],
     files: RecordFolder,
-    persons: tuple[str, str],
+    who: str,
     console: Console,
     operator: OperatorInput,
 ) -> int:
@@ -223,14 +164,14 @@ def _sittings(
     from experiments.proving.work import SITTINGS
     from experiments.run.stop import StopRequestedError
 
-    row = settings.row(args.terrain or settings.matrix.terrains[0].name).as_container()
+    row = settings.row(_terrain(args, settings)).as_container()
     is_anew = args.first is not None
     for sitting in SITTINGS:
         due = [step for step in sitting if step in steps]
 
         def work(scene: Scene, due: Sequence[ProofStep] = due) -> int:
             for step in wanted(scene, due, files, is_anew=is_anew):
-                if do_step(scene, step, files, persons).cause:
+                if do_step(scene, step, files, who).cause:
                     return 3
                 if scene.console_loop.stop.count:
                     raise StopRequestedError
@@ -246,28 +187,21 @@ def _daily(
     settings: Settings,
     fake: FakeOptions | None,
     files: RecordFolder,
-    persons: tuple[str, str],
+    who: str,
     console: Console,
     operator: OperatorInput,
 ) -> int:
-    """Do the daily check, draw its history and return the exit code."""
-    from experiments.commissioning.daily import read_history
+    """Do the daily check and return the exit code."""
     from experiments.proving.daily import do_daily, reference_of
-    from experiments.report.daily import write_history_page
 
     reference_of(files)  # before anything is touched
-    row = settings.row(args.terrain or settings.matrix.terrains[0].name).as_container()
+    row = settings.row(_terrain(args, settings)).as_container()
 
     def work(scene: Scene) -> int:
-        check = do_daily(scene, files, persons, is_simulated=args.fake)
+        check = do_daily(scene, files, who, is_simulated=args.fake)
         return 3 if check.cause else 0
 
-    before = len(read_history(files.folder, is_simulated=args.fake).checks)
-    code = _on_rig(settings, row, fake, console, operator, work)
-    history = read_history(files.folder, is_simulated=args.fake)
-    if len(history.checks) > before:
-        console.say(f"Page: {write_history_page(files.folder, history)}")
-    return code
+    return _on_rig(settings, row, fake, console, operator, work)
 
 
 def _on_rig(

@@ -29,7 +29,6 @@ class DailyCheck(RecordPart):
         started: UTC.
         ended: UTC.
         operator: who did it.
-        witness: who stood by; "" = nobody.
         raw: what was recorded.
         quantities: what came of it, with its limits.
         cause: the first contradiction, in words; "" = none.
@@ -38,7 +37,6 @@ class DailyCheck(RecordPart):
     started: datetime
     ended: datetime
     operator: Word
-    witness: Word
     raw: Raw
     quantities: Many[Measured]
     cause: Word = ""
@@ -59,7 +57,7 @@ class DailyHistory(RecordPart):
         checks: what was done.
     """
 
-    version: Literal[1] = 1
+    version: Literal[2] = 2
     is_simulated: bool = False
     checks: Many[DailyCheck] = ()
 

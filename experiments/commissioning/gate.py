@@ -67,26 +67,6 @@ def lacks(
     ]
 
 
-def accepted(record: Commissioning, terrain: str) -> list[str]:
-    """Return what failed and was accepted, a phrase each.
-
-    Names and reason stay in the record: recordings are given away.
-
-    Args:
-        record: what was done.
-        terrain: whose container is meant.
-    """
-    steps = [
-        record.of(step, terrain if step is ProofStep.CONTAINER else "")
-        for step in ORDER
-    ]
-    return [
-        f"accepted by two persons: {done.name} ({done.cause})"
-        for done in steps
-        if done is not None and done.accepted is not None
-    ]
-
-
 def _cause(
     record: Commissioning | None,
     step: ProofStep,
@@ -99,8 +79,6 @@ def _cause(
         return "not done"
     if done.verdict == "wrong":
         return done.cause or "failed"
-    if (done.accepted is not None) is not (done.verdict == "accepted"):
-        return f"{done.verdict}, by whom?"
     inputs = {**inputs, **record.told_inputs()}
     for name in bases_of(step):
         then, current = done.inputs.get(name), inputs.get(name)

@@ -17,7 +17,7 @@ from acquisition.files import open_directory, read_regular, replace_file
 from acquisition.validation import Entries, Many, first_problem
 from experiments.commissioning.steps import ORDER, ProofStep
 
-VERSION = 1
+VERSION = 2
 NAME = "commissioning.json"
 _LARGEST = 4_000_000  # bytes
 _FIRST = "0" * 64  # what the first step is chained to
@@ -25,11 +25,9 @@ _ANEW = "Put back the file as it was written, or do it again: traction commissio
 
 Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 Word = Annotated[str, Field(max_length=400)]
-Name = Annotated[str, Field(min_length=1, max_length=100)]
-Reason = Annotated[str, Field(min_length=1, max_length=300)]
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Moment = Annotated[datetime, Field(strict=False)]  # in a table it is read from a text
-Verdict = Literal["sound", "wrong", "accepted"]
+Verdict = Literal["sound", "wrong"]
 
 
 class RecordPart(BaseModel):
@@ -87,20 +85,6 @@ class Raw(RecordPart):
     sha256: Digest
 
 
-class Acceptance(RecordPart):
-    """Two persons took the responsibility for a step that failed.
-
-    Attributes:
-        names: of the two.
-        reason: as it was typed.
-        when: UTC.
-    """
-
-    names: tuple[Name, Name]
-    reason: Reason
-    when: datetime
-
-
 class StepRecord(RecordPart):
     """One step that was done.
 
@@ -111,13 +95,11 @@ class StepRecord(RecordPart):
         started: UTC.
         ended: UTC.
         operator: who did it.
-        witness: who stood by; "" = nobody.
         inputs: digests of what it stands on, by the names of `steps.BASES`.
         raw: what was recorded.
         quantities: what came of it.
-        verdict: "accepted" = two persons took the responsibility for `cause`.
+        verdict: "wrong" = a quantity is beyond its limits.
         cause: the first contradiction, in words; "" = none.
-        accepted: by whom and why; None = it was not.
         digest: of all this and of the step before.
     """
 
@@ -126,13 +108,11 @@ class StepRecord(RecordPart):
     started: datetime
     ended: datetime
     operator: Word
-    witness: Word
     inputs: Entries[Word, Digest]
     raw: Many[Raw] = ()
     quantities: Many[Measured] = ()
     verdict: Verdict
     cause: Word = ""
-    accepted: Acceptance | None = None
     digest: Digest = _FIRST
 
     @property
@@ -144,9 +124,6 @@ class StepRecord(RecordPart):
     def chained(self, before: str) -> Self:
         """Return it with the digest that follows the digest `before`."""
         content = self.model_dump(mode="json", exclude={"digest"})
-        for later in ("subject", "accepted"):  # records without them keep their digests
-            if not content[later]:
-                del content[later]
         text = json.dumps(content, sort_keys=True, separators=(",", ":"))
         digest = hashlib.sha256(f"{before}{text}".encode()).hexdigest()
         return self.model_copy(update={"digest": digest})
@@ -159,19 +136,15 @@ class Commissioning(RecordPart):
         version: of the file.
         program: version that wrote it.
         is_simulated: the arm is.
-        serials: of the seven motor pucks; None = not known.
         steps: what was done.
         told: when a person last said of a basis of `steps.BASES` that it changed, UTC.
-        signed: the two names typed at the end; () = it has not ended.
     """
 
-    version: Literal[1] = VERSION
+    version: Literal[2] = VERSION
     program: Word
     is_simulated: bool = False
-    serials: tuple[int | None, ...] = Field(default=(), max_length=7)
     steps: Many[StepRecord] = ()
     told: Entries[Word, Moment] = {}
-    signed: tuple[Word, ...] = Field(default=(), max_length=2)
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
@@ -185,37 +158,26 @@ class Commissioning(RecordPart):
 
         Args:
             step: which.
-            subject: with what of several; "" = whatever was last. A record that names
-                none may be of any.
+            subject: with what of several; "" = whatever was last.
         """
         found = [
             done
             for done in self.steps
-            if done.step is step and (not subject or done.subject in ("", subject))
+            if done.step is step and subject in ("", done.subject)
         ]
-        return max(
-            found,
-            key=lambda done: (bool(subject) and done.subject == subject, done.ended),
-            default=None,
-        )
+        return max(found, key=lambda done: done.ended, default=None)
 
     def with_step(self, done: StepRecord) -> Self:
-        """Return it with a step in its place; the chain is made anew, names go."""
-        steps = [
-            old
-            for old in self.steps
-            if old.step is not done.step or old.subject not in ("", done.subject)
-        ]
+        """Return it with a step in its place; the chain is made anew."""
+        steps = [old for old in self.steps if _place(old) != _place(done)]
         steps = sorted([*steps, done], key=_place)
         chained = _chain(steps, self.told)
-        return self.model_copy(update={"steps": chained, "signed": ()})
+        return self.model_copy(update={"steps": chained})
 
     def with_told(self, name: str, when: datetime) -> Self:
         """Return it with what a person says of a basis; the chain is made anew."""
         told = {**self.told, name: when}
-        return self.model_copy(
-            update={"told": told, "steps": _chain(self.steps, told), "signed": ()}
-        )
+        return self.model_copy(update={"told": told, "steps": _chain(self.steps, told)})
 
     def told_inputs(self) -> dict[str, str]:
         """Return digests of what a person said, by the names of `steps.BASES`."""
@@ -256,11 +218,7 @@ def read_commissioning(folder: Path) -> Commissioning | None:
     Raises:
         SettingsError: it cannot be read, is no such file, or was changed.
     """
-    return read_record(folder / NAME)
-
-
-def read_record(path: Path) -> Commissioning | None:
-    """Return what stands in a file; None, Raises: as `read_commissioning`."""
+    path = folder / NAME
     try:
         found = Commissioning.model_validate_json(read_regular(path, _LARGEST))
     except FileNotFoundError:
@@ -283,17 +241,7 @@ def _unreadable(path: Path, why: str) -> SettingsError:
     return SettingsError(f"{path} cannot be read: {why}.", hint=_ANEW)
 
 
-def newest_kept(folder: Path) -> Path | None:
-    """Return the last signed record that a later one took the place of."""
-    return max(folder.glob(f"{Path(NAME).stem}_*.json"), default=None)
-
-
-def kept_name(content: Commissioning) -> str:
-    """Return the name of a signed record once a later one takes its place."""
-    return f"{Path(NAME).stem}_{content.steps[-1].ended:%Y%m%dT%H%M%S}.json"
-
-
-def write_commissioning(folder: Path, content: Commissioning, name: str = NAME) -> None:
+def write_commissioning(folder: Path, content: Commissioning) -> None:
     """Write it whole, or leave the earlier one.
 
     Raises:
@@ -301,4 +249,4 @@ def write_commissioning(folder: Path, content: Commissioning, name: str = NAME) 
     """
     text = json.dumps(content.model_dump(mode="json"), indent=1) + "\n"
     with open_directory(folder) as directory:
-        replace_file(directory, name, text.encode())
+        replace_file(directory, NAME, text.encode())

@@ -8,7 +8,6 @@ from experiments.commissioning import daily
 from experiments.commissioning.gate import (
     COMPLETE,
     FIELD,
-    accepted,
     lacks,
     require,
 )
@@ -58,7 +57,6 @@ def check_commissioned(
     said_daily = _check_daily(rig, record, now, add)
     further = [lack.text for lack in found if lack.step not in GATED]
     said = [f"uncommissioned: {'; '.join(further)}"] if further else []
-    said += accepted(record, rig.row.name) if record is not None else []
     if said:
         text = ". ".join(said)
         add(WARNING, FIELD, text)

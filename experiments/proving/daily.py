@@ -47,14 +47,14 @@ _WAY_BACK = (
 
 
 def do_daily(
-    scene: Scene, files: RecordFolder, persons: tuple[str, str], *, is_simulated: bool
+    scene: Scene, files: RecordFolder, operator: str, *, is_simulated: bool
 ) -> DailyCheck:
     """Do the check, write what came of it and return that.
 
     Args:
         scene: the rig and the terminal.
         files: the commissioning that it is compared with.
-        persons: operator and witness.
+        operator: who does it.
         is_simulated: the arm is.
 
     Raises:
@@ -72,8 +72,7 @@ def do_daily(
     check = DailyCheck(
         started=started,
         ended=ended,
-        operator=persons[0],
-        witness=persons[1],
+        operator=operator,
         raw=raw,
         quantities=judgement.quantities,
         cause=judgement.cause,

@@ -16,7 +16,6 @@ from wam.model.arm_model import ArmModel
 from wam.model.constants import GRAVITY, Array, load_constants
 
 _PRIOR = np.radians(1.5)  # of each of the twelve angles
-_FREE = np.radians(45.0)  # of one that may be as large as it likes
 _DIRECTION, _STOP = np.radians(1.0), np.radians(0.6)  # spreads of what is measured
 _STEP = 1e-6  # rad, of derivatives
 _ROUNDS = 6
@@ -64,21 +63,14 @@ class HungFit:
         sole: where the string pulls in the sensor frame [m], shape (3,).
         way: angle between the weight and down, worst pose [degrees].
         angles: what `FITTED` are off by [rad], shape (12,).
-        spreads: standard deviations of these [rad], shape (12,).
         worst: index of the largest angle.
-        worst_angle: the same angle where it alone may be as large as it likes [rad]; by
-            the others' prior it is told too small.
-        worst_spread: standard deviation of that [rad].
     """
 
     scale: Array
     sole: Array
     way: float
     angles: Array
-    spreads: Array
     worst: int
-    worst_angle: float
-    worst_spread: float
 
 
 def fit_foot(values: Values) -> FootFit:
@@ -118,20 +110,13 @@ def fit_hung(values: Values) -> HungFit:
     ways = [angle(each @ force, _DOWN) for each, force in zip(R, forces, strict=True)]
     arms = np.concatenate([cross_matrix(force).T for force in forces])
     sole, *_ = np.linalg.lstsq(arms, loads[:, 3:].ravel())
-    priors = np.full(len(FITTED), _PRIOR)
-    angles, spreads = _fit_angles(values, forces, model, priors)
-    worst = int(np.abs(angles).argmax())
-    priors[worst] = _FREE
-    freed = _fit_angles(values, forces, model, priors)
+    angles = _fit_angles(values, forces, model)
     return HungFit(
         scale=np.linalg.norm(forces, axis=1) / (number(values, "hung") * GRAVITY),
         sole=sole.astype(np.float64),
         way=max(ways),
         angles=angles,
-        spreads=spreads,
-        worst=worst,
-        worst_angle=float(freed[0][worst]),
-        worst_spread=float(freed[1][worst]),
+        worst=int(np.abs(angles).argmax()),
     )
 
 
@@ -141,16 +126,13 @@ def orientations(values: Values, model: ArmModel) -> Array:
     return np.array(turned)
 
 
-def _fit_angles(
-    values: Values, forces: Array, model: ArmModel, priors: Array
-) -> tuple[Array, Array]:
-    """Return what zeros, base and sensor are off by, and spreads [rad], (12,) each.
+def _fit_angles(values: Values, forces: Array, model: ArmModel) -> Array:
+    """Return what zeros, base and sensor are off by [rad], shape (12,).
 
     Args:
         values: of C7.
         forces: of the hung weight in the sensor's frame [N], shape (n, 3).
         model: of the arm.
-        priors: standard deviations of what they are off by [rad], shape (12,).
     """
     seen = forces / np.linalg.norm(forces, axis=1)[:, None]
     angles = np.zeros(len(FITTED))
@@ -160,17 +142,16 @@ def _fit_angles(
         parts = (
             ((told - seen) / _DIRECTION).ravel(),
             (x[:7] - values["stops"]) / _STOP,
-            x / priors,
+            x / _PRIOR,
         )
         return np.concatenate(parts)
 
     steps = np.eye(len(angles)) * _STEP
-    slopes = np.zeros((0, len(angles)))
     for _ in range(_ROUNDS):
         here = left(angles)
         slopes = np.array([(left(angles + step) - here) / _STEP for step in steps]).T
         angles = angles - np.linalg.lstsq(slopes, here)[0]
-    return angles, np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)))
+    return angles
 
 
 def _down(values: Values, model: ArmModel, q: Array, x: Array) -> Array:

@@ -5,16 +5,13 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from acquisition.errors import SettingsError
 from experiments import provenance
 from experiments.commissioning.gate import lacks, require
 from experiments.commissioning.inputs import inputs_of
 from experiments.commissioning.record import (
-    Acceptance,
     Commissioning,
     Measured,
     StepRecord,
-    kept_name,
     read_commissioning,
     write_commissioning,
 )
@@ -23,7 +20,7 @@ from experiments.messages import preflight_error
 from experiments.operator.console import BAD, GOOD, WARNING, Console
 from experiments.proving import bus, by_hand
 from experiments.proving.limits import Judgement
-from experiments.proving.recording import Values, read_raw, write_raw
+from experiments.proving.recording import read_raw, write_raw
 from experiments.proving.scene import Scene
 from experiments.proving.work import WORK
 from experiments.rig.rig import Rig
@@ -57,39 +54,18 @@ class RecordFolder:
         return cls(folder, record)
 
     def keep(self, done: StepRecord) -> None:
-        """Write the record with a step in its place; a signed one is kept beside."""
-        if self.record.signed:
-            write_commissioning(self.folder, self.record, kept_name(self.record))
+        """Write the record with a step in its place."""
         self.record = self.record.with_step(done)
         write_commissioning(self.folder, self.record)
 
     def tell(self, name: str, when: datetime) -> None:
         """Write that a basis of `steps.BASES` changed, as a person says."""
-        if self.record.signed:
-            write_commissioning(self.folder, self.record, kept_name(self.record))
         self.record = self.record.with_told(name, when)
-        write_commissioning(self.folder, self.record)
-
-    def recordings(self) -> dict[ProofStep, Values]:
-        """Return what every step recorded that was done.
-
-        Raises:
-            SettingsError: a recording is missing, or is not what was recorded.
-        """
-        return {
-            done.step: read_raw(self.folder, done.raw[0])
-            for done in self.record.steps
-            if done.raw
-        }
-
-    def sign(self, names: tuple[str, str]) -> None:
-        """Write the two names at its end."""
-        self.record = self.record.model_copy(update={"signed": names})
         write_commissioning(self.folder, self.record)
 
 
 def do_step(
-    scene: Scene, step: ProofStep, files: RecordFolder, persons: tuple[str, str]
+    scene: Scene, step: ProofStep, files: RecordFolder, operator: str
 ) -> Judgement:
     """Do one step and write what came of it.
 
@@ -97,7 +73,7 @@ def do_step(
         scene: the rig and the terminal.
         step: which.
         files: the record.
-        persons: operator and witness.
+        operator: who does it.
 
     Raises:
         PreflightError: the arm is not fit, or a person did not do what was asked.
@@ -133,8 +109,7 @@ def do_step(
             subject=scene.rig.row.name if step is ProofStep.CONTAINER else "",
             started=started,
             ended=ended,
-            operator=persons[0],
-            witness=persons[1],
+            operator=operator,
             inputs=inputs_of(step, present),
             raw=(raw,),
             quantities=judgement.quantities,
@@ -154,30 +129,6 @@ def _commissioned_with(files: RecordFolder) -> list[int | None]:
     values = read_raw(files.folder, identity.raw[0])
     is_wrong = identity.verdict == "wrong"
     return bus.commissioned_with(values) if is_wrong else bus.serials_of(values)
-
-
-def accept(files: RecordFolder, done: StepRecord, acceptance: Acceptance) -> None:
-    """Write that two persons accept a step that failed.
-
-    Raises:
-        SettingsError: it did not fail, its recording is not there, or what failed is
-            nothing that a person may accept.
-    """
-    if not done.cause:
-        raise SettingsError(
-            f"{done.name} is sound: there is nothing to accept.", hint=_NOTHING
-        )
-    judgement = WORK[done.step].judge(read_raw(files.folder, done.raw[0]))
-    if judgement.barred:
-        raise SettingsError(
-            f"Nobody may accept this of {done.name}: {'; '.join(judgement.barred)}.",
-            hint=f"{WORK[done.step].way_back} {_NOTHING}",
-        )
-    changes = {"verdict": "accepted", "accepted": acceptance}
-    files.keep(done.model_copy(update=changes))
-
-
-_NOTHING = "Nothing was written."
 
 
 def wanted(
@@ -201,11 +152,6 @@ def say_judgement(console: Console, step: ProofStep, judgement: Judgement) -> No
     if judgement.cause:
         console.check(BAD, name, judgement.cause)
         console.say(f"   {WORK[step].way_back}")
-        if not judgement.barred:
-            console.say(
-                "   If it is right as it is, two persons may accept it: traction "
-                f"commission --accept {step}"
-            )
         return
     most = sorted(judgement.quantities, key=_nearness, reverse=True)[:SHOWN]
     text = ", ".join(each.text for each in judgement.quantities if each in most)
@@ -230,19 +176,14 @@ def recheck(files: RecordFolder, console: Console) -> bool:
         (raw,) = done.raw
         judgement = WORK[done.step].judge(read_raw(files.folder, raw))
         say_judgement(console, done.step, judgement)
-        is_sound = is_sound and not (judgement.cause and done.accepted is None)
-        if done.accepted is not None:
-            console.say("   it was accepted by two persons")
-        is_kept = done.accepted is not None and bool(judgement.cause)
+        is_sound = is_sound and not judgement.cause
         verdict = "wrong" if judgement.cause else "sound"
-        verdict = done.verdict if is_kept else verdict
         if (judgement.quantities, verdict) != (done.quantities, done.verdict):
             console.say(f"   it was {done.verdict}; the record says so now")
             changed = {
                 "quantities": judgement.quantities,
                 "verdict": verdict,
                 "cause": judgement.cause,
-                "accepted": done.accepted if is_kept else None,
             }
             files.keep(done.model_copy(update=changed))
     return is_sound

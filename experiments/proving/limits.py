@@ -4,7 +4,6 @@ Measured on simulated sound arms, with room for real ones; each record keeps the
 it was judged by, so that they can be revised from data.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -37,12 +36,10 @@ class Found:
     Attributes:
         measured: the quantity with its limits.
         wrong: the matter.
-        may_be_accepted: two persons may take the responsibility for it.
     """
 
     measured: Measured
     wrong: str
-    may_be_accepted: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,13 +49,11 @@ class Judgement:
     Attributes:
         quantities: in the order in which they were judged.
         cause: the first contradiction, in words; "" = none.
-        barred: what failed that nobody may accept, in words.
         notes: what is not as expected and keeps nobody from going on, in words.
     """
 
     quantities: tuple[Measured, ...]
     cause: str
-    barred: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
 
@@ -457,23 +452,6 @@ LIMITS: Mapping[str, Limit] = {
 }
 
 
-# What two persons may accept, within twice its limits: what an arm, a foot or a place
-# is like. Nobody accepts another master, late or lost replies, a stop that does not
-# stop, the sense or order of an encoder or a motor, an arm that moves without torque or
-# under its compensation, or limits that the module did not keep. What pucks say is
-# taken into the file that [arm] properties of rig.toml names, property by property.
-ACCEPTABLE = frozenset(
-    {
-        *("unusual", "drawings", "replaced", "travel", "stop_angle"),
-        *("force_left", "foot_mass", "weight_way", "foot_centre", "moment_left"),
-        *("hung_scale", "hung_spread", "fitted", "sole", "hung_way", "weight"),
-        *("stiffness", "lag"),
-        *("flat", "incline", "heading", "far_end", "short", "scale", "balance"),
-    }
-)
-_ACCEPTED = 2.0  # times the limit
-
-
 def found(
     key: str,
     value: float,
@@ -499,34 +477,12 @@ def found(
         low=limit.low if low is None else low,
         high=limit.high if high is None else high,
     )
-    return Found(
-        measured,
-        limit.wrong.format(**fields) if fields else limit.wrong,
-        key in ACCEPTABLE and _share(measured) <= _ACCEPTED,
-    )
-
-
-def _share(measured: Measured) -> float:
-    """Return how far out a value is, 1 on a limit; 0 where it is a number of things."""
-    low, high = measured.low, measured.high
-    if low is not None and high is not None:
-        middle, half = (low + high) / 2.0, (high - low) / 2.0
-        return abs(measured.value - middle) / half if half > 0.0 else math.inf
-    if high is not None:
-        return measured.value / high if high > 0.0 else 0.0
-    if low is not None:
-        return low / measured.value if measured.value > 0.0 else math.inf
-    return 0.0
+    return Found(measured, limit.wrong.format(**fields) if fields else limit.wrong)
 
 
 def judged(rows: Sequence[Found], notes: Sequence[str] = ()) -> Judgement:
     """Return what a step's quantities say together; the first that fails is named."""
     first = next((row for row in rows if not row.measured.is_within), None)
     cause = "" if first is None else f"{first.measured.text}. {first.wrong}"
-    barred = tuple(
-        row.measured.text
-        for row in rows
-        if not (row.measured.is_within or row.may_be_accepted)
-    )
     quantities = tuple(row.measured for row in rows)
-    return Judgement(quantities, cause[:400], barred, tuple(notes))
+    return Judgement(quantities, cause[:400], tuple(notes))

@@ -88,7 +88,8 @@ WORK: Mapping[ProofStep, StepWork] = {
         bus.judge_identity,
         1,
         "Is this the arm and the puck it should be? What is right as it is goes into "
-        "the file that [arm] properties of rig.toml names.",
+        "the file that [arm] properties of rig.toml names. Where a puck was replaced, "
+        "move commissioning.json away: every step is done again.",
     ),
     ProofStep.TIMING: StepWork(
         _time,

@@ -58,7 +58,6 @@ def record_of(
             started=when,
             ended=when,
             operator="one",
-            witness="two",
             inputs=inputs_of(step, present),
             verdict="sound",
         )

@@ -1,6 +1,5 @@
 """The first day by its command: who is on the bus, the stop circuit, the rest pose."""
 
-import importlib
 from collections.abc import Sequence
 
 import numpy as np
@@ -26,8 +25,6 @@ _CARRIED = 2.5  # s, in which hands bring the arm into a pose
 _COMES_TO_REST = 1.0  # s, until an arm that is held or let go of is still
 _FRICTION = "0.7"  # of the joints, as a share of what was identified on another arm
 _STOPPED = 3  # exit code: a step found something wrong
-# What each command draws its page with: loaded once, and there in those forked later.
-_PAGE = "experiments.report.commissioning"
 _ON_THE_BUS = GATED[1 : GATED.index(ProofStep.BY_HAND)]
 _BEFORE_TORQUE = GATED[: GATED.index(ProofStep.REST_POSE)]
 _ON_REST_POSE = GATED[len(_BEFORE_TORQUE) :]
@@ -103,13 +100,11 @@ def wrong_arms(room: MachineRoom) -> Figures:
 
 def _pushed(room: MachineRoom, *options: str) -> Program:
     """Return an arm with the friction of many, held by a hand that may let go of it."""
-    importlib.import_module(_PAGE)
     return served_arm(room, "--friction", _FRICTION, *options)
 
 
 def _at_home(room: MachineRoom, *options: str) -> Program:
     """Return `traction fake`: an arm at home, computed and answered in the machine."""
-    importlib.import_module(_PAGE)
     set_up_both(room.shell)
     room.write_bus_config()
     return room.serve_home_arm("--hand", "none", *options)

@@ -6,10 +6,9 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from acquisition.errors import PreflightError, SettingsError
-from experiments.commissioning.gate import accepted, bases_of, lacks, require
+from experiments.commissioning.gate import bases_of, lacks, require
 from experiments.commissioning.record import (
     NAME,
-    Acceptance,
     Commissioning,
     Measured,
     StepRecord,
@@ -28,7 +27,6 @@ def done(step, **changed):
         "started": NOON,
         "ended": NOON + timedelta(minutes=5),
         "operator": "one",
-        "witness": "two",
         "inputs": {name: INPUTS[name] for name in bases_of(step)},
         "quantities": (Measured(name="travel", value=1.25, unit="%", high=1.7),),
         "verdict": "sound",
@@ -37,14 +35,14 @@ def done(step, **changed):
 
 
 def whole(*steps):
-    record = Commissioning(program="0.3.0", serials=(1, 2, 3, 4, 5, 6, None))
+    record = Commissioning(program="0.3.0")
     for step in steps or ORDER:
         record = record.with_step(done(step))
     return record
 
 
 def test_what_is_written_is_read(tmp_path):
-    record = whole().model_copy(update={"signed": ("one", "two")})
+    record = whole()
     write_commissioning(tmp_path, record)
     assert read_commissioning(tmp_path) == record
 
@@ -53,12 +51,10 @@ def test_a_folder_without_the_file_has_none(tmp_path):
     assert read_commissioning(tmp_path) is None
 
 
-def test_a_step_that_is_done_again_takes_its_place_and_the_names_go():
-    record = whole().model_copy(update={"signed": ("one", "two")})
-    again = record.with_step(done(ProofStep.TIMING, cause="a slow adapter"))
+def test_a_step_that_is_done_again_takes_its_place():
+    again = whole().with_step(done(ProofStep.TIMING, cause="a slow adapter"))
     assert [one.step for one in again.steps] == list(ORDER)
     assert again.of(ProofStep.TIMING).cause == "a slow adapter"
-    assert again.signed == ()
     assert again.first_broken() is None
 
 
@@ -86,7 +82,7 @@ def test_a_step_that_was_taken_out_is_noticed_at_the_next(tmp_path):
 HOSTILE = {
     "nothing": "",
     "no object": "[]",
-    "another version": '{"version": 2, "program": "x"}',
+    "another version": '{"version": 1, "program": "x"}',
     "an unknown key": '{"program": "x", "steps": [], "torque": 1}',
     "a text for a number": '{"program": 1}',
     "no end": '{"program": "x", "steps": [' + "[" * 5000,
@@ -213,7 +209,7 @@ def test_a_quantity_stands_beside_its_limits(value, low, high, passes, text):
     assert (quantity.is_within, quantity.text) == (passes, text)
 
 
-# --- one of several, and accepted ----------------------------------------------------
+# --- one of several -------------------------------------------------------------------
 
 
 def test_every_terrain_keeps_its_own_container():
@@ -236,61 +232,3 @@ def test_every_terrain_keeps_its_own_container():
     again = record.with_step(done(ProofStep.CONTAINER, subject="S0", cause="moved"))
     assert again.of(ProofStep.CONTAINER, "S0").cause == "moved"
     assert again.of(ProofStep.CONTAINER, "S10") is not None
-
-
-def test_a_container_of_an_earlier_record_is_of_any_terrain_until_it_is_done_again():
-    record = whole()
-    assert lacks(record, INPUTS, NOON, "S0") == []
-    again = record.with_step(done(ProofStep.CONTAINER, subject="S0"))
-    assert [one.subject for one in again.steps if one.subject] == ["S0"]
-    assert len(again.steps) == len(ORDER)
-
-
-ACCEPTANCE = Acceptance(names=("Ada", "Grace"), reason="a new cable", when=NOON)
-
-
-def test_what_was_accepted_counts_and_is_said_without_the_names(tmp_path):
-    record = whole().with_step(
-        done(
-            ProofStep.OWN_WEIGHT,
-            verdict="accepted",
-            cause="the cable pulls",
-            accepted=ACCEPTANCE,
-        )
-    )
-    write_commissioning(tmp_path, record)
-    read = read_commissioning(tmp_path)
-    assert read == record
-    assert lacks(read, INPUTS, NOON) == []
-    assert accepted(read, "S0") == [
-        "accepted by two persons: C6 own weight (the cable pulls)"
-    ]
-
-
-@pytest.mark.parametrize(
-    ("old", "new"), [("Ada", "Eve"), ("a new cable", "nothing"), ("Grace", "Ada")]
-)
-def test_persons_and_reasons_are_not_changed_unseen(tmp_path, old, new):
-    failed = done(ProofStep.OWN_WEIGHT, verdict="accepted", accepted=ACCEPTANCE)
-    write_commissioning(tmp_path, whole().with_step(failed))
-    path = tmp_path / NAME
-    path.write_text(path.read_text().replace(old, new))
-    with pytest.raises(SettingsError, match="was changed at or before C6 "):
-        read_commissioning(tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("verdict", "who"), [("accepted", None), ("sound", ACCEPTANCE)]
-)
-def test_a_step_is_accepted_by_somebody_or_does_not_count(verdict, who):
-    failed = done(ProofStep.OWN_WEIGHT, verdict=verdict, accepted=who)
-    (lack,) = lacks(whole().with_step(failed), INPUTS, NOON)
-    assert lack.text == f"C6 own weight: {verdict}, by whom?"
-
-
-def test_a_record_of_a_former_version_keeps_its_digests():
-    # Made before a step could be of one of several, or accepted.
-    step = done(ProofStep.TIMING, inputs={}, quantities=())
-    assert step.chained("0" * 64).digest == (
-        "e0684ca75e3849d966a89df1c9ad439c729b2d06ce1d0b13f6c3f2c84f708217"
-    )

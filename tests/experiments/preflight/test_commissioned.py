@@ -13,7 +13,7 @@ from experiments.commissioning.daily import (
 )
 from experiments.commissioning.inputs import inputs_of, present_inputs
 from experiments.commissioning.record import NAME, Raw, write_commissioning
-from experiments.commissioning.steps import GATED, ORDER
+from experiments.commissioning.steps import GATED, ORDER, ProofStep
 from experiments.operator.console import BAD, GOOD, WARNING
 from experiments.preflight.commissioned import check_commissioned
 from experiments.preflight.connecting import connect_rig
@@ -116,7 +116,9 @@ def test_a_record_of_every_step_is_complete(config):
     record = sound_record(arm.rig, arm.info)
     present = present_inputs(arm.rig, arm.rig.backend.arm.answers(), arm.info)
     for step in ORDER[len(GATED) :]:
-        changes = {"step": step, "inputs": inputs_of(step, present)}
+        subject = "S0" if step is ProofStep.CONTAINER else ""
+        inputs = inputs_of(step, present)
+        changes = {"step": step, "subject": subject, "inputs": inputs}
         record = record.with_step(record.steps[0].model_copy(update=changes))
     write_commissioning(config.parent, record)
     said = {"commissioning": "complete", "daily_check": "commissioned today"}
@@ -149,7 +151,6 @@ def checked(config, hours, cause="", *, is_simulated=False):
         started=ended,
         ended=ended,
         operator="one",
-        witness="",
         raw=Raw(file="daily.npz", sha256="0" * 64),
         quantities=(),
         cause=cause,

@@ -18,7 +18,6 @@ from experiments.proving.fits import fit_foot
 from experiments.proving.guide import RecordFolder
 from experiments.proving.recording import texts
 from experiments.proving.weights import POSES
-from experiments.report.daily import write_history_page
 from experiments.rig.build import build_tool
 from experiments.settings.load import load_settings
 from tests.experiments.proving.held_arm import HeldArm
@@ -161,7 +160,6 @@ def check(days, lifted_at=1.0, cause=""):
         started=ended - timedelta(minutes=2),
         ended=ended,
         operator="Ada <A>",
-        witness="",
         raw=Raw(file="daily.npz", sha256="0" * 64),
         quantities=(
             Measured(name=name, value=lifted_at, unit="", low=0.85, high=1.15),
@@ -178,21 +176,3 @@ def test_a_history_is_read_as_it_was_written_and_counts_for_a_day(tmp_path):
     assert not read_history(tmp_path, is_simulated=True).checks
     assert history.counts_at(NOON + timedelta(days=1, hours=16))
     assert not history.counts_at(NOON + timedelta(days=1, hours=17))
-
-
-def test_its_page_draws_the_drift_beside_the_limits(tmp_path):
-    history = DailyHistory(is_simulated=True)
-    for days, value in enumerate((1.0, 0.95, 0.8)):
-        cause = "it drifts" if days > 1 else ""
-        history = history.with_check(check(days, value, cause))
-    text = write_history_page(tmp_path, history).read_text()
-    for words in (
-        "0.8",
-        "\u22120.2",
-        "it drifts",
-        "Ada &lt;A&gt;",
-        "2026-11-28",
-        "<svg",
-    ):
-        assert words in text
-    assert text.count("<svg") == 1  # masters are not drawn
