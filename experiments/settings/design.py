@@ -1,4 +1,4 @@
-"""matrix.toml of version 2: factors, defaults, cells and crosses, made into rows.
+"""matrix.toml: factors, defaults, cells and crosses, made into rows.
 
 A cell states every factor, or "-" where one does not apply; a cross stands for every
 combination of its lists. Where a cell stands follows from a place of rig.toml, or from
@@ -103,9 +103,9 @@ _VARIED = frozenset(
 
 
 class DesignFile(SettingsSection):
-    """A matrix.toml of version 2, cells and crosses not looked into yet."""
+    """A matrix.toml, cells and crosses not looked into yet."""
 
-    version: Literal[2]
+    version: Literal["1.0"]
     factors: tuple[DesignFactor, ...] = Field(default=(), max_length=MOST_FACTORS)
     design: Design = Design()
     defaults: dict[str, Any] = Field(default_factory=dict[str, Any])
@@ -132,7 +132,7 @@ class _Stated:
 def resolve_design(
     file: DesignFile, text: str, places: Mapping[str, StatedPlace], feet: Sequence[str]
 ) -> MatrixSettings:
-    """Return the rows that a file of version 2 stands for.
+    """Return the rows that a file stands for.
 
     Args:
         file: the file.

@@ -9,11 +9,12 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from acquisition.errors import SettingsError
+from acquisition.formats import format_problem
 from acquisition.settings import parse_toml, read_text
 from experiments.arguments import did_you_mean
 from experiments.settings.design import DesignFile, resolve_design
-from experiments.settings.explaining import explain, line_of
-from experiments.settings.matrix import MatrixSettings, TerrainRow, Version1Matrix
+from experiments.settings.explaining import explain
+from experiments.settings.matrix import MatrixSettings, TerrainRow
 from experiments.settings.numbers import beyond_real, unusual_numbers
 from experiments.settings.places import StatedPlace, TaughtPlace
 from experiments.settings.rig import FootSection, RigSettings
@@ -245,32 +246,20 @@ def _taught(name: str, place: StatedPlace, folder: Path) -> StatedPlace:
 
 
 def load_matrix(text: str, rig: RigSettings) -> MatrixSettings:
-    """Return the rows of a matrix.toml of either version.
+    """Return the rows of a matrix.toml.
 
     Raises:
-        SettingsError: no TOML, or a wrong key or value, or one that the rig has not.
+        SettingsError: no TOML, of another version, or a wrong key or value, or one that
+            the rig has not.
     """
-    if "version" in _toml(text, "matrix.toml"):
-        file = _parse(DesignFile, text, "matrix.toml")
-        return resolve_design(file, text, rig.places, tuple(rig.feet))
-    old = _parse(Version1Matrix, text, "matrix.toml")
-    names = [row.name for row in old.terrains]
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
+    table = _toml(text, "matrix.toml")
+    if problem := format_problem(table.get("version")):
         raise SettingsError(
-            f"matrix.toml: terrain {twice[0]!r} occurs twice.",
-            hint="Every row needs a name of its own. Nothing was started.",
+            f"matrix.toml {problem}.",
+            hint="traction init DIR writes one to be edited. Nothing was started.",
         )
-    for number, row in enumerate(old.terrains):
-        if row.foot not in rig.feet:
-            line = line_of(text, f"terrains[{number}].foot")
-            raise SettingsError(
-                f'matrix.toml: terrains[{number}].foot = "{row.foot}" - expected '
-                f"a foot of rig.toml: {', '.join(rig.feet)} (line {line}).",
-                hint="Nothing was started.",
-            )
-    rows = tuple(TerrainRow.model_validate(row.model_dump()) for row in old.terrains)
-    return MatrixSettings(terrains=rows)
+    file = _validated(DesignFile, table, text, "matrix.toml")
+    return resolve_design(file, text, rig.places, tuple(rig.feet))
 
 
 def read_foot(path: Path) -> FootSection:

@@ -1,7 +1,6 @@
 """The matrix: what stands in matrix.toml once it is read, a row per terrain.
 
-A file of version 1 has one table per terrain. One of version 2 names factors and cells
-(`design`); both end here.
+The file names factors, cells and crosses; `design` makes the rows.
 """
 
 import math
@@ -120,44 +119,18 @@ class Design(SettingsSection):
     seed: Annotated[Whole, Field(ge=0, le=2**31)] = 1
 
 
-class _Row(SettingsSection):
-    """What rows of either version have.
-
-    `reset`: what a person does to the terrain before every trial.
-    """
-
-    name: CellName = Field(examples=["S10"])
-    foot: FootName = Field(examples=["tread"])
-    far_end: FarEnd = Field(examples=[[0.70, 0.0, 0.12]])
-    heading_deg: Heading = Field(examples=[0.0])
-    travel: Travel = Field(examples=[0.45])
-    trials: Trials = Field(examples=[10])
-    reset: Tasks = Field(
-        default=RESET, examples=[["rake", "level", "foot at the far end"]]
-    )
-    calibration: File | None = Field(default=None, examples=["terrain_S10.toml"])
-
-
-class Version1Row(_Row):
-    """One table of a matrix.toml without a version."""
-
-    stones: Literal["small", "big", "none"] = Field(examples=["small"])
-    incline_deg: Annotated[Number, Usual(0.0, 20.0, "degrees")] = Field(
-        ge=0, le=30, examples=[10.0]
-    )
-    start_q: Angles = Field(examples=[[0, 0.77, 0, 1.19, 0, 1.19, 0]])
-
-
-class Version1Matrix(SettingsSection):
-    """A matrix.toml without a version."""
-
-    terrains: tuple[Version1Row, ...] = Field(min_length=1)
-
-
-class TerrainRow(_Row):
+class TerrainRow(SettingsSection):
     """One row of the matrix: a terrain, the foot, the way across, the factors.
 
     Attributes:
+        name: of the terrain.
+        foot: of rig.toml.
+        far_end: where the foot starts, in the base frame [m].
+        heading_deg: direction from the base to the container [degrees].
+        travel: length of a push [m].
+        trials: how many are to be kept.
+        reset: what a person does to the terrain before every trial.
+        calibration: file of the container as calibrated; None = it was not.
         stones: size of the stones as recordings state it: small, big, none, e.g.
             "12 mm", "fine", or "stones" of unknown size.
         incline_deg: of the container, positive where its far end is high [degrees].
@@ -170,6 +143,14 @@ class TerrainRow(_Row):
         simulate: by parameter of the simulated ground, what its words multiply it by.
     """
 
+    name: CellName
+    foot: FootName
+    far_end: FarEnd
+    heading_deg: Heading
+    travel: Travel
+    trials: Trials
+    reset: Tasks = RESET
+    calibration: File | None = None
     stones: Annotated[str, Field(max_length=24)]
     incline_deg: Incline
     push_deg: Push = 0

@@ -1,7 +1,7 @@
 """Every setting by its dotted name: its value, and where it comes from."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, cast
+from typing import cast
 
 from acquisition.settings import parse_toml
 from analysis.data.recorded_factors import value_text
@@ -34,27 +34,42 @@ def flatten(value: object, prefix: str = "") -> dict[str, object]:
 def origin_lines(settings: Settings) -> list[str]:
     """Return one line per setting: name, value, file and line it comes from.
 
-    A cell of version 2 is one line: it is made of several tables.
+    A cell is one line: it is made of several tables.
     """
+    matrix = settings.matrix
+    origin = _origin(settings, "matrix.toml")
+    design = matrix.model_dump(exclude={"terrains"})
+    rig = settings.rig_text, "rig.toml"
+    return [
+        *_lines(settings, settings.rig.model_dump(), parse_toml(rig[0]), *rig),
+        *(f"{_cell(row)}   ({origin})" for row in matrix.terrains),
+        *_lines(settings, design, design, settings.matrix_text, "matrix.toml"),
+    ]
+
+
+def _lines(
+    settings: Settings,
+    values: Mapping[str, object],
+    given: Mapping[str, object],
+    text: str,
+    file: str,
+) -> list[str]:
+    """Return one line per value of a file.
+
+    Args:
+        settings: all of them.
+        values: what is in force.
+        given: what the file states.
+        text: of the file.
+        file: its name.
+    """
+    origin, stated = _origin(settings, file), flatten(given)
     lines: list[str] = []
-    files: tuple[tuple[str, Any, str], ...] = (
-        ("rig.toml", settings.rig, settings.rig_text),
-        ("matrix.toml", settings.matrix, settings.matrix_text),
-    )
-    for file, model, text in files:
-        table, dump = parse_toml(text), model.model_dump()
-        origin = _origin(settings, file)
-        has_cells = "version" in table
-        if has_cells:
-            del dump["terrains"]
-            lines += [f"{_cell(r)}   ({origin})" for r in settings.matrix.terrains]
-        values = flatten(dump)
-        given = values if has_cells else flatten(table)
-        for name, value in values.items():
-            line = line_of(text, name) if name in given else None
-            location = f"{origin}, line {line}" if line else origin
-            source = location if name in given else f"default, not in {file}"
-            lines.append(f"{name} = {_shown(value)}   ({source})")
+    for name, value in flatten(values).items():
+        line = line_of(text, name) if name in stated else None
+        location = f"{origin}, line {line}" if line else origin
+        source = location if name in stated else f"default, not in {file}"
+        lines.append(f"{name} = {_shown(value)}   ({source})")
     return lines
 
 

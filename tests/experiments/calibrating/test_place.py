@@ -11,7 +11,7 @@ from experiments.settings.places import TaughtPlace
 from tests.experiments.program import traction, write_config
 
 QUICK = ("--fake", "--fast", "--operator-script", "auto")
-CELL = """version = 2
+CELL = """version = "1.0"
 [[cells]]
 name = "T1"
 foot = "tread"

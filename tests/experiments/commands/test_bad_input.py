@@ -120,45 +120,55 @@ SETTINGS = [
     (
         "matrix",
         ("trials = 10", 'trials = "ten"'),
-        'matrix.toml: terrains[0].trials = "ten" - expected a whole number >= 1 and '
+        'matrix.toml: cells[0].trials = "ten" - expected a whole number >= 1 and '
         "<= 99, e.g. 10 (line ",
     ),
     (
         "matrix",
         ("trials = 10", "trials = true"),
-        "matrix.toml: terrains[0].trials = True - expected a whole number",
+        "matrix.toml: cells[0].trials = True - expected a whole number",
     ),
     (
         "matrix",
         ("travel = 0.07", 'travel = "0.07"'),
-        'matrix.toml: terrains[0].travel = "0.07" - expected a number',
+        'matrix.toml: cells[0].travel = "0.07" - expected a number',
     ),
     (
         "matrix",
-        ("trials = 10\n", ""),
-        "matrix.toml: terrains[0].trials is missing, e.g. 10 (line ",
+        ("d50 = 19.0\n", ""),
+        "matrix.toml: S0 does not state d50; write d50 = ",
     ),
     (
         "matrix",
-        ('stones = "small"', 'stones = "tiny"'),
-        "matrix.toml: terrains[0].stones = \"tiny\" - expected 'small', 'big' or ",
+        ("d50 = 19.0", 'd50 = "tiny"'),
+        "matrix.toml: S0: d50 = 'tiny' - expected",
+    ),
+    (
+        "matrix",
+        ('version = "1.0"', "version = 2"),
+        "matrix.toml is of version '2'; this program reads version 1.0. traction init",
+    ),
+    (
+        "matrix",
+        ('version = "1.0"', ""),
+        "matrix.toml states no version; this program reads version 1.0.",
     ),
     (
         "matrix",
         ("travel = 0.07", "travel = nan"),
-        "matrix.toml: terrains[0].travel = nan - expected a number > 0.05 and <= 1.0",
+        "matrix.toml: cells[0].travel = nan - expected a number > 0.05 and <= 1.0",
     ),
     (
         "matrix",
         ('name = "S10"', 'name = "S0"'),
-        "matrix.toml: terrain 'S0' occurs twice.",
+        "matrix.toml: name 'S0' occurs twice",
     ),
     (
         "matrix",
         ('name = "S0"', 'name = "../S0"'),
-        'matrix.toml: terrains[0].name = "../S0" - expected',
+        'matrix.toml: cells[0].name = "../S0" - expected',
     ),
-    ("matrix", ("[[terrains]]", "[[terrains"), "matrix.toml: Expected "),
+    ("matrix", ("\n[[cells]]", "\n[[cells"), "matrix.toml: Expected "),
     (
         "rig",
         ("foot_speed", "foot_sped"),

@@ -46,9 +46,9 @@ def two_terrains(folder):
     """Write settings with a bed of stones and a plate only."""
     config = write_config(folder)
     matrix = config.with_name("matrix.toml")
-    rows = matrix.read_text().split("[[terrains]]")
+    rows = matrix.read_text().split("\n[[cells]]")
     kept = [rows[0], *(r for r in rows if 'name = "B0"' in r or 'name = "TF"' in r)]
-    matrix.write_text("[[terrains]]".join(kept))
+    matrix.write_text("\n[[cells]]".join(kept))
     assert len(load_settings(config).matrix.terrains) == 2
     return config
 

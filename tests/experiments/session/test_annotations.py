@@ -169,14 +169,10 @@ def test_every_setting_is_printed_with_where_it_comes_from(config):
     lines = traction("check", "--config-only", "--config", config).out.splitlines()
     beside = config.with_name("matrix.toml")
     assert line_in(config, 'can.channel = "can0"', "channel = ") in lines
-    assert line_in(beside, "terrains[1].incline_deg = 10.0", "incline_deg = 10") in (
-        lines
-    )
     assert "   arm.mech_at_home = none   (default, not in rig.toml)" in lines
-    reset = "['rake', 'level', 'foot at the far end']"
-    assert f"   terrains[0].reset = {reset}   (default, not in matrix.toml)" in lines
-    wiped = "terrains[6].reset = ['wipe', 'foot at the far end']"
-    assert line_in(beside, wiped, "reset = ") in lines
+    assert line_in(beside, 'factors[0].unit = "mm"', "unit = ") in lines
+    (cell,) = (line for line in lines if line.startswith("   cell S10:"))
+    assert cell.endswith(f"+10 degrees, push 0, 10 trials   ({beside})")
     shipped = traction("check", "--config-only").out
     assert '   can.channel = "can0"   (shipped default, line ' in shipped
     assert tomllib.loads(config.read_text())["can"]["channel"] == "can0"

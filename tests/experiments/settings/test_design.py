@@ -1,11 +1,11 @@
-"""matrix.toml of version 2: factors, cells and crosses."""
+"""matrix.toml: factors, cells and crosses."""
 
 import pytest
 
 from acquisition.errors import SettingsError
 from experiments.settings.load import load_settings
 
-FACTORS = """version = 2
+FACTORS = """version = "1.0"
 [[factors]]
 name = "d50"
 unit = "mm"
@@ -140,7 +140,7 @@ REFUSED = {
     ),
     "nothing": (FACTORS, "there are no [[cells]]"),
     "no ground": (
-        'version = 2\n[[cells]]\nname = "A"\nfoot = "tread"\nplace = "bay"\n',
+        'version = "1.0"\n[[cells]]\nname = "A"\nfoot = "tread"\nplace = "bay"\n',
         'needs ground = "stones", "plate" or "fine"',
     ),
     "too many": (
@@ -166,7 +166,6 @@ REFUSED = {
         FACTORS + "[simulate.moisture.wet]\nhope = 2\n" + CELL,
         "simulate.moisture.wet.hope",
     ),
-    "another version": (changed("version = 2", "version = 3"), "version = 3"),
     "block of nothing": (
         FACTORS + '[design]\norder = "blocked"\nblock_by = ["hope"]\n' + CELL,
         "block_by names 'hope'",
@@ -181,12 +180,6 @@ def test_what_is_wrong_is_refused_with_its_cause(load, name):
         load(text)
     assert cause in raised.value.message
     assert raised.value.message.startswith("matrix.toml: ")
-
-
-def test_a_foot_of_version_1_is_one_of_the_rig(load):
-    text = load_settings(None).matrix_text.replace('"bare"', '"claw"')
-    with pytest.raises(SettingsError, match=r'terrains\[7\].foot = "claw" - expected'):
-        load(text)
 
 
 def test_any_number_of_feet_and_the_errors_of_each(load):
