@@ -4,8 +4,7 @@ A JSON object, nothing that is executed. `_File` is its model; what every key me
 stands in `terrain_db.schema.json` beside this module, its JSON Schema.
 
 Between the points of a table values are linear; outside of it they are those of its
-edge. Version 1 had one mean and sd [N] for the quantiles of a model: it is still read,
-as normal distributions. Version 2 had neither inclines nor factors.
+edge.
 """
 
 import json
@@ -13,20 +12,19 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, Field, model_validator
+from pydantic import AfterValidator, BaseModel, Field, field_validator
 
 from acquisition.errors import SettingsError
 from acquisition.files import UnfitFileError, read_regular
 from acquisition.validation import Entries, Many, first_problem
+from analysis.breakaway.model import BreakAwayModel
 from analysis.data.recorded_factors import checked_factors
 from analysis.data.series import Array
-from analysis.study.distribution import SHARES
+from analysis.terrains.classifier import SurfaceClassifier
 from analysis.terrains.known import KnownTerrain, TerrainDatabase
-from analysis.terrains.parts import Parts, checked_parts
 from analysis.terrains.table import Rows, Table
 
-FORMAT, VERSION = "traction-terrain-db", 3
-_OLD = 1  # mean and sd instead of quantiles
+FORMAT, VERSION = "traction-terrain-db", "1.0"
 LARGEST = 6_000_000  # bytes; in memory it takes thirty times as much
 _MOST = 1_000_000_000  # trials or samples
 _MOST_POINTS = 400  # of an axis
@@ -54,17 +52,20 @@ _Shares = Annotated[
 _Rows = Many[Many[_Finite]]
 _Count = Annotated[int, Field(ge=0, le=_MOST)]
 _Factors = Annotated[dict[str, Any], AfterValidator(checked_factors)]
-_Parts = Annotated[Parts, AfterValidator(checked_parts)]
+
+
+def _break_away(content: Any) -> BreakAwayModel | None:  # noqa: ANN401
+    return None if content is None else BreakAwayModel.from_dict(content)
+
+
+def _surfaces(content: Any) -> SurfaceClassifier | None:  # noqa: ANN401
+    return None if content is None else SurfaceClassifier.from_dict(content)
 
 
 class _Model(BaseModel):
-    """A model of a terrain; mean and sd stand in files of version 1 alone."""
-
     title: str | None = None
     parameters: Any
-    quantiles: Many[_Rows] = ()
-    mean: _Rows = Field(default=(), exclude=True)
-    sd: _Rows = Field(default=(), exclude=True)
+    quantiles: Many[_Rows]
 
 
 class _Terrain(BaseModel):
@@ -76,7 +77,8 @@ class _Terrain(BaseModel):
     rho: float = Field(ge=0.0, lt=1.0)
     limits: Entries[int, float]
     models: Entries[str, _Model]
-    parts: _Parts = Field(default_factory=dict[str, Any])
+    roughness: Entries[int, _Finite] = Field(default_factory=dict[int, float])
+    break_away: Annotated[Any, AfterValidator(_break_away)] = None
 
 
 class _Axes(BaseModel):
@@ -88,7 +90,7 @@ class _File(BaseModel):
     """A database in the order of its file; units are for people."""
 
     format: Literal["traction-terrain-db"]
-    version: Literal[1, 2, 3]
+    version: Literal["1.0"]
     made_utc: str
     simulated: bool
     default: str
@@ -97,14 +99,14 @@ class _File(BaseModel):
     shares: _Shares
     axes: _Axes
     terrains: Entries[str, _Terrain] = Field(min_length=1)
-    parts: _Parts = Field(default_factory=dict[str, Any])
+    surfaces: Annotated[Any, AfterValidator(_surfaces)] = None
 
-    @model_validator(mode="before")
+    @field_validator("version", mode="before")
     @classmethod
-    def _of_version_1(cls, content: Any) -> Any:  # noqa: ANN401
-        if isinstance(content, dict) and content.get("version") == _OLD:
-            return {**content, "recogniser": content.get("default"), "shares": SHARES}
-        return content
+    def _is_read(cls, version: object) -> object:
+        if version != VERSION:
+            raise ValueError(f"it is {version!r:.20}, and only {VERSION} is read")
+        return version
 
 
 def load(path: Path | str) -> TerrainDatabase:
@@ -145,7 +147,7 @@ def _database(file: _File) -> TerrainDatabase:
         },
         file.simulated,
         file.made_utc,
-        file.parts,
+        file.surfaces,
     )
 
 
@@ -168,18 +170,14 @@ def _terrain(name: str, terrain: _Terrain, file: _File) -> KnownTerrain:
         default=file.default,
         titles={key: model.title or key for key, model in models.items()},
         recogniser=file.recogniser,
-        parts=terrain.parts,
+        roughness=terrain.roughness,
+        break_away=terrain.break_away,
     )
 
 
 def _table(model: _Model, file: _File) -> Table:
     F_n, v_t = file.axes.F_n, file.axes.v_t
     shape = (len(F_n), len(v_t))
-    if file.version == _OLD:
-        mean, sd = _array(model.mean, shape), _array(model.sd, shape)
-        if bool((sd < 0.0).any()):
-            raise ValueError("a standard deviation is negative")
-        return Table.normal(F_n, v_t, mean, sd)
     forces = _array(model.quantiles, (len(file.shares), *shape))
     if bool((np.diff(forces, axis=0) < 0.0).any()):
         raise ValueError("a larger share has a smaller quantile")
@@ -195,7 +193,7 @@ def _array(rows: tuple[Any, ...], shape: tuple[int, ...]) -> Array:
 
 
 def to_text(database: TerrainDatabase) -> str:
-    """Return a database as the text of a file, in the current version.
+    """Return a database as the text of a file.
 
     Raises:
         SettingsError: it has no terrain, terrains with different axes, or more than a
@@ -209,6 +207,7 @@ def to_text(database: TerrainDatabase) -> str:
             hint="Fit the terrains together, so that their tables agree.",
         )
     ((F_n, v_t, shares),) = grids
+    surfaces = database.surfaces
     file = _File.model_construct(
         format=FORMAT,
         version=VERSION,
@@ -220,7 +219,7 @@ def to_text(database: TerrainDatabase) -> str:
         shares=shares,
         axes=_Axes.model_construct(F_n=F_n, v_t=v_t),
         terrains={terrain.name: _stored(terrain) for terrain in known},
-        parts=database.parts,
+        surfaces=None if surfaces is None else surfaces.to_dict(),
     )
     text = json.dumps(file.model_dump(), default=str)
     if len(text.encode()) > LARGEST:
@@ -233,6 +232,7 @@ def to_text(database: TerrainDatabase) -> str:
 
 
 def _stored(terrain: KnownTerrain) -> _Terrain:
+    known = terrain.break_away
     return _Terrain.model_construct(
         kind=terrain.kind,
         incline_deg=terrain.incline_deg,
@@ -249,7 +249,8 @@ def _stored(terrain: KnownTerrain) -> _Terrain:
             )
             for name, table in terrain.tables.items()
         },
-        parts=terrain.parts,
+        roughness=terrain.roughness,
+        break_away=None if known is None else known.to_dict(),
     )
 
 

@@ -21,11 +21,6 @@ from analysis.study.study import Study
 from analysis.terrains.database import to_text
 from analysis.terrains.identify import Identification
 from analysis.terrains.known import KnownTerrain, TerrainDatabase
-from analysis.terrains.parts import (
-    BREAK_AWAY_PART,
-    ROUGHNESS_PART,
-    SURFACES_PART,
-)
 from analysis.terrains.table import Table, rows_of
 
 POINTS = 32  # of each axis
@@ -122,14 +117,14 @@ def database_of(
             default=default,
             titles={name: TITLES[name] for name in fitted},
             recogniser=recogniser,
-            parts=_parts(from_rest.get(task.terrain), identification, task),
+            roughness=_roughness(identification, task.terrain),
+            break_away=from_rest.get(task.terrain),
         )
         for task, fitted in zip(tasks, tables, strict=True)
         if default in fitted and recogniser in fitted
     }
-    return to_text(
-        TerrainDatabase(known, study.simulated, made_utc, _of_all(identification))
-    )
+    surfaces = None if identification is None else identification.classifier
+    return to_text(TerrainDatabase(known, study.simulated, made_utc, surfaces))
 
 
 def _table(forces: Array, axes: tuple[Array, Array]) -> Table:
@@ -164,33 +159,6 @@ def break_away_batch(
     """
     task = plan_break_away(trials, kinds, BreakAwayOptions(seed=seed))
     return Batch(fit_planned, [task])
-
-
-def _parts(
-    from_rest: BreakAwayModel | None,
-    identification: Identification | None,
-    task: TableTask,
-) -> dict[str, Any]:
-    """Return what the database says of a terrain besides its tables."""
-    parts: dict[str, Any] = {}
-    if from_rest is not None:
-        parts[BREAK_AWAY_PART] = from_rest.to_dict()
-    if identification is not None:
-        parts[ROUGHNESS_PART] = _finite(
-            {
-                size: limits[task.terrain].roughness
-                for size, limits in identification.limits.items()
-                if task.terrain in limits
-            }
-        )
-    return parts
-
-
-def _of_all(identification: Identification | None) -> dict[str, Any]:
-    """Return what the database says of all terrains together."""
-    if identification is None or identification.classifier is None:
-        return {}
-    return {SURFACES_PART: identification.classifier.to_dict()}
 
 
 def _tasks(study: Study) -> tuple[tuple[Array, Array], list[TableTask]]:
@@ -240,5 +208,13 @@ def _limits(identification: Identification | None, terrain: str) -> Mapping[int,
     }
 
 
-def _finite(limits: Mapping[int, float]) -> dict[str, float]:
-    return {str(k): round(v, 4) for k, v in limits.items() if np.isfinite(v)}
+def _roughness(
+    identification: Identification | None, terrain: str
+) -> Mapping[int, float]:
+    if identification is None:
+        return {}
+    return {
+        size: round(limits[terrain].roughness, 4)
+        for size, limits in identification.limits.items()
+        if terrain in limits and np.isfinite(limits[terrain].roughness)
+    }

@@ -17,11 +17,7 @@ from analysis.breakaway.model import BreakAwayModel
 from analysis.data.series import Array
 from analysis.data.terrain_kinds import Value
 from analysis.study.metrics import Prediction
-from analysis.terrains.parts import (
-    BREAK_AWAY_PART,
-    Parts,
-    break_away_in,
-)
+from analysis.terrains.classifier import SurfaceClassifier
 from analysis.terrains.points import points_of
 from analysis.terrains.table import SlipRisk, Table, TractionEstimate, TractionEstimates
 
@@ -43,7 +39,9 @@ class KnownTerrain:
         titles: of every model, for people.
         recogniser: name of the model that `rho` and `limits` belong to, which says how
             well a trial fits the terrain; "" = the default.
-        parts: what else is known of it, by name; see `analysis.terrains.parts`.
+        roughness: by window [kept samples], the least log sd of F_t about a line in F_n
+            [nat] of its own windows.
+        break_away: what it gives before a foot at rest slips; None = not known.
         incline_deg: along the push, positive downhill [degrees]; None where unknown.
         factors: of its recordings, the foot among them, by name; None = does not apply.
     """
@@ -59,7 +57,8 @@ class KnownTerrain:
     default: str
     titles: Mapping[str, str] = field(default_factory=dict)
     recogniser: str = ""
-    parts: Parts = field(default_factory=dict[str, Any])
+    roughness: Mapping[int, float] = field(default_factory=dict[int, float])
+    break_away: BreakAwayModel | None = None
     incline_deg: float | None = None
     factors: Mapping[str, Value] = field(default_factory=dict[str, Value])
 
@@ -118,16 +117,21 @@ class KnownTerrain:
     @property
     def has_from_rest(self) -> bool:
         """Whether it is known what it gives before it slips."""
-        return BREAK_AWAY_PART in self.parts
+        return self.break_away is not None
 
     @property
     def from_rest(self) -> BreakAwayModel:
-        """What it gives before it slips; read anew every time.
+        """What it gives before it slips.
 
         Raises:
             SettingsError: it is not known.
         """
-        return break_away_in(self.parts, self.name)
+        if self.break_away is None:
+            raise SettingsError(
+                f"{self.name}: the force before it slips from rest is not known.",
+                hint="Record three trials or more; risk_in_motion answers for sliding.",
+            )
+        return self.break_away
 
     def risk_in_motion(self, required: float, F_n: float, v_t: float = 0.0) -> SlipRisk:
         """Return the probability that a sliding foot meets less than `required` [N].
@@ -162,13 +166,13 @@ class TerrainDatabase:
         terrains: every terrain.
         is_simulated: the trials were simulated.
         made_utc: when.
-        parts: what else is known of all of them, by name.
+        surfaces: tells flat ground from rocky; None = not known.
     """
 
     terrains: Mapping[str, KnownTerrain]
     is_simulated: bool
     made_utc: str
-    parts: Parts = field(default_factory=dict[str, Any])
+    surfaces: SurfaceClassifier | None = None
 
     def terrain(self, name: str) -> KnownTerrain:
         """Return a terrain.

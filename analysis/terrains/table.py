@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.data.series import Array
-from analysis.study.distribution import SHARES, checked_shares
+from analysis.study.distribution import checked_shares
 
 Rows = tuple[tuple[float, ...], ...]
 
@@ -37,21 +37,6 @@ class Table:
     v_t: tuple[float, ...]
     shares: tuple[float, ...]
     forces: tuple[Rows, ...]
-
-    @classmethod
-    def normal(
-        cls, F_n: tuple[float, ...], v_t: tuple[float, ...], mean: Array, sd: Array
-    ) -> "Table":
-        """Return the quantiles of normal distributions.
-
-        Args:
-            F_n: normal forces [N], shape (n,).
-            v_t: velocities [m/s], shape (m,).
-            mean: F_t [N], shape (n, m).
-            sd: its standard deviation [N], shape (n, m).
-        """
-        forces = [mean + score * sd for score in normal_scores(SHARES)]
-        return cls(F_n, v_t, SHARES, tuple(rows_of(values) for values in forces))
 
     def at(self, F_n: float, v_t: float) -> tuple[float, ...]:
         """Return the quantiles [N] at one point, shape (q,); a few microseconds."""

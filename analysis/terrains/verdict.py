@@ -18,7 +18,6 @@ from analysis.data.terrain_kinds import groups_of
 from analysis.terrains.classifier import FLAT_GROUND, ROCKY_GROUND
 from analysis.terrains.known import KnownTerrain, TerrainDatabase
 from analysis.terrains.logistic import RidgeLogistic
-from analysis.terrains.parts import roughness_in, surfaces_in
 from analysis.terrains.recognition import Expert, TerrainScores, score_trial
 from analysis.terrains.windows import RESID, window_features
 
@@ -150,7 +149,7 @@ class _Known:
     @classmethod
     def of(cls, database: TerrainDatabase, window: int) -> "_Known":
         kinds = {name: terrain.kind for name, terrain in database.terrains.items()}
-        surfaces = surfaces_in(database.parts)
+        surfaces = database.surfaces
         return cls(
             limits={
                 name: limits_of(terrain, window)
@@ -182,6 +181,6 @@ class _Known:
 def limits_of(terrain: KnownTerrain, window: int) -> WindowLimits:
     """Return the limits of a known terrain's windows; none where they are not known."""
     return WindowLimits(
-        roughness=roughness_in(terrain.parts).get(window, -np.inf),
+        roughness=terrain.roughness.get(window, -np.inf),
         strain=terrain.limits.get(window, np.inf),
     )

@@ -1,6 +1,5 @@
 """The table of `traction status`: what is kept of what is wanted, over all sessions.
 
-`session_summaries` reads one session, `summary_cache` keeps what was read as long as no
-file changes, `table` counts, `upcoming` says what to record next. Begin
-with `table`.
+`session_summaries` reads one session, `table` counts, `upcoming` says what to record
+next. Begin with `table`.
 """

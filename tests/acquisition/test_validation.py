@@ -79,8 +79,8 @@ def test_a_package_of_a_million_wrong_files_has_one_problem():
         (("terrains", "S0", "limits"), {str(k): "a" for k in range(1000)}),
         (("terrains", "S0", "models"), {str(k): 1 for k in range(1000)}),
         (("terrains", "S0", "models", "gp", "quantiles"), [["a"] * 1000] * 1000),
-        (("terrains", "S0", "parts", "break_away", "draws"), [1] * 1000),
-        (("terrains", "S0", "parts", "roughness"), {str(k): "a" for k in range(1000)}),
+        (("terrains", "S0", "break_away", "draws"), [1] * 1000),
+        (("terrains", "S0", "roughness"), {str(k): "a" for k in range(1000)}),
     ],
 )
 def test_a_database_of_a_thousand_wrong_values_has_few_problems(tmp_path, place, value):

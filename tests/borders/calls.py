@@ -14,7 +14,7 @@ from analysis.study.distribution import NewTrialPrediction
 from analysis.study.metrics import Prediction
 from analysis.terrains.known import KnownTerrain
 from analysis.terrains.points import points_of
-from analysis.terrains.table import Table
+from tests.analysis.terrains.tables import normal_table
 from tests.borders.row import Answer, Border, Outcome
 from tests.borders.tables import judged, text
 
@@ -22,7 +22,7 @@ _ONE = np.ones(1)
 _NORMAL = Prediction(_ONE, _ONE)
 _MIXED = NewTrialPrediction(_ONE, _ONE, _ONE, freedom=4)
 _GRID = np.array([(1.0, 2.0), (3.0, 4.0)])
-_TABLE = Table.normal((1.0, 5.0), (0.01, 0.2), _GRID, _GRID)
+_TABLE = normal_table((1.0, 5.0), (0.01, 0.2), _GRID, _GRID)
 _TERRAIN = KnownTerrain("S0", "small", 1, 9, 0.0, {}, {"m": _TABLE}, {}, "m")
 
 

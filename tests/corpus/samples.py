@@ -147,7 +147,7 @@ def _database() -> dict[str, object]:
         loads=(1.0, 5.0),
         forces=(3.0, 12.0),
     )
-    terrain["parts"] = {"break_away": rest.to_dict(), "roughness": {"50": -1.0}}
+    terrain |= {"break_away": rest.to_dict(), "roughness": {"50": -1.0}}
     return {
         "format": FORMAT,
         "version": VERSION,

@@ -10,8 +10,8 @@ from analysis.exports.source import TerrainExport
 from analysis.study.distribution import SHARES, NewTrialPrediction
 from analysis.terrains.database import to_text
 from analysis.terrains.known import KnownTerrain, TerrainDatabase
-from analysis.terrains.parts import BREAK_AWAY_PART
 from analysis.terrains.table import Table, rows_of
+from tests.analysis.terrains.tables import normal_table
 
 UTC = "2027-01-15T08:00:00Z"
 DIGEST = "0123456789abcdef" * 4
@@ -68,7 +68,7 @@ def terrain(kind, name=None):
     forces = new_trial(kind, median).quantiles(SHARES).reshape(shape)
     table = Table(F_N, V_T, SHARES, tuple(map(rows_of, forces)))
     sd = np.full(median.shape, {"S0": 2.3, "TF": 0.33}[kind])
-    normal = Table.normal(F_N, V_T, median, sd)
+    normal = normal_table(F_N, V_T, median, sd)
     parameters = {
         "theta": {"log_sf": 1.0, "log_sc": log(LEVEL_SD[kind])},
         "trials": 10,
@@ -86,7 +86,7 @@ def terrain(kind, name=None):
         default="gp_se_trial",
         titles={"gp_se": "GP (SE)", "gp_se_trial": "GP (SE, new trial)"},
         recogniser="gp_se",
-        parts={BREAK_AWAY_PART: from_rest(kind).to_dict()},
+        break_away=from_rest(kind),
     )
 
 

@@ -66,8 +66,8 @@ def test_a_foot_in_motion_meets_less_than_one_at_rest_may_ask_for(path):
     assert known.risk_in_motion(6.0, 3.5) > 1.5 * known.slip_risk(6.0, 3.5).risk
 
 
-def test_a_database_of_before_break_away_is_still_read(path, tmp_path):
-    old = changed(path, tmp_path, lambda terrain: terrain.pop("parts"))
+def test_what_was_not_pushed_from_rest_answers_in_motion_only(path, tmp_path):
+    old = changed(path, tmp_path, lambda terrain: terrain.pop("break_away"))
     known = load(old).terrain("TF")
     assert 0.0 < known.risk_in_motion(2.6, 3.5) < 1.0
     with pytest.raises(SettingsError, match="not known"):
@@ -84,8 +84,6 @@ def test_a_database_of_before_break_away_is_still_read(path, tmp_path):
     ],
 )
 def test_a_damaged_break_away_model_is_refused(path, tmp_path, change, said):
-    bad = changed(
-        path, tmp_path, lambda terrain: terrain["parts"]["break_away"].update(change)
-    )
+    bad = changed(path, tmp_path, lambda terrain: terrain["break_away"].update(change))
     with pytest.raises(SettingsError, match=said):
         load(bad)

@@ -1,4 +1,4 @@
-"""The file of a terrain database: its versions, its schema, and what it keeps."""
+"""The file of a terrain database: its version, its schema, and what it keeps."""
 
 import json
 from dataclasses import replace
@@ -12,24 +12,23 @@ import pytest
 import analysis.terrains
 from acquisition.errors import SettingsError
 from analysis.study.distribution import SHARES
+from analysis.terrains.classifier import SurfaceClassifier
 from analysis.terrains.database import load, to_text
 from analysis.terrains.export import database_of
 from analysis.terrains.known import KnownTerrain, TerrainDatabase
+from analysis.terrains.logistic import RidgeLogistic
 from analysis.terrains.table import Table, rows_of
+from analysis.terrains.windows import FEATURES
+from tests.analysis.exports.databases import from_rest
+from tests.analysis.terrains.tables import normal_table
 
 UTC = "2027-01-15T08:00:00Z"
 MEAN, SD = [[1.0, 2.0], [3.0, 5.0]], [[0.5, 0.5], [1.0, 2.0]]
-AXES = {"F_n": [1.0, 5.0], "v_t": [0.01, 0.2]}
-OLD = {
-    "format": "traction-terrain-db", "version": 1, "made_utc": UTC, "simulated": True,
-    "default": "gp_se", "axes": AXES,
-    "terrains": {"S0": {
-        "kind": "small", "trials": 10, "samples": 9000, "rho": 0.9,
-        "limits": {"100": 3.0}, "models": {"gp_se": {
-            "title": "GP (SE)", "parameters": {"lml": -5.0}, "mean": MEAN, "sd": SD}},
-    }},
-}  # fmt: skip
 SCHEMA = Path(analysis.terrains.__file__).parent / "terrain_db.schema.json"
+
+
+_ONES = (1.0,) * len(FEATURES)
+SURFACES = SurfaceClassifier({50: RidgeLogistic(_ONES, _ONES, (0.0, *_ONES, *_ONES))})
 
 
 def saved(tmp_path, content):
@@ -38,7 +37,7 @@ def saved(tmp_path, content):
     return path
 
 
-def skewed(parts=None):
+def skewed(**more):
     """Return a database of one terrain with a lognormal force."""
     scores = [NormalDist().inv_cdf(share) for share in SHARES]
     middle = np.array(MEAN)
@@ -47,43 +46,12 @@ def skewed(parts=None):
     terrain = KnownTerrain(
         "S0", "small", 10, 9000, 0.9, {100: 3.0}, {"gp_se_trial": table},
         {"gp_se_trial": {"c": 3.0}}, "gp_se_trial", {"gp_se_trial": "new trial"},
-        "gp_se_trial", parts or {},
+        "gp_se_trial", **more,
     )  # fmt: skip
     return TerrainDatabase({"S0": terrain}, True, UTC)
 
 
-# --- version 1 ------------------------------------------------------------------------
-
-
-def test_a_file_of_version_1_is_read_as_normal_distributions(tmp_path):
-    answer = load(saved(tmp_path, OLD)).terrain("S0").predict(1.0, 0.01)
-    normal = NormalDist(1.0, 0.5)
-    assert answer.mean == pytest.approx(1.0, abs=1e-9)
-    assert answer.sd == pytest.approx(0.5, rel=5e-3)
-    for share in (0.001, 0.05, 0.3, 0.5, 0.97, 0.9999):
-        assert answer.quantile(share) == pytest.approx(normal.inv_cdf(share), abs=1e-9)
-
-
-@pytest.mark.parametrize("required", [0.2, 1.0, 1.3, 2.5])
-def test_the_slip_risk_of_version_1_is_that_of_a_normal(tmp_path, required):
-    terrain = load(saved(tmp_path, OLD)).terrain("S0")
-    expected = NormalDist(1.0, 0.5).cdf(required)
-    assert terrain.risk_in_motion(required, 1.0, 0.01) == pytest.approx(
-        expected, rel=1e-9
-    )
-
-
-def test_a_file_of_version_1_is_written_back_as_version_3(tmp_path):
-    text = to_text(load(saved(tmp_path, OLD)))
-    content = json.loads(text)
-    assert content["version"] == 3
-    assert content["terrains"]["S0"]["models"]["gp_se"]["title"] == "GP (SE)"
-    again = load(saved(tmp_path, text)).terrain("S0")
-    assert again.recogniser == "gp_se"
-    assert again.predict(5.0, 0.2).median == pytest.approx(5.0)
-
-
-# --- version 2 ------------------------------------------------------------------------
+# --- what is kept ---------------------------------------------------------------------
 
 
 def test_what_is_written_is_read_again(tmp_path):
@@ -109,19 +77,12 @@ def test_factors_and_incline_are_kept_and_bounded(tmp_path):
     assert again["factors"] == dict(known.factors)
 
 
-def test_a_file_of_version_2_has_no_factors(tmp_path):
-    content = json.loads(to_text(skewed()))
-    content["version"] = 2
-    del content["terrains"]["S0"]["factors"], content["terrains"]["S0"]["incline_deg"]
-    known = load(saved(tmp_path, content)).terrain("S0")
-    assert (known.incline_deg, known.factors) == (None, {})
-
-
-def test_further_parts_of_a_terrain_are_kept_and_written_back(tmp_path):
-    parts = {"push": {"v_slip": 0.06, "b": [2.3, 0.4]}, "remarks": "wet"}
-    text = to_text(load(saved(tmp_path, to_text(skewed(parts)))))
-    assert json.loads(text)["terrains"]["S0"]["parts"] == parts
-    assert load(saved(tmp_path, text)).terrain("S0").parts == parts
+@pytest.mark.parametrize("version", [1, 2, 3, "0.9", None, [1.0] * 99])
+def test_a_file_of_another_version_is_refused_by_its_version(tmp_path, version):
+    with pytest.raises(SettingsError) as refused:
+        load(saved(tmp_path, changed(version=version)))
+    shown = f"version: it is {version!r:.20}, and only 1.0 is read."
+    assert shown in str(refused.value)
 
 
 def test_a_skewed_force_keeps_its_skew():
@@ -164,7 +125,6 @@ def changed(**changes):
         ({"shares": [0.1, 0.9]}, "finite numbers"),
         ({"shares": [nan] * 9}, "shares"),
         ({"recogniser": "oracle"}, "lacks the model"),
-        ({"version": 4}, "version"),
     ],
 )
 def test_a_damaged_file_is_refused(tmp_path, changes, word):
@@ -188,14 +148,13 @@ def test_terrains_of_different_grids_make_no_file():
 
 
 def load_other_grid():
-    table = Table.normal((0.0, 1.0), (0.1, 0.2), np.array(MEAN), np.array(SD))
+    table = normal_table((0.0, 1.0), (0.1, 0.2), np.array(MEAN), np.array(SD))
     return KnownTerrain("TF", "flat", 1, 1, 0.0, {}, {"m": table}, {}, "m")
 
 
 def test_a_file_too_large_to_be_read_is_not_written():
-    remarks = {"remarks": "x" * 6_000_000}
     with pytest.raises(SettingsError, match="6 MB"):
-        to_text(skewed(remarks))
+        to_text(skewed(factors={"remarks": "x" * 6_000_000}))
 
 
 # --- the schema -----------------------------------------------------------------------
@@ -259,7 +218,15 @@ def broken(content):
 
 
 def test_what_is_written_follows_the_schema_that_is_shipped():
-    assert broken(json.loads(to_text(skewed({"push": {"v_slip": 0.06}})))) == []
+    terrain = replace(
+        skewed().terrain("S0"),
+        roughness={50: -1.5},
+        break_away=from_rest("S0"),
+        incline_deg=10.0,
+    )
+    text = to_text(TerrainDatabase({"S0": terrain}, True, UTC, SURFACES))
+    assert broken(json.loads(text)) == []
+    assert broken(json.loads(to_text(skewed()))) == []
 
 
 @pytest.mark.parametrize(

@@ -5,10 +5,10 @@ import pytest
 
 from acquisition.errors import SettingsError
 from analysis.terrains.known import KnownTerrain
-from analysis.terrains.table import Table
+from tests.analysis.terrains.tables import normal_table
 
 ROWS = np.array([(1.0, 2.0), (3.0, 4.0)])
-TABLE = Table.normal((1.0, 5.0), (0.01, 0.2), ROWS, ROWS)
+TABLE = normal_table((1.0, 5.0), (0.01, 0.2), ROWS, ROWS)
 TERRAIN = KnownTerrain("S0", "small", 1, 9, 0.0, {}, {"m": TABLE}, {}, "m")
 
 

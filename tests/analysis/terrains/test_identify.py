@@ -259,7 +259,7 @@ def test_an_unknown_terrain_and_an_unknown_model_are_named(path):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"version": 4}, "version: Input should be 1, 2 or 3"),
+        ({"version": 3}, "version: it is 3, and only 1.0 is read"),
         ({"terrains": {}}, "terrains: Dictionary should have at least 1 item"),
         (
             {"axes": {"F_n": [1.0, 0.0], "v_t": [0.1, 0.2]}},
@@ -343,7 +343,7 @@ def test_the_surface_of_a_trial_that_was_never_seen_is_told(path):
 
 def test_a_database_without_a_classifier_tells_surfaces_by_its_models(path, tmp_path):
     content = json.loads(path.read_text())
-    del content["parts"]
+    del content["surfaces"]
     old = tmp_path / "old.json"
     old.write_text(json.dumps(content))
     seen = recognise(kept(push("Tf", 80)), load(old))
@@ -358,7 +358,7 @@ def test_a_plate_is_none_of_the_stones(path, tmp_path):
     stones.write_text(json.dumps(content))
     seen = recognise(kept(push("S0", 81, spread=0.05)), load(stones))
     assert (seen.best, seen.surface) == ("none", "none")
-    del content["terrains"]["S0"]["parts"]["roughness"]
+    del content["terrains"]["S0"]["roughness"]
     stones.write_text(json.dumps(content))
     assert recognise(kept(push("S0", 81, spread=0.05)), load(stones)).best == "S0"
 
@@ -366,9 +366,9 @@ def test_a_plate_is_none_of_the_stones(path, tmp_path):
 @pytest.mark.parametrize(
     "change",
     [
-        lambda c: c["parts"]["surfaces"].update(models=3),
-        lambda c: c.update(parts=[1]),
-        lambda c: c["terrains"]["S0"]["parts"].update(roughness={"50": float("nan")}),
+        lambda c: c["surfaces"].update(models=3),
+        lambda c: c.update(surfaces=[1]),
+        lambda c: c["terrains"]["S0"].update(roughness={"50": float("nan")}),
     ],
 )
 def test_a_damaged_part_of_a_database_is_refused(path, tmp_path, change):
