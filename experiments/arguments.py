@@ -123,24 +123,17 @@ def friction_share(args: Namespace) -> float:
     """Return how much the simulated joints rub, as a share of another arm's.
 
     Raises:
-        SettingsError: the number is none that is simulated, or the arm is the twin of
-            one whose friction is known.
+        SettingsError: the number is none that is simulated.
     """
     from acquisition.errors import SettingsError
 
     if args.friction is None:
         return FRICTION
-    nothing = "Nothing was started."
-    if getattr(args, "twin", None):
-        raise SettingsError(
-            "--friction and --twin both set the friction of the joints.",
-            hint=f"Leave one of them out. {nothing}",
-        )
     if not 0.0 <= args.friction <= 2.0:
         raise SettingsError(
             f"--friction {args.friction:g} - expected a number 0..2, "
             f"e.g. {FRICTION:g}.",
-            hint=nothing,
+            hint="Nothing was started.",
         )
     return args.friction
 
@@ -316,12 +309,6 @@ def add_recording(parser: ArgumentParser) -> None:
         choices=PACES,
         default=PACES[0],
         help="how the simulated person pushes (steady)",
-    )
-    parser.add_argument(
-        "--twin",
-        action="store_true",
-        help="simulate the arm, sensor and containers that calibrations of rig.toml "
-        "describe, only with --fake",
     )
     add_fault(parser)
     parser.add_argument(

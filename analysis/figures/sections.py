@@ -10,8 +10,6 @@ class ReportSection(Enum):
     CHANGED = "Sensitivity to analysis choices"
     PAPER = "The paper's table and figures"
     BEYOND = "Beyond the paper"
-    FRICTION = "Friction of the drives"
-    LOADS = "Load limits by joint friction"
     HEALTH = "Rig health"
     REACH = "Measurement limits"
     IMPORTED = "Imported"

@@ -21,14 +21,7 @@ from analysis.findings.force_uncertainty import (
 )
 from ft_sensor.reading import largest_traction
 from wam.calibration.friction_file import friction_from_toml
-from wam.calibration.friction_reach import (
-    FrictionTorques,
-    friction_reach,
-    remaining_friction,
-)
-from wam.model.arm_model import ArmModel
-from wam.model.constants import GRAVITY, Body
-from wam.model.tool import Tool
+from wam.model.constants import GRAVITY
 
 HEALTH_UNITS = {
     "period": "ms",
@@ -47,7 +40,6 @@ HEALTH_UNITS = {
     "floor": "N",
     "load_bias": "N",
     "drag": "N",
-    "rest_open": "N",
     "lateral": "N",
 }
 PERIOD_EDGES = np.append(np.arange(0.05, 8.0, 0.1), np.inf)  # ms, 2 in mid-bin
@@ -94,8 +86,6 @@ class RigTrial:
         drag: what the joints' Coulomb friction asks of the hand along x_T [N], by the
             recorded calibration less what was compensated, else by the figures of the
             arm model; median over the moving samples.
-        rest_open: half the width of the interval in which friction leaves F_n at rest
-            [N], at the worse end of the trial; None without a recorded calibration.
         lateral: mean |F_y| while moving [N].
     """
 
@@ -122,7 +112,6 @@ class RigTrial:
     floor: float | None
     load_bias: float | None
     drag: float | None
-    rest_open: float | None
     lateral: float | None
 
     @property
@@ -175,7 +164,6 @@ def health_of(trial: RecordedTrial) -> RigTrial:
     is_moving = np.abs(np.nan_to_num(trial.traction[:, 0])) > _MOVING
     is_saturated = (trial.cycles["flags"] & int(Flag.FT_SATURATED)) != 0
     provenance = trial.metadata["provenance"]
-    torques = _friction_of(trial)
     return RigTrial(
         terrain=trial.terrain,
         name=trial.name,
@@ -199,8 +187,7 @@ def health_of(trial: RecordedTrial) -> RigTrial:
         force_uncertainty=None,
         floor=None,
         load_bias=_load_bias(trial, is_moving),
-        drag=_drag(trial, is_moving, torques),
-        rest_open=None if torques is None else _rest_open(trial, torques),
+        drag=_drag(trial, is_moving),
         lateral=float(np.abs(trial.lateral[is_moving]).mean())
         if is_moving.any()
         else None,
@@ -258,8 +245,11 @@ def _load_bias(trial: RecordedTrial, is_moving: np.ndarray) -> float | None:
     return float(np.median(trial.traction[is_moving, 2]) - set_load)
 
 
-def _friction_of(trial: RecordedTrial) -> FrictionTorques | None:
-    """Return the friction that the trial met, by the calibration in its file."""
+def _sliding_torques(trial: RecordedTrial) -> Array | None:
+    """Return the friction of sliding motors [N m], shape (7,), as the trial met it.
+
+    By the calibration in its file; None = it has none.
+    """
     try:
         stored = friction_from_toml(trial.friction_text, trial.name)
         share = float(trial.metadata["trial"].get("friction_compensation", "0"))
@@ -267,12 +257,10 @@ def _friction_of(trial: RecordedTrial) -> FrictionTorques | None:
         return None
     if stored.is_simulated != trial.is_simulated or not 0.0 <= share <= 1.0:
         return None
-    return remaining_friction(stored.fit, share)
+    return stored.fit.sliding_left(share)
 
 
-def _drag(
-    trial: RecordedTrial, is_moving: np.ndarray, torques: FrictionTorques | None
-) -> float | None:
+def _drag(trial: RecordedTrial, is_moving: np.ndarray) -> float | None:
     """Return the force along x_T [N] whose power the joints' Coulomb friction takes.
 
     F v_t = sum_j c_j |qd_j|: power in is power lost, whatever the joints do.
@@ -280,19 +268,11 @@ def _drag(
     if not is_moving.any():
         return None
     speeds, coulomb = trial.cycles["velocity"][is_moving], trial.constants.coulomb
+    torques = _sliding_torques(trial)
     if torques is not None:
-        speeds, coulomb = speeds @ trial.constants.j2mp.T, torques.sliding
+        speeds, coulomb = speeds @ trial.constants.j2mp.T, torques
     lost = np.abs(speeds) @ coulomb
     return float(np.median(lost / np.abs(trial.traction[is_moving, 0])))
-
-
-def _rest_open(trial: RecordedTrial, torques: FrictionTorques) -> float:
-    """Return half the width of the interval of F_n at rest [N], at the worse end."""
-    nothing = Body(0.0, np.zeros(3), np.zeros((3, 3)))
-    tool = Tool(nothing, nothing, trial.sole_point)
-    model, axes = ArmModel(trial.constants, tool), trial.frame.axes()
-    ends = [np.ascontiguousarray(trial.cycles["position"][i]) for i in (0, -1)]
-    return max(friction_reach(model, q, axes, torques).rest for q in ends)
 
 
 def _row(text: str) -> tuple[float, ...]:

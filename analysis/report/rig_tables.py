@@ -26,10 +26,9 @@ _REACH_NOTE = (
     "by the noise alone where a session has one tare only. "
     "Drag: Coulomb friction of the joints as seen by the hand's push, "
     "from the recorded friction calibration, less the compensation; "
-    "without a calibration, from the arm model. At rest F_n lies within ± of the set "
-    "load by friction, anywhere; – without a calibration. F_t and F_n are measured at "
-    "the wrist, below the joints, and v_t at the joints: friction biases no model, but "
-    "limits the loads and speeds that are reached. Medians over trials."
+    "without a calibration, from the arm model. F_t and F_n are measured at the wrist, "
+    "below the joints, and v_t at the joints: friction biases no model, but limits the "
+    "loads and speeds that are reached. Medians over trials."
 )
 
 
@@ -104,7 +103,6 @@ def reach(results: StudyResults) -> ReportTable:
                 _number(ratio, 1),
                 _number(_median(trials, lambda trial: trial.load_bias)),
                 _number(_median(trials, lambda trial: trial.drag)),
-                _number(_median(trials, lambda trial: trial.rest_open)),
             )
         )
     return ReportTable(
@@ -120,7 +118,6 @@ def reach(results: StudyResults) -> ReportTable:
             "error over floor",
             "F_n above set load [N]",
             "drag of the joints [N]",
-            "F_n at rest uncertain ± [N]",
         ),
         rows,
         note=_REACH_NOTE,

@@ -1,31 +1,34 @@
 """traction calibrate friction: turn every motor both ways, fit what resists it."""
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
-from acquisition.errors import SettingsError
-from acquisition.settings import read_text
-from analysis.report.friction_page import FRICTION_HEADER, FrictionPage, friction_rows
-from experiments.rig.build import start_of
 from experiments.run.console_loop import ConsoleLoop
 from experiments.run.pose_walk import PoseWalk
 from experiments.run.ready import activate
 from experiments.session.store import iso_utc
 from wam.calibration.excitation import FrictionLeg, LegUse, plan_friction
 from wam.calibration.free_space import FreeSpace
-from wam.calibration.friction_file import FrictionCalibration, friction_from_toml
+from wam.calibration.friction_file import FrictionCalibration
 from wam.calibration.friction_fit import FrictionFit, check_friction, fit_friction
+from wam.calibration.joint_friction import (
+    joint_asymmetry,
+    joint_breakaway,
+    joint_deviation,
+    speed_curve,
+)
 from wam.calibration.poses import MeasurementPose
 from wam.calibration.sliding import RecordedLeg, sliding_rows
-from wam.model.constants import Array
-from wam.model.friction import MotorFriction
+from wam.model.constants import ArmConstants, Array
+from wam.model.friction import joint_coulomb
 
 # kg m to which first moments are known: calibrated ones, and those of drawings.
 _KNOWN, _DRAWN = 0.02, 0.1
+_SIGMAS = 1.96
+_SPEEDS = np.array([0.01, 0.05, 0.1, 0.4])  # rad/s, of the table
+_HEADER = ["friction [N m]", *(f"joint {joint}" for joint in range(1, 8))]
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,30 +83,6 @@ class FrictionGuide:
             arm=rig.serials,
         )
 
-    def page(
-        self,
-        calibration: FrictionCalibration,
-        out: Path,
-        truth: MotorFriction | None,
-    ) -> FrictionPage:
-        """Return what stands on the page of a calibration.
-
-        Args:
-            calibration: the new one.
-            out: its file; the earlier ones lie beside it, as friction*.toml.
-            truth: friction of a simulated arm; None = it is a real one.
-        """
-        rig = self._rig
-        return FrictionPage(
-            model=rig.model,
-            calibration=calibration,
-            earlier=_earlier(calibration, out),
-            terrain=rig.row.name,
-            frame=rig.frame,
-            start_q=start_of(rig.row, rig.model),
-            truth=truth,
-        )
-
     def _record(self, legs: Sequence[FrictionLeg]) -> _RecordedWay:
         recorded = _RecordedWay([], [])
         clock, loop_client = self._rig.clock, self._rig.backend.loop_client
@@ -134,8 +113,8 @@ class FrictionGuide:
         )
 
     def _say(self, fit: FrictionFit) -> None:
-        rows = friction_rows(self._rig.model.constants, fit)
-        self._console.table(list(FRICTION_HEADER), rows)
+        rows = _rows(self._rig.model.constants, fit)
+        self._console.table(_HEADER, rows)
         shares = ", ".join(f"{share:.2f}" for share in fit.residual)
         self._console.say(
             f"residual on the held-out sweep, share of Coulomb friction: {shares} "
@@ -143,17 +122,24 @@ class FrictionGuide:
         )
 
 
-def _earlier(now: FrictionCalibration, out: Path) -> list[FrictionCalibration]:
-    """Return other calibrations of the same arm beside `out`, the oldest first."""
-    calibrations: list[FrictionCalibration] = []
-    for path in out.parent.glob("friction*.toml"):
-        if path == out:
-            continue
-        with suppress(SettingsError, OSError, ValueError):
-            calibrations.append(friction_from_toml(read_text(path), path.name))
-    before = [
-        calibration
-        for calibration in calibrations
-        if calibration.is_simulated == now.is_simulated
+def _rows(constants: ArmConstants, fit: FrictionFit) -> list[list[str]]:
+    """Return the friction of the joints [N m], a row of eight cells for each measure.
+
+    The first cell is the name, the others are joints 1 to 7.
+    """
+    friction = fit.friction
+    deviation = _SIGMAS * joint_deviation(constants, fit.deviation)
+    rows = [
+        _row("Coulomb", joint_coulomb(constants, friction.coulomb)),
+        _row("  ± (95 %)", deviation),
+        _row("asymmetry", joint_asymmetry(constants, friction.asymmetry)),
+        _row("break-away", joint_breakaway(constants, friction)),
     ]
-    return sorted(before, key=lambda calibration: calibration.measured_utc)
+    curves = [speed_curve(constants, friction, j, _SPEEDS) for j in range(7)]
+    for speed, torques in zip(_SPEEDS, np.array(curves).T, strict=True):
+        rows.append(_row(f"at {speed:g} rad/s", torques))
+    return rows
+
+
+def _row(name: str, values: Array) -> list[str]:
+    return [name, *(f"{value:.3f}" for value in values)]

@@ -58,14 +58,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Lead through one calibration and write its file; return the exit code."""
-    from acquisition.extras import require_extra
     from experiments.calibrating.opening import check_arm, check_new, guide_person
     from experiments.settings.load import load_settings
 
     check_arm(args)
     _check_poses(args)
-    if args.what == "friction":
-        require_extra("report")  # its page
     friction_share(args)
     settings = load_settings(args.config)
     row = settings.row(args.terrain or settings.matrix.terrains[0].name)
@@ -96,7 +93,6 @@ def _gravity(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> 
 
 
 def _friction(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> None:
-    from analysis.report.friction_page import friction_html
     from experiments.calibrating.friction import FrictionGuide
     from experiments.session.data_files import write_new_text
     from wam.calibration.excitation import CENTRES
@@ -109,7 +105,6 @@ def _friction(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) ->
     result = guide.run(is_forced=args.force)
     write_new_text(out, friction_to_toml(result, rig.model.constants))
     _say_use(console_loop, out, _section("friction", out), "rig.toml")
-    true = None
     if rig.simulation is not None:
         true = friction_of(rig.simulation.friction())
         load_at = result.fit.friction.load_at
@@ -117,13 +112,6 @@ def _friction(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) ->
         write_new_text(_truth_path(out), text)
         where = f"True friction of the simulated arm: {_truth_path(out)}."
         console.say(where)
-    page = guide.page(result, out, true)
-    write_new_text(_page_path(out), console_loop.run_aside(lambda: friction_html(page)))
-    console.say(f"Report: {_page_path(out)}.")
-
-
-def _page_path(out: Path) -> Path:
-    return out.with_suffix(".html")
 
 
 def _truth_path(out: Path) -> Path:
@@ -132,9 +120,8 @@ def _truth_path(out: Path) -> Path:
 
 def _written(args: argparse.Namespace, out: Path) -> list[Path]:
     """Return the files that the calibration will write."""
-    if args.what != "friction":
-        return [out]
-    return [out, _page_path(out), *([_truth_path(out)] if args.fake else [])]
+    is_true_known = args.what == "friction" and args.fake
+    return [out, _truth_path(out)] if is_true_known else [out]
 
 
 def _sensor(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> None:

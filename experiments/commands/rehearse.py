@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 EXAMPLES = """\
   traction rehearse --seed 2                all terrains, ten trials each, 43 bands
-  traction rehearse --twin lab              the arm of lab/rig.toml; not gated"""
+  traction rehearse --config lab/rig.toml   the terrains of a matrix of your own"""
 
 _FAILED = 6
 
@@ -31,12 +31,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--trials", type=int, default=10, metavar="N", help="trials per terrain (10)"
     )
     parser.add_argument(
-        "--twin",
-        type=Path,
-        metavar="DIR",
-        help="rehearse on the twin of the rig described in that folder",
-    )
-    parser.add_argument(
         "--jobs", type=int, metavar="N", help="processes at a time (one per core)"
     )
 
@@ -46,7 +40,6 @@ def run(args: argparse.Namespace) -> int:
     import json
 
     from experiments.operator.console import Console
-    from experiments.rig.law_calibrations import twin_words
     from experiments.session.data_files import write_text
     from experiments.settings.load import load_settings
     from experiments.tools.acceptance import (
@@ -58,12 +51,10 @@ def run(args: argparse.Namespace) -> int:
     )
 
     _check_arguments(args)
-    config = args.config if args.twin is None else args.twin / "rig.toml"
-    settings = load_settings(config)
-    calibrated = [] if args.twin is None else twin_words(settings)
+    settings = load_settings(args.config)
     rows = settings.matrix.terrains
     plan = AcceptancePlan(
-        config=config,
+        config=args.config,
         terrains=tuple(row.name for row in rows),
         plates=tuple(row.name for row in rows if row.stones == "none"),
         travel=min(row.travel for row in rows),
@@ -71,7 +62,6 @@ def run(args: argparse.Namespace) -> int:
         seed=args.seed,
         friction=friction_share(args),
         jobs=args.jobs,
-        is_twin=args.twin is not None,
         cables=args.cables,
         mount=mount_of(args),
         wrong=args.wrong,
@@ -82,10 +72,8 @@ def run(args: argparse.Namespace) -> int:
         f"traction rehearse        SIMULATED · {len(rows)} terrains x {plan.trials} "
         f"trials · seed {plan.seed} · {folder}"
     )
-    for line in calibrated:
-        console.say(line)
     plan = calibrate_arm(plan, folder)
-    if plan.config is not None and config is None:
+    if plan.config is not None and args.config is None:
         console.say(f"friction calibrated and compensated: {plan.config}")
     record_study(plan, folder, console.say)
     results = analyse(plan, folder)
@@ -114,8 +102,8 @@ def _print(
     console.say(f"{summary}. {folder / 'bands.json'}")
     deciding = [f.band.id for f in gated(plan, results) if f.band.id in failed]
     if beside := sorted(failed.difference(deciding)):
-        condition = "for a twin" if plan.is_twin else f"at friction {plan.friction:g}"
-        console.say(f"Outside: {', '.join(beside)}; not gated {condition}.")
+        words = ", ".join(beside)
+        console.say(f"Outside: {words}; not gated at friction {plan.friction:g}.")
     if not deciding:
         return 0
     console.problem(f"Outside their bands: {', '.join(deciding)}.")
@@ -134,11 +122,6 @@ def _free_folder(data: Path, seed: int) -> Path:
 def _check_arguments(args: argparse.Namespace) -> None:
     from acquisition.errors import SettingsError
 
-    if args.twin is not None and args.config is not None:
-        raise SettingsError(
-            "--twin and --config each name a rig.toml.",
-            hint="Leave --config out: the one in the folder is used.",
-        )
     for name, value, least, most in (
         ("seed", args.seed, 0, 10**9),
         ("trials", args.trials, 1, 99),

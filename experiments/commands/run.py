@@ -49,8 +49,7 @@ def run(args: argparse.Namespace) -> int:
             args.seed,
             friction,
             args.pace,
-            args.twin,
-            args.cables,
+            cables=args.cables,
             mount=mount_of(args),
             wrong=args.wrong,
         )
@@ -120,11 +119,10 @@ def _check_arguments(args: argparse.Namespace) -> None:
 
     nothing = "Nothing was started."
     time = asked_time(args)
-    simulated = (time, args.twin, args.fault, args.operator_script)
+    simulated = (time, args.fault, args.operator_script)
     if not args.fake and any(simulated):
         raise SettingsError(
-            "--fast, --processes, --twin, --fault and --operator-script work only "
-            "with --fake.",
+            "--fast, --processes, --fault and --operator-script work only with --fake.",
             hint=nothing,
         )
     check_truth(args)

@@ -8,25 +8,16 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.errors import SettingsError
 from acquisition.sample import Record
 from experiments.messages import preflight_error
 from experiments.operator.console import BAD, GOOD, WARNING
 from experiments.preflight.page import Add, CheckResult
-from experiments.rig.build import start_of
 from experiments.rig.rig import Rig
 from experiments.settings.load import SHIPPED
 from experiments.settings.rig import CONTACT_LIMITS, WITHIN_RANGE, RigSettings
 from ft_sensor.reading import axis_names, largest_load, largest_traction
 from ft_sensor.serial_line.sensor import BURSTY
 from wam.bus.socketcan import LONGEST_QUEUE, interface_state
-from wam.calibration.friction_file import friction_from_toml
-from wam.calibration.friction_reach import (
-    reaches_along,
-    remaining_friction,
-    rendered_masses,
-)
-from wam.model.gravity import MAX_VIRTUAL_MASS
 
 CPUS = Path("/sys/devices/system/cpu")
 FAST = "performance"
@@ -87,36 +78,6 @@ def check_origin(rig: Rig, law: str) -> CheckResult:
         return CheckResult(GOOD, "config", text)
     ask = "not written for this arm: name its rig.toml with --config"
     return CheckResult(BAD, "config", f"{text}; {ask}")
-
-
-def check_masses(rig: Rig) -> CheckResult | None:
-    """Grade the virtual mass by the friction of this arm; None = it is not known."""
-    section, text = rig.settings.rig.friction, rig.calibrations.friction
-    if not text:
-        return None
-    try:
-        stored = friction_from_toml(text, section.file)
-    except SettingsError as error:
-        return CheckResult(WARNING, "load", error.message)
-    if stored.is_simulated != rig.is_simulated:
-        return None
-    reaches = reaches_along(
-        rig.model,
-        start_of(rig.row, rig.model),
-        rig.frame.axes(),
-        rig.frame.travel,
-        remaining_friction(stored.fit, section.share),
-    )
-    masses = rendered_masses(reaches, rig.frame.incline)
-    mass = rig.settings.rig.control.virtual_mass
-    steps = (
-        f"reliable contact from {masses.down:.2f} kg",
-        f"within 50 % from {masses.half:.2f}",
-        f"within 10 % from {masses.tenth:.2f}",
-    )
-    most = f"set {mass:.2f}, at most {MAX_VIRTUAL_MASS:g}"
-    mark = GOOD if mass >= masses.down else WARNING
-    return CheckResult(mark, "load", f"foot {', '.join(steps)} ({most})")
 
 
 def check_ages(rig: Rig) -> CheckResult | None:

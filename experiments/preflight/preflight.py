@@ -22,7 +22,6 @@ from experiments.preflight.host_checks import (
     check_disk,
     check_governor,
     check_interface,
-    check_masses,
     check_origin,
     check_stream,
     check_wrenches,
@@ -128,7 +127,6 @@ def _check_host(rig: Rig, data: Path, page: ChecksPage, probe: DiskProbe) -> Non
     for text in forced_calibrations(rig.settings, rig.calibrations):
         page.add(WARNING, "calibration", text)
     page.add_result(check_ages(rig))
-    page.add_result(check_masses(rig))
     page.add_result(check_code(provenance.collect()))
     if not rig.is_stepped:
         page.add_result(check_governor())

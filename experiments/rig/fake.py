@@ -6,8 +6,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from acquisition.clock import Clock, SystemClock
 from acquisition.devices import WrenchSensor
 from acquisition.errors import SettingsError
@@ -26,19 +24,14 @@ from experiments.rig.build import (
     terrain_frame,
     tool_with,
 )
-from experiments.rig.law_calibrations import LawCalibrations, twin_gravity
 from experiments.settings.load import Settings, read_foot
 from experiments.settings.matrix import TerrainRow
 from experiments.settings.rig import RigSettings
 from ft_sensor.serial_line.link import SerialPort
 from ft_sensor.serial_line.sensor import SerialSensor
 from ft_sensor.vendors.registry import AnySensor
-from wam.calibration.friction_file import FrictionCalibration, friction_from_toml
-from wam.calibration.gravity_file import gravity_from_toml
 from wam.model.arm_model import ArmModel
-from wam.model.constants import ArmConstants, load_constants
-from wam.model.gravity import weighed_arm
-from wam.model.moments import moments_of_links
+from wam.model.constants import load_constants
 from wam.model.tool import Tool, tool_metadata
 
 if TYPE_CHECKING:
@@ -72,7 +65,6 @@ class SimulatedRig:
         seed: of everything random.
         friction: of the joints, as a share of what was identified on another arm.
         pace: how the simulated person pushes.
-        twin: calibrations of the arm whose twin it is; None = an arm of its own.
         cables: resonance of the joints on their cables [Hz]; None = stiff ones.
         truth: what is true of the rig, but not believed; None = nothing.
     """
@@ -82,7 +74,6 @@ class SimulatedRig:
     seed: int
     friction: float
     pace: str
-    twin: LawCalibrations | None = None
     cables: float | None = None
     truth: RigTruth | None = None
 
@@ -114,32 +105,7 @@ class SimulatedRig:
             "friction": self.friction,
             "pace": self.pace,
             "cables": self.cables,
-            "body": None if self.twin is None else self._body(self.twin),
         }
-
-    def _body(self, twin: LawCalibrations) -> dict[str, Any]:
-        """Return what the arm is by its calibrations, in plain values."""
-        known = None
-        if twin.friction:
-            known = friction_from_toml(twin.friction, self.rig.friction.file)
-        arm = self._weighed(twin, known)
-        return {
-            "com": [link.com.tolist() for link in arm.links],
-            "motors": None if known is None else known.fit.friction.metadata(),
-        }
-
-    def _weighed(
-        self, twin: LawCalibrations, known: FrictionCalibration | None
-    ) -> ArmConstants:
-        """Return the arm as weighed, corrected by what its friction showed."""
-        constants, weight = load_constants(), twin_gravity(self.rig, twin)
-        change = np.zeros((7, 3)) if known is None else known.fit.moments
-        if weight == "calibrated":
-            stored = gravity_from_toml(twin.gravity, self.rig.gravity.file)
-            return weighed_arm(constants, stored.mus + change, stored.tool)
-        if weight == "shipped":
-            return weighed_arm(constants, constants.mus + change)
-        return weighed_arm(constants, moments_of_links(constants) + change)
 
 
 def wrong_rigs() -> dict[str, str]:

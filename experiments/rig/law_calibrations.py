@@ -14,7 +14,6 @@ from experiments.settings.calibrations import (
     forced_words,
     read_calibration,
     unfit,
-    with_calibrations,
 )
 from experiments.settings.load import Settings
 from experiments.settings.rig import RigSettings
@@ -66,13 +65,10 @@ def friction_path(settings: Settings) -> Path:
     return settings.folder / settings.rig.friction.file
 
 
-def read_law_calibrations(
-    settings: Settings, *, is_twin: bool = False
-) -> LawCalibrations:
+def read_law_calibrations(settings: Settings) -> LawCalibrations:
     """Return the texts of the calibrations that rig.toml chooses.
 
-    A calibration of friction that is not chosen tells what the rig can do without it;
-    the twin of a rig weighs what its calibration says, whatever the law weighs.
+    A calibration of friction that is not chosen tells what the rig can do without it.
 
     Raises:
         SettingsError: one cannot be read.
@@ -80,8 +76,6 @@ def read_law_calibrations(
     gravity = friction = ""
     if settings.rig.gravity.model == "calibrated":
         gravity = read_calibration(gravity_path(settings), "gravity", _INSTEAD)
-    elif is_twin:
-        gravity = _text_of(gravity_path(settings))
     if settings.rig.friction.model == "calibrated":
         friction = read_calibration(friction_path(settings), "friction", _WITHOUT)
     else:
@@ -97,7 +91,7 @@ def _text_of(path: Path) -> str:
 
 
 def build_law_model(
-    rig: RigSettings, gravity_text: str, foot: str, *, is_simulated: bool | None
+    rig: RigSettings, gravity_text: str, foot: str, *, is_simulated: bool
 ) -> ArmModel:
     """Return the arm with `foot` on it as the control law weighs it.
 
@@ -134,14 +128,13 @@ def build_law(
     calibrations: LawCalibrations,
     foot: str,
     *,
-    is_simulated: bool | None,
+    is_simulated: bool,
 ) -> LawParts:
     """Return models and compensation of the control law with `foot` on the arm.
 
     Raises:
         SettingsError: a calibration is none, was made with another tool or gravity, or
-            with a simulated arm for a real one or conversely; to the twin of a rig
-            (`is_simulated` is None) both fit.
+            with a simulated arm for a real one or conversely.
     """
     return LawParts(
         ArmModel(load_constants(), build_tool(rig, foot)),
@@ -151,7 +144,7 @@ def build_law(
 
 
 def build_compensation(
-    rig: RigSettings, friction_text: str, *, is_simulated: bool | None
+    rig: RigSettings, friction_text: str, *, is_simulated: bool
 ) -> FrictionCompensation | None:
     """Return what takes friction off the hand; None where rig.toml has none.
 
@@ -223,65 +216,6 @@ def _check_size(name: str, constants: ArmConstants, friction: MotorFriction) -> 
                 f"than {limit:.2f} N m.",
                 hint=f"Run traction calibrate friction again, or {_WITHOUT}. {NOTHING}",
             )
-
-
-def twin_gravity(rig: RigSettings, known: LawCalibrations) -> str:
-    """Return which gravity the twin of a rig has, corrected by what friction showed.
-
-    What a calibration of friction takes for an asymmetry depends on the weight that it
-    subtracted: both belong together. Without one it is what was weighed, if anything.
-
-    Raises:
-        SettingsError: a calibration is wrong, or the weight that friction was measured
-            with is gone.
-    """
-    if not known.friction:
-        return "calibrated" if known.gravity else "cad"
-    rubbed = friction_from_toml(known.friction, rig.friction.file)
-    if rubbed.gravity == "calibrated" and not known.gravity:
-        raise SettingsError(
-            f"{rig.friction.file} was measured with gravity calibrated, and "
-            f"{rig.gravity.file} cannot be read: a gravity error would be identified "
-            "as friction.",
-            hint=f"Bring {rig.gravity.file} back beside it, or run traction calibrate "
-            f"friction again. {NOTHING}",
-        )
-    return rubbed.gravity
-
-
-def twin_words(settings: Settings) -> list[str]:
-    """Return what the twin of a rig takes from calibrations, and what from nominal.
-
-    Raises:
-        SettingsError: a calibration is wrong, or there is none: no rig is described.
-    """
-    measured: dict[str, str] = {}
-    rig, known = settings.rig, read_law_calibrations(settings, is_twin=True)
-    weight = twin_gravity(rig, known)
-    if weight == "calibrated":
-        stored = gravity_from_toml(known.gravity, rig.gravity.file)
-        measured["gravity"] = f"{rig.gravity.file} of {stored.measured_utc}"
-    if known.friction:
-        rubbed = friction_from_toml(known.friction, rig.friction.file)
-        measured["friction"] = f"{rig.friction.file} of {rubbed.measured_utc}"
-    for name in with_calibrations(settings, is_simulated=None).calibrations:
-        measured[name] = name.partition(":")[2]
-    if not measured:
-        raise SettingsError(
-            f"{settings.folder} contains no calibration of an arm.",
-            hint="Make one with: traction calibrate gravity, friction, sensor or "
-            f"terrain. {NOTHING}",
-        )
-    lines = [f"twin of {settings.origin}: {', '.join(measured.values())}"]
-    if not known.friction:
-        nominal = [name for name in ("gravity", "friction") if name not in measured]
-        lines.append(f"not calibrated, so nominal: {' and '.join(nominal)}")
-    elif weight != "calibrated":
-        lines.append(
-            f"gravity {weight}, corrected by {rig.friction.file}, which was measured "
-            "with it" + (f"; {rig.gravity.file} is not used" if known.gravity else "")
-        )
-    return lines
 
 
 def law_words(rig: RigSettings, calibrations: LawCalibrations, foot: str) -> str:

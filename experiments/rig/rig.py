@@ -46,7 +46,6 @@ class FakeOptions:
         seed: of everything random.
         friction: of the joints, as a share of what was identified on another arm.
         pace: how the simulated person pushes, a name of `fakes.plant.push.PACES`.
-        is_twin: the arm, its sensor and the containers are what calibrations say.
         cables: resonance of the joints on their cables [Hz]; None = stiff ones.
         spread: the rig is one of many sound ones, drawn by the seed; a wrong one is
             always.
@@ -60,7 +59,6 @@ class FakeOptions:
     seed: int
     friction: float = FRICTION
     pace: str = "steady"
-    is_twin: bool = False
     cables: float | None = None
     spread: bool = False
     mount: tuple[float, float, float] | None = None
@@ -134,19 +132,16 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
     """
     if fake is None:
         settings.check_real()
-    is_twin = fake is not None and fake.is_twin
-    kind = None if is_twin else fake is not None
-    true = with_calibrations(settings, is_simulated=None) if is_twin else settings
+    is_simulated = fake is not None
+    world: SimulatedRig | None = None
+    if fake is not None:  # a simulated world does not know what was calibrated
+        world = _world(settings, row.name, fake)
     if fake is not None and fake.wrong:
         settings = typed_wrongly(settings, fake.wrong)
-    settings = with_calibrations(settings, is_simulated=kind)
-    calibrations = read_law_calibrations(settings, is_twin=is_twin)
-    world: SimulatedRig | None = None
-    if fake is not None:
-        # A simulated world does not know what was calibrated, unless it is a twin.
-        world = _world(true, row.name, fake, calibrations)
+    settings = with_calibrations(settings, is_simulated=is_simulated)
+    calibrations = read_law_calibrations(settings)
     row = settings.row(row.name)
-    law = build_law(settings.rig, calibrations, row.foot, is_simulated=kind)
+    law = build_law(settings.rig, calibrations, row.foot, is_simulated=is_simulated)
     shared = SharedLayout.create()
     simulation: SimulationControl | None = None
     pace: WallPace | None = None
@@ -183,16 +178,13 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
     )
 
 
-def _world(
-    settings: Settings, terrain: str, fake: FakeOptions, calibrations: LawCalibrations
-) -> SimulatedRig:
+def _world(settings: Settings, terrain: str, fake: FakeOptions) -> SimulatedRig:
     return SimulatedRig(
         rig=settings.rig,
         row=settings.row(terrain),
         seed=fake.seed,
         friction=fake.friction,
         pace=fake.pace,
-        twin=calibrations if fake.is_twin else None,
         cables=fake.cables,
         truth=fake.truth,
     )
@@ -232,7 +224,6 @@ def _jobs(
     common: dict[str, Any] = {
         "rig": rig.model_dump(mode="json"),
         "is_simulated": world is not None,
-        "is_twin": world is not None and world["body"] is not None,
     }
     control = {
         **common,

@@ -62,7 +62,7 @@ class ControlWorker:
             self._rig,
             LawCalibrations(settings["gravity"], settings["friction"]),
             self._row.foot,
-            is_simulated=None if settings["is_twin"] else self._is_simulated,
+            is_simulated=self._is_simulated,
         )
         self._constants = self._law.model.constants
         self._arm: WamArm | None = None

@@ -46,20 +46,20 @@ def read_calibration(path: Path, what: str, instead: str) -> str:
 
 
 def check_kind(
-    name: str, *, is_of_simulation: bool, is_simulated: bool | None, instead: str
+    name: str, *, is_of_simulation: bool, is_simulated: bool, instead: str
 ) -> None:
     """Refuse what was measured on a simulated rig for a real one, and conversely.
 
     Args:
         name: of the file.
         is_of_simulation: it was measured on a simulated rig.
-        is_simulated: the rig of now; None = the twin of one, to which both fit.
+        is_simulated: the rig of now.
         instead: what to write into the settings to do without.
 
     Raises:
         SettingsError: the two do not fit.
     """
-    if is_simulated is None or is_of_simulation == is_simulated:
+    if is_of_simulation == is_simulated:
         return
     kinds = "simulated", "real"
     theirs, ours = kinds if is_of_simulation else kinds[::-1]
@@ -90,13 +90,12 @@ _M = TypeVar("_M", RigSettings, TerrainRow)
 _INSTEAD = "remove the line calibration = {name!r}"
 
 
-def with_calibrations(settings: Settings, *, is_simulated: bool | None) -> Settings:
+def with_calibrations(settings: Settings, *, is_simulated: bool) -> Settings:
     """Return the settings with what their calibrations measured in its place.
 
     A sensor's calibration gives the mounting, and mass and centre of the foot that was
     on; a foot's own goes before. A container's gives the frame of its row. A simulated
-    world is made from the settings without them: it does not know what was measured,
-    unless it is the twin of a rig (`is_simulated` is None), where all of them fit.
+    world is made from the settings without them: it does not know what was measured.
 
     Raises:
         SettingsError: a file cannot be read, is not a calibration, of another foot or
@@ -118,7 +117,7 @@ def with_calibrations(settings: Settings, *, is_simulated: bool | None) -> Setti
 class _Reader:
     """Reads each file once and keeps its text for the recordings."""
 
-    def __init__(self, settings: Settings, *, is_simulated: bool | None) -> None:
+    def __init__(self, settings: Settings, *, is_simulated: bool) -> None:
         self.texts: dict[str, str] = {}
         self._folder = settings.folder
         self._is_simulated = is_simulated

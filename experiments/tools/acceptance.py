@@ -57,7 +57,6 @@ class AcceptancePlan:
         seed: of everything random.
         friction: of the joints, as a share of what was identified on another arm.
         jobs: processes at a time; None = one per core.
-        is_twin: the simulated rig is the one that the calibrations describe.
         cables: resonance of the joints on their cables [Hz]; None = stiff ones.
         mount: turns of the true base about x, then y, then z [degrees]; None = none.
         wrong: name of the wrong rig that it is; "" = none.
@@ -71,7 +70,6 @@ class AcceptancePlan:
     seed: int
     friction: float
     jobs: int | None
-    is_twin: bool = False
     cables: float | None = None
     mount: tuple[float, float, float] | None = None
     wrong: str = ""
@@ -81,10 +79,10 @@ def gated(plan: AcceptancePlan, results: Sequence[BandResult]) -> list[BandResul
     """Return the bands that decide.
 
     Slips hardly go back on an arm whose wrist rubs: beyond a share of 0.02 the bands
-    on that are reported and do not decide. A twin, and an arm that rubs more than the
-    usual one, are judged by nobody.
+    on that are reported and do not decide. An arm that rubs more than the usual one is
+    judged by nobody.
     """
-    if plan.is_twin or plan.friction > FRICTION:
+    if plan.friction > FRICTION:
         return []
     if plan.friction <= _UNHINDERED:
         return list(results)
@@ -100,7 +98,7 @@ def calibrate_arm(plan: AcceptancePlan, data: Path) -> AcceptancePlan:
     Raises:
         SessionError: the calibration failed; its words are in `data`.
     """
-    if plan.config is not None or plan.is_twin or plan.friction < _RUBS:
+    if plan.config is not None or plan.friction < _RUBS:
         return plan
     data.mkdir(parents=True, exist_ok=True)
     folder, calibration = data / "rig", data / "calibration"
@@ -228,7 +226,7 @@ def _arguments(plan: AcceptancePlan, terrain: str, data: Path) -> list[str]:
 
 def _arm(plan: AcceptancePlan) -> list[str]:
     """Return the options that say which arm is simulated."""
-    kind = ["--twin"] if plan.is_twin else ["--friction", repr(plan.friction)]
+    kind = ["--friction", repr(plan.friction)]
     if plan.cables is not None:
         kind += ["--cables", repr(plan.cables)]
     if plan.mount is not None:

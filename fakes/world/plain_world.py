@@ -1,7 +1,6 @@
 """A simulated rig from plain values, as they go to a process of its own."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,6 @@ from fakes.world.rig import FakeRig, LocalSimulation, SimulatedScene
 from fakes.world.wrong_rigs import wrong_rig
 from ft_sensor.payload import TerrainFrame
 from wam.model.constants import ArmConstants
-from wam.model.friction import MotorFriction, friction_of
 from wam.model.tool import tool_of
 
 
@@ -61,42 +59,19 @@ def departure_of(truth: Mapping[str, Any] | None, seed: int) -> Departure | None
     return wrong_rig(name).departure.on(mounted) if name else mounted
 
 
-def arm_of(
-    body: Mapping[str, Any] | None, constants: ArmConstants
-) -> tuple[ArmConstants, MotorFriction | None]:
-    """Return the arm that is not the one of the drawings, and its motors' friction.
-
-    Args:
-        body: centres of mass of its links [m] and, unless None, friction of its motors;
-            None = the arm of the drawings.
-        constants: of the arm by its drawings.
-    """
-    if body is None:
-        return constants, None
-    pairs = zip(constants.links, body["com"], strict=True)
-    links = tuple(replace(link, com=np.array(com)) for link, com in pairs)
-    motors = None if body["motors"] is None else friction_of(body["motors"])
-    return replace(constants, links=links), motors
-
-
 def simulated_rig(
     fields: Mapping[str, Any], constants: ArmConstants, clock: Clock
 ) -> LocalSimulation:
     """Return the simulation that was put into plain values.
 
     Args:
-        fields: scene, tool, share of friction, pace, cables; "body" of a twin, which
-            has centres of mass of links and, unless None, friction of motors.
+        fields: scene, tool, share of friction, pace, cables.
         constants: of the arm by its drawings.
         clock: of the world.
     """
     scene = _scene_of(fields["scene"])
-    constants, motors = arm_of(fields.get("body"), constants)
     options = PlantOptions(
-        fields["friction"],
-        seed=scene.seed,
-        motors=motors,
-        cables=fields.get("cables"),
+        fields["friction"], seed=scene.seed, cables=fields.get("cables")
     )
     rig = FakeRig(scene, constants, tool_of(fields["tool"]), clock, options)
     return LocalSimulation(rig, PACES[fields["pace"]])

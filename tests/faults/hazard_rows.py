@@ -113,7 +113,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "the residual force at the tare; speed limits; energy, speed and way of an arm that holds, is guided, floats or is damped; a motor that a move turns in vain. Not detected where a person who holds the arm bears what a motor does not",
             "the tare is refused; damp, or idle where damping does not slow it",
             ("torque-limit", *_DEAD, *_REVERSED),
-            "what 22 wrong rigs do that nobody holds: `python -m studies.wrong_rigs`",
+            "",
             (
                 "tests/experiments/run/test_tare.py::test_a_wrong_mass_of_the_foot_shows_as_its_weight",
             ),

@@ -3,5 +3,5 @@
 `poses` plans measurement poses and the way between them, `gravity_file` is the file
 that a calibration writes and the control law reads. For friction `excitation` plans the
 way, `sliding` reduces what was recorded, `friction_fit` identifies, `friction_file`
-keeps, `friction_reach` says which loads on the ground it leaves. Begin with `poses`.
+keeps. Begin with `poses`.
 """

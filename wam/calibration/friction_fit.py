@@ -63,6 +63,18 @@ class FrictionFit:
         """Coulomb torque that the motors surely have [N m], shape (7,)."""
         return self.friction.coulomb - _SIGMAS * self.deviation
 
+    def sliding_left(self, share: float) -> Array:
+        """Return the most that sliding motors keep of friction [N m], shape (7,).
+
+        The upper end (95 %) of each, less what is compensated.
+
+        Args:
+            share: of the lower end that float takes off the hand, 0 = none.
+        """
+        asymmetry = np.abs(self.friction.asymmetry)
+        most = self.friction.coulomb + asymmetry + _SIGMAS * self.deviation
+        return most - share * np.maximum(self.lower_bound - asymmetry, 0.0)
+
 
 @dataclass(frozen=True, slots=True)
 class _MotorFit:

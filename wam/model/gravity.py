@@ -6,7 +6,6 @@ from wam.model.arm_model import ArmModel
 from wam.model.constants import ArmConstants, Array
 from wam.model.moments import (
     links_of_moments,
-    links_weighing,
     moments_of_links,
 )
 from wam.model.tool import Tool
@@ -76,22 +75,6 @@ def gravity_model(
     if fitted is not None:
         mus = _without_tool(constants, mus, fitted)
     return ArmModel(replace(constants, links=links_of_moments(constants, mus)), tool)
-
-
-def weighed_arm(
-    constants: ArmConstants, mus: Array, fitted: Tool | None = None
-) -> ArmConstants:
-    """Return an arm that weighs what first moments say, its masses as they were.
-
-    Unlike `gravity_model` it has an inertia, so it can be simulated.
-
-    Args:
-        constants: of the arm by its drawings.
-        mus: first moments [kg m], shape (7, 3), the tool's included.
-        fitted: what hung on the plate when they were fitted; None = nothing.
-    """
-    own = mus if fitted is None else _without_tool(constants, mus, fitted)
-    return replace(constants, links=links_weighing(constants, own))
 
 
 def _without_tool(constants: ArmConstants, mus: Array, tool: Tool) -> Array:

@@ -8,7 +8,7 @@ g_j is gravity in frame j, R_j turns frame j into frame j - 1. Only 12 of the 21
 can be seen in the torques: compare torques, never moments.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,6 @@ FARTHEST = 5.0  # N m from the drawings; another arm's moments are 2.3 off at mo
 SEEN_ZEROS = (2, 3, 4, 5)  # joints whose zero shows in the torques
 _TURN = 1e-5  # rad of a difference that stands for a slope
 _LEAST_NOISE = 0.01  # N m that torques are known to at best
-_ANY_POSES = 20  # that show all that can be seen
 _SINGULAR = 1e-3  # of the largest singular value: below it a direction is not seen
 
 
@@ -82,27 +81,6 @@ def links_of_moments(constants: ArmConstants, mus: Array) -> tuple[Body, ...]:
     return tuple(
         Body(1.0, mus[joint] - (7 - joint) * _step(constants, joint), none)
         for joint in range(7)
-    )
-
-
-def links_weighing(constants: ArmConstants, mus: Array) -> tuple[Body, ...]:
-    """Return the links with their centres moved until they weigh what `mus` weigh.
-
-    Masses, and inertias about the centres, stay. Of all ways to move the first moments
-    the smallest is taken: what does not show in the torques stays where it was.
-
-    Args:
-        constants: of the arm; its links have their masses.
-        mus: first moments [kg m], shape (7, 3), without a tool.
-    """
-    poses = np.random.default_rng(0).uniform(-2.0, 2.0, (_ANY_POSES, 7))
-    Y = np.vstack([regressor(constants, q) for q in poses])
-    seen = np.linalg.svd(Y, full_matrices=False)[2][:OBSERVABLE]
-    change = (mus - moments_of_links(constants)).ravel()
-    moved = (seen.T @ (seen @ change)).reshape(7, 3)
-    return tuple(
-        replace(link, com=link.com + moved[joint] / link.mass)
-        for joint, link in enumerate(constants.links)
     )
 
 

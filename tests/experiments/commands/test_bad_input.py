@@ -29,7 +29,7 @@ def refusal(done, code=2):
     return line
 
 
-SIMULATED = "--fast, --processes, --twin, --fault and --operator-script work only with"
+SIMULATED = "--fast, --processes, --fault and --operator-script work only with"
 # --- run ------------------------------------------------------------------------------
 
 
@@ -39,7 +39,6 @@ SIMULATED = "--fast, --processes, --twin, --fault and --operator-script work onl
         (("ZZ", *FAKE), "There is no terrain 'ZZ' in matrix.toml. Terrains: S0 S10"),
         (("TF", "--fast"), SIMULATED),
         (("TF", "--processes"), SIMULATED),
-        (("TF", "--twin"), SIMULATED),
         (("TF", "--fault", "estop"), SIMULATED),
         (("TF", *FAKE, "--trials", 0), "--trials 0 - expected a whole number 1..99"),
         (("TF", *FAKE, "--trials", 100), "--trials 100 - expected a whole number"),

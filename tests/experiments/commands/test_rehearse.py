@@ -149,7 +149,7 @@ def calibrated_at_once(arguments, folder):
 
 @pytest.mark.parametrize(
     "change",
-    [{"friction": 0.02}, {"is_twin": True, "config": "rig.toml"}, {"config": "a.toml"}],
+    [{"friction": 0.02}, {"config": "a.toml"}],
 )
 def test_no_other_arm_is_calibrated(change, tmp_path):
     plan = dataclasses.replace(PLAN, **change)
@@ -169,7 +169,6 @@ def test_a_calibration_that_fails_ends_the_rehearsal(tmp_path, monkeypatch):
         ({"friction": 0.02}, {"D4", "D5", "E3"}),
         ({}, {"D4"}),
         ({"friction": 1.0}, set()),
-        ({"is_twin": True}, set()),
     ],
 )
 def test_bands_on_slips_that_go_back_decide_where_nothing_rubs(change, deciding):

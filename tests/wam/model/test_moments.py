@@ -6,7 +6,7 @@ import pytest
 from acquisition.errors import SettingsError
 from wam.model.arm_model import ArmModel
 from wam.model.constants import Body, load_constants
-from wam.model.gravity import gravity_model, weighed_arm
+from wam.model.gravity import gravity_model
 from wam.model.moments import (
     MomentFit,
     check_fit,
@@ -160,24 +160,3 @@ def test_moments_fitted_with_one_foot_serve_another(example_tool, mass):
         assert model.weight_torque(q, 0.3) == pytest.approx(
             truth.weight_torque(q, 0.3), abs=1e-12
         )
-
-
-def test_an_arm_weighs_what_moments_say_and_keeps_its_masses(example_tool):
-    change = np.random.default_rng(3).normal(0.0, 0.02, (7, 3))
-    mus = moments_of_links(CONSTANTS, (example_tool.sensor, example_tool.foot)) + change
-    arm = weighed_arm(CONSTANTS, mus, example_tool)
-    model = ArmModel(arm, example_tool)
-    for q in random_poses(20, seed=5):
-        assert model.gravity(q) == pytest.approx(
-            gravity_torque(CONSTANTS, mus, q), abs=1e-9
-        )
-    assert [link.mass for link in arm.links] == [b.mass for b in CONSTANTS.links]
-
-
-def test_what_no_torque_shows_moves_no_link():
-    poses = random_poses(40, seed=6)
-    tau = torques(CONSTANTS, poses)
-    least = fit_moments(CONSTANTS, poses, tau).mus  # far from the drawings' moments
-    arm = weighed_arm(CONSTANTS, least)
-    for link, drawn in zip(arm.links, CONSTANTS.links, strict=True):
-        assert link.com == pytest.approx(drawn.com, abs=1e-9)
