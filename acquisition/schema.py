@@ -217,10 +217,4 @@ def fixed_layout(type_name: str, frame_id: str, text: str = "") -> Layout:
 
 
 CYCLE = fixed_layout("traction_msgs/msg/Cycle", "wam_base")
-# Of earlier versions, newest first; what they lack is zero when it is read.
-EARLIER_CYCLES = (
-    fixed_layout(
-        CYCLE.type_name, "wam_base", CYCLE_TEXT.partition("\nuint64 bus_ns")[0]
-    ),
-)
 TRUTH = fixed_layout("traction_msgs/msg/Truth", "wam_base")

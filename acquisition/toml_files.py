@@ -6,6 +6,7 @@ from typing import Self, cast
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from acquisition.formats import FORMAT, format_problem
 from acquisition.settings import SettingsSection, parse_toml
 from acquisition.validation import first_problem
 
@@ -20,22 +21,39 @@ class TomlTable(SettingsSection):
 
     model_config = ConfigDict(extra="ignore")
 
+    @classmethod
+    def parse(cls, text: str) -> Self:
+        """Return what `text` holds.
+
+        Raises:
+            ValueError: it is no such table; the message names the key and what is
+                wrong.
+        """
+        return cls._of(parse_toml(text))
+
+    @classmethod
+    def _of(cls, table: Mapping[str, object]) -> Self:
+        try:
+            return cls.model_validate(table)
+        except ValidationError as error:
+            raise ValueError(first_problem(error)) from error
+
 
 class TomlFile(TomlTable):
-    """A whole file."""
+    """A whole file, which states its version."""
 
     @classmethod
     def parse(cls, text: str) -> Self:
         """Return what `text` holds.
 
         Raises:
-            ValueError: it is no such file; the message names the key and what is wrong.
+            ValueError: it is of another version, or no such file; the message names the
+                key and what is wrong.
         """
         table = parse_toml(text)
-        try:
-            return cls.model_validate(table)
-        except ValidationError as error:
-            raise ValueError(first_problem(error)) from error
+        if problem := format_problem(table.get("version")):
+            raise ValueError(f"it {problem}")
+        return cls._of({key: table[key] for key in table if key != "version"})
 
     def text(self, comment: str) -> str:
         """Return the text of the file; floats keep every bit.
@@ -43,7 +61,7 @@ class TomlFile(TomlTable):
         Args:
             comment: its first line.
         """
-        return f"# {comment}\n{_lines(self, '').lstrip()}"
+        return f'# {comment}\nversion = "{FORMAT}"\n{_lines(self, "").lstrip()}'
 
 
 def _lines(table: BaseModel | Mapping[str, object], name: str) -> str:

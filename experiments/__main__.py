@@ -17,7 +17,6 @@ from acquisition.linear_algebra import openblas_settings
 from experiments.arguments import (
     add_global_options,
     did_you_mean,
-    with_present_names,
 )
 
 if TYPE_CHECKING:
@@ -167,7 +166,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if not _has_folder():
         print(_NO_FOLDER, file=sys.stderr)  # noqa: T201
         return SettingsError.exit_code
-    named = with_present_names(sys.argv[1:] if arguments is None else arguments)
+    named = list(sys.argv[1:] if arguments is None else arguments)
     parser = build_parser(set(named) & set(COMMANDS))
     try:
         args = parser.parse_args(named)

@@ -3,22 +3,13 @@
 import math
 import shlex
 from argparse import SUPPRESS, ArgumentParser, ArgumentTypeError, Namespace
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Literal
 
 FRICTION = 0.4  # of the simulated joints, as a share of another arm's; ASSUMED
 CABLES = (8.0, 25.0)  # Hz, resonance of joints on cables; ASSUMED
 _SHARDS = 10_000  # of one study, at most
-_SEED = {"--seed": "--points-seed"}
-_FORMER: Mapping[str, Mapping[str, str]] = {  # names that scripts may still use
-    "calibrate": {"--out": "--to"},
-    "export": _SEED,
-    "fit": {"--out": "--to", **_SEED},
-    "identify": {"--models": "--terrain-db", "--window": "--samples"},
-    "publish": _SEED,
-    "report": _SEED,
-}
 PACES = ("steady", "slow", "fast", "clumsy")  # of the simulated person
 # How time passes in a simulation: as on the wall, as fast as can be, in processes.
 TimeMode = Literal["paced", "fast", "processes"]
@@ -55,19 +46,6 @@ def add_global_options(
     group.add_argument(
         "--no-color", action="store_true", default=left_out or False, help="plain text"
     )
-
-
-def with_present_names(arguments: Sequence[str]) -> list[str]:
-    """Return a command line in which former names of options are the present ones."""
-    command = next((each for each in arguments if each in _FORMER), None)
-    if command is None:
-        return list(arguments)
-    start = arguments.index(command)
-    line = [*arguments[:start]]
-    for each in arguments[start:]:
-        name, sign, value = each.partition("=")
-        line.append(_FORMER[command].get(name, name) + sign + value)
-    return line
 
 
 def whole_number(text: str) -> int:

@@ -1,7 +1,6 @@
 """TrialReader: whole chunks into numpy arrays, damaged and hostile files refused."""
 
 import struct
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,10 +10,10 @@ from mcap.records import ChunkIndex
 from numpy.typing import NDArray
 
 from acquisition.errors import TrialFileError
+from acquisition.formats import format_problem
 from acquisition.sample import Record
 from acquisition.schema import (
     CYCLE,
-    EARLIER_CYCLES,
     TRUTH,
     Layout,
 )
@@ -85,6 +84,8 @@ class TrialReader:
         if "trial" not in self.metadata:
             reason = foreign_reason(path) or "is an MCAP file, but no trial of Traction"
             raise TrialFileError(path, reason, hint=_FOREIGN)
+        if problem := format_problem(self.metadata["trial"].get("format_version")):
+            raise TrialFileError(path, problem)
 
     @property
     def is_complete(self) -> bool:
@@ -98,7 +99,7 @@ class TrialReader:
 
     def cycles(self) -> TopicRows:
         """Return all records of `/cycle` in order."""
-        return self._rows("/cycle", CYCLE, *EARLIER_CYCLES)
+        return self._rows("/cycle", CYCLE)
 
     def truth(self) -> TopicRows:
         """Return all records of `/truth` in order (truth files of simulations)."""
@@ -110,9 +111,9 @@ class TrialReader:
         counts = self.summary.statistics.channel_message_counts
         return {c.topic: counts.get(i, 0) for i, c in self.summary.channels.items()}
 
-    def _rows(self, topic: str, newest: Layout, *earlier: Layout) -> TopicRows:
+    def _rows(self, topic: str, layout: Layout) -> TopicRows:
         with as_trial_file_error(self.path):
-            channel, layout = self._channel(topic, (newest, *earlier))
+            channel = self._channel(topic, layout)
             chunks = [
                 index
                 for index in self.summary.chunk_indexes
@@ -132,7 +133,6 @@ class TrialReader:
                     self.path, f"{topic}: {filled} messages, {count} announced"
                 )
             self._check_rows(heads, data, layout, channel)
-            data = data if layout is newest else _widened(data, newest)
             return TopicRows(data, heads["log_time"].copy(), heads["sequence"].copy())
 
     def _copy(self, index: ChunkIndex, channel: int, heads: Record, out: Record) -> int:
@@ -185,31 +185,19 @@ class TrialReader:
             raise TrialFileError(self.path, "has a damaged message index")
         return np.frombuffer(body, "<u8", size // 8, _INDEX.size)[1::2]
 
-    def _channel(self, topic: str, layouts: Sequence[Layout]) -> tuple[int, Layout]:
-        """Return the channel of a topic and which of `layouts` its messages have."""
-        type_name = layouts[0].type_name
+    def _channel(self, topic: str, layout: Layout) -> int:
+        """Return the channel of a topic whose messages have this layout."""
         for number, channel in self.summary.channels.items():
             if channel.topic == topic:
                 schema = self.summary.schemas.get(channel.schema_id)
-                if schema is None or schema.name != type_name:
-                    raise TrialFileError(self.path, f"{topic} is not a {type_name}")
-                fields = _fields(schema.data.decode())
-                for layout in layouts:
-                    if fields == _fields(layout.definition):
-                        return number, layout
-                raise TrialFileError(self.path, f"{topic} has other fields")
+                if schema is None or schema.name != layout.type_name:
+                    raise TrialFileError(
+                        self.path, f"{topic} is not a {layout.type_name}"
+                    )
+                if _fields(schema.data.decode()) != _fields(layout.definition):
+                    raise TrialFileError(self.path, f"{topic} has other fields")
+                return number
         raise TrialFileError(self.path, f"has no topic {topic}")
-
-
-def _widened(data: Record, newest: Layout) -> Record:
-    """Return messages of an earlier layout in the newest, zero where they lack it.
-
-    Names of an earlier layout may have capital letters, those of the newest have none.
-    """
-    out = np.zeros(len(data), newest.dtype)
-    for name in data.dtype.names or ():
-        out[name.lower()] = data[name]
-    return out
 
 
 def _gather(data: bytes, start: int, offsets: NDArray[np.intp], out: Record) -> None:

@@ -18,7 +18,7 @@ from acquisition.clock import NS_PER_S, PERIOD_NS
 from acquisition.errors import TrialFileError
 from acquisition.files import publish_file
 from acquisition.sample import Flag
-from acquisition.schema import CYCLE, EARLIER_CYCLES
+from acquisition.schema import CYCLE
 from acquisition.temporary_folders import temporary_folder
 from acquisition.trial_file.chunks import as_trial_file_error, read_file
 from acquisition.trial_file.contents import read_contents
@@ -28,7 +28,6 @@ from acquisition.trial_file.verify import VerifiedFile, verify_file
 from acquisition.trial_file.writer import CHUNK_BYTES
 
 _DIGEST = "sha256:"  # begins the keys of attachments in the provenance
-_CYCLES = {layout.size: layout for layout in (CYCLE, *EARLIER_CYCLES)}
 _MOST_BESIDE = 50  # files that are looked into
 _LONGEST_MISSED = 50_000_000  # ns; a loop that misses cycles for longer has ended
 _SECTION = "has data whose checksum is wrong"  # and no chunk or attachment is
@@ -226,9 +225,8 @@ class TrialCopy:
         )
         self.messages += 1
         is_cycle = record.channel_id == self._cycle_channel
-        layout = _CYCLES.get(len(record.data)) if is_cycle else None
-        if layout is not None:  # others fail to verify
-            cycle = np.frombuffer(record.data, layout.dtype, 1)[0]
+        if is_cycle and len(record.data) == CYCLE.size:  # others fail to verify
+            cycle = np.frombuffer(record.data, CYCLE.dtype, 1)[0]
             self._numbers.append(int(cycle["cycle"]))
             self._times.append(record.log_time)
             self._late += bool(cycle["flags"] & Flag.DEADLINE_MISSED)

@@ -12,13 +12,13 @@ from mcap.writer import CompressionType, Writer
 from acquisition.cdr import CdrWriter, encode_log, encode_string
 from acquisition.errors import TrialFileError
 from acquisition.files import publish_file, sync_directory
+from acquisition.formats import FORMAT
 from acquisition.sample import CHANNELS, Flag, Record
 from acquisition.schema import CYCLE, TRUTH, Layout, schema_text
 from acquisition.trial_file.header import TrialHeader, WriterCounts
 from acquisition.trial_file.views import VIEW_TOPICS, encode_can_batch, encode_views
 
 CHUNK_BYTES = 262_144
-FORMAT_VERSION = "1"
 NS_PER_S = 1_000_000_000
 
 TRIAL_TOPICS = {
@@ -200,7 +200,7 @@ class TrialWriter:
         }
         channels = {c.field: f"{c.unit} in {c.frame}; {c.sign}" for c in CHANNELS}
         metadata: dict[str, dict[str, str]] = {
-            "trial": {"format_version": FORMAT_VERSION, **header.trial},
+            "trial": {"format_version": FORMAT, **header.trial},
             "clock": clock,
             "provenance": {**header.provenance, **digests},
             "channels": channels,

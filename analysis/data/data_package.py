@@ -12,12 +12,20 @@ from collections.abc import Iterator, Sized
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path, PurePosixPath
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
 
 from acquisition.errors import SettingsError
 from acquisition.files import UnfitFileError, open_regular, read_regular
+from acquisition.formats import format_problem
 from acquisition.validation import Many, first_problem
 from analysis.data.memory import share_of_memory
 from analysis.data.recorded_factors import MOST, checked_factors
@@ -149,6 +157,7 @@ class DataPackage(BaseModel):
         title: for people.
         description: where the tables come from.
         created: UTC, as text.
+        version: of the tables of Traction; None = written by another program.
         profile: of the Frictionless standard.
         resources: the files.
     """
@@ -159,8 +168,16 @@ class DataPackage(BaseModel):
     title: str = ""
     description: str = ""
     created: str = ""
+    version: str | None = None
     profile: str = "tabular-data-package"
     resources: Many[PackageFile]
+
+    @model_validator(mode="after")
+    def _is_read(self) -> Self:
+        is_own = any(file.traction is not None for file in self.resources)
+        if is_own and (problem := format_problem(self.version)):
+            raise ValueError(f"it {problem}")
+        return self
 
     @field_validator("resources", mode="before")
     @classmethod

@@ -11,6 +11,7 @@ from typing import Literal, Self
 
 from acquisition.errors import SettingsError
 from acquisition.files import open_directory, read_regular, replace_file
+from acquisition.formats import FORMAT
 from acquisition.validation import Many, first_problem
 from experiments.commissioning.record import Measured, Raw, RecordPart, Word
 
@@ -57,7 +58,7 @@ class DailyHistory(RecordPart):
         checks: what was done.
     """
 
-    version: Literal[2] = 2
+    version: Literal["1.0"] = FORMAT
     is_simulated: bool = False
     checks: Many[DailyCheck] = ()
 

@@ -14,10 +14,10 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from acquisition.errors import SettingsError
 from acquisition.files import open_directory, read_regular, replace_file
+from acquisition.formats import FORMAT
 from acquisition.validation import Entries, Many, first_problem
 from experiments.commissioning.steps import ORDER, ProofStep
 
-VERSION = 2
 NAME = "commissioning.json"
 _LARGEST = 4_000_000  # bytes
 _FIRST = "0" * 64  # what the first step is chained to
@@ -140,7 +140,7 @@ class Commissioning(RecordPart):
         told: when a person last said of a basis of `steps.BASES` that it changed, UTC.
     """
 
-    version: Literal[2] = VERSION
+    version: Literal["1.0"] = FORMAT
     program: Word
     is_simulated: bool = False
     steps: Many[StepRecord] = ()

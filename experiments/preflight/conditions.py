@@ -16,7 +16,7 @@ from experiments.operator.prompts import OperatorInput, Prompt
 from experiments.operator.terminal import wait_for_key
 from experiments.preflight.page import CheckResult
 from experiments.rig.rig import Rig
-from experiments.session.recorded_conditions import FILE, VERSION, read_conditions
+from experiments.session.recorded_conditions import read_conditions
 from experiments.session.store import SessionFolder, list_sessions
 from experiments.settings.matrix import TerrainRow
 from experiments.settings.origins import flatten
@@ -75,7 +75,7 @@ def default_conditions(
 ) -> dict[str, str]:
     """Return the conditions of settings that are left out, by name.
 
-    A setting that a session of an older version does not have had this value then.
+    A setting that a session does not state had this value then.
 
     Args:
         sensor_kind: `ft_sensor.kind`, whose section has the sensor's defaults.
@@ -112,16 +112,9 @@ def check_conditions(
     """Compare `now` with the conditions of the session; return what differs.
 
     Raises:
-        SessionError: something differs and it is not forced, or the file was written
-            by a newer version of the program.
+        SessionError: something differs and it is not forced.
     """
-    then = read_conditions(folder)
-    if then.version > VERSION:
-        raise SessionError(
-            f"{folder.path / FILE} is of version {then.version}, known is {VERSION}.",
-            hint="Use the newer Traction. Nothing was recorded.",
-        )
-    changed = differences(then.values, now)
+    changed = differences(read_conditions(folder), now)
     for text in changed[:_SHOWN]:
         console.say(f"{WARNING} {text}")
     if len(changed) > _SHOWN:
@@ -183,7 +176,7 @@ def last_foot(data: Path, *, is_simulated: bool) -> MountedFoot | None:
     mounted: list[tuple[int, str, MountedFoot]] = []
     for folder in list_sessions(data):
         journal = folder.path / "events.jsonl"
-        foot = read_conditions(folder).values.get(FOOT)
+        foot = read_conditions(folder).get(FOOT)
         if folder.is_simulated is is_simulated and foot and journal.is_file():
             order = journal.stat().st_mtime_ns, folder.path.name
             mounted.append((*order, MountedFoot(folder, foot)))

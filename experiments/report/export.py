@@ -7,6 +7,7 @@ from typing import Any
 
 from acquisition.clock import SystemClock
 from acquisition.errors import SessionError, TrialFileError
+from acquisition.formats import FORMAT
 from analysis.data.data_package import (
     DESCRIPTOR,
     DataPackage,
@@ -123,6 +124,7 @@ class TableWriter:
             title=title,
             description=about,
             created=iso_utc(SystemClock().utc_ns()),
+            version=FORMAT,
             resources=tuple(self.files),
         )
         write_new(self.folder / DESCRIPTOR, package.text().encode())
@@ -197,7 +199,7 @@ def export_sessions(
         row += [value_text(known[n], 12) if n in known else "" for n in columns]
     index = {**_INDEX_MEANINGS, **columns}
     writer.add_texts(INDEX, rows, index, "The trials.")
-    meanings = dictionary_rows(form)
+    meanings = dictionary_rows(form, index)
     writer.add_texts(DICTIONARY, meanings, DICTIONARY_MEANINGS, "Every column.")
     what = f"Kept trials of {', '.join(s.id for s in sessions)}"
     is_simulated = sessions[0].is_simulated
@@ -249,11 +251,15 @@ def _write_trial(
     return [file, session.id, trial.terrain, *values, recording]
 
 
-def dictionary_rows(form: str) -> list[list[str]]:
+def dictionary_rows(form: str, index: Mapping[str, str]) -> list[list[str]]:
     """Return what every column of every table means, a row each.
 
     The resolution is that of the instrument, the largest rounding what was lost when
     the number was written, both in the unit of the column.
+
+    Args:
+        form: of the tables of trials, "csv" or "parquet".
+        index: what the columns of the index are.
     """
     rows = column_rows(f"T01.{form}", QUANTITIES)
     rows += column_rows(f"T01.kept.{form}", KEPT)
@@ -262,7 +268,7 @@ def dictionary_rows(form: str) -> list[list[str]]:
     rows.append([f"T01.kept.{form}", "(which rows)", *about, rule])
     return rows + [
         [INDEX, name, "", "", "string", "", "", meaning]
-        for name, meaning in _INDEX_MEANINGS.items()
+        for name, meaning in index.items()
     ]
 
 

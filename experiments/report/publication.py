@@ -12,6 +12,7 @@ from pathlib import Path
 
 from acquisition.clock import SystemClock
 from acquisition.extras import require_extra
+from acquisition.formats import FORMAT
 from acquisition.trial_file.data_files import list_folder, open_data
 from analysis.data.load import RecordedTrial, load_trial
 from experiments import provenance
@@ -121,7 +122,8 @@ def _write_texts(
 ) -> None:
     """Write what people and repositories read first."""
     terrains = list(dict.fromkeys(trial.terrain for trial in trials))
-    choices = {"seed": order.seed, "terrains": list(order.terrains)}
+    terrain_order = list(order.terrains)
+    choices = {"version": FORMAT, "seed": order.seed, "terrains": terrain_order}
     texts = {
         ANALYSIS: json.dumps(choices, indent=1) + "\n",
         "environment.txt": _environment(code),

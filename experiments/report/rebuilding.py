@@ -11,6 +11,7 @@ from typing import cast
 
 from acquisition.errors import SettingsError
 from acquisition.files import read_regular
+from acquisition.formats import format_problem
 from analysis.findings.findings import compute_results, findings_rows
 from analysis.findings.rig_health import with_tares
 from analysis.study.fits import to_csv
@@ -48,11 +49,14 @@ def rebuild(folder: Path, console: Console) -> TableComparison:
     Nothing of an earlier run is used, and nothing is written into the folder.
 
     Raises:
-        SettingsError: the folder does not state how its results were made.
+        SettingsError: the folder is of another version, or does not state how its
+            results were made.
         TrialFileError: a file cannot be read.
         SessionError: there is no kept trial.
     """
     choices = read_json(folder / ANALYSIS)
+    if choices and (problem := format_problem(choices.get("version"))):
+        raise SettingsError(f"{folder / ANALYSIS} {problem}.")
     seed, terrains = choices.get("seed"), choices.get("terrains")
     if type(seed) is not int or seed < 0 or not isinstance(terrains, list):
         raise SettingsError(

@@ -18,6 +18,7 @@ from acquisition.files import (
     removed_at_error,
     replace_file,
 )
+from acquisition.formats import FORMAT, format_problem
 from acquisition.trial_file.data_files import (
     check_absent,
     open_data,
@@ -182,6 +183,7 @@ def _finite(text: str) -> float:
 
 
 _CRC, _NUMBER = "crc", "line"
+_VERSION = "version"  # key of the first line
 _CHECKED = re.compile(rb'^(?P<body>\{.+), "crc": "(?P<crc>[0-9a-f]{8})"\}$')
 
 
@@ -191,28 +193,41 @@ def journal_line(event: Mapping[str, object], number: int) -> bytes:
     Args:
         event: what has happened.
         number: of the line in its file, from 1, which it states: a line that is gone
-            is missed by those behind it.
+            is missed by those behind it. The first line states the version.
     """
-    body = json.dumps({**event, _NUMBER: number}, allow_nan=False).encode()
+    stated = {**event, _NUMBER: number}
+    if number == 1:
+        stated[_VERSION] = FORMAT
+    body = json.dumps(stated, allow_nan=False).encode()
     crc = b', "%s": "%08x"}\n' % (_CRC.encode(), zlib.crc32(body))
     return body[:-1] + crc
 
 
 def parse_line(line: bytes) -> dict[str, Any] | None:
-    """Return the event of a line, None where it is torn or its checksum is wrong.
-
-    A line of an older version has no checksum and is taken as it is.
-    """
+    """Return the event of a line, None where it is torn or its checksum is wrong."""
     event = _parse_numbered(line)
     if event is not None:
         event.pop(_NUMBER, None)
+        event.pop(_VERSION, None)
     return event
+
+
+def journal_problem(text: bytes) -> str:
+    """Return why a journal of another version is not read; "" if it is one of 1.0.
+
+    A first line that is torn or changed says nothing of the version.
+    """
+    first = text.partition(b"\n")[0]
+    event = parse_object(first)
+    if event is None or (_CRC in event and _parse_numbered(first) is None):
+        return ""
+    return format_problem(event.get(_VERSION))
 
 
 def _parse_numbered(line: bytes) -> dict[str, Any] | None:
     event = parse_object(line)
     if event is None or _CRC not in event:
-        return event
+        return None
     checked = _CHECKED.match(line.strip())
     if checked is None or zlib.crc32(checked["body"] + b"}") != int(checked[_CRC], 16):
         return None
@@ -223,11 +238,9 @@ def _parse_numbered(line: bytes) -> dict[str, Any] | None:
 def line_faults(text: bytes) -> list[str]:
     """Return what is wrong with the lines of a journal, in words.
 
-    A torn line is what a kill leaves, and no fault. Lines of older versions state no
-    number; once they do, each states its own.
+    A torn line is what a kill leaves, and no fault.
     """
     faults: list[str] = []
-    is_numbered = False
     for number, line in enumerate(text.splitlines(), 1):
         event = _parse_numbered(line)
         if event is None:
@@ -235,9 +248,6 @@ def line_faults(text: bytes) -> list[str]:
                 faults.append(f"has a wrong checksum in line {number}")
             continue
         stated = event.get(_NUMBER)
-        if stated is None and not is_numbered:
-            continue
-        is_numbered = True
         if stated != number:
             was = f"line {stated}" if type(stated) is int else "of no number"
             faults.append(f"lacks lines or has others: line {number} was {was}")

@@ -54,7 +54,6 @@ def compare_kept(
 ) -> list[Deviation]:
     """Return every kept trial that is missing or changed, in the order of trials.
 
-    A journal of an older version names no checksums: that of the sidecar counts then.
     A trial whose files have yet to follow the journal is no deviation.
 
     Args:

@@ -24,6 +24,7 @@ from acquisition.trial_file.data_files import (
 )
 from experiments.session.data_files import (
     journal_line,
+    journal_problem,
     parse_line,
     read_json,
     sha256_of,
@@ -120,15 +121,18 @@ class SessionFolder:
         """Return the journal; torn lines and those of a wrong checksum are left out.
 
         Raises:
-            TrialFileError: as `journal_text`.
+            TrialFileError: as `journal_text`, or it is of another version.
         """
-        lines = map(parse_line, self.journal_text().splitlines())
+        text = self.journal_text()
+        if problem := journal_problem(text):
+            raise TrialFileError(self.path / JOURNAL_FILE, problem)
+        lines = map(parse_line, text.splitlines())
         return [event for event in lines if event is not None]
 
     def kept_trials(self, digest: Callable[[Path], str] | None = None) -> list[Path]:
         """Return the kept trial files, in order, whose checksum is right.
 
-        It is right where sidecar and journal state it; older journals state none.
+        It is right where sidecar and journal state it.
 
         Args:
             digest: what computes the checksum of a file; None = `sha256_of`.
@@ -144,7 +148,7 @@ class SessionFolder:
             stated, attempt = fields.get("sha256"), fields.get("attempt")
             number = int(sidecar.stem[1:3])
             key = (number, attempt if type(attempt) is int else 0)
-            is_recorded = recorded.get(key, stated) == stated
+            is_recorded = recorded.get(key) == stated
             is_sound = is_recorded and is_there(path) and digest(path) == stated
             if fields.get("verdict") == "keep" and is_sound:
                 kept.append(path)

@@ -158,7 +158,7 @@ def recorded_factors(folder: SessionFolder) -> list[str]:
     """Return the names of the factors that a session's conditions.json states."""
     from experiments.session.recorded_conditions import read_conditions
 
-    names = read_conditions(folder).values
+    names = read_conditions(folder)
     return [n.removeprefix(_FACTORS) for n in names if n.startswith(_FACTORS)]
 
 
@@ -171,7 +171,7 @@ def recorded_facts(folder: SessionFolder, where: Where) -> dict[str, Value]:
 
     if not where.keys - {"terrain", "kind", "session", "operator"}:
         return {}
-    stated = read_conditions(folder).values
+    stated = read_conditions(folder)
     prefixes = ("terrain.", _FACTORS)
     return {
         key: None if stated[name] == "None" else stated[name]

@@ -7,6 +7,7 @@ import lz4.frame
 import zstandard
 from mcap.writer import CompressionType, Writer
 
+from acquisition.formats import FORMAT
 from acquisition.schema import CYCLE, schema_text
 from tests.acquisition.trials import resealed, span_of
 
@@ -38,7 +39,7 @@ def one_message(compression="zstd", schema=None):
     out = io.BytesIO()
     writer = Writer(out, compression=COMPRESSIONS[compression], enable_data_crcs=True)
     writer.start(profile="ros2", library="hostile")
-    writer.add_metadata("trial", {"session": "S"})
+    writer.add_metadata("trial", {"session": "S", "format_version": FORMAT})
     text = schema_text(CYCLE.type_name) if schema is None else schema
     number = writer.register_schema(CYCLE.type_name, "ros2msg", text.encode())
     channel = writer.register_channel("/cycle", "cdr", number)
@@ -84,7 +85,7 @@ def packed_trial(cycles, compression, **options):
     kind = COMPRESSIONS[compression]
     writer = Writer(out, compression=kind, enable_data_crcs=True, **options)
     writer.start(profile="ros2", library="other")
-    writer.add_metadata("trial", {"session": "S"})
+    writer.add_metadata("trial", {"session": "S", "format_version": FORMAT})
     text = schema_text(CYCLE.type_name).encode()
     schema = writer.register_schema(CYCLE.type_name, "ros2msg", text)
     other = writer.register_channel("/other", "cdr", schema)

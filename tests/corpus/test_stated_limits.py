@@ -24,7 +24,7 @@ from analysis.dialects.encoding import LONGEST_LINE
 from analysis.study.store import LARGEST, MOST_BYTES
 from analysis.terrains import database
 from experiments.operator.scripted import ScriptedOperator
-from experiments.session.data_files import parse_object
+from experiments.session.data_files import journal_line, parse_object
 from experiments.session.store import MOST_EVENTS, create_session
 from experiments.settings.calibrations import read_calibration
 from experiments.settings.load import load_settings
@@ -87,9 +87,10 @@ def test_a_file_of_a_session_may_have_its_size_and_no_byte_more(tmp_path, name):
 def test_a_journal_may_have_fifty_thousand_lines(tmp_path):
     folder = create_session(tmp_path, "S0", is_simulated=True, utc_ns=0)
     journal = folder.path / "events.jsonl"
-    journal.write_bytes(b"{}\n" * 50_000)
+    first, line = journal_line({}, 1), journal_line({}, 2)
+    journal.write_bytes(first + line * 49_999)
     assert len(folder.events()) == 50_000
-    journal.write_bytes(b"{}\n" * 50_001)
+    journal.write_bytes(first + line * 50_000)
     with pytest.raises(TrialFileError, match="more than 50000 lines"):
         folder.events()
 

@@ -8,7 +8,6 @@ import pytest
 
 from experiments import provenance
 from experiments.__main__ import COMMANDS, EXIT_CODES, build_parser
-from experiments.arguments import with_present_names
 from experiments.messages import CATALOGUE
 from tests.experiments.program import traction
 
@@ -37,31 +36,6 @@ def test_what_is_no_command_is_a_usage_error(arguments):
     done = traction(*arguments)
     assert done.code == 2
     assert "usage: traction" in done.err
-
-
-FORMER = [
-    ("fit a.csv --out x", "fit a.csv --to x"),
-    (
-        "--data d fit a.csv --out=x --seed 3",
-        "--data d fit a.csv --to=x --points-seed 3",
-    ),
-    ("identify a --models b --window 50", "identify a --terrain-db b --samples 50"),
-    ("calibrate foot --out f --seed 2", "calibrate foot --to f --seed 2"),
-    ("report --all --seed 2", "report --all --points-seed 2"),
-    ("run S0 --fake --seed 2", "run S0 --fake --seed 2"),
-]
-
-
-@pytest.mark.parametrize(("former", "present"), FORMER)
-def test_former_names_of_options_are_taken_for_the_present_ones(former, present):
-    assert with_present_names(former.split()) == present.split()
-    assert build_parser().parse_args(present.split()).command in former
-
-
-def test_a_former_name_is_accepted_and_not_shown(tmp_path):
-    done = traction("fit", tmp_path / "no.csv", "--out", tmp_path / "out")
-    assert "no.csv: cannot be read" in done.err
-    assert "--out" not in traction("fit", "--help").out
 
 
 def test_without_a_command_the_first_steps_are_shown():

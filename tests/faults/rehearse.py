@@ -181,7 +181,7 @@ def _calibrate(patch: pytest.MonkeyPatch, config: Path, data: Path) -> Done:
     patch.setattr(poses, "REACH", 0.6 * poses.REACH)
     data.mkdir()
     options = ("--fake", "--fast", "--poses", 3, "--force", "--config", config)
-    out = ("--data", data, "--out", data / CALIBRATION)
+    out = ("--data", data, "--to", data / CALIBRATION)
     return traction("calibrate", "gravity", *options, *out)
 
 

@@ -15,7 +15,7 @@ from pydantic import ConfigDict, Field, model_validator
 
 from acquisition.errors import SettingsError, UnfitDeviceError
 from acquisition.settings import Whole
-from acquisition.toml_files import TomlFile, TomlTable
+from acquisition.toml_files import TomlTable
 from wam.bus.frames import MOTOR_NODES, encode_set
 from wam.bus.properties import (
     Device,
@@ -85,7 +85,7 @@ def _passing(row: Sequence[tuple[int, int]], found: Values) -> int:
     )
 
 
-class PuckTable(TomlFile):
+class PuckTable(TomlTable):
     """Expected properties by their names; those that are left out are not compared."""
 
     model_config = ConfigDict(extra="forbid")

@@ -159,7 +159,7 @@ def test_attachments_come_back_with_their_digests(reader):
 
 
 def test_metadata_says_what_was_recorded(reader):
-    assert reader.metadata["trial"]["format_version"] == "1"
+    assert reader.metadata["trial"]["format_version"] == "1.0"
     assert reader.metadata["trial"]["session"] == "S"
     assert reader.metadata["clock"] == {
         "utc_offset_ns": str(OFFSET_NS),

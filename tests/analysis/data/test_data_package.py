@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from acquisition.errors import SettingsError
+from acquisition.formats import FORMAT
 from analysis.data.data_package import (
     DESCRIPTOR,
     DataPackage,
@@ -40,7 +41,8 @@ def write_package(folder: Path, path="S1/T01.csv", text=ROWS, **changes) -> Path
             table="trial", session="S7", trial="T01", terrain="gravel", stones="small"
         ),
     } | changes
-    package = DataPackage(name="p", resources=(PackageFile.model_validate(entry),))
+    resources = (PackageFile.model_validate(entry),)
+    package = DataPackage(name="p", version=FORMAT, resources=resources)
     (folder / DESCRIPTOR).write_text(package.text())
     return file
 

@@ -48,7 +48,7 @@ def calibrate(out, *options, press=None, is_quick=True):
                 return usual(self, asked)
 
             patch.setattr(AutoOperator, "answer", answer)
-        arguments = ("calibrate", "friction", "--fake", "--fast", "--out", out)
+        arguments = ("calibrate", "friction", "--fake", "--fast", "--to", out)
         return traction(*arguments, *options), made
 
 

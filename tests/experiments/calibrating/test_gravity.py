@@ -74,7 +74,7 @@ def calibrate(out, *options, press=None, is_quick=True):
                 return usual(self, asked)
 
             patch.setattr(AutoOperator, "answer", answer)
-        arguments = ("calibrate", "gravity", "--fake", "--fast", "--out", out)
+        arguments = ("calibrate", "gravity", "--fake", "--fast", "--to", out)
         return traction(*arguments, *options), HeavierRig.made[-1]
 
 
@@ -120,7 +120,7 @@ def test_an_arm_with_all_the_friction_that_was_identified_is_not_taken_for_stuck
 ):
     """Its motors start at up to 1.4 of it while other joints swing theirs."""
     arm = ("--friction", "1.0", "--seed", "1", "--fake", "--fast")
-    out = ("--out", tmp_path / "gravity.toml", "--data", tmp_path)
+    out = ("--to", tmp_path / "gravity.toml", "--data", tmp_path)
     done = traction("calibrate", "gravity", "--force", *arm, *out)
     assert done.code == 0, done.err
     assert (tmp_path / "gravity.toml").is_file()
@@ -235,7 +235,7 @@ def test_a_simulated_calibration_is_marked_and_lies_beside_rig_toml(tmp_path):
 def test_a_file_is_never_overwritten(tmp_path):
     out = tmp_path / "gravity.toml"
     out.write_text("mine")
-    done = traction("calibrate", "gravity", "--fake", "--fast", "--out", out)
+    done = traction("calibrate", "gravity", "--fake", "--fast", "--to", out)
     assert done.code == 2
     assert "never overwritten" in done.err
     assert out.read_text() == "mine"
@@ -243,7 +243,7 @@ def test_a_file_is_never_overwritten(tmp_path):
 
 def test_a_folder_that_is_not_there_is_refused_before_the_arm_moves(tmp_path):
     out = tmp_path / "nowhere" / "gravity.toml"
-    done = traction("calibrate", "gravity", "--fake", "--fast", "--out", out)
+    done = traction("calibrate", "gravity", "--fake", "--fast", "--to", out)
     assert done.code == 2
     assert "There is no folder" in done.err
 

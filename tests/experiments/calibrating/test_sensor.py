@@ -91,7 +91,7 @@ def calibrated(tmp_path_factory):
     """Return (what was said, file) of a calibration of another foot, turned sensor."""
     folder = tmp_path_factory.mktemp("sensor")
     out = folder / "ft_sensor.toml"
-    options = ("--poses", 6, "--out", out)
+    options = ("--poses", 6, "--to", out)
     done = calibrate("sensor", folder, *options, errors=SteadyErrors)
     assert done.code == 0, done.err
     return done, out
@@ -110,7 +110,7 @@ def test_six_orientations_recover_payload_mounting_and_sign(calibrated):
 
 def test_a_sensor_with_its_usual_drift_is_calibrated(tmp_path):
     out = tmp_path / "ft_sensor.toml"
-    done = calibrate("sensor", tmp_path, "--poses", 6, "--out", out)
+    done = calibrate("sensor", tmp_path, "--poses", 6, "--to", out)
     assert done.code == 0, done.err
     fit = sensor_from_toml(out.read_text(), out.name).fit
     assert 0.05 < fit.residual < 0.3
@@ -167,7 +167,7 @@ def test_tared_at_one_angle_only_an_incline_shows_as_force():
 @pytest.mark.long
 def test_drift_is_told_and_refused_unless_forced(tmp_path):
     out = tmp_path / "ft_sensor.toml"
-    options = ("--poses", 6, "--out", out)
+    options = ("--poses", 6, "--to", out)
     done = calibrate("sensor", tmp_path, *options, errors=DriftingErrors)
     assert done.code == 2
     assert "N rms unexplained (limit 0.3)" in done.err
@@ -284,7 +284,7 @@ def touch(folder, terrain, *options):
         done = traction(
             *("calibrate", "terrain", "--terrain", terrain, *QUICK),
             *("--friction", 0.02),
-            *("--data", folder, "--config", config, "--out", out, *options),
+            *("--data", folder, "--config", config, "--to", out, *options),
         )
     return done, out
 

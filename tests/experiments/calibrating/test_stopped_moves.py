@@ -58,7 +58,7 @@ def frozen(tmp_path_factory):
     out = tmp_path_factory.mktemp("frozen") / "gravity.toml"
     with pytest.MonkeyPatch.context() as patch:
         console = FrozenConsole(patch)
-        done = traction("calibrate", "gravity", "--fake", "--fast", "--out", out)
+        done = traction("calibrate", "gravity", "--fake", "--fast", "--to", out)
     return console, done
 
 

@@ -343,7 +343,7 @@ def test_live_and_simulated_sessions_do_not_mix(copied):
 
 @pytest.mark.parametrize("seed", ["-1", "x", "1" * 30])
 def test_a_seed_that_is_no_number_is_a_usage_error(tmp_path, seed):
-    done = traction("report", "--all", "--seed", seed, "--data", tmp_path)
+    done = traction("report", "--all", "--points-seed", seed, "--data", tmp_path)
     assert done.code == 2
     assert "expected a whole number >= 0, e.g. 1" in done.err.splitlines()[-1]
 

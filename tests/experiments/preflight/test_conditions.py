@@ -1,7 +1,6 @@
-"""The conditions of a session, also of one that another version has recorded."""
+"""The conditions of a session, also of one that lacks settings of today."""
 
 import io
-import json
 from contextlib import redirect_stdout
 
 import pytest
@@ -15,7 +14,6 @@ from experiments.preflight.conditions import (
 )
 from experiments.session.recorded_conditions import (
     FILE,
-    VERSION,
     read_conditions,
     write_conditions,
 )
@@ -36,64 +34,47 @@ def check(folder, now, *, is_forced=False):
         return check_conditions(folder, now, Console(), is_forced=is_forced)
 
 
-def write_old(folder, values):
-    """Write the file as version 1 did."""
-    (folder.path / FILE).write_text(json.dumps(values))
-
-
 def without(values, *names):
     return {name: value for name, value in values.items() if name not in names}
 
 
 def test_conditions_are_read_as_they_were_written(folder):
     write_conditions(folder, NOW)
-    conditions = read_conditions(folder)
-    assert (conditions.version, conditions.values) == (VERSION, NOW)
-
-
-def test_a_file_without_a_number_is_version_1(folder):
-    write_old(folder, NOW)
-    assert read_conditions(folder).version == 1
+    assert read_conditions(folder) == NOW
 
 
 def test_damaged_conditions_are_empty(folder):
     (folder.path / FILE).write_text("[")
-    assert not read_conditions(folder).values
+    assert read_conditions(folder) == {}
 
 
 def test_a_setting_that_is_younger_than_the_session_had_its_default(folder):
-    write_old(folder, without(NOW, LATER))
+    write_conditions(folder, without(NOW, LATER))
     assert check(folder, NOW) == []
 
 
 def test_a_younger_setting_that_is_not_at_its_default_is_named(folder):
-    write_old(folder, without(NOW, LATER))
+    write_conditions(folder, without(NOW, LATER))
     with pytest.raises(SessionError, match=f"{LATER} was {DEFAULTS[LATER]}, is 4000"):
         check(folder, {**NOW, LATER: "4000"})
 
 
 def test_a_whole_section_may_be_younger(folder):
     section = [name for name in NOW if name.startswith("rig.safety.")]
-    write_old(folder, without(NOW, *section))
+    write_conditions(folder, without(NOW, *section))
     assert len(section) > 2
     assert check(folder, NOW) == []
 
 
 def test_a_missing_setting_without_a_default_is_a_difference(folder):
-    write_old(folder, without(NOW, "rig.limits.foot_speed"))
+    write_conditions(folder, without(NOW, "rig.limits.foot_speed"))
     (text,) = check(folder, NOW, is_forced=True)
     assert text.startswith("rig.limits.foot_speed was not there")
 
 
 def test_a_setting_that_is_not_known_any_more_is_left_out(folder):
-    write_old(folder, {**NOW, "rig.limits.of_old": "3"})
+    write_conditions(folder, {**NOW, "rig.limits.of_old": "3"})
     assert check(folder, NOW) == []
-
-
-def test_a_file_of_a_newer_version_is_refused(folder):
-    (folder.path / FILE).write_text(json.dumps({"version": VERSION + 1, **NOW}))
-    with pytest.raises(SessionError, match=f"version {VERSION + 1}"):
-        check(folder, NOW, is_forced=True)
 
 
 def test_what_no_number_depends_on_has_no_default_either():

@@ -180,13 +180,16 @@ def test_a_journal_line_with_a_wrong_checksum_is_left_out_and_named(data):
     assert "events.jsonl has a wrong checksum in line 1" in done.err
 
 
-def test_journal_lines_without_a_checksum_are_read(data):
+def test_a_journal_line_without_a_checksum_is_left_out(data):
     path = only_session(data) / "events.jsonl"
-    text = path.read_text().splitlines()
-    older = "".join(line.rpartition(', "crc"')[0] + "}\n" for line in text)
-    path.write_text(older)
+    lines = path.read_text().splitlines(keepends=True)
+    lines[3] = lines[3].rpartition(', "crc"')[0] + "}\n"
+    path.write_text("".join(lines))
     session = find_session(data, "S001")
-    assert len(session.events()) == len(text)
+    assert len(session.events()) == len(lines) - 1
+    done = traction("verify", "S001", "--data", data)
+    assert done.code == 6
+    assert "events.jsonl has a wrong checksum in line 4" in done.err
 
 
 def test_names_of_journal_and_sidecars_are_forced_to_the_disk(data, monkeypatch):

@@ -71,7 +71,10 @@ def test_only_trials_with_verdict_and_right_checksum_count(tmp_path):
         path = session.trials / f"T{number:02d}.mcap"
         path.write_bytes(b"trial %d" % number)
         checksum = store.sha256_of(path) if is_sound else "0" * 64
-        write_json(path.with_suffix(".json"), {"verdict": verdict, "sha256": checksum})
+        fields = {"verdict": verdict, "sha256": checksum, "attempt": 1}
+        write_json(path.with_suffix(".json"), fields)
+        recorded = {"event": "trial-kept", "trial": number, "attempt": 1}
+        session.append_event({**recorded, "sha256": checksum})
     write_json(session.trials / "T04.json", {"verdict": "keep", "sha256": ""})
     assert [path.name for path in session.kept_trials()] == ["T01.mcap"]
 

@@ -74,14 +74,6 @@ def lose_line(number):
     return spoil
 
 
-def without_numbers(session):
-    """Write the journal as older versions did, of whose lines one could be lost."""
-    events = [parse_line(line) for line in lines(session)]
-    old = [{k: v for k, v in e.items() if k not in {"line", "crc"}} for e in events]
-    texts = [json.dumps(event).encode() + b"\n" for event in old]
-    write_lines(session, texts[:-4])
-
-
 def set_json(name, **fields):
     return lambda session: change_json(session.path / name, **fields)
 
@@ -150,10 +142,6 @@ DAMAGES = {
     "rejection lost": (
         lose_line(5),
         {("events.jsonl", "lacks lines or has others: line 5 was line 6")},
-    ),
-    "lines without numbers": (
-        without_numbers,
-        {("events.jsonl", "ends after 8 of 12 lines")},
     ),
     "summary gone": (
         drop("session.json"),
