@@ -105,7 +105,6 @@ _VARIED = frozenset(
 class DesignFile(SettingsSection):
     """A matrix.toml, cells and crosses not looked into yet."""
 
-    version: Literal["1.0"]
     factors: tuple[DesignFactor, ...] = Field(default=(), max_length=MOST_FACTORS)
     design: Design = Design()
     defaults: dict[str, Any] = Field(default_factory=dict[str, Any])

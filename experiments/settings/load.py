@@ -178,7 +178,7 @@ def load_unplaced(
     text = _shipped("rig.toml") if config is None else _read(config)
     folder = Path() if config is None else config.parent
     name = "rig.toml" if config is None else config.name
-    rig = _parse(RigSettings, text, name)
+    rig = _rig_of(text, name)
     build_device(rig.ft_sensor)
     if foot is not None and foot not in rig.feet:
         raise SettingsError(
@@ -213,10 +213,29 @@ def load_rig(text: str, name: str, folder: Path) -> RigSettings:
     Raises:
         SettingsError: no TOML, or it or a taught place has a wrong key or value.
     """
-    rig = _parse(RigSettings, text, name)
+    rig = _rig_of(text, name)
     build_device(rig.ft_sensor)
     places = {key: _taught(key, each, folder) for key, each in rig.places.items()}
     return rig.model_copy(update={"places": places})
+
+
+def _rig_of(text: str, name: str) -> RigSettings:
+    return _validated(RigSettings, _read_table(text, name), text, name)
+
+
+def _read_table(text: str, name: str) -> dict[str, Any]:
+    """Return what a settings file states beside its version.
+
+    Raises:
+        SettingsError: no TOML, or of another version.
+    """
+    table = _toml(text, name)
+    if problem := format_problem(table.get("version")):
+        raise SettingsError(
+            f"{name} {problem}.",
+            hint="traction init DIR writes one to be edited. Nothing was started.",
+        )
+    return {key: value for key, value in table.items() if key != "version"}
 
 
 def _taught(name: str, place: StatedPlace, folder: Path) -> StatedPlace:
@@ -252,13 +271,7 @@ def load_matrix(text: str, rig: RigSettings) -> MatrixSettings:
         SettingsError: no TOML, of another version, or a wrong key or value, or one that
             the rig has not.
     """
-    table = _toml(text, "matrix.toml")
-    if problem := format_problem(table.get("version")):
-        raise SettingsError(
-            f"matrix.toml {problem}.",
-            hint="traction init DIR writes one to be edited. Nothing was started.",
-        )
-    file = _validated(DesignFile, table, text, "matrix.toml")
+    file = _validated(DesignFile, _read_table(text, "matrix.toml"), text, "matrix.toml")
     return resolve_design(file, text, rig.places, tuple(rig.feet))
 
 

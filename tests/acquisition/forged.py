@@ -29,7 +29,7 @@ def foreign(profile, name="trial", data_crcs=True):
     out = io.BytesIO()
     writer = Writer(out, enable_data_crcs=data_crcs)
     writer.start(profile=profile, library="other")
-    writer.add_metadata(name, {"a": "b"})
+    writer.add_metadata(name, {"format_version": FORMAT})
     writer.finish()
     return out.getvalue()
 

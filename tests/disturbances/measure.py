@@ -26,7 +26,7 @@ from tests.disturbances.rewriting import rewrite
 from tests.disturbances.rows import Outcome, Recording, RecordingRow, TableRow
 
 DATA = Path(__file__).parents[1] / "data"
-RECORDED = DATA / "recorded" / "session-0.1.tar.xz"
+RECORDED = DATA / "recorded" / "session-1.0.tar.xz"
 TRIALS = {"S0": "S0/00", "TF": "TF/05"}
 
 

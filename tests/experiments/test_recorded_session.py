@@ -1,4 +1,4 @@
-"""What an earlier version recorded stays readable, and a seed stays what it was."""
+"""What was recorded in format 1.0 stays readable, and a seed stays what it was."""
 
 import json
 import tarfile
@@ -14,7 +14,7 @@ from tests.experiments.program import journal, only_session, traction
 
 RECORDED = Path(__file__).parents[1] / "data" / "recorded"
 # Two trials of three on TF; the configuration lies in the folder of the session.
-SESSION = RECORDED / "session-0.1.tar.xz"
+SESSION = RECORDED / "session-1.0.tar.xz"
 
 
 @pytest.fixture
@@ -36,7 +36,7 @@ def test_one_seed_records_the_cycles_it_always_did(tmp_path):
     assert found["digests"] == kept["digests"]
 
 
-def test_a_session_of_version_0_1_is_counted(recorded):
+def test_a_session_of_format_1_0_is_counted(recorded):
     data, config = recorded
     done = traction("status", "--json", "--data", data, "--config", config)
     assert done.code == 0
@@ -44,7 +44,7 @@ def test_a_session_of_version_0_1_is_counted(recorded):
     assert [(row["terrain"], row["kept"]) for row in rows if row["kept"]] == [("TF", 2)]
 
 
-def test_a_session_of_version_0_1_is_held_against_its_sidecars(recorded):
+def test_a_session_of_format_1_0_is_held_against_its_sidecars(recorded):
     data, config = recorded
     arguments = ("verify", "--all", "--data", data, "--config", config)
     assert traction(*arguments).code == 0
@@ -55,16 +55,17 @@ def test_a_session_of_version_0_1_is_held_against_its_sidecars(recorded):
     assert path.name in done.err
 
 
-def test_cycles_of_version_0_1_lack_the_time_of_the_bus_only(recorded):
+def test_cycles_of_format_1_0_are_all_there(recorded):
     path = only_session(recorded[0]) / "trials" / "T01.mcap"
     cycles = TrialReader(path).cycles().data
-    assert not cycles["bus_ns"].any()
     assert np.all(np.diff(cycles["cycle"]) == 1)
-    assert (cycles["arm_ns"] > cycles["host_ns"]).all()
+    asked = cycles[cycles["arm_ns"] > 0]
+    assert len(asked) > 0.9 * len(cycles)
+    assert (asked["arm_ns"] > asked["host_ns"]).all()
     assert np.isfinite(cycles["traction"][-1]).all()
 
 
-def test_a_truncated_trial_of_version_0_1_is_recovered(recorded):
+def test_a_truncated_trial_of_format_1_0_is_recovered(recorded):
     path = only_session(recorded[0]) / "trials" / "T01.mcap"
     whole = len(TrialReader(path).cycles().data)
     path.write_bytes(path.read_bytes()[: path.stat().st_size * 2 // 3])
@@ -76,7 +77,7 @@ def test_a_truncated_trial_of_version_0_1_is_recovered(recorded):
 
 
 @pytest.mark.slow
-def test_a_session_of_version_0_1_is_reported(recorded):
+def test_a_session_of_format_1_0_is_reported(recorded):
     data, config = recorded
     done = traction("report", "S001", "--data", data, "--config", config)
     assert done.code == 0, done.err
@@ -84,7 +85,7 @@ def test_a_session_of_version_0_1_is_reported(recorded):
 
 
 @pytest.mark.slow
-def test_a_session_of_version_0_1_is_resumed_and_completed(recorded):
+def test_a_session_of_format_1_0_is_resumed_and_completed(recorded):
     data, config = recorded
     done = traction(
         *("resume", "S001", "--operator-script", "auto"),

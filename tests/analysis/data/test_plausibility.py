@@ -12,7 +12,7 @@ from analysis.data.plausibility import doubts_of, doubts_of_record, summed_up
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.series import TractionSeries
 
-RECORDED = Path(__file__).parents[2] / "data" / "recorded" / "session-0.1.tar.xz"
+RECORDED = Path(__file__).parents[2] / "data" / "recorded" / "session-1.0.tar.xz"
 TIME, SPEED, LOAD, ALONG = range(4)
 
 

@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 from mcap.writer import Writer
 
-from experiments.session.data_files import write_json
+from experiments.session.data_files import journal_line, parse_line, write_json
 from experiments.session.store import create_session
 from tests.experiments.program import (
     digest,
-    journal,
     only_session,
     run_short,
     sidecar,
@@ -263,17 +262,20 @@ def copied(recorded, tmp_path):
 
 
 def vouch_for(path):
-    """Let the sidecar state the checksum of the file as it is now.
-
-    The journal becomes one of an older version, which says nothing about checksums.
-    """
-    fields = sidecar(path) | {"sha256": digest(path)}
-    write_json(path.with_suffix(".json"), fields)
-    folder = path.parents[1]
-    newer = {"sha256", "size", "crc"}
-    events = [{k: e[k] for k in e if k not in newer} for e in journal(folder)]
-    text = "".join(json.dumps(event) + "\n" for event in events)
-    (folder / "events.jsonl").write_text(text)
+    """Let sidecar and journal state the checksum of the file as it is now."""
+    now = {"sha256": digest(path), "size": path.stat().st_size}
+    write_json(path.with_suffix(".json"), sidecar(path) | now)
+    journal = path.parents[1] / "events.jsonl"
+    number = int(path.stem[1:])
+    events = map(parse_line, journal.read_bytes().splitlines())
+    lines = [
+        journal_line(
+            event | now if "sha256" in event and event["trial"] == number else event,
+            line,
+        )
+        for line, event in enumerate(events, 1)
+    ]
+    journal.write_bytes(b"".join(lines))
 
 
 def test_a_report_of_nothing_is_refused(tmp_path):
