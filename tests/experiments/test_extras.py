@@ -92,8 +92,6 @@ def test_an_extra_whose_library_is_hidden_is_named(extra, monkeypatch):
         ("report", ("report", "--all")),
         ("report", ("fit", SLICE, "--to", "fit")),
         ("report", ("publish", "--all", "--to", "crate", *AUTHOR)),
-        ("report", ("commission", *FAKE)),
-        ("report", ("calibrate", "friction", *FAKE)),
         ("cluster", ("report", "--all", "--scheduler", "tcp://127.0.0.1:9")),
         ("cluster", ("fit", SLICE, "--to", "f", "--scheduler", "tcp://127.0.0.1:9")),
         ("publish", ("publish", "--all", "--to", "crate", *AUTHOR)),
