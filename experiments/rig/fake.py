@@ -109,10 +109,10 @@ class SimulatedRig:
 
 
 def wrong_rigs() -> dict[str, str]:
-    """Return what is wrong with each rig of the catalogue, by its name."""
+    """Return what is wrong with each rig of the catalogue and why, by its name."""
     from fakes.world.wrong_rigs import catalogue
 
-    return {name: rig.wrong for name, rig in catalogue().items()}
+    return {name: f"{rig.wrong} ({rig.cause})" for name, rig in catalogue().items()}
 
 
 def typed_wrongly(settings: Settings, wrong: str) -> Settings:

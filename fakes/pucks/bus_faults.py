@@ -66,7 +66,6 @@ class BusFaults:
         is_off: the host's controller has left the bus, as Linux shows it: what is sent
             vanishes, nothing arrives, and one error frame told it.
         is_unheard: nobody acknowledges what the host sends: it waits in its queue.
-        lag_ns: by which the host's adapter hands over every frame too late.
         error_frames: (classes, detail) that the host's controller has still to tell.
     """
 
@@ -74,7 +73,6 @@ class BusFaults:
         self.is_down = False
         self.is_off = False
         self.is_unheard = False
-        self.lag_ns = 0
         self.error_frames: list[tuple[int, bytes]] = []
         self._schedule = schedule
         self._rng = np.random.default_rng(seed)
@@ -112,11 +110,6 @@ class BusFaults:
     ) -> None:
         """Let every frame be followed by `other` of it, `after_ns` later."""
         self._add(can_id, lambda data: [(0, data), (after_ns, other(data))], None)
-
-    def lag(self, lag_ns: int) -> None:
-        """Let the host's adapter hand over every frame `lag_ns` too late."""
-        self.lag_ns = lag_ns
-        self._step_in()
 
     def falsify(self, can_id: int, lie: Callable[[int], int]) -> None:
         """Let `lie` change every position [counts] that a puck tells."""
@@ -163,7 +156,6 @@ class BusFaults:
         if self.is_off:
             self.error_frames.append((_RESTARTED, bytes(8)))
         self.is_off = self.is_down = self.is_unheard = False
-        self.lag_ns = 0
         self._flood += 1
         self._rules.clear()
 
@@ -205,8 +197,7 @@ class BusFaults:
 
     def _release(self, can_id: int, delay_ns: int, data: bytes) -> None:
         now_ns = self._schedule.now_ns
-        late_ns = delay_ns + self.lag_ns
-        at_ns = max(now_ns + late_ns, self._released_ns.get(can_id, 0))
+        at_ns = max(now_ns + delay_ns, self._released_ns.get(can_id, 0))
         if at_ns == now_ns:
             self._put(can_id, data)
             return
@@ -242,7 +233,7 @@ Hear = Callable[[int, int, bytes], None]  # (time [ns], identifier, data)
 class OtherMaster:
     """Asks for positions 500 times a second while it is on the bus, and sends torques.
 
-    Those are zero; a poller sends none.
+    Those are zero.
     """
 
     def __init__(self, schedule: EventQueue, hear: Hear) -> None:
@@ -250,13 +241,11 @@ class OtherMaster:
         self._schedule = schedule
         self._hear = hear
         self._node = HOST
-        self._says = _FRAMES
         self._visit = 0  # number of the present one; events of earlier ones are void
 
-    def join(self, node: int = HOST, *, is_poller: bool = False) -> None:
+    def join(self, node: int = HOST) -> None:
         """Begin to send as `node`."""
         self._visit += 1
-        self._says = _FRAMES[:1] if is_poller else _FRAMES
         self._node = node
         visit = self._visit
         self._schedule.after(_HALF_NS, lambda: self._send(visit))
@@ -269,7 +258,7 @@ class OtherMaster:
         if visit != self._visit:
             return
         schedule = self._schedule
-        for group, data in self._says:
+        for group, data in _FRAMES:
             can_id = group_id(group, self._node)
             schedule.put(can_id, data)
             self._hear(schedule.now_ns, can_id, data)

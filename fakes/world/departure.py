@@ -32,19 +32,13 @@ class Place:
 
     Attributes:
         incline: further inclined [rad].
-        is_other_way: the row has the incline with the wrong sign.
-        heading: further turned about its far end [rad].
         far_end: further away [m].
         travel: longer [m].
-        is_relabelled: a plate is in it instead of stones, or the other way round.
     """
 
     incline: float = 0.0
-    is_other_way: bool = False
-    heading: float = 0.0
     far_end: tuple[float, float, float] = (0.0, 0.0, 0.0)
     travel: float = 0.0
-    is_relabelled: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,20 +47,16 @@ class BusTrouble:
 
     Attributes:
         late_ns: by which the position replies of a node come too late: (node, ns), ...
-        lag_ns: by which the adapter hands over every frame too late.
         lost: share of the position replies that is lost.
         doubled: node that is there twice; 0 = none.
         other_master: node of another program that drives the arm; 0 = none.
-        poller: node of another program that asks for positions; 0 = none.
         silent: nodes that say nothing.
     """
 
     late_ns: tuple[tuple[int, int], ...] = ()
-    lag_ns: int = 0
     lost: float = 0.0
     doubled: int = 0
     other_master: int = 0
-    poller: int = 0
     silent: tuple[int, ...] = ()
 
 
@@ -79,14 +69,12 @@ class ModuleTrouble:
         dead_button: of the pendant that does nothing; None = none.
         is_disobedient: it ignores a host that lowers its mode.
         heartbeat: how long it waits for positions, as a multiple.
-        voltage: of the power bus [V]; None = nominal.
     """
 
     limits: tuple[tuple[str, float], ...] = ()
     dead_button: PendantAction | None = None
     is_disobedient: bool = False
     heartbeat: float = 1.0
-    voltage: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +90,6 @@ class Departure:
         foot_mass: true mass of the foot, as a share.
         foot_centre: how far its centre is off [m], frame 7, shape (3,).
         sole: how far the sole is off [m], frame 7, shape (3,).
-        is_foot_turned: the foot is mounted turned by 180 degrees about joint 7.
         shown: what the sensor shows of the load on it, shape (6, 6).
         force_late: age of what it shows [s].
         cable: force of its cable on the foot [N], base frame, shape (3,).
@@ -126,7 +113,6 @@ class Departure:
     foot_mass: float = 1.0
     foot_centre: Array = field(default_factory=_no_vector)
     sole: Array = field(default_factory=_no_vector)
-    is_foot_turned: bool = False
     shown: Array = field(default_factory=lambda: np.eye(6))
     force_late: float = 0.0
     cable: Array = field(default_factory=_no_vector)

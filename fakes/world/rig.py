@@ -42,7 +42,6 @@ from fakes.world.true_rig import (
     true_network,
     true_options,
     true_start,
-    true_stones,
     true_tool,
 )
 from ft_sensor.payload import TerrainFrame
@@ -114,8 +113,6 @@ class FakeRig:
             options = true_options(options or PlantOptions(), departure)
             network = true_network(network, departure)
             scene = replace(scene, frame=true_frame(scene.frame, departure))
-            stones = true_stones(scene.ground.stones, departure)
-            scene = replace(scene, ground=replace(scene.ground, stones=stones))
             q = true_start(q, departure)
         self.scene = scene
         self.plant = ArmPlant(constants, tool, scene.frame, q, options)

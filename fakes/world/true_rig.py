@@ -48,12 +48,10 @@ def true_constants(believed: ArmConstants, departure: Departure) -> ArmConstants
 
 def true_tool(believed: Tool, departure: Departure) -> Tool:
     """Return the foot as it is."""
-    turn = np.diag([-1.0, -1.0, 1.0]) if departure.is_foot_turned else np.eye(3)
-    foot = believed.foot
-    com = turn @ foot.com + departure.foot_centre
-    share = departure.foot_mass
-    body = Body(share * foot.mass, com, share * (turn @ foot.inertia @ turn.T))
-    return replace(believed, foot=body, sole=turn @ believed.sole + departure.sole)
+    foot, share = believed.foot, departure.foot_mass
+    centre = foot.com + departure.foot_centre
+    body = Body(share * foot.mass, centre, share * foot.inertia)
+    return replace(believed, foot=body, sole=believed.sole + departure.sole)
 
 
 def true_options(believed: PlantOptions, departure: Departure) -> PlantOptions:
@@ -75,22 +73,14 @@ def true_network(believed: NetworkOptions, departure: Departure) -> NetworkOptio
 def true_frame(believed: TerrainFrame, departure: Departure) -> TerrainFrame:
     """Return where the container stands, in the frame of the base as it is turned."""
     place, yaw = departure.place, float(departure.mount[2])
-    incline = -believed.incline if place.is_other_way else believed.incline
     shifted = np.array(believed.far_end) + place.far_end
     x, y, z = (rotation((0.0, 0.0, yaw)).T @ shifted).tolist()
     return TerrainFrame(
-        incline + place.incline,
-        believed.heading + place.heading - yaw,
+        believed.incline + place.incline,
+        believed.heading - yaw,
         (x, y, z),
         believed.travel + place.travel,
     )
-
-
-def true_stones(believed: str, departure: Departure) -> str:
-    """Return the stones in the container: "small", "big" or "none"."""
-    if not departure.place.is_relabelled:
-        return believed
-    return "small" if believed == "none" else "none"
 
 
 def true_start(q: Array, departure: Departure) -> Array:
@@ -154,16 +144,12 @@ def _break_module(network: PuckNetwork, departure: Departure) -> None:
         network.disobey()
     if module.heartbeat != 1.0:
         network.set_heartbeat(round(module.heartbeat * NetworkOptions().heartbeat_ns))
-    if module.voltage is not None:
-        network.set_bus_voltage(module.voltage)
 
 
 def _break_bus(network: PuckNetwork, bus: BusTrouble) -> None:
     faults = network.faults
     for node, late_ns in bus.late_ns:
         faults.delay(position_reply_id(node), late_ns, None)
-    if bus.lag_ns:
-        faults.lag(bus.lag_ns)
     if bus.lost:
         for node in MOTOR_NODES:
             faults.drop(position_reply_id(node), None, bus.lost)
@@ -172,8 +158,6 @@ def _break_bus(network: PuckNetwork, bus: BusTrouble) -> None:
             faults.answer_twice(reply, _of_twin, _TWIN_NS)
     if bus.other_master:
         network.other_master.join(bus.other_master)
-    if bus.poller:
-        network.other_master.join(bus.poller, is_poller=True)
     for node in bus.silent:
         network.silence(node)
 

@@ -129,13 +129,13 @@ def test_hands_take_orders_as_at_an_arm_that_is_served_by_the_command(caller):
 
 
 def test_a_wrong_arm_differs_as_the_catalogue_says(files):
-    of_joint_2 = []
-    for wrong in ("", "encoder-2-reversed"):
+    of_joint_4 = []
+    for wrong in ("", "encoder-4-reversed"):
         caller = Caller()
         served = {**files, **WANTED, "wrong": wrong}
         assert caller.say(Call.SERVE, json.dumps(served)) == DONE
-        of_joint_2.append(positions(caller, 0.02)[1])
-    assert of_joint_2[0] != of_joint_2[1]
+        of_joint_4.append(positions(caller, 0.02)[3])
+    assert of_joint_4[0] != of_joint_4[1]
 
 
 def test_a_call_of_an_offset_that_means_nothing_is_refused(caller):

@@ -7,7 +7,6 @@ import pytest
 from experiments.commands.commission import FAKE_FOLDER
 from experiments.commissioning.record import NAME, read_commissioning
 from tests.experiments.program import traction, write_config
-from tests.wrong_rigs import commissioned
 
 FIRST = ("--fake", "--fast", "--operator-script", "auto", "--until", "C1")
 
@@ -95,7 +94,6 @@ def test_a_puck_that_was_replaced_is_noticed_until_it_is_begun_anew(tmp_path):
     ("wrong", "words"),
     [
         ("puck-6-hot", "puck 6 has 58 °C, an idle one has 10 to 50"),
-        pytest.param("otemp-120", "OTEMP of puck 2 is 120", marks=pytest.mark.slow),
         pytest.param("", "", marks=pytest.mark.slow),
     ],
 )
@@ -105,22 +103,3 @@ def test_what_is_unusual_is_said_and_passes(tmp_path, wrong, words):
     assert done.code == 0, done.err
     assert ("▲ C2 identity" in done.out) is bool(wrong)
     assert words in " ".join(done.out.split())
-
-
-# Name of the catalogue, the step that finds it, words of its cause.
-WRONG = [
-    ("foot-typed-4.5kg", "C0", "feet.tread.mass = 4.5"),
-    ("other-master", "C1", "Another program drives this arm"),
-    ("pidx-3-is-2", "C2", "PIDX of puck 3 is 2"),
-    ("mixed-firmware", "C2", "firmware versions of the pucks are incompatible"),
-    ("duplicate-node", "C2", "Two devices have one number"),
-    ("vl2-doubled", "C2", "VL2 = 8192"),
-]
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(1200)
-@pytest.mark.parametrize(("name", "step", "words"), WRONG)
-def test_a_wrong_rig_is_found_where_it_should_be(name, step, words):
-    ending = commissioned(name, 1, 0.7, last=step)
-    assert (ending.step, words in ending.cause) == (step, True), ending

@@ -139,8 +139,8 @@ def test_a_seed_draws_one_of_many_sound_arms(serve):
 
 
 def test_a_wrong_arm_is_one_of_many_with_something_wrong(serve):
-    departure = serve("--wrong", "motor-2-reversed").departure
-    assert departure.torque[1, 1] == -1.0
+    departure = serve("--wrong", "motor-3-reversed").departure
+    assert departure.torque[2, 2] == -1.0
     assert departure.zeros.any()
 
 
@@ -150,7 +150,7 @@ def test_a_wrong_rig_that_there_is_not_is_refused_with_all_names(command):
     done = traction(command, *more, "--wrong", "motor-9-reversed")
     assert done.code == 2
     assert "Did you mean motor-" in done.err
-    assert "encoders-5-6-swapped" in done.err
+    assert "encoders-6-7-swapped" in done.err
 
 
 def test_help_on_wrong_rigs_lists_them():
@@ -159,7 +159,9 @@ def test_help_on_wrong_rigs_lists_them():
     assert "sensor-scale-95" in done.out
 
 
-@pytest.mark.parametrize("option", [("--wrong", "mt-700"), ("--mount", "1", "2", "3")])
+@pytest.mark.parametrize(
+    "option", [("--wrong", "pidx-3-is-2"), ("--mount", "1", "2", "3")]
+)
 @pytest.mark.parametrize("command", [("run", "S0"), ("check",), ("calibrate", "foot")])
 def test_a_real_rig_cannot_be_made_wrong(command, option):
     done = traction(*command, *option)

@@ -1,0 +1,74 @@
+"""Every judge of a commissioning is tripped by a wrong rig, every rig by a judge."""
+
+import pytest
+
+from experiments.commissioning.steps import ProofStep
+from experiments.proving.limits import LIMITS
+from experiments.proving.work import WORK
+from fakes.world.wrong_rigs import catalogue
+from tests.wrong_rigs import FOUND, REFUSED, WARNED, found_by
+
+# Quantities that say how a step was done, not what the rig is like.
+OF_THE_WORK = {
+    *("listened", "answered", "cycles", "seen", "active", "rocked", "turned"),
+    *("corners", "flat", "pressed", "pulled"),
+}
+# Judged on made recordings and held arms in tests/experiments/proving: a start refuses
+# the rig, another quantity is sooner, or rig.toml alone is wrong.
+OF_RECORDINGS = {
+    *("load", "drawings", "error_frames", "module", "serials"),
+    *("late", "jumps", "answer", "stop", "stays", "idles", "asleep"),
+    *(
+        "hung_scale",
+        "hung_spread",
+        "fitted",
+        "hung_way",
+        "rest",
+        "stiffness",
+        "ringing",
+        "balance",
+    ),
+}
+# Only in the check of every day.
+OF_THE_DAY = {"changed", "exchange", "zero", "hang_force", "hang_way", "drift"}
+ROWS = [(name, finding) for name, row in FOUND.items() for finding in row]
+_QUICK = {ProofStep.CONFIGURATION, ProofStep.LISTEN, ProofStep.IDENTITY}
+
+
+def marked():
+    """Return every finding; those before the loop runs are slow, the others long."""
+    return [
+        pytest.param(
+            *(name, finding),
+            id=f"{name}-{finding.step}",
+            marks=pytest.mark.slow if finding.step in _QUICK else pytest.mark.long,
+        )
+        for name, finding in ROWS
+    ]
+
+
+def test_every_rig_of_the_catalogue_is_found_and_no_other():
+    assert set(FOUND) == set(catalogue())
+    assert all(finding.by for _, finding in ROWS)
+
+
+def test_every_judge_is_tripped_by_a_rig():
+    assert {finding.step for _, finding in ROWS} == set(WORK)
+    judged = {finding.step for _, finding in ROWS if finding.by != (REFUSED,)}
+    assert judged == set(WORK)
+
+
+def test_every_quantity_is_tripped_by_a_rig_or_judged_elsewhere():
+    tripped = {key for _, finding in ROWS for key in finding.by} - {REFUSED, WARNED}
+    assert tripped <= set(LIMITS)
+    others = [OF_THE_WORK, OF_RECORDINGS, OF_THE_DAY]
+    assert all(not tripped & each for each in others)
+    assert set().union(tripped, *others) == set(LIMITS)
+
+
+@pytest.mark.timeout(1200)
+@pytest.mark.parametrize(("name", "finding"), marked())
+def test_a_wrong_rig_is_found_as_the_table_says(name, finding):
+    ending = found_by(name, finding)
+    assert ending.is_as(finding), ending
+    assert ending.is_gentle, ending
