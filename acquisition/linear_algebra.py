@@ -8,7 +8,7 @@ of 2013, whose products take a third longer.
 Such matrices are too large for the heap of the C library as it comes: every temporary
 one is mapped, cleared and unmapped again, and with threads beside it each unmapping
 interrupts the other cores. Two workers of a Dask cluster on two cores were 1.26 times
-as fast as one by that; docs/measured.md has the figure of today.
+as fast as one by that; `python -m benchmarks` has the figure of today.
 """
 
 import ctypes
