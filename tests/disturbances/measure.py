@@ -82,7 +82,7 @@ def _fitted(folder: Path, table: Array, row: TableRow | None) -> tuple[str, floa
 
 @contextmanager
 def recorded_trial() -> Iterator[Path]:
-    """Unpack the trial that version 0.1 recorded."""
+    """Unpack a trial of the recorded session."""
     with TemporaryDirectory() as folder:
         with tarfile.open(RECORDED) as archive:
             archive.extractall(folder, filter="data")
@@ -115,7 +115,12 @@ def see_recording(row: RecordingRow, source: Path) -> Seen:
         except TractionError as error:
             return Seen(Outcome.REFUSED, error.message, 0.0)
     said = [text for mark, text in after.lines() if mark != GOOD]
-    usual = [text for mark, text in before.lines() if mark != GOOD]
-    new = [text for text in said if text not in usual]
+    usual = {_check(text) for mark, text in before.lines() if mark != GOOD}
+    new = [text for text in said if _check(text) not in usual]
     outcome = Outcome.FLAGGED if new else Outcome.HARMLESS
     return Seen(outcome, "; ".join(new), abs(after.ratio / before.ratio - 1.0))
+
+
+def _check(text: str) -> str:
+    """Return which check of the review says `text`: its first word."""
+    return text.split(maxsplit=1)[0]

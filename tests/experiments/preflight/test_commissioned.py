@@ -83,8 +83,8 @@ def test_a_record_that_settings_made_stale_is_refused(config, old, new, words):
     assert words in Arm(config).refusal().message
 
 
-def test_another_arm_with_the_same_files_is_refused(config):
-    refusal = Arm(config, "another-arm").refusal()
+def test_an_arm_of_another_puck_with_the_same_files_is_refused(config):
+    refusal = Arm(config, "one-puck-replaced").refusal()
     assert "C2 identity: stale: serial number" in refusal.message
 
 
