@@ -118,14 +118,15 @@ def run_session(request: SessionRequest, mode: OpenMode) -> int:
             raise load.blamed(error) from error
         sensor = sensor_conditions(page.devices)
         differences += _check_conditions(sensor, mode, console)
-        hand = _hand(request, rig)
+        simulated = rig.simulation
+        hand = None if simulated is None else SimulatedHand(simulated)
         operator = request.operator
         with handle_signals(stop), keyboard(operator), ExitStack() as stack:
             stack.callback(host_faults.restore)
             journal = _open_journal(request, mode, rig, stack, host_faults)
             if mode.journal is None:
                 write_conditions(journal.folder, {**rig_conditions(rig), **sensor})
-            metadata = _write_metadata(request, rig, page, journal)
+            metadata = _write_metadata(request, page, journal)
             console_loop = ConsoleLoop(rig, console, operator, stop, hand, faults)
             runner = SessionRunner(console_loop, metadata, journal)
             code = runner.run(mode.event, **_details(request, mode, differences))
@@ -134,13 +135,6 @@ def run_session(request: SessionRequest, mode: OpenMode) -> int:
         console.say(f"▲ The fault {text} was not raised: its time was not reached.")
     _print_next(request, journal, code)
     return code
-
-
-def _hand(request: SessionRequest, rig: Rig) -> SimulatedHand | None:
-    """Return the hand of a simulated operator, None on a real rig."""
-    if rig.simulation is None:
-        return None
-    return SimulatedHand(rig.simulation)
 
 
 def _check_rig(request: SessionRequest, rig: Rig, host_faults: HostFaults) -> Preflight:
@@ -198,7 +192,7 @@ def _open_journal(
 
 
 def _write_metadata(
-    request: SessionRequest, rig: Rig, page: Preflight, journal: Journal
+    request: SessionRequest, page: Preflight, journal: Journal
 ) -> SessionMetadata:
     """Write what is known at this opening; later ones get a number of their own."""
     seed = request.fake.seed if request.fake is not None else None

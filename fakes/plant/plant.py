@@ -209,11 +209,6 @@ class ArmPlant:
     # --- the world ----------------------------------------------------------------
 
     @property
-    def is_touching(self) -> bool:
-        """Whether the ground carries anything."""
-        return self._ground[2] > 0.05
-
-    @property
     def contact_force(self) -> tuple[float, float, float]:
         """Force of the ground on the foot in the terrain frame, mean of a cycle [N]."""
         x, y, z, _, _, _ = self._ground

@@ -17,6 +17,10 @@ def plant():
     return plant
 
 
+def is_touching(plant):
+    return plant.contact_force[2] > 0.05  # N
+
+
 def test_the_hand_lifts_the_foot_and_holds_it_still(plant):
     plant.hand.lift_to_start()
     for _ in float_for(plant, 1.5):
@@ -24,16 +28,16 @@ def test_the_hand_lifts_the_foot_and_holds_it_still(plant):
     assert plant.hand.is_done
     assert sole(plant) == pytest.approx([0.0, 0.0, LIFT], abs=2e-3)
     assert plant.foot_speed < 1e-3
-    assert not plant.is_touching
+    assert not is_touching(plant)
 
 
 def test_the_hand_puts_the_foot_down_and_lets_it_rest(plant):
     plant.hand.put_down(plant.terrain.surface(0.0))
     forces = []
     for _ in float_for(plant, 2.0, virtual_mass=0.3):
-        forces.append(plant.is_touching)
+        forces.append(is_touching(plant))
     assert plant.hand.phase is HandPhase.REST
-    assert plant.is_touching
+    assert is_touching(plant)
     assert forces.index(True) > 100  # it was carried first
     assert abs(sole(plant)[0]) < 5e-3
     assert plant.foot_speed < 5e-3
