@@ -1,4 +1,4 @@
-"""Boots the machine and runs scenarios: python -m lab [--short] [--only NAME] ..."""
+"""Boots the machine and runs scenarios: python -m lab [--only NAME] ..."""
 
 import argparse
 import compileall
@@ -46,7 +46,6 @@ sleep 60
 def parser() -> argparse.ArgumentParser:
     """Return the options."""
     options = argparse.ArgumentParser(prog="python -m lab", description=__doc__)
-    options.add_argument("--short", action="store_true", help="the short form")
     options.add_argument(
         "--only", action="append", default=[], metavar="NAME", help="this scenario"
     )
@@ -75,7 +74,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if unknown := [name for name in options.only if name not in names]:
         print(f"--only {unknown[0]!r} is none of: {', '.join(sorted(names))}")
         return 2
-    scenarios = chosen(options.only, is_short=options.short)
+    scenarios = chosen(options.only)
     if options.list:
         print("\n".join(f"{one.name:<28} {one.what}" for one in scenarios))
         return 0

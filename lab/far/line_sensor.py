@@ -39,25 +39,15 @@ class Served(Protocol):
 
 
 class FarEnd:
-    """A sensor with its power switch, at the end of a serial line."""
+    """A sensor at the end of a serial line."""
 
     def __init__(self, stream: SensorStream, t_ns: int) -> None:
         self._stream = stream
-        self._is_on = True
         stream.due(t_ns)
         stream.port_opened(t_ns)
 
-    def switch(self, t_ns: int, *, is_on: bool) -> None:
-        """Take the sensor's power away, or give it back: it starts anew."""
-        self._is_on = is_on
-        self._stream.due(t_ns)
-        if is_on:
-            self._stream.reset(t_ns)
-
     def advance(self, t_ns: int, data: bytes) -> bytes:
         """Take bytes of the host; return the sensor's up to `t_ns`."""
-        if not self._is_on:
-            return b""
         if data:
             self._stream.receive(t_ns, data)
         return b"".join(part for _, part in self._stream.due(t_ns))
@@ -81,6 +71,5 @@ class LineSensor:
         return TICK_NS, [], self._end.advance(self._clock.go_on(), data)
 
     def do(self, line: str) -> None:
-        """Switch its power: on, off."""
-        is_on = {"on": True, "off": False}[line]
-        self._end.switch(self._clock.now_ns(), is_on=is_on)
+        """Raise KeyError: nobody is at it."""
+        raise KeyError(line)

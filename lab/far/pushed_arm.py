@@ -1,8 +1,8 @@
 """An arm with ground and hand at the far end of a CAN bus.
 
 Lines move the hand and press the pendant, as a person would do: prepare TRIAL, lift,
-put_down, push, rest, let_go, activate, idle, estop, break FAULT, mend, sensor_off,
-sensor_on; and orders to hands as `traction fake` takes them, e.g. pose, release.
+put_down, push, rest, activate, idle, mend; and orders to hands as `traction fake` takes
+them, e.g. pose, release.
 """
 
 from collections.abc import Callable
@@ -70,13 +70,9 @@ class PushedArm:
             "put_down": simulation.put_down,
             "push": simulation.push,
             "rest": simulation.rest,
-            "let_go": simulation.let_go,
             "mend": simulation.clear_faults,
             "activate": lambda: simulation.pendant("activate"),
             "idle": lambda: simulation.pendant("idle"),
-            "estop": lambda: simulation.pendant("estop"),
-            "sensor_off": lambda: self._switch(is_on=False),
-            "sensor_on": lambda: self._switch(is_on=True),
         }
 
     def do(self, line: str) -> None:
@@ -84,8 +80,6 @@ class PushedArm:
         word, _, operand = line.partition(" ")
         if word == "prepare":
             self._simulation.prepare(int(operand))
-        elif word == "break":
-            self._simulation.inject(operand)
         elif line in self._actions:
             self._actions[line]()
         elif (order := parse_hand_order(line.split())) is not None:
@@ -105,7 +99,3 @@ class PushedArm:
         event_ns = wired.next_event_ns()
         left = TICK_NS if event_ns is None else max(event_ns - now_ns, _TOGETHER_NS)
         return min(left, TICK_NS), sent, written
-
-    def _switch(self, *, is_on: bool) -> None:
-        if self._line is not None:
-            self._line.switch(self._clock.now_ns(), is_on=is_on)

@@ -77,11 +77,6 @@ class Program:
         os.set_blocking(self._out, False)
 
     @property
-    def pid(self) -> int:
-        """Number of the process."""
-        return self._process.pid
-
-    @property
     def is_running(self) -> bool:
         """Whether it has not ended."""
         return self._process.poll() is None
@@ -131,10 +126,6 @@ class Program:
                 raise ScenarioError(f"did not end within {patience:g} s")
         self._read(0.0)
         return self._process.returncode
-
-    def signal(self, number: signal.Signals) -> None:
-        """Send it a signal."""
-        self._process.send_signal(number)
 
     def close(self) -> None:
         """End it and all it has started, if it still runs; safe to repeat."""

@@ -1,6 +1,5 @@
 """The two CAN interfaces: set up, down and up, slow and lossy, counted."""
 
-import json
 from pathlib import Path
 
 from lab.guest.commands import Shell, read_text, require
@@ -33,12 +32,6 @@ def disturb(shell: Shell, name: str, how: str) -> None:
 def clear(shell: Shell, name: str) -> None:
     """Take netem away, with what waits in it."""
     shell.run(f"tc qdisc del dev {name} root", is_checked=False)
-
-
-def queue_length(shell: Shell, name: str) -> int:
-    """Return `txqueuelen` of an interface."""
-    (link,) = json.loads(shell.run(f"ip -json link show {name}"))
-    return int(link["txqlen"])
 
 
 def counters(name: str) -> dict[str, int]:

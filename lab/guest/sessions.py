@@ -6,7 +6,7 @@ from pathlib import Path
 
 from acquisition.clock import PERIOD_NS
 from acquisition.trial_file.reader import TrialReader
-from lab.guest.commands import Program, ScenarioError, require
+from lab.guest.commands import Program, ScenarioError, require, seconds
 from lab.guest.commissioned import take_as_commissioned
 from lab.guest.machine_room import MachineRoom
 
@@ -14,6 +14,7 @@ _START = 60.0  # s of guest time until the arm is to be activated
 _STEP = 30.0  # s until the program goes on by itself
 _REVIEW = 90.0  # s until a trial is reviewed: what that needs is read from the host
 _REACTION = 0.1  # s from a prompt to the key
+_SUPPORT = "Support the arm: it goes idle"
 _REST = 0.7  # s in which the foot comes to rest on the ground
 _PUSH = 1.0  # s of a trial, ended by key: every second costs the host many
 TERRAIN = "TF"
@@ -104,15 +105,22 @@ class LedSession:
         """End the session by key, its last tare taken; return the exit code."""
         self.program.expect("[space] to end the session", _STEP)
         self._press(" ")
+        self.program.expect(_SUPPORT, _STEP)
+        self._press(" ")
         return self.program.wait(_STEP)
 
-    def pause(self) -> None:
-        """Let the arm hold for a second, then go on; a trial is ready before."""
-        self._press("p")
-        self.program.expect("Paused.", _STEP)
-        self.program.run_on(_REACTION)
-        self._press(" ")
-        self.program.expect("[space] record", _STEP)
+    def cut_off(self) -> int:
+        """Return the exit code of a session that was cut, once it has ended.
+
+        An arm that still holds then is supported before it goes idle, as asked.
+        """
+        end = seconds() + _STEP
+        while self.program.is_running and seconds() < end:
+            self.program.run_on(_REACTION)
+            if _SUPPORT in self.program.output:
+                self._press(" ")
+                break
+        return self.program.wait(_STEP)
 
     def confirm(self) -> None:
         """Press the space bar, as asked."""

@@ -4,7 +4,7 @@ import pytest
 
 from lab import __main__ as program
 from lab.follower import PANICKED
-from lab.guest.scenarios.registry import ALL, Scenario, chosen
+from lab.guest.scenarios.registry import ALL, Scenario
 from lab.kernel import Kernel, image_package
 from lab.machine import SLOWNESS, Sockets, command
 from lab.requirements import LabError, install_line, missing_packages
@@ -27,7 +27,7 @@ def test_the_line_installs_the_firmware_too():
 
 def test_a_run_without_its_packages_says_what_to_install(monkeypatch, capsys):
     monkeypatch.setattr(program, "missing_packages", lambda: ["kmod"])
-    assert program.main(["--short"]) == program.NOT_READY
+    assert program.main([]) == program.NOT_READY
     assert install_line(["kmod"]) in capsys.readouterr().out
 
 
@@ -42,12 +42,6 @@ def test_the_list_names_scenarios_without_any_package(monkeypatch, capsys):
     assert program.main(["--list"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) == len(ALL)
-
-
-def test_the_short_form_is_a_part_of_the_full_one():
-    short, full = chosen([], is_short=True), chosen([], is_short=False)
-    assert set(short) < set(full)
-    assert short
 
 
 def test_every_scenario_has_a_name_and_a_sentence_of_its_own():

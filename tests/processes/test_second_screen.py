@@ -12,9 +12,9 @@ from acquisition.ipc.layout import SharedLayout
 from acquisition.schema import CYCLE
 from experiments.session.lock import session_lock
 from experiments.session.store import create_session
-from lab.guest.viewer import Viewer
 from tests.acquisition.ros import decode
 from tests.experiments.live.test_watching import written
+from tests.experiments.live.viewer import Viewer
 from tests.processes.watching import CLOCK, START, running_trial, until
 
 pytest.importorskip("foxglove")

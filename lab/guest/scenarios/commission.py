@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from experiments.commissioning.record import NAME, Commissioning, read_commissioning
+from experiments.commissioning.record import Commissioning, read_commissioning
 from experiments.commissioning.steps import GATED, ProofStep
 from experiments.proving.recording import Values, read_raw
 from experiments.proving.rest_pose import liftoffs, rest_pose
@@ -13,9 +13,8 @@ from experiments.settings.load import load_settings
 from lab.guest.commands import Program, ScenarioError, require
 from lab.guest.commissioned import take_as_commissioned
 from lab.guest.machine_room import MachineRoom
-from lab.guest.network import set_up_both
 from lab.guest.scenarios.bus import Figures
-from lab.guest.scenarios.recording import served_arm
+from lab.guest.scenarios.losses import served_arm
 from lab.guest.sessions import LedSession
 from wam.model.arm_model import ArmModel
 from wam.model.constants import load_constants
@@ -25,42 +24,16 @@ _CARRIED = 2.5  # s, in which hands bring the arm into a pose
 _COMES_TO_REST = 1.0  # s, until an arm that is held or let go of is still
 _FRICTION = "0.7"  # of the joints, as a share of what was identified on another arm
 _STOPPED = 3  # exit code: a step found something wrong
-_ON_THE_BUS = GATED[1 : GATED.index(ProofStep.BY_HAND)]
 _BEFORE_TORQUE = GATED[: GATED.index(ProofStep.REST_POSE)]
 _ON_REST_POSE = GATED[len(_BEFORE_TORQUE) :]
-# Wrong arms, the step that has to stop at each, and words of its cause.
-_WRONG = (
-    ("pidx-3-is-2", ProofStep.IDENTITY, "PIDX of puck 3 is 2"),
-    ("module-disobeys", ProofStep.STOP_CIRCUIT, "does not go back to idle"),
-    ("motor-3-reversed", ProofStep.RAMPS, "motor 3"),
-)
+_WRONG = "motor-3-reversed"
 
 
-def on_the_bus(room: MachineRoom) -> Figures:
-    """Commission an arm without torque: C1 to C4, the pendant pressed as asked.
-
-    C0 touches no device, and refuses this configuration's short test of the loop.
-    """
-    day = _bus_steps(room, _pushed(room), _ON_THE_BUS[0])
-    room.finish(day.program, _STEP)
-    record = _sound_record(room, _ON_THE_BUS)
-    timing = _recorded(room, record, ProofStep.TIMING)
-    p50, p99 = np.percentile(timing["replies_ns"], (50, 99)) / 1e6
-    return {
-        "exchange": f"{p50:.2f} ms (p99 {p99:.2f})",
-        "answer": f"{timing['answer_ns'] / 1e6:.2f} ms",
-        "idle loop": f"{timing['cycles']} cycles, {timing['incomplete']} incomplete",
-        "early": _measured(record, ProofStep.STOP_CIRCUIT, "nobody asked for it"),
-        "stop": _measured(record, ProofStep.STOP_CIRCUIT, "pucks without power"),
-    }
-
-
-def on_the_rest_pose(room: MachineRoom) -> Figures:
+def at_rest(room: MachineRoom) -> Figures:
     """Commission an arm with little torque: C8 to C11 on its rest pose.
 
-    C0 to C7, which send none, are written into the record as sound: C1 to C4 are a
-    scenario of their own, C5 to C7 want a hand for many poses. The command finds by
-    itself that C8 is next, and nothing before it stale.
+    C0 to C7, which send none, are written into the record as sound. The command finds
+    by itself that C8 is next, and nothing before it stale.
     """
     day = _rest_steps(room, _pushed(room))
     room.finish(day.program, _STEP)
@@ -75,60 +48,20 @@ def on_the_rest_pose(room: MachineRoom) -> Figures:
     }
 
 
-def wrong_arms(room: MachineRoom) -> Figures:
-    """Commission arms that are wrong: C2, C4 and C9 stop, and say why."""
-    figures: Figures = {}
-    for name, step, words in _WRONG:
-        if step in _ON_THE_BUS:
-            arm = _at_home(room, "--wrong", name)
-            day = _bus_steps(room, arm, step)
-        else:
-            arm = _pushed(room, "--wrong", name)
-            day = _rest_steps(room, arm)
-        room.finish(day.program, _STEP, _STOPPED)
-        arm.close()
-        record = _record(room)
-        (wrong,) = [done for done in record.steps if done.cause]
-        require(wrong.step is step, f"{name}: {wrong.name}, in place of {step}")
-        require(words in wrong.cause, f"{name}: {wrong.cause}")
-        figures[name] = f"{step}: {wrong.cause}"
-        if step not in _ON_THE_BUS:
-            figures["sole"] = _farthest(room, record)
-        (room.folder / NAME).unlink()
-    return figures
+def wrong_arm(room: MachineRoom) -> Figures:
+    """Commission an arm with a reversed motor: C9 stops, and says which."""
+    day = _rest_steps(room, _pushed(room, "--wrong", _WRONG))
+    room.finish(day.program, _STEP, _STOPPED)
+    record = _record(room)
+    (wrong,) = [done for done in record.steps if done.cause]
+    require(wrong.step is ProofStep.RAMPS, f"{wrong.name} stopped, in place of C9")
+    require("motor 3" in wrong.cause, wrong.cause)
+    return {_WRONG: wrong.cause, "sole": _farthest(room, record)}
 
 
 def _pushed(room: MachineRoom, *options: str) -> Program:
     """Return an arm with the friction of many, held by a hand that may let go of it."""
     return served_arm(room, "--friction", _FRICTION, *options)
-
-
-def _at_home(room: MachineRoom, *options: str) -> Program:
-    """Return `traction fake`: an arm at home, computed and answered in the machine."""
-    set_up_both(room.shell)
-    room.write_bus_config()
-    return room.serve_home_arm("--hand", "none", *options)
-
-
-def _bus_steps(room: MachineRoom, arm: Program, first: ProofStep) -> LedSession:
-    """Return a commissioning from `first` to C4, the pendant pressed where it asks."""
-    words = ("--from", first, "--until", _ON_THE_BUS[-1])
-    day = LedSession(room, room.traction("commission", *words), arm)
-    if first is not ProofStep.IDENTITY:
-        _press_pendant(day)
-    return day
-
-
-def _press_pendant(day: LedSession) -> None:
-    """Press the pendant as C4 asks."""
-    day.program.expect("1/4 Press Shift-activate", _STEP)
-    day.hand("activate")
-    day.program.expect("2/4 Press the stop button", _STEP)
-    day.hand("estop")
-    day.program.expect("3/4 Release the stop button", _STEP)
-    day.confirm()
-    day.program.expect("4/4 Press Shift-idle", _STEP)
-    day.hand("idle")
 
 
 def _rest_steps(room: MachineRoom, arm: Program) -> LedSession:

@@ -19,9 +19,9 @@ from experiments.operator.console import Console
 from experiments.report.playback import serve
 from experiments.session.lock import session_lock
 from experiments.session.store import create_session
-from lab.guest.viewer import Viewer
 from tests.acquisition.ros import decode
 from tests.acquisition.test_schema import filled
+from tests.experiments.live.viewer import Viewer
 from tests.experiments.program import traction
 
 pytest.importorskip("foxglove")

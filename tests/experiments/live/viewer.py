@@ -9,7 +9,6 @@ import json
 import os
 import socket
 import struct
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from types import TracebackType
@@ -148,27 +147,3 @@ class Viewer:
         if not data:
             raise ConnectionError("the server hung up")
         self._data += data
-
-
-def main() -> None:
-    """Read everything of the port that the first operand names, until it ends.
-
-    Each 50th message of the loop's cycles is told.
-    """
-    count = 0
-
-    def tell(viewer: Viewer) -> bool:
-        nonlocal count
-        seen = len(viewer.messages.get("/cycle", ()))
-        if seen - count >= 50:
-            count = seen
-            sys.stdout.write(f"{seen} cycles\n")
-            sys.stdout.flush()
-        return False
-
-    with Viewer(int(sys.argv[1])) as viewer:
-        viewer.look(tell)
-
-
-if __name__ == "__main__":
-    main()

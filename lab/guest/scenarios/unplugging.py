@@ -1,0 +1,56 @@
+"""The sensor's adapter and the CAN card pulled out in a trial, and put in again."""
+
+from lab.guest.machine_room import CAN, MachineRoom, line_port
+from lab.guest.monitor import ADAPTER, CARD, Monitor
+from lab.guest.network import NET, set_up, set_up_both
+from lab.guest.promises import hold_to
+from lab.guest.scenarios.bus import Figures, figure
+from lab.guest.scenarios.serial_line import MAKES, PORT, write_make
+from lab.guest.sessions import (
+    LedSession,
+    begin,
+    cycle_figures,
+    require_rejected,
+    resume,
+    verify_kept,
+)
+
+_PATIENCE = 60.0  # s of guest time until a cut trial is on the disk
+_SETTLED = 1.0  # s until a sensor that came back is read again
+
+
+def in_a_trial(room: MachineRoom) -> Figures:
+    """Pull the sensor's adapter out in a trial, the CAN card in its repetition."""
+    write_make(room, MAKES[0])
+    set_up_both(room.shell)
+    arm = room.serve_pushed_arm("--line", str(line_port()))
+    monitor = Monitor(room)
+    try:
+        session = begin(room, arm, 1)
+        session.await_ready()
+        session.record()
+        monitor.pull_out(ADAPTER, PORT)
+        session.program.expect("saved as interrupted", _PATIENCE)
+        monitor.put_in(ADAPTER, PORT)
+        _again(session)
+        session.record()
+        monitor.pull_out(CARD, NET / CAN)
+        code = session.cut_off()
+        hold_to("interface-down", "recording", code)
+        message = figure(session.program.output, r"(?m)^((?!.*floating).*ARM: .*)$")
+        monitor.put_in(CARD, NET / CAN)
+        set_up(room.shell, CAN)
+        resume(room, arm).whole_trial()
+    finally:
+        monitor.close()
+    verify_kept(room, 1)
+    require_rejected(room, 2)
+    return {"exit code": str(code), "said": message, **cycle_figures(room)}
+
+
+def _again(session: LedSession) -> None:
+    """Wait until the same trial can be recorded again, the sensor being back."""
+    session.program.run_on(_SETTLED)
+    session.hand("rest")
+    session.lift()
+    session.another()
