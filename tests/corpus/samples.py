@@ -30,7 +30,6 @@ from wam.calibration.gravity_file import GravityCalibration, gravity_to_toml
 from wam.model.constants import Body, load_constants
 from wam.model.tool import Tool
 
-_FORESEEN = Path(__file__).parents[1] / "data" / "lab" / "terrains.json"
 _TOOL = Tool(
     Body(0.136, np.array([0.0, 0.0, 0.006]), np.diag([7e-5, 7e-5, 1.4e-4])),
     Body(0.45, np.array([0.01, 0.0, 0.062]), np.diag([4e-4, 5.5e-4, 4.5e-4])),
