@@ -1,7 +1,6 @@
 """Every message of the catalogue, raised through the whole program."""
 
 import functools
-import json
 import os
 import re
 import shutil
@@ -28,6 +27,7 @@ from experiments.rig.backend import InProcessBackend
 from experiments.rig.build import build_tool
 from experiments.run import ready, runner
 from experiments.run import tare as taring
+from experiments.session.data_files import journal_line, parse_line
 from experiments.session.lock import session_lock
 from experiments.session.reducer import replay
 from experiments.session.store import list_sessions
@@ -431,11 +431,9 @@ def _crashed_resume(scene):
 def _complete(scene):
     """Let the last trial count and the program end before it can say so."""
     path = scene.folder / "events.jsonl"
-    lines = path.read_text().splitlines()
-    start = json.loads(lines[0])
-    del start["crc"]  # a line without a checksum is one of an older version
-    lines[0] = json.dumps({**start, "trials": 1})
-    path.write_text("\n".join(lines[:-1]) + "\n")
+    first, *rest, _ = path.read_bytes().splitlines(keepends=True)
+    start = journal_line({**(parse_line(first) or {}), "trials": 1}, 1)
+    path.write_bytes(b"".join([start, *rest]))
     return resume(scene)
 
 
@@ -575,7 +573,7 @@ CASES = {
     "bug": fault("bug@T2+0.1s", 1, words="InjectedBugError: rehearsed."),
     "command-bug": refused(lambda s: _failing_status(s, ZeroDivisionError("so")), 1),
     # what was asked for cannot be
-    "config": refused(_bad_config, words='terrains[0].trials = "ten" - expected a w'),
+    "config": refused(_bad_config, words='cells[0].trials = "ten" - expected a w'),
     "mismatch": refused(lambda s: _run(s, "S0"), words="S001 is TF, you asked for S0"),
     "unfinished": refused(_run, words="S001 TF is unfinished, 1 of 2 kept."),
     "mixed": refused(_mixed),

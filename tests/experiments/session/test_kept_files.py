@@ -147,15 +147,6 @@ def test_a_trial_that_is_gone_is_missed_without_the_journal(data, lose):
     assert "trials/T02.mcap" in files(data)
 
 
-def test_lines_of_an_older_version_state_no_number(data):
-    path = only_session(data) / "events.jsonl"
-    events = [json.loads(line) for line in path.read_text().splitlines()]
-    for event in events:
-        del event["crc"], event["line"]
-    path.write_text("".join(json.dumps(event) + "\n" for event in events))
-    assert files(data) == set()
-
-
 def test_nothing_found_is_not_all_well(tmp_path):
     done = traction("verify", "--all", "--data", tmp_path)
     assert done.code == 2
