@@ -248,7 +248,8 @@ def test_a_foot_calibrated_with_another_foot_is_refused(tmp_path, calibrated):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("", "is missing"),
+        ("", "states no version"),
+        ('version = "1.0"\n', "is missing"),
         ("mass = 1\n" * 2, "not a calibration of a wrist sensor"),
         ("x = [" * 3000, "not a calibration of a wrist sensor"),
     ],
