@@ -20,6 +20,7 @@ from experiments.report.rebuilding import compare_tables
 from experiments.rig.law_calibrations import build_compensation
 from experiments.run.surroundings import read_poses
 from experiments.session.crash_recovery import recover_session
+from experiments.session.data_files import journal_line
 from experiments.session.journal import open_journal
 from experiments.session.lock import session_lock
 from experiments.session.store import list_sessions
@@ -238,7 +239,7 @@ READERS: dict[str, Callable[[bytes, Path], None]] = {
     "session": lambda data, folder: _session(folder, "session.json", data),
     "sidecar": lambda data, folder: _session(folder, "trials/T01.json", data),
     "partial": lambda data, folder: _session(
-        folder, "trials/T01.mcap.partial", data, RUNNING
+        folder, "trials/T01.mcap.partial", data, journal_of(*EVENTS)
     ),
     "rig": _settings("rig.toml"),
     "matrix": _settings("matrix.toml"),
@@ -285,8 +286,14 @@ terrain,model,fold,quantity,value,unit
 TF,tustin,1,mae,0.5,N
 TF,gp_se,1,nlpd,nan,log N
 """
-RUNNING = b"""\
-{"event": "session-started", "terrain": "TF", "trials": 2}
-{"event": "activated"}
-{"event": "trial-started", "trial": 1, "attempt": 1}
-"""
+_FIRST_ATTEMPT = {"trial": 1, "attempt": 1}
+EVENTS = (
+    {"event": "session-started", "terrain": "TF", "trials": 2},
+    {"event": "activated"},
+    {"event": "trial-started", **_FIRST_ATTEMPT},
+)
+
+
+def journal_of(*events: dict[str, object]) -> bytes:
+    """Return a journal of events."""
+    return b"".join(journal_line(event, n) for n, event in enumerate(events, 1))

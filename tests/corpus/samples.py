@@ -8,6 +8,7 @@ from importlib import resources
 
 import numpy as np
 
+from acquisition import formats
 from analysis.breakaway.censored import Family
 from analysis.breakaway.model import BREAK_AWAY, BreakAwayModel, PushLaw
 from analysis.data.data_package import TableOrigin
@@ -21,7 +22,7 @@ from ft_sensor.calibration.sensor_file import SensorCalibration, sensor_to_toml
 from ft_sensor.payload import TerrainFrame, payload_of
 from tests.corpus.copied_session import all_lines, all_names
 from tests.corpus.logs import log_samples
-from tests.corpus.readers import PACKAGED, RESULTS, RUNNING
+from tests.corpus.readers import EVENTS, PACKAGED, RESULTS, journal_of
 from tests.corpus.used_session import session_file
 from wam.bus.frames import encode_force, encode_position, encode_torques
 from wam.calibration.friction_file import FrictionCalibration, friction_to_toml
@@ -36,16 +37,15 @@ _TOOL = Tool(
     np.array([0.01, 0.0, 0.112]),
 )
 _UTC = "2027-01-15T08:00:00Z"
-_JOURNAL = (
-    RUNNING
-    + b"""\
-{"event": "trial-recorded", "trial": 1, "attempt": 1}
-{"event": "trial-kept", "trial": 1, "attempt": 1, "reason": "", "who": "mk"}
-{"event": "trial-started", "trial": 2, "attempt": 1}
-{"event": "trial-rejected", "trial": 2, "attempt": 1, "reason": "too fast"}
-{"event": "session-ended", "reason": "unfinished"}
-{"event": "verdict-changed", "trial": 2, "attempt": 1, "verdict": "keep"}
-"""
+_SECOND = {"trial": 2, "attempt": 1}
+_JOURNAL = journal_of(
+    *EVENTS,
+    {"event": "trial-recorded", "trial": 1, "attempt": 1},
+    {"event": "trial-kept", "trial": 1, "attempt": 1, "reason": "", "who": "mk"},
+    {"event": "trial-started", **_SECOND},
+    {"event": "trial-rejected", **_SECOND, "reason": "too fast"},
+    {"event": "session-ended", "reason": "unfinished"},
+    {"event": "verdict-changed", **_SECOND, "verdict": "keep"},
 )
 _SIDECAR = {"trial": "T01", "attempt": 1, "sha256": "", "verdict": "keep"}
 _SCRIPT = b"keep\nredo 2  # again\nremark wet\nquit\n"
@@ -186,7 +186,8 @@ def _package() -> bytes:
         "schema": {"fields": [{"name": "t [s]", "type": "number", "unit": "s"}]},
         "traction": {"table": "trial", "terrain": "TF", "incline_deg": 5.0},
     }
-    return json.dumps({"name": "p", "resources": [entry]}).encode()
+    package = {"name": "p", "version": formats.FORMAT, "resources": [entry]}
+    return json.dumps(package).encode()
 
 
 def _sums() -> bytes:
