@@ -22,7 +22,7 @@ class Flag(IntFlag):
     FT_FRESH = 1 << 4
     FT_SATURATED = 1 << 5
     TORQUE_CLIPPED = 1 << 6
-    # 1 << 7 is reserved: a warning of earlier versions that was never set
+    # bit 7 is free
     SAFETY_WARNING = 1 << 8
     SAFETY_FAULT = 1 << 9
     DEADLINE_MISSED = 1 << 10

@@ -58,8 +58,7 @@ def read_bracket(
     """Return the tares around a trial; None where one of them is not known.
 
     The tare before the trial stands in its file, the one after it in the sidecar
-    beside the file, which older recordings and the last trial of a session that was
-    cut short do not have.
+    beside the file, which the last trial of a session that was cut short does not have.
 
     Args:
         path: the trial file.

@@ -18,7 +18,7 @@ def target_names() -> tuple[str, ...]:
 def shown(text: str) -> str:
     """Return a text for comments and titles: a line of letters, digits, " .,:()_+-".
 
-    No character of it ends a comment, a string or an element of any language.
+    No character of it ends a comment or a string of any language.
     """
     return re.sub(r"[^A-Za-z0-9 .,:()_+-]", "?", text)[:_LONGEST_SHOWN].strip() or "?"
 

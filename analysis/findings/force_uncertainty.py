@@ -100,8 +100,8 @@ class TaredTrial(Protocol):
 def tare_changes(trials: Sequence[TaredTrial]) -> list[Array | None]:
     """Return how far the force's zero moved from the tare of each trial to the next.
 
-    Of trials without a bracket, as older recordings are, the tare of the session's next
-    trial counts. Shape (3,) [N]; None where no tare followed.
+    Of trials without a bracket the tare of the session's next trial counts. Shape (3,)
+    [N]; None where no tare followed.
     """
     following: dict[int, Array] = {}
     for k, (first, second) in enumerate(pairwise(trials)):

@@ -177,7 +177,7 @@ def _resampled(values: NDArray[np.float64], columns: int) -> NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class KeptRow:
-    """A kept trial in the running table; None = not known of an older record.
+    """A kept trial in the running table; None = not known.
 
     Attributes:
         trial: its name.

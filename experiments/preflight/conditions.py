@@ -159,7 +159,7 @@ class MountedFoot:
 
     Attributes:
         folder: of the session.
-        foot: "tread" or "bare".
+        foot: its name in rig.toml.
     """
 
     folder: SessionFolder

@@ -145,8 +145,8 @@ class FootSection(SettingsSection):
     def plain(self) -> dict[str, Any]:
         """Return it in plain values, without what it does not state of its sole."""
         values = self.model_dump(mode="json")
-        new = ("shape", "area", "simulate")
-        return {k: v for k, v in values.items() if k not in new or v is not None}
+        few = ("shape", "area", "simulate")
+        return {k: v for k, v in values.items() if k not in few or v is not None}
 
 
 class ControlSection(SettingsSection):

@@ -52,7 +52,7 @@ class SessionSummary:
 
 @dataclass(frozen=True, slots=True)
 class SeenSession:
-    """A session, and what it looked like when it was read.
+    """A session, and what the table shows of it.
 
     Attributes:
         folder: the session.

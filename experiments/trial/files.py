@@ -98,8 +98,9 @@ def trial_header(rig: Rig, details: SessionMetadata, name: TrialName) -> TrialHe
 
 
 def _stated_factors(rig: Rig) -> dict[str, str]:
-    """Return what a matrix of version 2 states of a cell; {} where it has no factors.
+    """Return what the matrix states of a cell; {} where that is nothing.
 
+    That is so without factors, of a push toward the base with foot "tread" or "bare".
     `factors` is JSON: values by name, null = does not apply; `factor_units` and
     `factor_scales` their units, and on which scale numbers are compared.
     """

@@ -92,7 +92,7 @@ def test_doubts_of_one_kind_are_one_line_with_their_trials():
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
-    """Return a trial of the session that version 0.1 recorded."""
+    """Return a trial of the recorded session."""
     folder = tmp_path_factory.mktemp("recorded")
     with tarfile.open(RECORDED) as archive:
         archive.extractall(folder, filter="data")

@@ -98,7 +98,7 @@ def test_the_change_to_the_next_tare_counts_though_a_trial_between_was_rejected(
     assert changes[1] is None
 
 
-def test_an_older_session_is_bracketed_by_the_tares_of_its_next_trials():
+def test_a_session_without_brackets_goes_by_the_tares_of_its_next_trials():
     trials = [trial(0.1), trial(0.4), trial(5.0, session="S002")]
     assert tare_changes(trials)[0] == pytest.approx(np.full(3, 0.3))
     (name,) = uncertainties_of(trials)
