@@ -1,4 +1,4 @@
-"""Names that are looked up only when a slow test, a study or a benchmark runs.
+"""Names that are looked up only when a slow test or a benchmark runs.
 
 What a test replaces in a module, what a script in a string imports, and the keywords a
 call uses: each has to exist, or a renamed thing is found out hours later.
@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-FOLDERS = ("tests", "studies", "benchmarks")
+FOLDERS = ("tests", "benchmarks")
 OURS = {
     *("acquisition", "wam", "ft_sensor", "experiments", "analysis", "fakes"),
     *("traction", "lab", *FOLDERS),
