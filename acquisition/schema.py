@@ -185,15 +185,14 @@ class Layout:
         return self.dtype.itemsize
 
 
-def fixed_layout(type_name: str, frame_id: str, text: str = "") -> Layout:
+def fixed_layout(type_name: str, frame_id: str) -> Layout:
     """Derive the CDR layout of `type_name` from its definition.
 
     Every field is aligned to its own size, counted from after the four bytes of
     encapsulation (DDS-XTypes, plain CDR). `frame_id` has a constant length, so the
-    message has a fixed size. `text`: the definition, where it is that of an earlier
-    version.
+    message has a fixed size.
     """
-    text = text or _TEXTS[type_name]
+    text = _TEXTS[type_name]
     names = ["encapsulation", "sec", "nanosec", "frame_id_length", "frame_id"]
     frame = frame_id.encode() + b"\0"
     formats: list[object] = ["S4", "<i4", "<u4", "<u4", f"S{len(frame)}"]

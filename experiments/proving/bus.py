@@ -120,8 +120,6 @@ def serials_of(values: Values) -> list[int | None]:
 
 def commissioned_with(values: Values) -> list[int | None]:
     """Return the serial numbers that the arm had when it was last sound; [] = never."""
-    if "commissioned" not in values:  # an earlier recording
-        return []
     stored = values["commissioned"].tolist()
     return [None if each == _SILENT else int(each) for each in stored]
 
@@ -138,8 +136,6 @@ def _replaced(values: Values) -> list[str]:
 
 def _temperatures(values: Values) -> list[str]:
     """Return in words which pucks and motors are not as warm as idle ones are."""
-    if "degrees" not in values:  # an earlier recording
-        return []
     low, high = IDLE_DEGREES
     return [
         f"{what} {node} has {degrees:.0f} °C, an idle one has {low:g} to {high:g}"

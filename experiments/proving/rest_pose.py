@@ -152,7 +152,7 @@ def is_heartbeat(verdict: GuardVerdict) -> bool:
 def judge_rest(values: Values) -> Judgement:
     """Judge an arm without torque from its first active cycle, and its module."""
     rows = rest_rows(values)
-    if "silent_ns" in values:  # an earlier recording has none
+    if "silent_ns" in values:  # not after a fault, nor of the daily check
         rows.append(found("silence", _braked_after(values)))
     return judged(rows)
 

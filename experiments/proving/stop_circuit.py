@@ -103,9 +103,10 @@ def judge(values: Values) -> Judgement:
     t_ns, mode, fresh = values["t_ns"], values["mode"], values["fresh"]
     stop = mode == SafetyMode.E_STOP
     first = int(stop.argmax()) if stop.any() else len(stop)
-    early = _longest(t_ns, mode[:first] == SafetyMode.ACTIVE)
-    if "early_ns" in values:  # an earlier recording has none
-        early = max(early, _longest_pause(t_ns, int(values["early_ns"])))
+    early = max(
+        _longest(t_ns, mode[:first] == SafetyMode.ACTIVE),
+        _longest_pause(t_ns, int(values["early_ns"])),
+    )
     silent = _silent_since(fresh, first)
     stopped = 1e9 if silent is None else max(0.0, float(silent - first) * _MS)
     kept = (t_ns > int(values["released_ns"])) & (t_ns < int(values["idled_ns"]))

@@ -90,8 +90,7 @@ def _question(newest: UnfinishedSession, terrain: str) -> str:
     return f"{newest.text()} {mismatch}" if newest.is_crashed else mismatch
 
 
-_FAKE, _FIELDS = TypeAdapter(FakeOptions), TypeAdapter(dict[str, Any])
-_FRICTION_OF_THEN = 0.02  # where none is written
+_FAKE = TypeAdapter(FakeOptions)
 _OPENINGS = (Event.STARTED, Event.RESUMED, Event.REDO)
 
 
@@ -277,12 +276,8 @@ def _path_of(opening: Mapping[str, Any], name: str) -> Path | None:
 
 def fake_of(opening: Mapping[str, Any], request: ResumeRequest) -> FakeOptions:
     """Return how it was simulated before, and how time is to pass now."""
-    written = opening.get("fake")
     try:
-        known = {"friction": _FRICTION_OF_THEN} | _FIELDS.validate_python(written)
-        if "mode" not in known:  # as it was before there was a pace
-            known["mode"] = "fast" if known.pop("is_fast", False) else "paced"
-        before = _FAKE.validate_python(known)
+        before = _FAKE.validate_python(opening.get("fake"))
     except ValidationError:
         before = FakeOptions("paced", seed=1)
     pace = before.pace if before.pace in PACES else PACES[0]

@@ -49,7 +49,7 @@ class FrictionCalibration:
 
 
 class _FitTable(TomlTable):
-    """How well the motors are known; files of before 0.2 have no moments."""
+    """How well the motors are known."""
 
     deviation: _Seven
     asymmetry_deviation: _Seven
@@ -58,9 +58,8 @@ class _FitTable(TomlTable):
     moments: Annotated[
         Many[tuple[_Moment, _Moment, _Moment]], Field(min_length=7, max_length=7)
     ] = Field(
-        default=((0.0, 0.0, 0.0),) * 7,
         description="To be added to the first moments whose weight was subtracted "
-        "[kg m].",
+        "[kg m]."
     )
 
     @field_validator("deviation", "asymmetry_deviation")

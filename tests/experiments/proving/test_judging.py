@@ -78,6 +78,7 @@ def pressed(*, silent_after=0):
         "mode": np.array(modes, dtype=np.int64),
         "fresh": np.array(fresh),
         "seen": np.array([True] * 3),
+        "early_ns": np.array(46_000_000),
         "released_ns": np.array(1_000_000_000),
         "idled_ns": np.array(2_190_000_000),
     }

@@ -218,8 +218,7 @@ def test_a_trial_whose_sidecar_is_damaged_is_redone_and_the_old_one_kept(
 @pytest.mark.parametrize(
     ("fake", "friction"),
     [
-        ({"is_fast": True, "seed": 3}, 0.02),  # as it was when nobody could choose
-        ({"is_fast": True, "seed": 3, "friction": 0.7}, 0.7),
+        ({"mode": "fast", "seed": 3, "friction": 0.7}, 0.7),
         (asdict(FakeOptions("fast", seed=3)), FRICTION),
     ],
 )
@@ -231,9 +230,7 @@ def test_a_simulated_arm_rubs_on_as_it_did(fake, friction):
 @pytest.mark.parametrize(
     ("fake", "asked", "mode"),
     [
-        ({"is_fast": False, "seed": 3}, None, "paced"),  # processes then
-        ({"is_fast": False, "seed": 3}, "fast", "fast"),
-        ({"is_fast": True, "seed": 3}, "processes", "processes"),
+        ({"mode": "paced", "seed": 3}, "fast", "fast"),
         ({"mode": "processes", "seed": 3}, None, "processes"),
         ({"mode": "hurried", "seed": 3}, None, "paced"),
         (None, None, "paced"),
