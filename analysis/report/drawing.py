@@ -6,10 +6,10 @@ be kept, too. They are known by all that they show and by the code that draws th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, overload
 
 from acquisition.worker_processes import available_cores
 from analysis.figures.pictures import Picture
@@ -28,18 +28,12 @@ DRAWN_TYPES: Mapping[str, type] = {
 }
 
 
-def report_figures(
-    shown: ShownNumbers, n_jobs: int | None = None
-) -> list[ReportFigure]:
+def report_figures(shown: ShownNumbers) -> list[ReportFigure]:
     """Return every figure that there are numbers for, in the order of the page.
 
-    Args:
-        shown: what they show.
-        n_jobs: processes that draw; they share no figure, so pictures are the same.
-            By default as many as pay.
+    Processes that draw share no figure, so pictures are the same by any number of them.
     """
-    if n_jobs is None:
-        n_jobs = _processes(shown.results.study)
+    n_jobs = _processes(shown.results.study)
     drawn = {
         figure.picture.key: figure
         for figure in run_tasks(draw_figure, FigureTasks(shown), n_jobs)
@@ -140,29 +134,20 @@ def figure_specs() -> Mapping[str, FigureSpec]:
     return {spec.key: spec for family in families for spec in family.FIGURES}
 
 
-def kept_figures(shown: ShownNumbers, store: Store | None = None) -> list[ReportFigure]:
-    """Return every figure that there are numbers for, in the order of the page.
+def kept_figures(shown: ShownNumbers, store: Store | None) -> list[ReportFigure]:
+    """Return every figure that there are numbers for, from the store or drawn anew.
 
     Args:
         shown: what they show.
-        store: figures of earlier reports.
+        store: figures of earlier reports; None = they are drawn every time.
     """
-    return drawn_once(report_figures, shown, store)
-
-
-def drawn_once(
-    draw: Callable[[Any], list[ReportFigure]],
-    shown: Any,  # noqa: ANN401
-    store: Store | None,
-) -> list[ReportFigure]:
-    """Return what `draw` makes of `shown`: from the store, or drawn and kept."""
     if store is None:
-        return draw(shown)
-    kept = store.get(draw, shown)
+        return report_figures(shown)
+    kept = store.get(report_figures, shown)
     if isinstance(kept, tuple) and all(isinstance(k, ReportFigure) for k in kept):
         return list(kept)
-    drawn = draw(shown)
-    store.put(draw, shown, drawn)
+    drawn = report_figures(shown)
+    store.put(report_figures, shown, drawn)
     return drawn
 
 

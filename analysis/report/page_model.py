@@ -61,7 +61,6 @@ class ReportFigure:
         alt: what the picture shows, for those who cannot see it.
         caption: what is seen in it.
         picture: its files.
-        is_filed: the files lie in a folder of figures, not in the page alone.
     """
 
     section: ReportSection
@@ -69,7 +68,6 @@ class ReportFigure:
     alt: str
     caption: str
     picture: Picture
-    is_filed: bool = True
 
 
 @dataclass(frozen=True, slots=True)

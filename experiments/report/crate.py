@@ -28,7 +28,6 @@ _MEDIA = {
     ".jsonl": "application/jsonl",
     ".toml": "application/toml",
     ".html": "text/html",
-    ".jpg": "image/jpeg",
     ".png": "image/png",
     ".pdf": "application/pdf",
     ".md": "text/markdown",

@@ -1,4 +1,5 @@
 from dataclasses import replace
+from functools import wraps
 
 import numpy as np
 import pytest
@@ -6,11 +7,12 @@ import pytest
 from analysis.figures.pictures import Picture
 from analysis.figures.sections import ReportSection
 from analysis.findings.findings import compute_results
+from analysis.report import drawing
 from analysis.report.drawing import (
     DRAWN_TYPES,
     FigureTasks,
     draw_figure,
-    drawn_once,
+    kept_figures,
 )
 from analysis.report.page_model import ReportFigure, ShownNumbers
 from analysis.study.digests import value_digest
@@ -28,34 +30,33 @@ def store(tmp_path):
 
 @pytest.fixture
 def drawings(monkeypatch):
-    """How many times `draw` has drawn."""
-    monkeypatch.setattr(draw, "count", 0)
-    return lambda: draw.count
+    """Return what was drawn; every time it is one figure."""
+    drawn = []
 
+    @wraps(drawing.report_figures)  # pictures are kept by its module and name
+    def draw(shown):
+        drawn.append(shown)
+        return [FIGURE]
 
-def draw(_):
-    draw.count += 1
-    return [FIGURE]
-
-
-draw.count = 0
+    monkeypatch.setattr(drawing, "report_figures", draw)
+    return drawn
 
 
 def test_the_same_numbers_are_drawn_once_and_come_back_byte_by_byte(store, drawings):
     shown = (1.0, 2.0)
-    assert drawn_once(draw, shown, store) == drawn_once(draw, shown, store) == [FIGURE]
-    assert drawings() == 1
+    assert kept_figures(shown, store) == kept_figures(shown, store) == [FIGURE]
+    assert len(drawings) == 1
 
 
 def test_without_a_store_figures_are_drawn_every_time(drawings):
-    assert drawn_once(draw, 1.0, None) == drawn_once(draw, 1.0, None) == [FIGURE]
-    assert drawings() == 2
+    assert kept_figures(1.0, None) == kept_figures(1.0, None) == [FIGURE]
+    assert len(drawings) == 2
 
 
 def test_other_numbers_are_drawn_anew(store, drawings):
-    drawn_once(draw, (1.0, 2.0), store)
-    drawn_once(draw, (1.0, 2.5), store)
-    assert drawings() == 2
+    kept_figures((1.0, 2.0), store)
+    kept_figures((1.0, 2.5), store)
+    assert drawings == [(1.0, 2.0), (1.0, 2.5)]
 
 
 DIFFERENT = (
@@ -97,17 +98,17 @@ def test_what_has_no_known_content_has_no_digest():
 
 @pytest.mark.parametrize("kept", [b"", b"{}"], ids=len)
 def test_damaged_figures_are_drawn_anew(tmp_path, store, drawings, kept):
-    drawn_once(draw, 1.0, store)
+    kept_figures(1.0, store)
     (path,) = tmp_path.iterdir()
     path.write_bytes(kept)
-    assert drawn_once(draw, 1.0, store) == [FIGURE]
-    assert drawings() == 2
+    assert kept_figures(1.0, store) == [FIGURE]
+    assert len(drawings) == 2
 
 
 def test_what_is_no_figure_is_drawn_anew(store, drawings):
-    store.put(draw, 1.0, ["figure"])
-    assert drawn_once(draw, 1.0, store) == [FIGURE]
-    assert drawings() == 1
+    store.put(drawing.report_figures, 1.0, ["figure"])
+    assert kept_figures(1.0, store) == [FIGURE]
+    assert len(drawings) == 1
 
 
 @pytest.mark.parametrize("value", [np.float64(1.5), np.int64(3), np.bool_(True)])
