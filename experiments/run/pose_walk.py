@@ -78,7 +78,7 @@ STILL = 0.02  # rad/s, largest joint speed while something is averaged
 ASTRAY = np.array([0.04, 0.04, 0.04, 0.04, 0.04, 0.04, 0.1])
 ATTEMPTS = 4  # at an arm that does not come to rest
 
-AcceptancePlan = Callable[[Array, FreeSpace], Sequence[MeasurementPose]]
+HaltPlan = Callable[[Array, FreeSpace], Sequence[MeasurementPose]]
 
 
 class PoseWalk:
@@ -95,7 +95,7 @@ class PoseWalk:
         self._here = np.zeros(7)
 
     def begin(
-        self, plan: AcceptancePlan, seconds_per_pose: float
+        self, plan: HaltPlan, seconds_per_pose: float
     ) -> Sequence[MeasurementPose]:
         """Plan the way of an activated arm and ask for free space; return the halts.
 
