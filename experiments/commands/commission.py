@@ -140,11 +140,12 @@ def _note_changes(args: argparse.Namespace, files: RecordFolder) -> None:
     from datetime import UTC, datetime
 
     from acquisition.clock import SystemClock
+    from experiments.commissioning.steps import TOLD
 
     if not files.record.steps:
         return
     now = datetime.fromtimestamp(SystemClock().utc_ns() // 1_000_000_000, UTC)
-    for name, is_told in (("mounting", args.moved), ("cables", args.tensioned)):
+    for name, is_told in zip(TOLD, (args.moved, args.tensioned), strict=True):
         if is_told:
             files.tell(name, now)
 

@@ -56,9 +56,8 @@ def check_commissioned(
         ) from error
     said_daily = _check_daily(rig, record, now, add)
     further = [lack.text for lack in found if lack.step not in GATED]
-    said = [f"uncommissioned: {'; '.join(further)}"] if further else []
-    if said:
-        text = ". ".join(said)
+    if further:
+        text = f"uncommissioned: {'; '.join(further)}"
         add(WARNING, FIELD, text)
         return {FIELD: text, daily.FIELD: said_daily}
     add(GOOD, FIELD, "all steps, sound and not stale")
