@@ -7,7 +7,7 @@ swapped column or a wrong unit breaks one of these, and no fit notices.
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,7 +56,6 @@ DoubtName = Literal[
     "heading",
     "pressure",
 ]
-DOUBTS: tuple[DoubtName, ...] = get_args(DoubtName)
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,6 @@ from analysis.exports.names import TARGETS, target_names
 from analysis.exports.source import TerrainExport
 
 README, SOURCE = "README.md", "source.json"
-README_LINES = 10
 Files = Mapping[str, bytes]
 
 

@@ -205,14 +205,12 @@ class Lag:
         seconds: the best value [s].
         low: smallest that is as good [s].
         high: largest that is as good [s].
-        events: starts and stops that it was judged by.
         how: in words.
     """
 
     seconds: float
     low: float
     high: float
-    events: int
     how: str
 
 
@@ -257,7 +255,6 @@ def find_lag(t: Array, v_t: Array, F_n: Array, F_t: Array) -> Lag | None:
         found.seconds,
         found.seconds - sure,
         found.seconds + sure,
-        len(events),
         f"inertia of the foot explains {found.explained:.0%} of the force",
     )
 
@@ -269,7 +266,6 @@ def _lag_of(best: float, each: Array, flat: Array, step: float) -> Lag:
         float(best),
         float(min(low, flat[0], best - sure)),
         float(max(high, flat[-1], best + sure)),
-        len(each),
         f"F_t/F_n turns with the motion at {len(each)} starts and stops",
     )
 

@@ -6,7 +6,7 @@ F_s is a constant in newtons. Only the curve is identified on most terrains, not
 parameter; the flags of a fit say so.
 """
 
-from dataclasses import astuple, dataclass, field, fields, replace
+from dataclasses import astuple, dataclass, field, fields
 from typing import Literal
 
 import numpy as np
@@ -51,13 +51,6 @@ class TustinParameters:
     v_s: float
     delta_s: float
     b: float
-
-    def canonical(self) -> "TustinParameters":
-        """Return the same curve with v_s > 0: only |v/v_s| enters.
-
-        A negative delta_s is left alone; no positive one gives the same curve.
-        """
-        return replace(self, v_s=abs(self.v_s))
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +124,6 @@ class TustinFit:
         sse: sum of squared residuals [N^2], unweighted.
         rows: number of samples it was fitted to.
         flags: what a reader must know before believing a parameter.
-        starts: sums of (weighted) squares that the polished starts reached [N^2].
         form: variant that was fitted.
         profiles: intervals of v_s and delta_s that the samples leave open.
     """
@@ -140,7 +132,6 @@ class TustinFit:
     sse: float
     rows: int
     flags: tuple[str, ...]
-    starts: tuple[float, ...] = field(default=())
     form: TustinForm = field(default_factory=TustinForm)
     profiles: Profiles | None = None
 
@@ -233,7 +224,6 @@ def fit_tustin(
         sse=float(residual @ residual),
         rows=F_n.size,
         flags=_flags(problem, optima[0], bounds, open_intervals),
-        starts=tuple(point.sse for point in optima),
         form=form,
         profiles=open_intervals,
     )

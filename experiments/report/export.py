@@ -34,7 +34,6 @@ from experiments.session.data_files import write_new
 from experiments.session.store import SessionFolder, iso_utc
 
 DICTIONARY, INDEX = "data_dictionary.csv", "trials.csv"
-FORMATS = ("csv", "parquet")
 _MEDIA = {"csv": "text/csv", "parquet": "application/vnd.apache.parquet"}
 _METADATA = (
     "operator",

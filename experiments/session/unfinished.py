@@ -26,13 +26,11 @@ class UnfinishedSession:
         state: what its journal says; a crash is a phase of its own here.
         seconds: sound recording in the file of a trial that was cut short [s], with
             what was recorded before the trigger; None without such a file.
-        last_utc: time of the last event, as the journal has it.
     """
 
     folder: SessionFolder
     state: SessionState
     seconds: float | None
-    last_utc: str
 
     @property
     def is_crashed(self) -> bool:
@@ -89,13 +87,10 @@ def is_unfinished(state: SessionState) -> bool:
 
 def inspect_session(folder: SessionFolder) -> UnfinishedSession | None:
     """Return the session as one to be resumed, None where it is not."""
-    events = folder.events()
-    state = replay(events)
+    state = replay(folder.events())
     if not is_unfinished(state) or owner_of(folder) is not None:
         return None
-    return UnfinishedSession(
-        folder, state, _seconds(folder, state), str(events[-1].get("utc") or "")
-    )
+    return UnfinishedSession(folder, state, _seconds(folder, state))
 
 
 def _seconds(folder: SessionFolder, state: SessionState) -> float | None:

@@ -4,13 +4,12 @@ The file names factors, cells and crosses; `design` makes the rows.
 """
 
 import math
-from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
 from acquisition.settings import File, Number, SettingsSection, Usual, Whole
-from analysis.data.terrain_kinds import FLAT, SIZE_BY_WORD, Value, terrain_kind
+from analysis.data.terrain_kinds import Value, terrain_kind
 
 MOST_FACTORS = 12
 LONGEST_WORD = 40
@@ -167,19 +166,6 @@ class TerrainRow(SettingsSection):
         """Kind of terrain: the size of its stones, or "flat" for a plate."""
         return terrain_kind(self.name, [self.stones])
 
-    @property
-    def is_plate(self) -> bool:
-        """Whether there are no stones."""
-        return self.kind == FLAT
-
-    @property
-    def d50(self) -> float | None:
-        """Grain size [mm]; None where there is none, or it is not stated."""
-        stated = self.factors.get("d50")
-        if isinstance(stated, float | int):
-            return float(stated)
-        return SIZE_BY_WORD.get(self.stones)
-
     def as_container(self) -> "TerrainRow":
         """Return it as its container stands, whichever way it is crossed."""
         return self if self.push_deg == 0 else self.model_copy(update={"push_deg": 0})
@@ -189,12 +175,6 @@ class TerrainRow(SettingsSection):
         values = self.model_dump(mode="json")
         few = ("push_deg", "place", "taught", "factors", "simulate")
         return {k: v for k, v in values.items() if k not in few or v}
-
-    @property
-    def facts(self) -> Mapping[str, Value]:
-        """What tells it apart from others: factors, foot, incline and push."""
-        fixed = {"foot": self.foot, "incline_deg": self.incline_deg}
-        return {**self.factors, **fixed, "push_deg": float(self.push_deg)}
 
 
 class MatrixSettings(SettingsSection):

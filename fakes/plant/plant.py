@@ -215,11 +215,6 @@ class ArmPlant:
         return x, y, z
 
     @property
-    def sole_x(self) -> float:
-        """Way of the sole from the far end [m]."""
-        return self._body.motion()[0]
-
-    @property
     def foot_speed(self) -> float:
         """Speed of the sole [m/s]."""
         return float(np.linalg.norm(self._body.motion()[3:6]))

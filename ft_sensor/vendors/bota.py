@@ -27,7 +27,6 @@ MAX_COMMAND_SIZE = 64  # the device's input buffer
 CONFIGURE = b"C"
 RUN = b"R"
 SOFT_RESET = b"I"
-HARD_RESET = b"#"
 
 _FRAME = struct.Struct("<BH6fIfH")
 _BODY = struct.Struct("<H6fIf")  # what the checksum covers

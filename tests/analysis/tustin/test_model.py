@@ -200,15 +200,6 @@ def test_wild_samples_do_not_pull_a_robust_fit(loss):
     assert np.abs(robust.mean(F_n, v) - clean).mean() < 0.15
 
 
-def test_canonical_form_is_the_same_curve():
-    row = TustinParameters(mu=0.71, F_s=13.52, v_s=-0.841, delta_s=-0.017, b=-23.4)
-    F_n, v = np.array([3.0, 5.0]), np.array([0.02, 0.1])
-    assert row.canonical().v_s == 0.841
-    np.testing.assert_array_equal(
-        predict(row, F_n, v), predict(row.canonical(), F_n, v)
-    )
-
-
 def test_a_force_that_falls_with_load_is_flagged_as_nonphysical():
     rng = np.random.default_rng(10)
     F_n, v = rng.uniform(2, 10, 300), rng.uniform(0.005, 0.2, 300)

@@ -47,7 +47,7 @@ def test_a_session_that_was_not_closed_is_found(tmp_path):
     (found,) = find_unfinished(tmp_path)
     assert (found.folder, found.state.kept, found.running) == (folder, (1,), "T02")
     assert found.seconds == pytest.approx(0.4)  # 201 cycles of 2 ms
-    assert (found.last_utc, found.is_crashed) == ("U3", True)
+    assert found.is_crashed
     assert found.text() == "S001 ended without closing (T02 at 0.4 s). 1 kept."
 
 

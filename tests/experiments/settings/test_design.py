@@ -54,23 +54,23 @@ def load(tmp_path):
 def test_a_cell_stands_where_its_place_is(load):
     (row,) = load(FACTORS + CELL).matrix.terrains
     assert (row.far_end, row.travel, row.place) == ((0.7, 0.0, 0.12), 0.45, "bay")
-    assert (row.stones, row.d50, row.kind) == ("small", 19.0, "small")
+    assert (row.stones, row.kind) == ("small", "small")
     assert row.factors == {"d50": 19.0, "moisture": "dry"}
     assert (row.start_q, row.push_deg, row.trials) == (None, 0, 10)
 
 
 @pytest.mark.parametrize(
-    ("d50", "stones", "kind", "is_plate"),
+    ("d50", "stones", "kind"),
     [
-        ("37", "big", "big", False),
-        ("12.5", "12.5 mm", "12.5 mm", False),
-        ("0.5", "fine", "fine", False),
-        ('"-"', "none", "flat", True),
+        ("37", "big", "big"),
+        ("12.5", "12.5 mm", "12.5 mm"),
+        ("0.5", "fine", "fine"),
+        ('"-"', "none", "flat"),
     ],
 )
-def test_the_ground_follows_from_the_grain_size(load, d50, stones, kind, is_plate):
+def test_the_ground_follows_from_the_grain_size(load, d50, stones, kind):
     (row,) = load(FACTORS + CELL.replace("d50 = 19", f"d50 = {d50}")).matrix.terrains
-    assert (row.stones, row.kind, row.is_plate) == (stones, kind, is_plate)
+    assert (row.stones, row.kind) == (stones, kind)
 
 
 def test_a_cross_is_every_combination(load):
