@@ -41,17 +41,13 @@ class TareResult:
     Attributes:
         t_ns: monotonic time of the last sample [ns].
         wrench: mean fx fy fz tx ty tz in the sensor frame [N, N m].
-        deviation: standard deviation of each [N, N m].
         spread: largest minus smallest 0.2 s mean of a force component, the worst of
             the three [N].
-        samples: how many samples went in.
     """
 
     t_ns: int
     wrench: Wrench
-    deviation: Wrench
     spread: float
-    samples: int
 
 
 def take_mean(
@@ -87,9 +83,7 @@ def take_mean(
     return TareResult(
         t_ns=samples[-1].t_ns,
         wrench=cast("Wrench", tuple(wrenches.mean(axis=0).tolist())),
-        deviation=cast("Wrench", tuple(wrenches.std(axis=0).tolist())),
         spread=spread,
-        samples=len(samples),
     )
 
 

@@ -101,11 +101,6 @@ class RecordedTrial:
         return self.metadata["trial"].get("simulated") == "true"
 
     @property
-    def is_complete(self) -> bool:
-        """Whether the recording was ended properly; False for a recovered one."""
-        return self.metadata["result"].get("complete") == "true"
-
-    @property
     def displacement(self) -> Array:
         """Distance of the sole from the far end along x_T [m], shape (n,)."""
         return self.frame.displacement(self.sole)

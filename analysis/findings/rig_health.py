@@ -126,11 +126,6 @@ class RigTrial:
         return {name: getattr(self, name) for name in names}
 
 
-def summarise_rig(trials: Sequence[RecordedTrial]) -> list[RigTrial]:
-    """Return the health of every trial, sessions in the order they are given."""
-    return with_tares([health_of(trial) for trial in trials], trials)
-
-
 def with_tares(
     found: Sequence[RigTrial], trials: Sequence[TaredTrial]
 ) -> list[RigTrial]:

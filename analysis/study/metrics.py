@@ -137,11 +137,6 @@ def ranked_probability(F_t: Array, prediction: Prediction) -> Array:
     return scale * (z * (2.0 * stdtr(nu, z) - 1.0) + tail - spread)
 
 
-def mean_absolute_error(F_t: Array, mean: Array) -> float:
-    """Return the mean absolute error [N] of predicted means."""
-    return float(np.mean(np.abs(F_t - mean)))
-
-
 _EXACT = 14  # trials up to which every pattern of signs is tried
 _PATTERNS = 20_000  # random ones beyond that
 

@@ -93,11 +93,6 @@ class DatagramPort:
             ) from error
 
     @property
-    def local_address(self) -> str:
-        """The one address of this computer that it is bound to."""
-        return str(self._socket.getsockname()[0])
-
-    @property
     def in_waiting(self) -> int:
         """Number of bytes that can be read at once; whole datagrams."""
         self._receive()

@@ -23,8 +23,7 @@ from wam.bus.link import Link
 from wam.bus.properties import Device, PuckRole, PuckStatus, property_number
 from wam.bus.property_client import PropertyClient
 
-_FT = property_number(Device.SENSOR, "FT")
-_GET_FT = encode_get(_FT)
+_GET_FT = encode_get(property_number(Device.SENSOR, "FT"))
 _VERS, _ROLE, _SN, _STAT = 0, 1, 2, 5  # the same asleep and awake
 _MS = 1_000_000
 _WAKE_NS = 10 * _MS
@@ -107,19 +106,6 @@ class BarrettSensor:
         """Return what has been heard since the last call, oldest first."""
         samples, self._inbox = self._inbox, []
         return samples
-
-    def tare(self) -> None:
-        """Let the sensor call its present load zero; for a calibration only.
-
-        It also forgets which gauges saturated. A session's tare stays in software. The
-        first reading after a tare is thrown away, as it may be the old one.
-
-        Raises:
-            LinkError: the bus is down.
-        """
-        self._properties.set(SENSOR_NODE, _FT, 0)
-        self._properties.pause(_WAKE_NS)
-        self._exchange()
 
     def describe(self) -> dict[str, str]:
         """Return the sensor's identity as text."""

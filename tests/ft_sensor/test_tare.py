@@ -44,8 +44,6 @@ def test_tare_is_the_mean_of_the_samples():
     values = noise(1600)
     result = measure(samples(values))
     assert result.wrench == pytest.approx((2, 0, values.mean(), 0.5, 0, 0))
-    assert result.deviation[2] == pytest.approx(values.std())
-    assert result.samples == 1600
     assert result.t_ns == 5_000_000_000 + 1599 * PERIOD_NS
 
 
@@ -87,7 +85,8 @@ def test_a_spread_of_just_the_limit_is_accepted():
 
 
 def test_one_second_is_enough():
-    assert measure(samples(noise(800))).samples == 800
+    second = samples(noise(800))
+    assert measure(second).t_ns == second[-1].t_ns
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 780, 799])
@@ -105,7 +104,7 @@ def test_half_a_period_less_than_a_second_is_enough(short_ns, is_enough):
     ]
     slow[-1] = replace(slow[-1], t_ns=slow[-1].t_ns - short_ns)
     if is_enough:
-        assert take_mean(slow, 0.5, 12.5).samples == 12
+        assert take_mean(slow, 0.5, 12.5).t_ns == slow[-1].t_ns
         return
     with pytest.raises(TareError, match=r"12 F/T samples over 0\.96 s are too few"):
         take_mean(slow, 0.5, 12.5)
@@ -114,7 +113,7 @@ def test_half_a_period_less_than_a_second_is_enough(short_ns, is_enough):
 def test_one_second_of_jittering_arrivals_is_enough():
     jittered = samples(noise(800))
     jittered[0] = replace(jittered[0], t_ns=jittered[0].t_ns + 500_000)
-    assert measure(jittered).samples == 800
+    assert measure(jittered).t_ns == jittered[-1].t_ns
 
 
 def test_a_touch_at_the_very_end_is_refused():
@@ -159,7 +158,7 @@ def test_half_of_the_promised_samples_are_enough(rate, is_enough):
         for k, sample in enumerate(samples(noise(2 * rate)))
     ]
     if is_enough:
-        assert measure(slow).samples == 2 * rate
+        assert measure(slow).t_ns == slow[-1].t_ns
         return
     with pytest.raises(TareError, match="Only"):
         measure(slow)
@@ -192,7 +191,7 @@ def test_a_sensor_that_promises_less_may_send_less(promised, is_enough):
         for k, sample in enumerate(samples(noise(400)))
     ]
     if is_enough:
-        assert take_mean(slow, 0.5, promised).samples == 400
+        assert take_mean(slow, 0.5, promised).t_ns == slow[-1].t_ns
         return
     with pytest.raises(TareError, match="Only 40 F/T samples in one"):
         take_mean(slow, 0.5, promised)

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.data.load import load_trial
-from analysis.findings.rig_health import summarise_rig
-from tests.analysis.data.test_load import as_left, write
+from tests.analysis.data.test_load import as_left, summarised, write
 from tests.wam.model.test_friction import example
 from wam.calibration.friction_file import FrictionCalibration, friction_to_toml
 from wam.calibration.friction_fit import FrictionFit
@@ -39,7 +38,7 @@ def health(trial, share="0.0", **changes):
     speeds[:, 1] = 0.1
     left = as_left(trial, velocity=speeds)
     left.metadata["trial"] |= {"simulated": "true", "friction_compensation": share}
-    (row,) = summarise_rig([replace(left, **changes)])
+    (row,) = summarised([replace(left, **changes)])
     return row
 
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from analysis.data.load import load_trial
 from analysis.findings.held_trial import HeldTrial, TrialFiles
-from analysis.findings.rig_health import summarise_rig, with_tares
+from analysis.findings.rig_health import health_of, with_tares
 
 MOST_BYTES = 40  # of a cycle: time, velocity, two forces, and what is small
 
@@ -14,7 +14,8 @@ def test_what_is_held_says_the_same_as_the_trial(first_trial):
     held = HeldTrial.of(trial)
     assert (held.name, held.terrain) == (trial.name, trial.terrain)
     np.testing.assert_array_equal(held.series.F_t, trial.series().F_t)
-    (health,), (whole,) = with_tares([held.health], [held]), summarise_rig([trial])
+    (health,) = with_tares([held.health], [held])
+    (whole,) = with_tares([health_of(trial)], [trial])
     assert health.numbers() == whole.numbers()
 
 

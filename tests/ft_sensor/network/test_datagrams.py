@@ -58,7 +58,7 @@ def test_whole_datagrams_of_the_sensor_are_read_in_pieces(far_end, port):
 
 def test_nobody_else_is_heard_and_one_address_is_bound(far_end, port):
     reader = reader_of(far_end, port)
-    assert port.local_address == "127.0.0.1"
+    assert reader[0] == "127.0.0.1"
     with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as stranger:
         stranger.bind(("127.0.0.1", 0))
         stranger.sendto(bytes(36), reader)

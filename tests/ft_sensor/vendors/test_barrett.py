@@ -295,17 +295,6 @@ def test_a_sensor_with_a_saturated_gauge_is_refused():
         Bench(lambda _: (0, 90.0, 0, 0, 0, 0)).sensor.open()
 
 
-def test_a_tare_is_told_to_the_sensor_and_its_first_reading_thrown_away():
-    bench = Bench(lambda _: (1.0, -2.0, 4.0, 0, 0, 0))
-    bench.sensor.open()
-    bench.sensor.tare()
-    assert [data for _, _, data in bench.rig.sent[-2:]] == [b"\xb6\0\0\0\0\0", b"\x36"]
-    assert bench.sensor.poll(0) == []
-    bench.arm.start()
-    bench.arm.attach_device(bench.sensor)
-    assert bench.run(2)[1][1][0].wrench == (0.0,) * 6
-
-
 def test_closing_twice_forgets_what_was_heard():
     bench = Bench().started()
     bench.arm.read(bench.clock.t_ns)
