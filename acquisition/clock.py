@@ -13,6 +13,7 @@ NS_PER_MS = 1_000_000
 PERIOD_NS = 2_000_000  # of the control loop, of the records and of the simulated world
 RATE_HZ = NS_PER_S // PERIOD_NS
 _POLL_NS = 100_000  # a link without a descriptor is looked at this often
+_TRIES = 20  # of reading UTC
 
 
 @runtime_checkable
@@ -116,14 +117,14 @@ class SystemClock:
         return True
 
 
-def utc_offset_ns(clock: Clock, tries: int = 20) -> tuple[int, int]:
+def utc_offset_ns(clock: Clock) -> tuple[int, int]:
     """Return (offset, uncertainty) [ns] such that UTC = monotonic + offset.
 
-    UTC is read between two readings of the monotonic clock; of `tries` the tightest
+    UTC is read between two readings of the monotonic clock, several times; the tightest
     pair is kept, and half its width is the uncertainty.
     """
     best: tuple[int, int] | None = None
-    for _ in range(tries):
+    for _ in range(_TRIES):
         before = clock.now_ns()
         utc = clock.utc_ns()
         after = clock.now_ns()

@@ -32,30 +32,27 @@ class InertialForce(NamedTuple):
     uncertainty: float
 
 
-def inertial_force(
-    t: Array, position: Array, mass: float, window: float = WINDOW
-) -> InertialForce:
+def inertial_force(t: Array, position: Array, mass: float) -> InertialForce:
     """Return the force that accelerates a body.
 
     Args:
         t: time [s], shape (n,), strictly increasing.
         position: of its centre of mass [m], shape (n, 3).
         mass: of the body [kg].
-        window: that one parabola spans [s].
 
     Raises:
-        SettingsError: the samples are too few, or too far apart for the window.
+        SettingsError: the samples are too few, or too far apart for `WINDOW`.
     """
     from scipy.interpolate import CubicSpline
     from scipy.signal import savgol_filter
 
     period = float(np.median(np.diff(t)))
     count = round((t[-1] - t[0]) / period) + 1
-    width = 2 * round(0.5 * window / period) + 1
+    width = 2 * round(0.5 * WINDOW / period) + 1
     if width < _FEWEST or width > t.size or t.size < _FEWEST_ROWS * count:
         raise SettingsError(
             f"Samples every {period * 1e3:.1f} ms show no acceleration: the foot's "
-            f"motion is smoothed over {window * 1e3:.0f} ms.",
+            f"motion is smoothed over {WINDOW * 1e3:.0f} ms.",
             hint="It needs the cycles of a recording, about 500 a second.",
         )
     even = t[0] + np.arange(count) * period  # a lost row is no jerk

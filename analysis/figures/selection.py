@@ -22,6 +22,7 @@ _MOST_POINTS = 1500  # drawn per panel
 _CURVE_POINTS = 120
 _STEP = 0.1  # s between the windows compared
 _ENOUGH_BOUNCES = 2
+_MOST_KINDS = 4  # shown, a terrain of each
 _BEFORE, _AFTER = 0.3, 0.6  # s around a slip that a window should hold
 
 
@@ -81,13 +82,13 @@ class Panel:
         return np.argmin(np.abs(self.data.F_n[:, None] - self.loads), axis=1)
 
 
-def representatives(study: Study, most: int = 4) -> list[TerrainResult]:
+def representatives(study: Study) -> list[TerrainResult]:
     """Return the first terrain of every kind that has kept samples."""
     first: dict[str, TerrainResult] = {}
     for result in study.terrains.values():
         if result.kept:
             first.setdefault(result.kind, result)
-    return list(first.values())[:most]
+    return list(first.values())[:_MOST_KINDS]
 
 
 def time_windows(study: Study) -> list[TimeWindow]:

@@ -69,6 +69,7 @@ MODEL_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 _DPI = 320
 _SHOWN = 160  # pixels of a page per inch
 _MOST_TICKS = 5  # below a small panel
+_MOST_COLUMNS = 4  # panels side by side
 _MARK = 6.0  # points of the watermark per inch of the figure's width
 _KIND_COLOURS = {
     SMALL: ("#08306b", "#2f79b5", "#9dc7e6"),
@@ -130,9 +131,7 @@ def mark_simulated(figure: Figure) -> None:
     )
 
 
-def panel_grid(
-    count: int, height: float, most_columns: int = 4
-) -> tuple[Figure, list[Axes]]:
+def panel_grid(count: int, height: float) -> tuple[Figure, list[Axes]]:
     """Return a figure of `count` panels that share their axes, row by row.
 
     One panel alone is as wide as one column of a paper.
@@ -140,9 +139,8 @@ def panel_grid(
     Args:
         count: number of panels.
         height: of one row [inches].
-        most_columns: panels side by side.
     """
-    columns = min(most_columns, count)
+    columns = min(_MOST_COLUMNS, count)
     rows = -(-count // columns)
     figure = new_figure(height * rows + 0.7, ONE_COLUMN if count == 1 else WIDTH)
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)

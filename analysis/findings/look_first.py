@@ -117,13 +117,8 @@ class OddTrial:
     reasons: tuple[str, ...]
 
 
-def look_first(study: Study, limit: float = 1.0) -> list[OddTrial]:
-    """Return the trials that stand out, the farthest first; none in a sound study.
-
-    Args:
-        study: the study.
-        limit: score beyond which a trial is named.
-    """
+def look_first(study: Study) -> list[OddTrial]:
+    """Return the trials that stand out, the farthest first; none in a sound study."""
     measured = {
         name: [_measured(result, k) for k in range(len(result.trials))]
         for name, result in study.terrains.items()
@@ -134,7 +129,7 @@ def look_first(study: Study, limit: float = 1.0) -> list[OddTrial]:
         for k, trial in enumerate(result.trials):
             doubts = [d.seen for d in doubts_of(trial) if d.name != _SMOOTH]
             ranked = sorted(compared[name][k], key=lambda found: -abs(found[0]))
-            told = [text for share, text in ranked if abs(share) > limit][:_TOLD]
+            told = [text for share, text in ranked if abs(share) > 1.0][:_TOLD]
             if doubts or told:
                 score = math.inf if doubts else abs(ranked[0][0])
                 odd.append(OddTrial(name, k + 1, trial.name, score, (*doubts, *told)))

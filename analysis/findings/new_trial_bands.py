@@ -62,9 +62,9 @@ class HeldOutShares:
     oracle: tuple[OracleBand, ...]
 
 
-def held_out_shares(study: Study, model: str = GP_SE_TRIAL) -> list[HeldOutShares]:
-    """Return the shares of every terrain with at least three folds of the model."""
-    found = (_of_terrain(result, model) for result in study.terrains.values())
+def held_out_shares(study: Study) -> list[HeldOutShares]:
+    """Return the shares of every terrain with three folds of `GP_SE_TRIAL` or more."""
+    found = map(_of_terrain, study.terrains.values())
     return [shares for shares in found if shares is not None]
 
 
@@ -76,10 +76,10 @@ def plain_shares(shares: HeldOutShares) -> dict[str, Any]:
     }
 
 
-def _of_terrain(result: TerrainResult, model: str) -> HeldOutShares | None:
+def _of_terrain(result: TerrainResult) -> HeldOutShares | None:
     shares = [
         fold.model.predict(trial.F_n, trial.v_t, trial.further).cdf(trial.F_t)
-        for k, fold in result.left_out(model)
+        for k, fold in result.left_out(GP_SE_TRIAL)
         for trial in [result.trials[k]]
     ]
     if len(shares) < 3:

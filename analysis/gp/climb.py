@@ -16,7 +16,7 @@ from analysis.data.series import Array
 Objective = Callable[[Array], tuple[float, Array]]
 
 # a climb ends where a step gains less than this share of the value
-TOLERANCE = 2e-9
+_TOLERANCE = 2e-9
 # where there is no value a climb meets one that is so much below the lowest it has met:
 # low enough to be turned down, and not so low that the next step would be next to none
 _DROP = 100.0
@@ -41,7 +41,6 @@ def climb(
     start: Array,
     bounds: Array,
     is_known: Callable[[Array, float], bool] = lambda theta, value: False,
-    tolerance: float = TOLERANCE,
     scale: Array | float = 1.0,
 ) -> Climbed:
     """Return the top that a start leads to.
@@ -52,7 +51,6 @@ def climb(
             value is where the climb ends.
         bounds: of theta, shape (p, 2).
         is_known: theta, value -> whether the climb is left there.
-        tolerance: share of the value that the last step gains less than.
         scale: in which the density bends alike along every parameter, shape (p,):
             fewer steps are lost until the method has learnt how it does.
     """
@@ -84,7 +82,7 @@ def climb(
         method="L-BFGS-B",
         bounds=(bounds.T / scale).T,
         callback=watch,
-        options={"ftol": tolerance},
+        options={"ftol": _TOLERANCE},
     )
     value = -float(found.fun) if has_value else -np.inf
     return Climbed(inside(found.x), value, int(found.nfev))

@@ -172,14 +172,14 @@ def _plain(rule: Mapping[int, Mapping[str, Confusion]]) -> dict[str, Any]:
     }
 
 
-def identify_study(study: Study, model: str = GP_SE) -> Identification | None:
+def identify_study(study: Study) -> Identification | None:
     """Return how well windows of trials are recognised by models that never saw them.
 
-    Trial k of every terrain is scored by the models of fold k. None where no fold has
-    the model for two terrains or more.
+    Trial k of every terrain is scored by the models of fold k, Gaussian processes with
+    the SE kernel. None where no fold has the model for two terrains or more.
     """
-    rho = _correlations(study, model)
-    evidence = _evidence(study, model, rho)
+    rho = _correlations(study)
+    evidence = _evidence(study, rho)
     if len(evidence.trials) < 2:
         return None
     groups = groups_of(study.kinds) | words_of(study)
@@ -259,32 +259,30 @@ def words_of(study: Study) -> dict[str, dict[str, str]]:
     }
 
 
-def _correlations(study: Study, model: str) -> dict[str, float]:
+def _correlations(study: Study) -> dict[str, float]:
     """Return rho of every terrain, from trials that its models never saw."""
     return {
         name: neighbour_correlation(
             [
                 (trial, predictor(trial.F_n, trial.v_t))
-                for trial, predictor in _held_out(result, model)
+                for trial, predictor in _held_out(result)
             ]
         )
         for name, result in study.terrains.items()
     }
 
 
-def _held_out(
-    result: TerrainResult, model: str
-) -> list[tuple[PreparedTrial, Predictor]]:
+def _held_out(result: TerrainResult) -> list[tuple[PreparedTrial, Predictor]]:
     return [
-        (result.trials[k], fold.model.predict) for k, fold in result.left_out(model)
+        (result.trials[k], fold.model.predict) for k, fold in result.left_out(GP_SE)
     ]
 
 
-def _evidence(study: Study, model: str, rho: Mapping[str, float]) -> StudyEvidence:
+def _evidence(study: Study, rho: Mapping[str, float]) -> StudyEvidence:
     """Return every trial scored by the models of its own number's folds."""
     experts: dict[int, dict[str, Expert]] = {}
     for name, result in study.terrains.items():
-        for k, fold in result.left_out(model):
+        for k, fold in result.left_out(GP_SE):
             of_trial = experts.setdefault(k, {})
             of_trial[name] = Expert(fold.model.predict, rho[name])
     tasks = [

@@ -20,6 +20,7 @@ _CLIPPED_AT = 5.0  # standard deviations beyond which a feature says no more
 _LARGEST_LOGIT = 30.0
 _STEPS, _HALVINGS = 25, 14
 _CONVERGED = 1e-4
+_RIDGE = 1.0  # penalty of every weight but the bias
 _SMALL = 1e-9
 _LARGEST_NUMBER = 1e9  # of a stored number
 
@@ -81,16 +82,13 @@ class RidgeLogistic:
 _PLAIN = TypeAdapter(RidgeLogistic)
 
 
-def fit_logistic(
-    features: Array, truth: np.ndarray, weight: Array, ridge: float = 1.0
-) -> RidgeLogistic:
+def fit_logistic(features: Array, truth: np.ndarray, weight: Array) -> RidgeLogistic:
     """Return the regression of rows; both answers have to occur.
 
     Args:
         features: shape (m, n).
         truth: whether the row is positive, shape (m,).
         weight: what a row counts, shape (m,).
-        ridge: penalty of every weight but the bias.
 
     Raises:
         ValueError: only one answer occurs.
@@ -99,7 +97,7 @@ def fit_logistic(
         raise ValueError("only one answer occurs")
     mean, scale = features.mean(axis=0), features.std(axis=0) + _SMALL
     design = _design(features, mean, scale)
-    penalty = np.full(design.shape[1], ridge)
+    penalty = np.full(design.shape[1], _RIDGE)
     penalty[0] = _SMALL
     loss = _Loss(design, truth.astype(np.bool_), weight, penalty)
     w = np.zeros(design.shape[1])
