@@ -71,7 +71,7 @@ def float_rig() -> Rig:
     backend.start_arm()
     backend.open_sensor()
     backend.begin()
-    backend.loop_client.request(ArmState.HOLD)
+    backend.loop_client.start()
     backend.loop_client.advance(0.1)
     hand.lift()
     hand.pendant("activate")

@@ -286,6 +286,12 @@ def fault_text(verdict: GuardVerdict, context: FaultContext, saved: str = "") ->
     return message.text(values, saved)
 
 
+def fault_words(verdict: GuardVerdict) -> str:
+    """Return what happened, in one sentence, of a fault beside a stricter one."""
+    context = FaultContext(prompt=None)
+    return fault_text(verdict, context).partition(" ARM: ")[0]
+
+
 def rest_text(mode: SafetyMode, *, is_confirmed: bool) -> str:
     """Return what the arm does at the end, `is_confirmed` by the safety module."""
     if not is_confirmed:

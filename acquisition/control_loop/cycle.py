@@ -104,6 +104,8 @@ class Cycle:
         self._is_tared = False
         self._speed = self._energy = 0.0
         self._requested: ArmEvent | None = None
+        self._known = 0  # number of the newest verdict when it was requested
+        self._is_starting = False
         self._move: tuple[Vector, float] | None = None
         self._proof: ProofGoal | None = None
         self._silent_until_ns = 0
@@ -112,17 +114,49 @@ class Cycle:
         self.replies_ns = 0
         self.status = ControlStatus()
 
-    def request(self, state: ArmState) -> None:
+    def request(self, state: ArmState, known: int | None = None) -> None:
         """Ask for a state; it is entered at the next complete reading, IDLE at once.
 
-        A state asked for while the arm is still idle sends its torques at once: they
-        are there when the pendant activates the arm, or it would fall for a moment.
+        IDLE is never refused, and clears no verdict. Another state is, unless the
+        newest verdict is known to whoever asks, and while one stands that idles: only
+        `start` ends that.
+
+        Args:
+            state: what the arm is to do.
+            known: number of the newest verdict that was told or acted on; None = all.
         """
-        self._requested = REQUESTS[state]
+        if state is not ArmState.IDLE:
+            verdict = self.status.verdict
+            is_latched = verdict is not None and verdict.action is Action.IDLE
+            if is_latched or not self._is_newest(known):
+                return
+            self.status.clear()
+        else:
+            self._is_starting = False
+        self._ask(REQUESTS[state])
+
+    def start(self, known: int | None = None) -> None:
+        """Ask an idle arm for hold, and for a person who activates it then.
+
+        Its torques are sent at once: they are there when the pendant activates the
+        arm, or it would fall for a moment. Refused if the arm is active already, or the
+        newest verdict not `known`, as of `request`.
+        """
+        if self.status.safety is SafetyMode.ACTIVE or not self._is_newest(known):
+            return
+        self.status.clear()
+        self._is_starting = True
+        self._ask(ArmEvent.REQUEST_HOLD)
+
+    def _is_newest(self, known: int | None) -> bool:
+        return known is None or known >= self.status.number
+
+    def _ask(self, event: ArmEvent) -> None:
+        self._requested = event
+        self._known = self.status.number
         self._move = None
         self._proof = None
         self._silent_until_ns = 0
-        self.status.verdict = None
 
     def move_to(self, goal: Sequence[float], speed: float) -> None:
         """Ask for a move to joint positions `goal` [rad], seven; only in hold.
@@ -153,6 +187,8 @@ class Cycle:
         status.safety = self._arm.safety_mode()
         if status.safety in SHORTED:
             self._handle(ArmEvent.CIRCUIT_IDLE, reading)
+        elif status.safety is SafetyMode.ACTIVE:
+            self._is_starting = False
         self._enter_requested(reading)
         self._begin_move(reading)
         tau, tau_gravity = self._torque(reading)
@@ -196,12 +232,16 @@ class Cycle:
             self._contact = contact_of(sample, wrench.saturated)
 
     def _enter_requested(self, reading: ArmReading) -> None:
-        """Obey a request: torques need all seven positions, idle needs none."""
+        """Obey a request: torques need all seven positions, idle needs none.
+
+        A verdict that came meanwhile was not known to whoever asked.
+        """
         event = self._requested
         if event is None or (reading.missing_cycles and event is not _REQUEST_IDLE):
             return
         self._requested = None
-        self._handle(event, reading)
+        if event is _REQUEST_IDLE or self._known == self.status.number:
+            self._handle(event, reading)
 
     def _begin_move(self, reading: ArmReading) -> None:
         """Begin the move or proof asked for; none if a fault stands."""
@@ -270,6 +310,7 @@ class Cycle:
             sole=tuple(self._sample.foot_position.tolist()),
             state=status.state,
             energy=self._energy,
+            is_starting=self._is_starting,
         )
         self._guard, verdict = check(self.limits, self._guard, seen)
         if self.law.is_proving():
@@ -291,7 +332,7 @@ class Cycle:
         return verdict_for(Fault.PROOF_MOTION, excess)
 
     def _obey(self, verdict: GuardVerdict, reading: ArmReading) -> None:
-        """Enter the state the guard asks for and keep the worst verdict."""
+        """Enter the state the guard asks for and latch the verdict."""
         if self.law.is_proving():  # nothing else is known to bear this arm
             verdict = replace(verdict, action=Action.IDLE)
         self._handle(VERDICTS[verdict.action], reading)
@@ -299,9 +340,9 @@ class Cycle:
             # Known only now: idling the arm asks the module for its monitors.
             causes = CircuitCauses(self._arm.safety_faults())
             verdict = replace(verdict, detail=causes)
-        worst = self.status.verdict
-        if worst is None or verdict.severity > worst.severity:
-            self.status.verdict = verdict
+        if verdict.action is Action.IDLE:
+            self._is_starting = False
+        self.status.latch(verdict)
         self.is_recording = False
 
     def _fill(

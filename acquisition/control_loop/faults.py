@@ -62,6 +62,7 @@ class Fault(StrEnum):
     BUS_SHARED = "bus-shared"
     PUCK_CHANGED = "puck-changed"
     NOT_ASKED_ACTIVE = "not-asked-active"
+    NOT_ACTIVE = "arm-not-active"
     ACTIVATION_MOTION = "activation-motion"
     HOLD_MOTION = "hold-motion"
     DAMP_MOTION = "damp-motion"
@@ -128,6 +129,7 @@ FAULTS: Mapping[Fault, FaultSpec] = {
     Fault.BUS_SHARED: FaultSpec(_IDLE, ForeignFrame, ends_session=True),
     Fault.PUCK_CHANGED: FaultSpec(_IDLE, MotorChange, ends_session=True),
     Fault.NOT_ASKED_ACTIVE: FaultSpec(_IDLE, ends_session=True),
+    Fault.NOT_ACTIVE: FaultSpec(_IDLE, ends_session=True),
     Fault.ACTIVATION_MOTION: FaultSpec(_IDLE, MotionExcess, ends_session=True),
     Fault.HOLD_MOTION: FaultSpec(_IDLE, MotionExcess, ends_session=True),
     Fault.DAMP_MOTION: FaultSpec(_IDLE, MotionExcess, ends_session=True),
@@ -172,6 +174,11 @@ class GuardVerdict:
     def severity(self) -> int:
         """How much is taken: 0 nothing, 1 the trial, 2 hold, 3 damp, 4 idle."""
         return _SEVERITY[self.action]
+
+    @property
+    def strictness(self) -> tuple[bool, int]:
+        """Order of verdicts that stand together: what ends a session comes first."""
+        return self.ends_session, self.severity
 
     @property
     def reason(self) -> str:

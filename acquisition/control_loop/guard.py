@@ -91,6 +91,7 @@ class Observation(NamedTuple):
         is_moving: the arm moves by itself, or keeps the goal of a move.
         state: what is asked of the arm.
         energy: its kinetic energy [J].
+        is_starting: torques are ready for a person who activates the arm.
     """
 
     reading: ArmReading
@@ -109,6 +110,7 @@ class Observation(NamedTuple):
     is_moving: bool = False
     state: ArmState = ArmState.FLOAT
     energy: float = 0.0
+    is_starting: bool = False
 
 
 @dataclass(slots=True)
@@ -144,8 +146,9 @@ def check(
 
     Torques that are commanded are judged unless idle is confirmed since before: a
     safety circuit of unknown state may drive the arm. E-stop is always reported. An
-    arm without torques must not be active, and no other master may be there. Among
-    equally severe verdicts the first of `CHECKS` counts.
+    arm without torques must not be active nor recorded, and no other master may be
+    there; one that is asked for torques must be active, or wait for its activation.
+    Among equally severe verdicts the first of `CHECKS` counts.
     """
     may_drive = seen.is_commanded and (state.may_drive or seen.safety not in SHORTED)
     is_live = may_drive and seen.safety not in SHORTED
@@ -175,16 +178,19 @@ def check(
 
 
 def _check_idle(seen: Observation) -> GuardVerdict:
-    """Look at an arm to which no torques are sent, but questions.
+    """Look at an arm that is idle, or is not active yet.
 
-    Its questions keep the safety circuit content: once active, the arm would fall.
+    Questions without torques keep the safety circuit content: once active, the arm
+    would fall. Torques behind a circuit that nobody is asked to activate would drive it
+    at the next press of the pendant.
     """
-    if seen.state is not ArmState.IDLE:
-        return OK
-    if seen.reading.foreign_id is not None:
-        return verdict_for(Fault.BUS_SHARED, ForeignFrame(seen.reading.foreign_id))
-    if seen.safety is SafetyMode.ACTIVE:
-        return verdict_for(Fault.NOT_ASKED_ACTIVE)
+    if seen.state is ArmState.IDLE:
+        if seen.reading.foreign_id is not None:
+            return verdict_for(Fault.BUS_SHARED, ForeignFrame(seen.reading.foreign_id))
+        if seen.safety is SafetyMode.ACTIVE:
+            return verdict_for(Fault.NOT_ASKED_ACTIVE)
+    if seen.is_recording or (seen.is_commanded and not seen.is_starting):
+        return verdict_for(Fault.NOT_ACTIVE)
     return OK
 
 

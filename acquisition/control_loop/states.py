@@ -132,11 +132,43 @@ class ControlStatus:
     Attributes:
         state: what the arm is doing.
         safety: what the safety circuit says.
-        verdict: the guard's worst verdict since the last request; None = nothing.
+        verdict: the strictest verdict that stands; None = none does.
         ft_age_ns: age of the force sample [ns].
+        number: how many verdicts there were; a request names the newest it knows.
+        others: the verdicts that stand besides, the strictest first.
     """
 
     state: ArmState = ArmState.IDLE
     safety: SafetyMode = SafetyMode.UNKNOWN
     verdict: GuardVerdict | None = None
     ft_age_ns: int = 0
+    number: int = 0
+    others: tuple[GuardVerdict, ...] = ()
+
+    @property
+    def standing(self) -> tuple[GuardVerdict, ...]:
+        """All verdicts that stand, the strictest first."""
+        return () if self.verdict is None else (self.verdict, *self.others)
+
+    def latch(self, verdict: GuardVerdict) -> None:
+        """Let a verdict stand; a fault that stands already is not told again.
+
+        It is new where its fault stands not at all, or with a milder action.
+        """
+        standing = self.standing
+        if any(
+            verdict.fault is other.fault and verdict.severity <= other.severity
+            for other in standing
+        ):
+            return
+        kept = [other for other in standing if other.fault is not verdict.fault]
+        # Sorting is stable, reversed too: of equally strict ones the earliest is first.
+        self.verdict, *others = sorted(
+            [*kept, verdict], key=lambda v: v.strictness, reverse=True
+        )
+        self.others = tuple(others)
+        self.number += 1
+
+    def clear(self) -> None:
+        """Let no verdict stand any more."""
+        self.verdict, self.others = None, ()

@@ -25,19 +25,20 @@ COMMAND_DTYPE = np.dtype(
     ]
 )
 _COMMAND: Final = struct_of(COMMAND_DTYPE)
-_STATUS: Final = struct.Struct("<QBB?B4xqQQQQ")
+_STATUS: Final = struct.Struct("<QBB?B4xqQQQQQ")
 _NOTHING = (0.0,) * _VALUES
 
 
 class CommandKind(IntEnum):
     """What a command asks for."""
 
-    ENTER = 1  # argument: an ArmState
+    ENTER = 1  # argument: an ArmState; value: number of the newest verdict known
     WATCH_TRIAL = 2  # argument: 1 while a trial is recorded
     SET_BIAS = 3  # values: the sensor's reading without load, six of them
     MOVE = 4  # values: joint positions to go to, seven of them, and the speed
     LEAVE = 5  # end the loop; the arm is idle by then, or is made so
     PROVE = 6  # values: what the arm is given, four numbers as of `ProofGoal`
+    START = 7  # hold, until a person activates the arm; value: as of ENTER
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,15 +117,16 @@ class StatusSlot:
 
     def __init__(self, slot: Slot) -> None:
         self._slot = slot
-        self._verdict: GuardVerdict | None = None
+        self._verdicts: tuple[GuardVerdict, ...] = ()
         self._text = b""
 
     def write(self, status: LoopStatus) -> None:
         """Publish `status`."""
         control = status.control
-        if control.verdict is not self._verdict:
-            self._verdict = control.verdict
-            self._text = _verdict_text(control.verdict)
+        standing = control.standing
+        if standing != self._verdicts:
+            self._verdicts = standing
+            self._text = _text_of(standing)
         head = _STATUS.pack(
             status.obeyed,
             control.state,
@@ -136,6 +138,7 @@ class StatusSlot:
             status.skipped,
             status.late,
             status.worst_late_ns,
+            control.number,
         )
         self._slot.write(head + self._text)
 
@@ -144,11 +147,28 @@ class StatusSlot:
         raw = self._slot.read()
         if len(raw) < _STATUS.size:
             return LoopStatus()
-        obeyed, state, safety, running, bus, age, cycles, skipped, late, worst = (
-            _STATUS.unpack_from(raw)
+        (
+            obeyed,
+            state,
+            safety,
+            running,
+            bus,
+            age,
+            cycles,
+            skipped,
+            late,
+            worst,
+            number,
+        ) = _STATUS.unpack_from(raw)
+        verdicts = _verdicts_of(raw[_STATUS.size :])
+        control = ControlStatus(
+            state=ArmState(state),
+            safety=SafetyMode(safety),
+            verdict=verdicts[0] if verdicts else None,
+            ft_age_ns=age,
+            number=number,
+            others=tuple(verdicts[1:]),
         )
-        verdict = _verdict_of(raw[_STATUS.size :])
-        control = ControlStatus(ArmState(state), SafetyMode(safety), verdict, age)
         return LoopStatus(
             obeyed=obeyed,
             is_running=running,
@@ -161,9 +181,9 @@ class StatusSlot:
         )
 
 
-def _verdict_text(verdict: GuardVerdict | None) -> bytes:
-    return b"" if verdict is None else json.dumps(to_plain(verdict)).encode()
+def _text_of(verdicts: tuple[GuardVerdict, ...]) -> bytes:
+    return json.dumps([to_plain(v) for v in verdicts]).encode() if verdicts else b""
 
 
-def _verdict_of(text: bytes) -> GuardVerdict | None:
-    return from_plain(json.loads(text)) if text else None
+def _verdicts_of(text: bytes) -> list[GuardVerdict]:
+    return [from_plain(plain) for plain in json.loads(text)] if text else []

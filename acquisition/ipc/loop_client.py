@@ -44,6 +44,7 @@ class LoopClient:
         self._commands = CommandQueue(shared.commands)
         self._status_slot = StatusSlot(shared.status)
         self._asked = 0
+        self._known = 0
         self.on_tick: list[Callable[[], None]] = []
 
     @property
@@ -53,11 +54,22 @@ class LoopClient:
 
     @property
     def status(self) -> ControlStatus:
-        """State of the arm and the guard's verdict since the last request."""
+        """State of the arm and the verdicts that stand."""
         loop = self.loop
-        if loop.obeyed < self._asked:
-            loop.control.verdict = None  # given before the loop saw the request
+        if loop.obeyed < self._asked and loop.control.number <= self._known:
+            loop.control.clear()  # known when the request was made
         return loop.control
+
+    def note(self, control: ControlStatus) -> None:
+        """Take the verdicts of a status as known: they are told, or acted on.
+
+        The loop refuses a request for torques by who does not know the newest one.
+        """
+        self._known = max(self._known, control.number)
+
+    def is_news(self, control: ControlStatus) -> bool:
+        """Return whether a verdict stands that is not known yet."""
+        return control.verdict is not None and control.number > self._known
 
     @property
     def late_cycles(self) -> int:
@@ -80,8 +92,14 @@ class LoopClient:
         self._shared.heartbeats.beat(ProcessRole.CONSOLE, self._clock.now_ns())
 
     def request(self, state: ArmState) -> None:
-        """Ask the loop for a state of the arm."""
-        self._asked = self._commands.post(CommandKind.ENTER, state)
+        """Ask the loop for a state of the arm; see `Cycle.request`."""
+        self._asked = self._commands.post(
+            CommandKind.ENTER, state, values=(self._known,)
+        )
+
+    def start(self) -> None:
+        """Ask the loop to hold, until a person activates the arm; see `Cycle.start`."""
+        self._asked = self._commands.post(CommandKind.START, values=(self._known,))
 
     def idle(self, seconds: float = 1.0) -> bool:
         """Ask for idle and wait; return whether the arm is confirmed idle."""

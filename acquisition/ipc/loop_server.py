@@ -98,7 +98,9 @@ class LoopServer:
     def _obey(self, command: Command) -> None:
         kind, cycle = command.kind, self._cycle
         if kind is CommandKind.ENTER:
-            cycle.request(ArmState(command.argument))
+            cycle.request(ArmState(command.argument), int(command.values[0]))
+        elif kind is CommandKind.START:
+            cycle.start(int(command.values[0]))
         elif kind is CommandKind.WATCH_TRIAL:
             cycle.is_recording = bool(command.argument)
             self._publish_metadata()

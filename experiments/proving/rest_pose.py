@@ -12,7 +12,6 @@ from acquisition.control_loop.proof import (
     ProofGoal,
     ProofKind,
 )
-from acquisition.control_loop.states import ArmState
 from acquisition.devices import SHORTED, SafetyMode
 from acquisition.errors import PreflightError
 from acquisition.sample import MOTOR_FRESH_SHIFT, SAFETY_MODE_MASK
@@ -82,7 +81,7 @@ def lay_down(scene: Scene) -> None:
 
 def _activate(scene: Scene, said: str, *presses: PendantAction) -> None:
     """Have an arm that lies activated without torque; raises as `lay_down`."""
-    scene.loop_client.request(ArmState.HOLD)
+    scene.loop_client.start()
     scene.prove(ProofGoal(ProofKind.REST))
     scene.wait(0.1)
     scene.say(f"{said} Keep the hands off the arm: it gets no torque.")

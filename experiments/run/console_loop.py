@@ -8,11 +8,13 @@ from typing import TypeVar
 import numpy as np
 
 from acquisition.control_loop.faults import OK, Action, Fault, GuardVerdict
-from acquisition.control_loop.states import ArmState
+from acquisition.control_loop.states import ArmState, ControlStatus
+from acquisition.devices import SHORTED
 from acquisition.errors import TractionError
 from acquisition.ipc.loop_client import LoopClient
 from experiments.fault_injection.plan import FaultTrigger, PlannedFaults
-from experiments.operator.console import Console
+from experiments.messages import fault_words
+from experiments.operator.console import WARNING, Console
 from experiments.operator.keys import KeyAction, key_action
 from experiments.operator.prompts import OperatorInput, Prompt, PromptState
 from experiments.operator.terminal import is_person
@@ -86,7 +88,9 @@ class ConsoleLoop:
     _rests: int = field(default=0, init=False)  # ticks since
     _rested_ns: int = field(default=0, init=False)  # in which simulated time stood
     _is_stopped: bool = field(default=False, init=False)
-    _reported: str = field(default="", init=False)  # a fault that persists
+    _told: set[Fault | None] = field(  # faults that persist
+        default_factory=set[Fault | None], init=False
+    )
 
     @property
     def loop_client(self) -> LoopClient:
@@ -195,18 +199,36 @@ class ConsoleLoop:
         Raises:
             ArmFaultError: it did.
         """
-        verdict = self.loop_client.status.verdict
-        if verdict is not None:
-            raise ArmFaultError(verdict)
+        control = self.loop_client.status
+        if self.loop_client.is_news(control):
+            raise self._fault(control)
 
     def _raise_fault(self, prompt: Prompt) -> None:
-        """Raise the guard's verdict, unless it was reported and only persists."""
-        verdict = self.loop_client.status.verdict
-        if verdict is None or prompt not in _AT_REST:
-            self._reported = ""
-        if verdict is not None and verdict.reason != self._reported:
-            self._reported = verdict.reason
-            raise ArmFaultError(verdict)
+        """Raise the guard's strictest verdict, unless it is told and only persists."""
+        control = self.loop_client.status
+        if control.verdict is None or prompt not in _AT_REST:
+            self._told.clear()
+        if control.verdict is None:
+            return
+        is_told = control.verdict.fault in self._told
+        fault = self._fault(control)
+        if not is_told:
+            raise fault
+
+    def _fault(self, control: ControlStatus) -> ArmFaultError:
+        """Return the strictest verdict that stands, to be told; tell the others."""
+        strictest, *others = control.standing
+        for verdict in others:
+            self._tell_besides(verdict)
+        self._told.add(strictest.fault)
+        self.loop_client.note(control)
+        return ArmFaultError(strictest)
+
+    def _tell_besides(self, verdict: GuardVerdict) -> None:
+        """Say a fault that is not the strictest, once while it persists."""
+        if verdict.fault not in self._told:
+            self._told.add(verdict.fault)
+            self.console.say(f"{WARNING} {fault_words(verdict)}")
 
     def show(self, view: View | None) -> None:
         """Show what `view(width)` returns eight times a second, None for nothing."""
@@ -232,14 +254,22 @@ class ConsoleLoop:
             self.faults.inject_due(moment, number, seconds)
 
     def worst_verdict(self, verdict: GuardVerdict) -> GuardVerdict:
-        """Return `verdict`, or the guard's newest one where that is more severe.
+        """Return `verdict`, or the guard's strictest one where that is stricter.
 
-        A fault that persists may cost the arm while a trial is being sealed.
+        A fault that persists may cost the arm while a trial is being sealed. The milder
+        one is told here, and every fault that came besides.
         """
         self.loop_client.advance(TICK)
-        newest = self.loop_client.status.verdict
-        is_worse = newest is not None and newest.severity > verdict.severity
-        return newest if newest is not None and is_worse else verdict
+        control = self.loop_client.status
+        if control.verdict is None:
+            return verdict
+        strictest = self._fault(control).verdict
+        is_worse = strictest.strictness > verdict.strictness
+        worst, milder = (strictest, verdict) if is_worse else (verdict, strictest)
+        if milder.fault is not worst.fault:
+            self._told.discard(milder.fault)
+            self._tell_besides(milder)
+        return worst
 
     def clear_faults(self, verdict: GuardVerdict = OK) -> None:
         """Clear rehearsed faults, and the guard's `verdict` with them; the arm holds.
@@ -254,7 +284,6 @@ class ConsoleLoop:
         if self.rig.simulation is not None:
             self.rig.simulation.clear_faults()
         if verdict.action is Action.DAMP:
-            self._reported = verdict.reason
             self.console.say(_DAMPED)
             while self.tick(Prompt.DAMPED) != " ":
                 pass
@@ -296,12 +325,13 @@ class ConsoleLoop:
         an answer, or at a request to stop, it goes idle all the same.
         """
         loop_client = self.loop_client
-        if loop_client.status.state not in _DRIVEN or self.console.is_lost:
+        is_driven = loop_client.status.state in _DRIVEN
+        is_shorted = self.rig.backend.safety_mode() in SHORTED
+        if not is_driven or is_shorted or self.console.is_lost:
             return
         self.show(None)
         rest = self.rig.settings.rig.arm.rest
         verdict = loop_client.status.verdict
-        self._reported = "" if verdict is None else verdict.reason
         try:
             if loop_client.status.state in {ArmState.FLOAT, ArmState.GUIDE}:
                 loop_client.request(ArmState.HOLD)
@@ -316,7 +346,9 @@ class ConsoleLoop:
                 loop_client.request(ArmState.GUIDE)
             self.console.say(_SUPPORT if rest is None else _LAY_DOWN)
             self._await_hand(Prompt.LAY_DOWN, lambda: self._lies(rest))
-        except (ArmFaultError, TractionError):
+        except ArmFaultError as fault:  # the arm is idled at once
+            self.console.problem(fault_words(fault.verdict))
+        except TractionError:
             return  # the arm is not under control: it is idled at once
 
     def _await_hand(self, prompt: Prompt, is_done: Callable[[], bool]) -> bool:

@@ -34,7 +34,7 @@ def activate(console_loop: ConsoleLoop) -> None:
     """
     control, clock = console_loop.loop_client, console_loop.rig.clock
     console_loop.require_no_fault()
-    control.request(ArmState.HOLD)
+    control.start()
     control.advance(_READY_SECONDS)
     _require_torques(console_loop)
     console_loop.console.say(

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from acquisition.clock import NS_PER_S
-from acquisition.control_loop.states import ArmState
 from acquisition.control_loop.timing import TIMING_DTYPE, LoopReport, loop_report
 from acquisition.devices import SafetyMode
 from acquisition.errors import PreflightError
@@ -179,7 +178,7 @@ def _power_up(rig: Rig) -> bool:
     if rig.simulation is None:
         return False
     loop_client = rig.backend.loop_client
-    loop_client.request(ArmState.HOLD)
+    loop_client.start()
     loop_client.advance(0.1)
     rig.simulation.lift()
     rig.simulation.pendant("activate")

@@ -36,6 +36,7 @@ WHY: Mapping[Fault, str] = {
     Fault.BUS_SHARED: f"{_TORQUES}: they are another program's too",
     Fault.PUCK_CHANGED: _TORQUES,
     Fault.NOT_ASKED_ACTIVE: "no torque is ready: active, it would fall",
+    Fault.NOT_ACTIVE: "the next press of the pendant would drive it",
     Fault.ACTIVATION_MOTION: _TORQUES,
     Fault.HOLD_MOTION: _TORQUES,
     Fault.DAMP_MOTION: _TORQUES,
@@ -62,6 +63,7 @@ WHY: Mapping[Fault, str] = {
 # Rows of the matrix that lead to the fault, where they do not have its name.
 _ROWS = {
     Fault.NOT_ASKED_ACTIVE: "",
+    Fault.NOT_ACTIVE: "",
     Fault.MOTOR_STUCK: "stuck-motor-2",
     Fault.MOTOR_STILL: "",
     Fault.HOLD_MOTION: "",

@@ -54,6 +54,17 @@ class SimulatedScene:
     heard_ns: int = 0
     seen: list[tuple[int, str, ArmState]] = field(default_factory=list)
     usual_limits: GuardLimits | None = None
+    due: list[tuple[int, Callable[["SimulatedScene"], None]]] = field(
+        default_factory=list
+    )
+
+    def act(self) -> None:
+        """Do what is due by now."""
+        now_ns = self.clock.now_ns()
+        ready = [action for at_ns, action in self.due if at_ns <= now_ns]
+        self.due = [row for row in self.due if row[0] > now_ns]
+        for action in ready:
+            action(self)
 
     def clear_faults(self) -> None:
         """Give the guard its limits back."""
@@ -231,6 +242,7 @@ def _watch(patch: pytest.MonkeyPatch) -> list[SimulatedScene]:
     def call(cycle, tick):
         scene = scenes[-1]
         scene.cycle = cycle
+        scene.act()
         try:
             usual_call(cycle, tick)
         finally:

@@ -214,9 +214,20 @@ class Bench:
         self.cycle.request(state)
         return self.run()
 
+    def start(self):
+        """Let the idle arm be ready for its activation."""
+        self.arm.mode = SafetyMode.IDLE
+        self.run()
+        self.cycle.start()
+        return self.run()
+
     @property
     def state(self):
         return self.cycle.status.state
+
+    @property
+    def reasons(self):
+        return [verdict.reason for verdict in self.cycle.status.standing]
 
     @property
     def reason(self):
@@ -308,12 +319,13 @@ def test_the_fresh_bits_name_the_silent_motor(bench):
 
 
 def test_a_state_is_not_entered_on_an_incomplete_reading(bench):
-    bench.arm.missing = 1
     bench.enter(ArmState.FLOAT)
-    assert bench.state is ArmState.IDLE
+    bench.arm.missing = 1
+    bench.enter(ArmState.HOLD)
+    assert bench.state is ArmState.FLOAT
     bench.arm.missing = 0
     bench.run()
-    assert bench.state is ArmState.FLOAT
+    assert bench.state is ArmState.HOLD
 
 
 def test_idle_does_not_wait_for_a_complete_reading(bench):
@@ -403,7 +415,10 @@ def test_the_safety_mode_is_in_the_flags(bench, mode):
 
 
 def test_the_lock_is_flagged_while_it_holds(bench):
+    bench.arm.mode = SafetyMode.IDLE
     assert not has(bench.run(), Flag.JOINT7_LOCKED)
+    bench.start()
+    bench.arm.mode = SafetyMode.ACTIVE
     for state in TORQUE:
         assert has(bench.enter(state), Flag.JOINT7_LOCKED)
 
@@ -478,7 +493,10 @@ def test_a_fault_is_never_made_milder(bench):
     bench.arm.qd = np.zeros(7)
     bench.arm.missing = 6
     bench.run()
-    assert (bench.state, bench.reason) == (ArmState.DAMP, "overspeed")
+    assert (bench.state, bench.reasons) == (
+        ArmState.DAMP,
+        ["can-silence", "overspeed"],  # what ends the session is told first
+    )
 
 
 def test_a_worse_fault_replaces_the_first(bench):
@@ -622,21 +640,90 @@ def test_an_unknown_arm_can_be_held_again(bench):
 
 
 def test_torques_are_there_before_the_pendant_activates(bench):
-    bench.arm.mode = SafetyMode.IDLE
-    bench.enter(ArmState.HOLD)
+    bench.start()
     bench.run(10)
     assert (bench.state, bench.reason) == (ArmState.HOLD, "")
     assert bench.arm.sent[-1].tolist() == [2.0] * 7
 
 
 def test_idle_at_the_pendant_after_activation_is_a_verdict(bench):
-    bench.arm.mode = SafetyMode.IDLE
-    bench.enter(ArmState.HOLD)
+    bench.start()
     bench.arm.mode = SafetyMode.ACTIVE
     bench.run()
     bench.arm.mode = SafetyMode.IDLE
     bench.run()
     assert (bench.state, bench.reason) == (ArmState.IDLE, "pendant-idle")
+
+
+@pytest.mark.parametrize("state", sorted(TORQUE))
+def test_a_braked_arm_gets_no_torque_but_at_a_start(bench, state):
+    bench.arm.mode = SafetyMode.IDLE
+    bench.run()
+    bench.enter(state)
+    assert (bench.state, bench.reason) == (ArmState.IDLE, "arm-not-active")
+
+
+def fault(name):
+    """Return a fault that another process reports."""
+    return verdict_for(Fault(name))
+
+
+def test_a_request_that_does_not_know_the_newest_verdict_is_refused(bench):
+    bench.enter(ArmState.FLOAT)
+    known = bench.cycle.status.number
+    bench.cycle.report(fault("console-silent"))
+    bench.run()
+    bench.cycle.request(ArmState.FLOAT, known)
+    bench.run()
+    assert (bench.state, bench.reason) == (ArmState.HOLD, "console-silent")
+    bench.cycle.request(ArmState.FLOAT, bench.cycle.status.number)
+    bench.run()
+    assert (bench.state, bench.reason) == (ArmState.FLOAT, "")
+
+
+def test_a_request_that_waits_for_positions_is_refused_by_a_verdict_meanwhile(bench):
+    bench.enter(ArmState.FLOAT)
+    bench.arm.missing = 1
+    bench.enter(ArmState.HOLD)
+    bench.cycle.report(fault("console-silent"))
+    bench.run()
+    bench.arm.missing = 0
+    bench.run()
+    assert (bench.state, bench.reason) == (ArmState.HOLD, "console-silent")
+
+
+@pytest.mark.parametrize("state", sorted(TORQUE))
+def test_a_verdict_that_idles_stands_until_a_start(bench, state):
+    bench.enter(ArmState.FLOAT)
+    bench.cycle.report(fault("motor-stuck"))
+    bench.run()
+    for wanted in (state, ArmState.IDLE):
+        bench.enter(wanted)
+        assert (bench.state, bench.reason) == (ArmState.IDLE, "motor-stuck")
+    bench.start()
+    assert (bench.state, bench.reason) == (ArmState.HOLD, "")
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [("console-silent", "motor-stuck"), ("motor-stuck", "console-silent")],
+)
+def test_of_two_verdicts_the_stricter_comes_first_and_both_stand(bench, first, second):
+    bench.enter(ArmState.FLOAT)
+    for name in (first, second):
+        bench.cycle.report(fault(name))
+        bench.run()
+    faults = [verdict.fault for verdict in bench.cycle.status.standing]
+    assert faults == [Fault.MOTOR_STUCK, Fault.CONSOLE_SILENT]
+    assert (bench.state, bench.cycle.status.number) == (ArmState.IDLE, 2)
+
+
+def test_a_fault_that_persists_is_one_verdict(bench):
+    bench.enter(ArmState.FLOAT)
+    for _ in range(3):
+        bench.cycle.report(fault("console-silent"))
+        bench.run()
+    assert bench.cycle.status.number == 1
 
 
 def test_the_status_shows_the_age_of_the_force(bench):
@@ -665,8 +752,7 @@ def test_a_sensor_whose_port_is_gone_is_a_silent_one(bench):
     ],
 )
 def test_a_stop_is_told_before_the_arm_was_ever_active(bench, mode, state, reason):
-    bench.arm.mode = SafetyMode.IDLE
-    bench.enter(ArmState.HOLD)
+    bench.start()
     bench.arm.mode = mode
     bench.run()
     assert (bench.state, bench.reason) == (state, reason)
@@ -696,7 +782,10 @@ def test_a_request_does_not_end_the_watch_on_a_silent_module(bench):
     assert (bench.state, bench.reason) == (ArmState.HOLD, "safety-silent")
     bench.arm.qd = np.full(7, 1.6)
     bench.run()
-    assert (bench.state, bench.reason) == (ArmState.DAMP, "overspeed")
+    assert (bench.state, bench.reasons) == (
+        ArmState.DAMP,
+        ["safety-silent", "overspeed"],
+    )
 
 
 def test_torques_for_a_module_that_is_silent_from_the_start_are_idled(bench):
@@ -729,8 +818,7 @@ def test_torques_grow_from_zero_after_the_brakes(bench):
     bench.run(5)
     record = bench.enter(ArmState.IDLE)
     assert not record["torque_command"].any()
-    bench.arm.mode = SafetyMode.IDLE
-    bench.enter(ArmState.FLOAT)
+    bench.start()
     assert bench.arm.sent[-1].tolist() == pytest.approx([3.0] * 6 + [9.0])
 
 

@@ -28,6 +28,7 @@ RECORDED_NAMES = {
     "bus-shared",
     "puck-changed",
     "not-asked-active",
+    "arm-not-active",
     "activation-motion",
     "hold-motion",
     "damp-motion",

@@ -66,6 +66,7 @@ OBSERVED = {
     "is_moving": False,
     "state": ArmState.FLOAT,
     "energy": 0.0,
+    "is_starting": False,
 }
 QUIET = Observation(**OBSERVED)
 
@@ -249,7 +250,8 @@ def test_damping_is_worse_than_holding_and_better_than_idle():
 
 @pytest.mark.parametrize("name", FAULTS)
 def test_an_arm_that_is_not_powered_is_left_alone(name):
-    assert judge(**FAULTS[name], is_commanded=False).action is Action.NONE
+    idle = {"is_commanded": False, "is_recording": False}
+    assert judge(**FAULTS[name], **idle).action is Action.NONE
 
 
 @pytest.mark.parametrize("name", [Fault.JOINT7_SLIP, Fault.FT_STALE])
@@ -508,7 +510,16 @@ ACTIVE, BRAKED, UNKNOWN = SafetyMode.ACTIVE, SafetyMode.IDLE, SafetyMode.UNKNOWN
 
 
 def test_torques_made_ready_behind_confirmed_brakes_are_not_judged():
-    assert after(BRAKED, BRAKED, qd=at(1, 9.0)) is OK
+    ready = {"is_starting": True, "is_recording": False}
+    assert after(BRAKED, BRAKED, qd=at(1, 9.0), **ready) is OK
+
+
+@pytest.mark.parametrize(
+    "asked", [{"is_recording": False}, {"is_starting": True}, {"is_commanded": False}]
+)
+def test_an_arm_behind_brakes_is_neither_driven_nor_recorded(asked):
+    _, verdict = check(LIMITS, GuardState(), seen(safety=BRAKED, **asked))
+    assert verdict.fault is Fault.NOT_ACTIVE
 
 
 @pytest.mark.parametrize("before", [ACTIVE, UNKNOWN])
@@ -522,7 +533,8 @@ def test_an_unknown_circuit_is_judged_from_the_first_command_on():
 
 def test_a_new_begin_behind_confirmed_brakes_is_no_stop():
     state = check(LIMITS, ARMED, seen(is_commanded=False))[0]
-    _, verdict = check(LIMITS, state, seen(safety=BRAKED))
+    starting = seen(safety=BRAKED, is_starting=True, is_recording=False)
+    _, verdict = check(LIMITS, state, starting)
     assert verdict is OK
 
 
@@ -549,7 +561,7 @@ def test_limits_of_fewer_joints_than_the_arm_has_are_refused(name):
         replace(LIMITS, **{name: getattr(LIMITS, name)[:6]})
 
 
-IDLE = {"is_commanded": False, "state": ArmState.IDLE}
+IDLE = {"is_commanded": False, "is_recording": False, "state": ArmState.IDLE}
 
 
 @pytest.mark.parametrize("before", [GuardState(), ARMED])
@@ -564,7 +576,7 @@ def test_an_idle_arm_that_is_not_active_is_well(safety):
 
 
 def test_an_arm_whose_idle_is_not_confirmed_is_not_idled_in_every_cycle():
-    unknown = {"is_commanded": False, "state": ArmState.UNKNOWN}
+    unknown = {**IDLE, "state": ArmState.UNKNOWN}
     assert judge(safety=SafetyMode.ACTIVE, **unknown) is OK
 
 

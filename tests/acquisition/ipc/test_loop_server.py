@@ -27,8 +27,11 @@ class Cycle:
         self.requests, self.reports, self.goals, self.biases = [], [], [], []
         self.ticks = 0
 
-    def request(self, state):
-        self.requests.append(state)
+    def request(self, state, known=None):
+        self.requests.append((state, known))
+
+    def start(self, known):
+        self.requests.append(("start", known))
 
     def report(self, verdict):
         self.reports.append(verdict)
@@ -86,12 +89,13 @@ def loop():
 
 
 def test_commands_reach_the_cycle_and_are_confirmed(loop):
-    loop.console.post(CommandKind.ENTER, ArmState.FLOAT)
+    loop.console.post(CommandKind.START, values=(3,))
+    loop.console.post(CommandKind.ENTER, ArmState.FLOAT, values=(4,))
     loop.console.post(CommandKind.WATCH_TRIAL, 1)
     loop.console.post(CommandKind.SET_BIAS, values=(1.0, 2.0, 3.0, 4.0, 5.0, 6.0))
     number = loop.console.post(CommandKind.MOVE, values=(*GOAL, 0.25))
     loop.run(0.002)
-    assert loop.cycle.requests == [ArmState.FLOAT]
+    assert loop.cycle.requests == [("start", 3), (ArmState.FLOAT, 4)]
     assert loop.cycle.is_recording
     assert loop.cycle.biases == [(1.0, 2.0, 3.0, 4.0, 5.0, 6.0)]
     assert loop.cycle.goals == [(GOAL, 0.25)]
@@ -169,7 +173,7 @@ def test_an_orphaned_arm_holds_at_once_and_brakes_after_a_second(loop):
     loop.run(0.998)
     assert loop.cycle.requests == []
     loop.run(0.01)
-    assert set(loop.cycle.requests) == {ArmState.IDLE}
+    assert set(loop.cycle.requests) == {(ArmState.IDLE, None)}
     assert loop.loop_server.is_over
 
 

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from acquisition.control_loop.states import ControlStatus
+from acquisition.control_loop.states import ArmState, ControlStatus
 from acquisition.devices import BusCondition, SafetyMode
 from experiments.operator.console import Console
 from experiments.rig.pace import WallPace
@@ -29,6 +29,7 @@ class StubClient:
     status: ControlStatus = field(default_factory=ControlStatus)
     advanced: float = 0.0
     requested: list = field(default_factory=list)
+    known: int = 0
     on_advance: list = field(default_factory=list)
     loop: SimpleNamespace = field(
         default_factory=lambda: SimpleNamespace(
@@ -44,6 +45,15 @@ class StubClient:
 
     def request(self, state):
         self.requested.append(state)
+
+    def start(self):
+        self.requested.append(ArmState.HOLD)
+
+    def note(self, control):
+        self.known = control.number
+
+    def is_news(self, control):
+        return control.verdict is not None and control.number > self.known
 
     def last(self, seconds):
         del seconds

@@ -134,7 +134,7 @@ def test_a_verdict_while_torques_are_made_ready_is_reported_as_such():
 
 def test_a_fault_that_stands_is_reported_before_anything_is_asked_for():
     loop = bench(keys={0: " "}, active_at=0)
-    loop.loop_client.status.verdict = GuardVerdict(Action.IDLE, Fault.E_STOP)
+    loop.loop_client.status.latch(GuardVerdict(Action.IDLE, Fault.E_STOP))
     with pytest.raises(ArmFaultError):
         activate(loop)
     assert loop.loop_client.requested == []

@@ -6,7 +6,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from acquisition.control_loop.faults import Action, Fault, GuardVerdict
+from acquisition.control_loop.details import CircuitCauses
+from acquisition.control_loop.faults import Fault, verdict_for
 from acquisition.control_loop.states import ArmState
 from acquisition.errors import SessionError
 from experiments.operator.prompts import Prompt
@@ -15,11 +16,12 @@ from experiments.run.console_loop import TICK
 from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.session.sidecar import TrialName
 from fakes.clock import SteppedClock
-from tests.experiments.run.bench import Keys, make_loop
+from tests.experiments.run.bench import Keys, make_loop, said
 
 NAME = TrialName(3, 2)
-STANDING = GuardVerdict(Action.HOLD, Fault.JOINT_LIMIT)
-WORSE = GuardVerdict(Action.IDLE, Fault.E_STOP)
+STANDING = verdict_for(Fault.CONSOLE_LOST)
+MILD = verdict_for(Fault.CONSOLE_SILENT)
+WORSE = verdict_for(Fault.E_STOP, CircuitCauses())
 
 
 def test_a_tick_lets_20_ms_pass_and_returns_the_key():
@@ -102,10 +104,33 @@ def test_a_fault_is_raised_at_every_tick_where_the_arm_is_wanted():
 def test_the_worst_verdict_is_the_newest_only_if_it_is_more_severe():
     loop = make_loop(Keys())
     assert loop.worst_verdict(STANDING) is STANDING
-    loop.loop_client.status.verdict = WORSE
+    loop.loop_client.status.latch(WORSE)
     assert loop.worst_verdict(STANDING) is WORSE
-    loop.loop_client.status.verdict = STANDING
+    loop.loop_client.status.clear()
+    loop.loop_client.status.latch(STANDING)
     assert loop.worst_verdict(WORSE) is WORSE
+
+
+def test_a_fault_beside_a_stricter_one_is_told_once():
+    loop = make_loop(Keys())
+    loop.loop_client.status.latch(MILD)
+    with pytest.raises(ArmFaultError) as raised:
+        loop.tick(Prompt.REVIEW)
+    assert raised.value.verdict is MILD
+    loop.loop_client.status.latch(WORSE)
+    words = said(lambda: loop.worst_verdict(MILD))
+    assert words.count("No heartbeat from the console for 0.5 s.") == 1
+    assert "Stop pressed" not in words
+    assert said(lambda: loop.tick(Prompt.REVIEW)) == ""
+
+
+def test_what_stands_is_known_to_the_loop_once_it_is_raised():
+    loop = make_loop(Keys())
+    loop.loop_client.status.latch(MILD)
+    assert loop.loop_client.known == 0
+    with pytest.raises(ArmFaultError):
+        loop.tick(Prompt.READY)
+    assert loop.loop_client.known == 1
 
 
 def test_the_heartbeat_goes_on_while_something_slow_is_done():

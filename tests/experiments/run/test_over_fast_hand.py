@@ -37,7 +37,7 @@ class Bench:
         backend.start_arm()
         backend.open_sensor()
         backend.begin()
-        self.loop_client.request(ArmState.HOLD)
+        self.loop_client.start()
         self.loop_client.advance(0.1)
         self.rig.simulation.pendant("activate")
         self.loop_client.advance(0.2)

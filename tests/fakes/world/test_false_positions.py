@@ -64,7 +64,7 @@ class Bench:
         self.cycle = Cycle(self.arm, NoSensor(), law, NoFoot(), LIMITS, outputs)
         self.loop = Loop(self.cycle, self.clock)
         self.run(5)
-        self.cycle.request(ArmState.HOLD)
+        self.cycle.start()
         self.run(20)
         self.rig.network.pendant("activate")
         self.run(20)

@@ -1,0 +1,215 @@
+"""A fault after a fault: every ordered pair, delay and phase: `-m tests.faults.pairs`.
+
+Whatever the pair, four things hold: every verdict that the loop latched is told; once
+one of them idles, the arm is not driven again, whatever is pressed at the pendant; the
+session ends if either fault ends it; and no trial is kept in which the motors had no
+power.
+"""
+
+import argparse
+import random
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from string import Formatter
+
+from acquisition.control_loop.faults import Action, Fault, GuardVerdict, verdict_for
+from acquisition.control_loop.states import ControlStatus
+from acquisition.devices import SafetyMode
+from acquisition.sample import SAFETY_MODE_MASK
+from acquisition.trial_file.reader import TrialReader
+from experiments.messages import CATALOGUE
+from tests.experiments.program import write_config
+from tests.faults.phases import MOVING
+from tests.faults.rehearse import MS, Seen, SimulatedScene, Strike, run_with
+from tests.faults.strikes import strike_of
+
+DELAYS_MS = (0, 20, 60, 100, 140, 200, 500)
+PHASES = ("idle", "tare", "ready", "recording", "review", MOVING)
+_RELEASED_NS = 300 * MS  # after a fault of the circuit a person presses idle, activate
+
+
+def _reported(fault: Fault) -> Strike:
+    """Return a strike of a process beside the loop."""
+    return lambda scene: scene.cycle.report(verdict_for(fault))
+
+
+# Faults of every reaction of the guard, by the name of their row.
+STRIKES: dict[str, Strike] = {
+    # They end a trial, or hold.
+    "contact-force": strike_of("contact-force"),
+    "ft-stale": strike_of("ft-stale"),
+    "console-silent": _reported(Fault.CONSOLE_SILENT),
+    "recorder-silent": _reported(Fault.RECORDER_SILENT),
+    "move-refused": _reported(Fault.MOVE_REFUSED),
+    # They damp.
+    "overspeed": strike_of("overspeed"),
+    "joint-limit": strike_of("joint-limit"),
+    # They hold, then idle.
+    "puck-silent": strike_of("puck-silent"),
+    "can-silence": strike_of("can-silence"),
+    "position-jump": strike_of("position-jump"),
+    "replies-late": strike_of("replies-late"),
+    "safety-silent": strike_of("safety-silent"),
+    # They idle.
+    "bus-shared": strike_of("bus-shared"),
+    "not-a-number": strike_of("not-a-number"),
+    "safety-heartbeat": strike_of("safety-heartbeat"),
+    "pendant-idle": strike_of("pendant-idle"),
+    "estop": strike_of("estop"),
+}
+_OF_THE_CIRCUIT = ("estop", "pendant-idle", "safety-heartbeat")
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """Two faults, the second `delay_ms` after the first, which comes in `phase`."""
+
+    first: str
+    second: str
+    delay_ms: int
+    phase: str
+
+    def __str__(self) -> str:
+        return f"{self.first}, {self.second} after {self.delay_ms} ms, {self.phase}"
+
+
+def every_pair() -> Iterator[Pair]:
+    """Yield every ordered pair of different faults, with every delay and phase."""
+    for phase in PHASES:
+        for delay_ms in DELAYS_MS:
+            for first in STRIKES:
+                for second in STRIKES:
+                    if first != second:
+                        yield Pair(first, second, delay_ms, phase)
+
+
+def problems_of(pair: Pair, config: Path, data: Path) -> list[str]:
+    """Run a session, or a calibration, with the pair; return what did not hold."""
+    latched: list[tuple[int, GuardVerdict]] = []
+    scenes: list[SimulatedScene] = []
+
+    def strike(scene: SimulatedScene) -> None:
+        scenes.append(scene)
+        usual_latch = ControlStatus.latch
+
+        def latch(status: ControlStatus, verdict: GuardVerdict) -> None:
+            latched.append((scene.clock.now_ns(), verdict))
+            usual_latch(status, verdict)
+
+        scene.patch.setattr(ControlStatus, "latch", latch)
+        STRIKES[pair.first](scene)
+        at_ns = scene.clock.now_ns() + pair.delay_ms * MS
+        scene.due.append((at_ns, STRIKES[pair.second]))
+        for name, struck_ns in (
+            (pair.first, scene.clock.now_ns()),
+            (pair.second, at_ns),
+        ):
+            if name in _OF_THE_CIRCUIT:
+                scene.due.append((struck_ns + _RELEASED_NS, _release))
+
+    seen = run_with(strike, pair.phase, config, data)
+    return [
+        *_untold(seen, latched),
+        *_driven_again(seen, latched),
+        *_not_ended(seen, latched),
+        *_kept_without_power(seen),
+    ]
+
+
+def _release(scene: SimulatedScene) -> None:
+    """Press Shift-idle and Shift-activate, though nothing asks for it."""
+    network = scene.rig.network
+    if network.safety_mode is not SafetyMode.ACTIVE:
+        network.pendant("idle")
+        network.pendant("activate")
+
+
+def _untold(seen: Seen, latched: Sequence[tuple[int, GuardVerdict]]) -> list[str]:
+    said = seen.done.out + seen.done.err
+    if "Traceback" in said:
+        return [f"a traceback: {said[-600:]}"]
+    faults = dict.fromkeys(v.fault for _, v in latched if v.fault is not None)
+    return [f"{fault} was not told" for fault in faults if not _is_told(fault, said)]
+
+
+_OTHER_NAMES = {
+    Fault.PENDANT_IDLE: ("safety-idle",),
+    Fault.E_STOP: ("safety-stop",),
+    Fault.CAN_SILENCE: ("puck-silent", "interface-down", "unacknowledged", "bus-off"),
+}
+
+
+def _is_told(fault: Fault, said: str) -> bool:
+    names = (fault.value, *_OTHER_NAMES.get(fault, ()))
+    return any(_has_words(CATALOGUE[name].what, said) for name in names)
+
+
+def _has_words(what: str, said: str) -> bool:
+    """Return whether the longest fixed part of a message was said."""
+    return max((words for words, *_ in Formatter().parse(what)), key=len) in said
+
+
+def _driven_again(seen: Seen, latched: Sequence[tuple[int, GuardVerdict]]) -> list[str]:
+    """Return when the arm got torques again after a verdict that idles."""
+    idled = [ns for ns, v in latched if v.action is Action.IDLE]
+    if not idled:
+        return []
+    begin_ns = min(idled) + 20 * MS
+    again = [row for row in seen.scene.seen if row[0] > begin_ns and row[1] == "driven"]
+    return [f"driven {(row[0] - begin_ns) / MS:.0f} ms after idle" for row in again[:1]]
+
+
+def _not_ended(seen: Seen, latched: Sequence[tuple[int, GuardVerdict]]) -> list[str]:
+    code = seen.done.code
+    is_over = any(verdict.ends_session for _, verdict in latched)
+    # A tare that is given up, or the last one, which costs nothing, ends otherwise.
+    is_well = code in {3, 4} or (not is_over and code in {0, 5})
+    is_at_the_end = code == 0 and "No tare at the end" in seen.done.out
+    return [] if is_well or is_at_the_end else [f"exit code {code}"]
+
+
+def _kept_without_power(seen: Seen) -> list[str]:
+    if seen.folder is None:
+        return []
+    bad = []
+    for path in sorted((seen.folder / "trials").glob("T??.mcap")):
+        modes = TrialReader(path).cycles().data["flags"] & SAFETY_MODE_MASK
+        if (modes != SafetyMode.ACTIVE).any():
+            bad.append(f"{path.stem} was kept without power")
+    return bad
+
+
+def _problems(pair: Pair) -> tuple[Pair, list[str]]:
+    with tempfile.TemporaryDirectory(prefix="pair-") as scratch:
+        config = write_config(Path(scratch))
+        return pair, problems_of(pair, config, Path(scratch) / "data")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run all pairs, or a share of them drawn by a seed; print what did not hold."""
+    options = argparse.ArgumentParser(prog="python -m tests.faults.pairs")
+    options.add_argument("--count", type=int, help="so many of them; else all")
+    options.add_argument("--seed", type=int, default=1)
+    options.add_argument("--jobs", type=int, default=2)
+    chosen = options.parse_args(arguments)
+    pairs = list(every_pair())
+    if chosen.count is not None:
+        pairs = random.Random(chosen.seed).sample(pairs, chosen.count)
+    wrong = 0
+    with ProcessPoolExecutor(chosen.jobs) as pool:
+        for done, (pair, problems) in enumerate(pool.map(_problems, pairs), 1):
+            if problems:
+                wrong += 1
+                print(f"{pair}: {'; '.join(problems)}", flush=True)  # noqa: T201
+            if done % 100 == 0:
+                print(f"{done} of {len(pairs)}, {wrong} wrong", flush=True)  # noqa: T201
+    print(f"{len(pairs)} pairs, {wrong} wrong")  # noqa: T201
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
