@@ -107,6 +107,8 @@ class ArmReading:
             are extrapolated by one cycle.
         late: positions that came although none was asked for; None = none did.
         change: of a motor's controller since the start; None = none was seen.
+        disobeys: how a motor's controller contradicts what it was told, `was`; told in
+            one cycle. None = none does.
     """
 
     host_ns: int
@@ -125,6 +127,7 @@ class ArmReading:
     is_unasked: bool = False
     late: LatePositions | None = None
     change: MotorChange | None = None
+    disobeys: MotorChange | None = None
 
 
 @dataclass(slots=True)

@@ -184,6 +184,8 @@ def _check_idle(seen: Observation) -> GuardVerdict:
     would fall. Torques behind a circuit that nobody is asked to activate would drive it
     at the next press of the pendant.
     """
+    if seen.reading.disobeys is not None:
+        return verdict_for(Fault.PUCK_DISOBEYS, seen.reading.disobeys)
     if seen.state is ArmState.IDLE:
         if seen.reading.foreign_id is not None:
             return verdict_for(Fault.BUS_SHARED, ForeignFrame(seen.reading.foreign_id))
@@ -320,6 +322,14 @@ def _check_change(facts: Facts) -> GuardVerdict:
     return verdict_for(Fault.PUCK_CHANGED, reading.change)
 
 
+def _check_obedience(facts: Facts) -> GuardVerdict:
+    """Give up an arm of which a motor does not do what it is told."""
+    disobeys = facts.seen.reading.disobeys
+    if disobeys is None:
+        return OK
+    return verdict_for(Fault.PUCK_DISOBEYS, disobeys)
+
+
 def _check_move(facts: Facts) -> GuardVerdict:
     """Idle a move that turns a motor in vain: it would be pulled on for ever."""
     motor = facts.seen.stuck_motor
@@ -438,6 +448,7 @@ CHECKS: tuple[Callable[[Facts], GuardVerdict], ...] = (
     _check_late,
     _check_master,
     _check_change,
+    _check_obedience,
     _check_move,
     _check_numbers,
     _check_position,

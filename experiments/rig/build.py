@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -33,6 +34,7 @@ from wam.control.joint_lock import LockGains
 from wam.control.soft_walls import SoftWalls, Walls
 from wam.driver.arm import WamArm
 from wam.driver.health import health_metadata
+from wam.driver.lost_positions import LostPositions
 from wam.driver.puck_properties import known_table
 from wam.driver.safety_module import WARNING_SHARE, SafetyLimits
 from wam.driver.settings import ArmSettings
@@ -40,6 +42,8 @@ from wam.model.arm_model import ArmModel
 from wam.model.constants import ArmConstants, Array, Body
 from wam.model.start_pose import elbow_up, lowered_to
 from wam.model.tool import Tool, sensor_body
+
+LOST_POSITIONS = "positions-lost.txt"  # beside rig.toml
 
 
 def terrain_frame(row: TerrainRow) -> TerrainFrame:
@@ -167,15 +171,25 @@ def build_arm(
     link: CanLink,
     clock: Clock,
     properties: str = "",
+    lost: Path | None = None,
 ) -> WamArm:
-    """Return the driver of the arm on `link`, whose pucks are as in `properties`."""
+    """Return the driver of the arm on `link`.
+
+    Args:
+        rig: settings of the rig.
+        constants: of the arm.
+        link: its bus.
+        clock: the time of the loop.
+        properties: what its pucks say of themselves, "" for a factory's.
+        lost: file that notes positions that were lost; None = none is kept.
+    """
     settings = ArmSettings(
         j2mp=constants.j2mp,
         safety_limits=build_safety_limits(rig),
         speed_limits=tuple(rig.limits.speed),
         pucks=known_table(properties, rig.arm.properties or "pucks.toml"),
     )
-    return WamArm(link, clock, settings)
+    return WamArm(link, clock, settings, LostPositions(lost))
 
 
 def open_bus_sensor(arm: WamArm, link: CanLink, clock: Clock) -> BarrettSensor:

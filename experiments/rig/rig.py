@@ -14,7 +14,12 @@ from acquisition.simulation import SimulationControl
 from experiments.arguments import FRICTION, TimeMode
 from experiments.rig.arm_lock import ArmLock
 from experiments.rig.backend import RigBackend
-from experiments.rig.build import build_tool, read_properties, terrain_frame
+from experiments.rig.build import (
+    LOST_POSITIONS,
+    build_tool,
+    read_properties,
+    terrain_frame,
+)
 from experiments.rig.fake import (
     RigTruth,
     SimulatedRig,
@@ -220,7 +225,7 @@ def _jobs(
     world: dict[str, Any] | None,
 ) -> WorkerConfigs:
     """Return the settings of the processes; `world` is of the simulated rig."""
-    rig = settings.rig
+    rig, lost = settings.rig, settings.folder / LOST_POSITIONS
     common: dict[str, Any] = {
         "rig": rig.model_dump(mode="json"),
         "is_simulated": world is not None,
@@ -230,8 +235,9 @@ def _jobs(
         "row": row.model_dump(mode="json"),
         "gravity": calibrations.gravity,
         "friction": calibrations.friction,
-        # Those of a simulated arm are a factory's.
+        # A simulated arm is as it left the factory, and has no past.
         "properties": read_properties(settings) if world is None else "",
+        "lost_positions": str(lost) if world is None else "",
         "can": rig.can.model_dump(mode="json"),
         "terminal": _terminal(),
     }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
+from pathlib import Path
 
 from acquisition.clock import SystemClock
 from acquisition.control_loop.loop import Loop
@@ -131,8 +132,14 @@ class ControlWorker:
             transport = open_transport(*address, self._clock)
             link = self._link = build_link(transport, self._context.shared, self._clock)
             properties = self._context.settings["properties"]
+            noted = self._context.settings["lost_positions"]
             self._arm = build_arm(
-                self._rig, self._constants, link, self._clock, properties
+                self._rig,
+                self._constants,
+                link,
+                self._clock,
+                properties,
+                Path(noted) if noted else None,
             )
         return self._arm
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import TypeVar
 
@@ -380,7 +381,18 @@ class ConsoleLoop:
         return False
 
     def make_safe(self) -> bool:
-        """Idle the arm and abandon an open file; return whether idle is confirmed."""
+        """Idle the arm and abandon an open file; return whether idle is confirmed.
+
+        What the loop finds in that is told: a puck may have missed it.
+        """
         backend = self.rig.backend
         backend.recorder.abandon()
-        return backend.idle()
+        is_confirmed = backend.idle()
+        if not self.loop_client.loop.is_running:
+            return is_confirmed
+        with suppress(TractionError):
+            self.loop_client.advance(TICK)
+            control = self.loop_client.status
+            if self.loop_client.is_news(control):
+                self.console.problem(fault_words(self._fault(control).verdict))
+        return is_confirmed

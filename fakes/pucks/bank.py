@@ -16,6 +16,7 @@ from wam.bus.frames import (
     encode_positions,
     wrap_positions,
 )
+from wam.bus.properties import PuckMode
 
 
 class MotorSide(Protocol):
@@ -62,6 +63,7 @@ class PuckBank:
             MotorPuck(PuckPower(node, options, schedule), options)
             for node in MOTOR_NODES
         ]
+        self._deaf: set[int] = set()  # to the module
         self._members: dict[int, list[MotorPuck]] = {}
         self._reporting: dict[tuple[int, int], list[MotorPuck]] = {}
         self._wake_up()
@@ -91,6 +93,29 @@ class PuckBank:
     def reboot(self, node: int) -> None:
         """Let a puck fall into its monitor."""
         self._pucks[node - 1].restart(Power.MONITOR)
+        self._forget_groups()
+        self._apply()
+
+    def deafen(self, node: int, *, is_deaf: bool) -> None:
+        """Let a puck miss every change of mode that the module tells, or hear again."""
+        (self._deaf.add if is_deaf else self._deaf.discard)(node)
+
+    def driven(self) -> list[int]:
+        """Return the pucks that follow torques."""
+        return [puck.node for puck in self._pucks if puck.is_driven]
+
+    def lose_mode(self, node: int) -> None:
+        """Let a puck leave torque mode by itself."""
+        puck = self._pucks[node - 1]
+        puck.define("MODE", PuckMode.IDLE)
+        puck.torque = 0
+        self._apply()
+
+    def restart_at_once(self, node: int) -> None:
+        """Let a puck restart and run again in no time."""
+        puck = self._pucks[node - 1]
+        puck.restart(Power.AWAKE)
+        self._lose_positions([puck])
         self._forget_groups()
         self._apply()
 
@@ -191,6 +216,8 @@ class PuckBank:
 
     def _set_puck_modes(self) -> None:
         for puck in self._pucks:
+            if puck.node in self._deaf and self._mode is not SafetyMode.E_STOP:
+                continue
             if puck.is_awake:
                 puck.define("MODE", puck_mode_in(self._mode))
             puck.torque = 0

@@ -54,10 +54,19 @@ class _Rule:
     passed: int = 0
 
 
+@dataclass(slots=True)
+class Unheard:
+    """Frames of the host that reach no device; `left` of them, None = all."""
+
+    is_lost: Callable[[int, bytes], bool]
+    left: int | None
+
+
 class BusFaults:
     """Loses, delays, doubles and spoils the frames of a network's devices.
 
-    Devices among themselves are not touched: the faults sit before the host. Frames of
+    Devices among themselves are not touched: the faults sit before the host, and
+    `lose_from_host` behind it. Frames of
     one identifier keep their order, as they do in the queue of a CAN controller.
     `count` is how many frames a fault strikes, None = all until `clear_faults`.
 
@@ -79,6 +88,27 @@ class BusFaults:
         self._rules: dict[int, list[_Rule]] = {}
         self._released_ns: dict[int, int] = {}
         self._flood = 0  # number of the present one; events of earlier ones are void
+        self._unheard: list[Unheard] = []
+
+    def lose_from_host(
+        self, is_lost: Callable[[int, bytes], bool], count: int | None = None
+    ) -> None:
+        """Let no device hear the host's frames for which `is_lost(identifier, data)`.
+
+        Args:
+            is_lost: which frames.
+            count: how many of them; None = all until `clear_faults`.
+        """
+        self._unheard.append(Unheard(is_lost, count))
+
+    def is_heard(self, can_id: int, data: bytes) -> bool:
+        """Return whether devices hear a frame of the host."""
+        for rule in self._unheard:
+            if rule.left != 0 and rule.is_lost(can_id, data):
+                if rule.left is not None:
+                    rule.left -= 1
+                return False
+        return True
 
     def drop(self, can_id: int, count: int | None = 1, share: float = 1.0) -> None:
         """Lose frames, each with probability `share`."""
@@ -158,6 +188,7 @@ class BusFaults:
         self.is_off = self.is_down = self.is_unheard = False
         self._flood += 1
         self._rules.clear()
+        self._unheard.clear()
 
     def _add(
         self,

@@ -93,6 +93,8 @@ class PuckNetwork:
             schedule.advance(t_ns)
         elif schedule.now_ns < t_ns:  # nothing is planned till then
             schedule.now_ns = t_ns
+        if not self.faults.is_heard(can_id, bytes(data)):
+            return
         to = can_id & 0x1F
         try:
             if can_id & GROUP_BIT:
@@ -169,6 +171,22 @@ class PuckNetwork:
             self._bank.reboot(node)
         elif self._sensor is not None:
             self._sensor.reboot()
+
+    def deafen(self, node: int, *, is_deaf: bool = True) -> None:
+        """Let a motor puck miss every change of mode that the module tells."""
+        self._bank.deafen(node, is_deaf=is_deaf)
+
+    def driven(self) -> list[int]:
+        """Return the motor pucks that follow torques."""
+        return self._bank.driven()
+
+    def lose_mode(self, node: int) -> None:
+        """Let a motor puck leave torque mode by itself."""
+        self._bank.lose_mode(node)
+
+    def restart_at_once(self, node: int) -> None:
+        """Let a motor puck restart within a cycle: mode and position are lost."""
+        self._bank.restart_at_once(node)
 
     def _receive_group(self, group: int, data: Payload) -> None:
         if group in TORQUE_GROUPS and len(data) == 8:

@@ -1,6 +1,7 @@
 """Faults of the simulated arm and its bus by the names a rehearsal calls them."""
 
 from collections.abc import Callable, Iterable
+from functools import partial
 from typing import Protocol
 
 from acquisition.clock import PERIOD_NS
@@ -11,7 +12,14 @@ from fakes.pucks.network import PuckNetwork
 from fakes.pucks.safety_module import NOMINAL_VOLTAGE
 from fakes.sensor.errors import NO_SHIFT
 from fakes.sensor.stream import SensorStream
-from wam.bus.frames import MOTOR_NODES, SAFETY_NODE, SENSOR_NODE, position_reply_id
+from wam.bus.frames import (
+    MOTOR_NODES,
+    SAFETY_NODE,
+    SENSOR_NODE,
+    Group,
+    group_id,
+    position_reply_id,
+)
 
 PUCK = 3  # of those that fail alone: its joint carries little, the arm stays up
 FOREIGN_LOAD = 0.6  # of the bus, half of it before the arm's frames and half after
@@ -27,6 +35,7 @@ _BEHIND_THE_NEXT_QUESTION_NS = 1_950_000
 _LATE_EVERY = 50  # cycles
 # Late by one cycle, and by two: the replies are taken for those of the present one.
 _PAST_NS, _LONG_PAST_NS = 2_000_000, 3_950_000
+_LOSING_MODE = (2, 4, 7)  # pucks
 LAST_PUCK = 7  # nothing is on the wire after its reply
 _LOST_SHARE = 0.01  # of the replies of each puck
 
@@ -41,6 +50,13 @@ def network_faults(network: PuckNetwork) -> dict[str, Callable[[], None]]:
         "puck-reboot": lambda: network.reboot(PUCK),
         "puck-hot": lambda: network.set_property(PUCK, "TEMP", _HOT),
         "puck-changed": lambda: network.set_property(PUCK, "IPNM", _OTHER_IPNM),
+        **{
+            f"mode-lost-{node}": partial(network.lose_mode, node)
+            for node in _LOSING_MODE
+        },
+        "puck-restart": lambda: network.restart_at_once(LAST_PUCK),
+        "torques-lost": lambda: _lose_torques(faults, Group.LOWER_TORQUE),
+        "torques-lost-wrist": lambda: _lose_torques(faults, Group.WRIST_TORQUE),
         "puck-error": lambda: network.set_property(PUCK, "ERROR", 7),
         "can-silence": lambda: _silence_all(network),
         "bus-off": faults.go_off,
@@ -83,6 +99,7 @@ def clear_network_faults(network: PuckNetwork) -> None:
     network.set_property(PUCK, "IPNM", network.options.ipnm[PUCK - 1])
     for node in MOTOR_NODES:
         network.silence(node, is_mute=False)
+        network.deafen(node, is_deaf=False)
         for name, value in _USUAL.items():
             network.set_property(node, name, value)
 
@@ -119,6 +136,11 @@ def _say_idle(network: PuckNetwork) -> None:
     """Let the module say IDLE, and obey nobody."""
     network.disobey()
     network.say_idle()
+
+
+def _lose_torques(faults: BusFaults, group: Group) -> None:
+    """Let the torques of one group of motors reach nobody."""
+    faults.lose_from_host(lambda can_id, _: can_id == group_id(group))
 
 
 def _silence_all(network: PuckNetwork) -> None:

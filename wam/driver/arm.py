@@ -12,6 +12,7 @@ from acquisition.devices import (
     ArmReading,
     BusCondition,
     LatePositions,
+    MotorChange,
     SafetyMode,
     Vector,
 )
@@ -23,13 +24,14 @@ from acquisition.errors import (
 )
 from wam.bus.frames import MOTOR_NODES
 from wam.bus.link import Link
-from wam.bus.properties import COMMON
+from wam.bus.properties import COMMON, PuckMode
 from wam.bus.property_client import PropertyClient
 from wam.driver.cyclic_io import BusDevice, CycleTraffic
 from wam.driver.discovery import pucks_verb
 from wam.driver.health import PuckHealth
 from wam.driver.home import HOME_LIMIT
 from wam.driver.joint_estimator import JointEstimator
+from wam.driver.lost_positions import LostPositions
 from wam.driver.safety_module import SafetyModule
 from wam.driver.settings import ArmSettings
 from wam.driver.startup import ArmInfo, StartUp
@@ -43,7 +45,6 @@ _ALL_FRESH = (1 << MOTORS) - 1
 _URGENT_CYCLES = 3
 _FIRST_POSITIONS_NS = 1_000 * _MS  # as long as the vendor's library waits for them
 _DOUBTED = 5  # cycles until positions that were late are not asked for again
-_BEARING_NODE = 2  # its motor bears most of the arm
 _IGNORED_SPEED_FAULTS = 5  # the safety module's history, as libbarrett says
 
 
@@ -58,8 +59,14 @@ class WamArm:
     """
 
     def __init__(
-        self, link: Link, clock: Clock, settings: ArmSettings | None = None
+        self,
+        link: Link,
+        clock: Clock,
+        settings: ArmSettings | None = None,
+        lost: LostPositions | None = None,
     ) -> None:
+        """Start nothing yet; `lost` is what earlier starts know of this arm."""
+        self._lost = lost or LostPositions()
         self._link = link
         self._clock = clock
         self._settings = settings or ArmSettings()
@@ -114,7 +121,7 @@ class WamArm:
             LinkTimeoutError: a device stopped answering on the way.
             LinkError: the bus is down.
         """
-        start_up = StartUp(self._properties, self._clock, self._settings)
+        start_up = StartUp(self._properties, self._clock, self._settings, self._lost)
         self._answers = start_up.answers
         info = start_up.run()
         self._safety = SafetyModule(self._properties, self._clock, info.safety_vers)
@@ -125,6 +132,8 @@ class WamArm:
         firmware = [puck.vers for puck in info.pucks]
         self._poller.health.begin(health, firmware, self._clock.now_ns())
         self._poller.watch.begin(start_up.answers, firmware)
+        most = [answers.get("MT") for answers in start_up.answers]
+        self._poller.commands.begin(most, firmware)
         self._traffic.set_firmware(firmware[0])  # P and T are the same in all seven
         transmission = Transmission(
             self._settings.j2mp,
@@ -222,6 +231,7 @@ class WamArm:
             has_bus_error=traffic.take_bus_error(),
             is_unasked=is_unasked,
             change=self._poller.watch.change,
+            disobeys=self._poller.take_disobedience(),
         )
 
     def send(self, tau: Vector, tau_gravity: Vector) -> Vector:
@@ -236,6 +246,7 @@ class WamArm:
         transmission = (self._motion or self._started()).transmission
         command = transmission.command(tau, tau_gravity)
         is_sent = self._traffic.transmit(command.units)
+        self._poller.commands.note_sent(self._traffic.sent)
         self._traffic.ask()
         self._is_commanded = True
         return command.tau if is_sent else transmission.tau(self._traffic.sent)
@@ -270,15 +281,15 @@ class WamArm:
         """Idle the arm: module to IDLE, confirmed, then zero torque.
 
         Zero torque while ACTIVE would be free fall, so without the confirmation none
-        is sent, nor when a puck contradicts the module; the heartbeat then stops the
-        arm within 0.1 s of the last reading.
+        is sent, nor when a puck contradicts the module: it keeps its torque until it
+        agrees, or the module has taken its power. Where the module does not obey, the
+        heartbeat stops the arm within 0.1 s of the last reading.
         Never raises. Returns whether the module confirmed.
         """
         if self._is_closed:
             return self._poller.mode in SHORTED
         mode = self._safety.lower_to_idle(self._settings.idle_ns)
-        if mode is SafetyMode.IDLE and self._safety.is_driven(_BEARING_NODE):
-            self._poller.contradicted_by = _BEARING_NODE
+        if mode is SafetyMode.IDLE and self._are_driven():
             mode = SafetyMode.ACTIVE  # whatever the module says
         self._poller.note_mode(mode, self._clock.now_ns())
         if self._poller.mode not in SHORTED:
@@ -287,6 +298,25 @@ class WamArm:
         self._traffic.transmit([0] * MOTORS)
         self._look_at_pendant()
         return True
+
+    def _are_driven(self) -> bool:
+        """Return whether a puck obeys torques behind an idle module.
+
+        One that missed the module's word is told by itself. Where all contradict it,
+        it is the module that is wrong.
+        """
+        driven = self._safety.driven()
+        if driven and len(driven) < MOTORS:
+            self._poller.disobeys = MotorChange(
+                driven[0], "MODE", PuckMode.IDLE, PuckMode.TORQUE
+            )
+            try:
+                self._safety.idle_pucks(driven)
+            except LinkError:
+                self.counters.link_errors += 1
+            driven = self._safety.driven()
+        self._poller.contradict(driven)
+        return bool(driven)
 
     def close(self) -> None:
         """Idle the arm and give the bus back; a second call does nothing."""
@@ -319,6 +349,7 @@ class WamArm:
         self._begin_at_rest()
         _check_taken(motion.transmission, counts, motion.counts)
         self._safety.mark_zeroed()
+        self._lost.clear()
 
     def _show_positions(self) -> None:
         """Read the first positions, which to the safety module may be a jump.
@@ -331,7 +362,7 @@ class WamArm:
         for _ in range(_IGNORED_SPEED_FAULTS):
             self._properties.pause(_MS)
             self._traffic.exchange(self._clock.now_ns())
-        self._safety.ignore_speed_faults(0)
+        self._safety.judge_speed()
 
     def _look_at_pendant(self) -> None:
         """Learn why the arm is idle; without an answer the last one stands."""

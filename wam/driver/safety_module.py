@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from acquisition.clock import Clock
 from acquisition.devices import SafetyMode
 from acquisition.errors import DeviceFaultError, LinkError
-from wam.bus.frames import SAFETY_NODE
+from wam.bus.frames import MOTOR_NODES, SAFETY_NODE
 from wam.bus.properties import (
     Device,
     PuckMode,
@@ -51,6 +51,7 @@ class SafetyLimits:
 
 _MODE = 8  # the same in every firmware
 _RETRY_NS = 10_000_000
+_ANSWER_NS = 2_000_000  # of a puck; the vendor's library gives up after 1 ms
 _CONFIG_GAP_NS = 10_000_000  # configuration frames closer together are not promised
 
 
@@ -116,10 +117,23 @@ class SafetyModule:
         In IDLE it does not, whatever the module says. A silent one is not judged.
         """
         try:
-            mode = self._properties.get(node, _MODE, _RETRY_NS)
+            mode = self._properties.get(node, _MODE, _ANSWER_NS)
         except LinkError:
             return False
         return mode == PuckMode.TORQUE
+
+    def driven(self) -> list[int]:
+        """Return the motor pucks that say that they obey torques."""
+        return [node for node in MOTOR_NODES if self.is_driven(node)]
+
+    def idle_pucks(self, nodes: Collection[int]) -> None:
+        """Tell motor pucks themselves what they missed when the module told it.
+
+        Raises:
+            LinkError: the bus is down.
+        """
+        for node in nodes:
+            self._properties.set(node, _MODE, PuckMode.IDLE)
 
     def _ask_down(self) -> int | None:
         """Ask for IDLE once; return MODE as answered, None without an answer."""
@@ -147,12 +161,37 @@ class SafetyModule:
             )
 
     def forget_zero(self) -> None:
-        """Tell the module that positions have been lost."""
+        """Tell the module that positions have been lost.
+
+        Raises:
+            DeviceFaultError: the module does not confirm.
+        """
         self._set("ZERO", 0)
+        if self.is_zeroed():
+            raise DeviceFaultError(
+                "The safety module does not accept ZERO = 0: a puck has lost its "
+                "position, and the arm would pass for zeroed.",
+                hint="Start again; if it stays so, switch the arm off and on.",
+            )
 
     def ignore_speed_faults(self, count: int) -> None:
         """Let the module ignore `count` samples before something makes a jump."""
         self._set("IFAULT", count)
+
+    def judge_speed(self) -> None:
+        """Let the module ignore no sample any more.
+
+        Raises:
+            DeviceFaultError: it says that it still does.
+        """
+        self.ignore_speed_faults(0)
+        left = self._try_get("IFAULT")
+        if left:
+            raise DeviceFaultError(
+                f"The safety module has IFAULT = {left}, expected 0: it would let so "
+                "many samples beyond its speed limit pass.",
+                hint="Start again; if it stays so, switch the arm off and on.",
+            )
 
     def set_limits(self, limits: SafetyLimits) -> tuple[str, ...]:
         """Bring VL and TL to their power-up values, then to `limits`.

@@ -32,6 +32,8 @@ class ArmSettings:
             those for the pendant's word.
         health_poll_cycles: cycles between questions for the health of a puck.
         watch_poll_cycles: cycles between questions for what a puck said at the start.
+        command_poll_cycles: cycles between questions for what a puck holds; 14 of them
+            ask all seven for mode and torque.
         safety_limits: what the safety module is set to tolerate.
         pucks: what the motor pucks have to say of themselves.
         boot_ns: silence while pucks boot [ns].
@@ -49,6 +51,7 @@ class ArmSettings:
     safety_poll_cycles: int = 25
     health_poll_cycles: int = 50
     watch_poll_cycles: int = 50
+    command_poll_cycles: int = 4
     safety_limits: SafetyLimits = field(default_factory=SafetyLimits)
     pucks: PuckTable = field(default_factory=shipped_table)
     boot_ns: int = 1_000 * _MS

@@ -23,6 +23,7 @@ from wam.bus.properties import (
 from wam.bus.property_client import PropertyClient
 from wam.driver.discovery import discover_pucks, pucks_verb
 from wam.driver.health import PuckHealth, ask_health
+from wam.driver.lost_positions import LostPositions
 from wam.driver.pendant import PendantWord
 from wam.driver.puck_properties import Values, ask_properties, compare, refuse
 from wam.driver.safety_module import SafetyModule
@@ -119,8 +120,13 @@ class StartUp:
     """
 
     def __init__(
-        self, properties: PropertyClient, clock: Clock, settings: ArmSettings
+        self,
+        properties: PropertyClient,
+        clock: Clock,
+        settings: ArmSettings,
+        lost: LostPositions,
     ) -> None:
+        self._lost = lost
         self._properties = properties
         self._clock = clock
         self._boot_ns = settings.boot_ns
@@ -146,15 +152,14 @@ class StartUp:
         mode = safety.mode()
         self._warnings += safety.set_limits(self._limits)
         asleep = [node for node, stat in stats.items() if stat == PuckStatus.RESET]
+        self._forget_positions(safety, [n for n in asleep if n in MOTOR_NODES])
         self._wake(asleep)
         pucks = tuple(self._identify(node, node in asleep) for node in MOTOR_NODES)
         self._check_firmware(pucks)
         self._check_wrist(pucks[-1])
         self._check_properties(pucks)
-        if any(puck.was_asleep for puck in pucks) and safety.is_zeroed():
-            safety.forget_zero()  # one puck restarted alone: it has lost its position
         if mode is not SafetyMode.ACTIVE:
-            self._properties.set_group(Group.ARM, _MODE, PuckMode.IDLE)
+            self._idle_pucks(safety)
         pendant, doubt = safety.doubted_pendant()
         self._warnings += [doubt] if doubt else []
         return ArmInfo(
@@ -163,12 +168,43 @@ class StartUp:
             safety_vers=safety_vers,
             safety_mode=safety.mode(),
             pendant=pendant,
-            is_zeroed=safety.is_zeroed(),
+            is_zeroed=safety.is_zeroed() and not self._lost.is_noted,
             late_replies=self._properties.late_replies,
             warnings=tuple(self._warnings),
             safety_serial=safety.serial(),
             safety_defaults=safety.defaults,
         )
+
+    def _forget_positions(self, safety: SafetyModule, asleep: list[int]) -> None:
+        """Have it known that sleeping pucks count from anywhere, before they are woken.
+
+        Awake they do not show it any more: a start that ends on the way, or a write
+        that is lost, would leave an arm that passes for zeroed.
+
+        Raises:
+            DeviceFaultError: the module does not confirm.
+            LinkError: the bus is down, or the module silent.
+        """
+        if asleep:
+            self._lost.note(asleep)
+            safety.forget_zero()
+
+    def _idle_pucks(self, safety: SafetyModule) -> None:
+        """Have the pucks of an arm that is not active obey no torque.
+
+        Raises:
+            UnfitDeviceError: one still does.
+            LinkError: the bus is down.
+        """
+        self._properties.set_group(Group.ARM, _MODE, PuckMode.IDLE)
+        safety.idle_pucks(safety.driven())
+        driven = safety.driven()
+        if driven:
+            nodes = ",".join(map(str, driven))
+            raise UnfitDeviceError(
+                f"Puck {nodes} obeys torques although the arm is idle.",
+                hint="Switch the arm off and on, then start again.",
+            )
 
     def _wake(self, asleep: list[int]) -> None:
         """Wake nodes, keep silent while they boot, and see that they are there.

@@ -4,9 +4,10 @@ Half a millisecond of a 2 ms cycle is free on the bus; a question and its answer
 0.15 ms of it.
 """
 
+from collections.abc import Collection
 from typing import Final
 
-from acquisition.devices import SHORTED, SafetyMode
+from acquisition.devices import SHORTED, MotorChange, SafetyMode
 from wam.bus.frames import (
     MOTOR_NODES,
     SAFETY_NODE,
@@ -24,6 +25,7 @@ from wam.bus.properties import (
     nearest_documented,
     property_number,
 )
+from wam.driver.command_watch import CommandWatch
 from wam.driver.health import HealthTable
 from wam.driver.pendant import PendantWord, decode_pendant
 from wam.driver.property_watch import PropertyWatch
@@ -33,16 +35,20 @@ from wam.driver.settings import ArmSettings
 _MODE = 8  # the same in every firmware
 _GET_MODE = encode_get(_MODE)
 _SET_IDLE = encode_set(_MODE, SafetyMode.IDLE)
+_SET_STOP = encode_set(_MODE, SafetyMode.E_STOP)
+_SET_PUCK_IDLE = encode_set(_MODE, PuckMode.IDLE)
 _SAFETY_REPLY_ID = property_reply_id(SAFETY_NODE)
 _NODES: Final = {property_reply_id(node): node for node in MOTOR_NODES}
 _UNANSWERED_POLLS = 4  # this many questions without an answer: mode unknown
+_STUBBORN_POLLS = 4  # after so many questions a puck that is driven loses its power
 
 
 class StatusPoller:
     """Asks safety module and pucks how they are and keeps the newest answers.
 
     In a cycle there is one question at most. The mode goes before the pendant's word,
-    the word before the pucks' health, and that before what they are.
+    the word before the pucks' health, that before what they are, and that before
+    whether they do as they are told.
 
     Attributes:
         mode: last known mode of the safety module.
@@ -52,10 +58,12 @@ class StatusPoller:
         excused: monitors that made no sense at start-up; they are left out.
         health: the newest answers of the pucks.
         watch: what they must go on answering.
+        commands: whether they hold what they are told.
+        disobeys: the newest contradiction of a puck, until it is taken.
         is_lowering: IDLE is sent again with every question for its mode,
             until it says that it is.
-        contradicted_by: puck that obeyed torques when the module said IDLE; the module
-            is not believed before this puck agrees. 0 = none.
+        contradicted_by: pucks that obeyed torques when the module said IDLE; the module
+            is not believed before they agree, and takes their power if they do not.
     """
 
     def __init__(self, link: Link, settings: ArmSettings) -> None:
@@ -66,8 +74,10 @@ class StatusPoller:
         self.excused: tuple[str, ...] = ()
         self.health = HealthTable()
         self.watch = PropertyWatch()
+        self.commands = CommandWatch()
+        self.disobeys: MotorChange | None = None
         self.is_lowering = False
-        self.contradicted_by = 0
+        self.contradicted_by: set[int] = set()
         self._link = link
         self._settings = settings
         self._now_ns = 0
@@ -79,6 +89,8 @@ class StatusPoller:
         self._until_pendant = settings.safety_poll_cycles // 2
         self._until_health = settings.health_poll_cycles // 3
         self._until_watch = 2 * settings.watch_poll_cycles // 3
+        self._until_command = settings.command_poll_cycles
+        self._contradictions = 0  # questions that a contradiction has outlasted
         self.set_firmware(MODERN)
 
     def set_firmware(self, vers: int) -> None:
@@ -93,6 +105,7 @@ class StatusPoller:
         self._until_pendant -= 1
         self._until_health -= 1
         self._until_watch -= 1
+        self._until_command -= 1
 
     def ask(self, *, is_urgent: bool = False) -> None:
         """Put the question that is due, if there is one, once in a cycle.
@@ -106,6 +119,7 @@ class StatusPoller:
             return
         self._has_asked = True
         is_hinted = self._link.mode_hints != self._hints_seen
+        is_urgent = is_urgent or self.commands.is_to_be_confirmed(self.heard_ns)
         if self._until_mode <= 0 or is_hinted or is_urgent:
             if is_hinted:
                 self._hints_seen = self._link.mode_hints
@@ -120,8 +134,15 @@ class StatusPoller:
             self._link.send(node, encode_get(number))
         elif self._until_watch <= 0:
             self._until_watch = self._settings.watch_poll_cycles
-            if (question := self.watch.next_question()) is not None:
-                self._link.send(question[0], encode_get(question[1]))
+            self._send(self.watch.next_question())
+        elif self._until_command <= 0 or self.commands.is_suspicious:
+            self._until_command = self._settings.command_poll_cycles
+            self._send(self.commands.question())
+
+    def _send(self, question: tuple[int, int] | None) -> None:
+        """Ask a puck for a property."""
+        if question is not None:
+            self._link.send(question[0], encode_get(question[1]))
 
     def on_frame(self, can_id: int, data: Payload) -> None:
         """Take a frame that is no position.
@@ -138,8 +159,11 @@ class StatusPoller:
         if node is not None:
             self.health.note(node, reply, self._now_ns)
             self.watch.note(node, reply)
-            if reply.number == _MODE and node == self.contradicted_by:
-                self._note_puck_mode(reply.value)
+            if reply.number == _MODE and node in self.contradicted_by:
+                self._note_puck_mode(node, reply.value)
+            elif self.mode is SafetyMode.ACTIVE:
+                change = self.commands.judge(node, reply, self._now_ns, self.heard_ns)
+                self.disobeys = change or self.disobeys
         elif reply.number == _MODE:
             mode = decode_mode(reply.value)
             is_doubted = mode is SafetyMode.IDLE and self.contradicted_by
@@ -158,11 +182,15 @@ class StatusPoller:
         self._unanswered = 0
         if mode in SHORTED:
             self.is_lowering = False
+            self.commands.forget()
+        if mode is SafetyMode.E_STOP:
+            self.contradicted_by.clear()  # they have no power
 
     def begin(self, pendant: PendantWord) -> None:
         """Take the word of a start; what makes no sense in it is left out later."""
         self.is_lowering = False
-        self.contradicted_by = 0
+        self.contradicted_by.clear()
+        self.disobeys = None
         self.excused = pendant.unclear
         self.note_pendant(pendant)
 
@@ -171,9 +199,21 @@ class StatusPoller:
         self.warnings = pendant.warnings
         self.faults = pendant.faults
 
-    def _note_puck_mode(self, value: int) -> None:
-        if value != PuckMode.TORQUE:
-            self.contradicted_by = 0
+    def contradict(self, nodes: Collection[int]) -> None:
+        """Take pucks that obey torques though the module said IDLE."""
+        self.contradicted_by = set(nodes)
+        self._contradictions = 0
+
+    def take_disobedience(self) -> MotorChange | None:
+        """Return how a puck contradicted what it was told since the last call."""
+        disobeys, self.disobeys = self.disobeys, None
+        return disobeys
+
+    def _note_puck_mode(self, node: int, value: int) -> None:
+        if value == PuckMode.TORQUE:
+            return
+        self.contradicted_by.discard(node)
+        if not self.contradicted_by:
             self.note_mode(SafetyMode.IDLE, self._now_ns)
 
     def _ask_mode(self) -> None:
@@ -191,5 +231,13 @@ class StatusPoller:
         if self.is_lowering:
             self._link.send(SAFETY_NODE, _SET_IDLE)
         if self.contradicted_by:
-            self._link.send(self.contradicted_by, _GET_MODE)
+            self._contradictions += 1
+            if self._contradictions > _STUBBORN_POLLS:
+                # It pulls for ever; without power the arm sinks in a person's hands.
+                self._link.send(SAFETY_NODE, _SET_STOP)
+        is_missed = len(self.contradicted_by) < len(MOTOR_NODES)
+        for node in self.contradicted_by:
+            if is_missed:
+                self._link.send(node, _SET_PUCK_IDLE)
+            self._link.send(node, _GET_MODE)
         self._link.send(SAFETY_NODE, _GET_MODE)

@@ -27,6 +27,7 @@ RECORDED_NAMES = {
     "motor-still",
     "bus-shared",
     "puck-changed",
+    "puck-disobeys",
     "not-asked-active",
     "arm-not-active",
     "activation-motion",

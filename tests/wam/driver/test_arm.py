@@ -12,7 +12,7 @@ from acquisition.errors import (
 )
 from fakes.pucks.options import NetworkOptions
 from tests.fakes.stepped import Rig
-from wam.bus.frames import decode_torques
+from wam.bus.frames import MOTOR_NODES, decode_torques
 from wam.driver.arm import WamArm
 from wam.driver.settings import ArmSettings
 
@@ -486,9 +486,10 @@ def test_idle_is_confirmed_before_zero_torque_is_sent():
     assert arm.idle()
     order = frames(rig)
     zeros = [i for i, (can_id, _) in enumerate(order) if can_id in (0x401, 0x402)]
-    assert order[:3] == [SAFETY_TO_IDLE, GET_MODE, (2, GET_MODE[1])]
-    assert zeros == [3, 4]
-    assert decode_torques(order[3][1]) == (0, 0, 0, 0)
+    asked = [(node, GET_MODE[1]) for node in MOTOR_NODES]
+    assert order[:9] == [SAFETY_TO_IDLE, GET_MODE, *asked]
+    assert zeros == [9, 10]
+    assert decode_torques(order[9][1]) == (0, 0, 0, 0)
     assert rig.network.safety_mode is SafetyMode.IDLE
 
 

@@ -95,8 +95,9 @@ def test_idle_is_confirmed_before_zero_torque(bench):
     bench.cycle(TAU)
     bench.rig.sent.clear()
     assert bench.arm.idle()
-    # Behind the questions to the module and to puck 2.
-    order = [(i, d) for _, i, d in bench.rig.sent if i not in (0x00A, 0x002)]
+    # Behind the questions to the module and to the pucks.
+    nodes = (0x00A, *MOTOR_NODES)
+    order = [(i, d) for _, i, d in bench.rig.sent if i not in nodes]
     assert [decode_torques(data) for _, data in order] == [(0, 0, 0, 0)] * 2
     assert bench.rig.network.safety_mode is SafetyMode.IDLE
 

@@ -66,8 +66,9 @@ def test_all_are_asked_in_turn_and_none_changes_by_itself(vers):
     bench = Bench(vers=(vers,) * 7)
     assert bench.run(TURN + 100).change is None
     asked = {(i, d) for _, i, d in bench.rig.sent if i in MOTOR_NODES and len(d) == 1}
-    # Five of these and four of health, TEMP, THERM, VBUS and ERROR, of each puck.
-    assert len(asked) == (len(WATCHED) + 4) * len(MOTOR_NODES)
+    # Five of these, four of health, TEMP, THERM, VBUS and ERROR, of each puck, and MODE
+    # and T of what it holds.
+    assert len(asked) == (len(WATCHED) + 4 + 2) * len(MOTOR_NODES)
 
 
 def test_no_cycle_has_two_questions():

@@ -1,0 +1,127 @@
+"""Pucks that do not do as they are told, and those that do."""
+
+import numpy as np
+import pytest
+
+from acquisition.devices import MotorChange, SafetyMode
+from fakes.pucks.options import NetworkOptions
+from tests.fakes.stepped import Rig
+from wam.bus.frames import MOTOR_NODES, Group, group_id
+from wam.bus.properties import PuckMode
+from wam.driver.arm import WamArm
+
+HOME_COUNTS = (0, -36833, 36832, -36728, 0, 0, 0)
+CYCLE_NS = 2_000_000
+JOINTS = np.array([1.0, 1.5, 0.8, 0.6, 0.5, 0.2, 0.3])  # N m, no motor without any
+PERIODS = 100  # 0.2 s, within which a contradiction has to be told
+GROUPS = {Group.LOWER_TORQUE: (1, 2, 3, 4), Group.WRIST_TORQUE: (5, 6, 7)}
+
+
+class Driven:
+    """An arm that is driven with torques that change in every cycle."""
+
+    def __init__(self, *, is_active=True):
+        self.rig = Rig(NetworkOptions(), HOME_COUNTS)
+        self.arm = WamArm(self.rig.link, self.rig.clock)
+        self.arm.start()
+        self.number = 0
+        self.told = None
+        self.run(20)
+        if is_active:
+            self.rig.network.pendant("activate")
+            self.run(50)
+        assert self.told is None
+
+    def run(self, cycles):
+        """Run until something is told; return after how many cycles."""
+        for cycle in range(cycles):
+            self.number += 1
+            reading = self.arm.read(self.rig.clock.t_ns)
+            if reading.is_complete:
+                share = 0.1 + 0.05 * np.sin(0.1 * self.number)
+                self.arm.send(share * JOINTS, np.zeros(7))
+            self.rig.rest(CYCLE_NS - self.rig.clock.t_ns % CYCLE_NS)
+            if reading.disobeys is not None:
+                self.told = reading.disobeys
+                return cycle
+        return cycles
+
+
+@pytest.fixture
+def driven():
+    return Driven()
+
+
+def test_pucks_that_do_as_they_are_told_are_not_accused(driven):
+    network = driven.rig.network
+    for press in ("idle", "activate", "estop"):
+        assert driven.run(700) == 700
+        network.pendant(press)
+    assert driven.run(200) == 200
+
+
+def test_an_arm_that_waits_for_its_activation_is_not_accused():
+    waiting = Driven(is_active=False)
+    assert waiting.run(500) == 500
+
+
+def test_single_torque_frames_that_are_lost_accuse_nobody(driven):
+    rng = np.random.default_rng(1)
+    groups = [group_id(group) for group in GROUPS]
+    driven.rig.network.faults.lose_from_host(
+        lambda can_id, _: can_id in groups and rng.random() < 0.02
+    )
+    assert driven.run(3000) == 3000
+
+
+def test_answers_that_are_lost_accuse_nobody(driven):
+    for node in MOTOR_NODES:
+        driven.rig.network.faults.lose_from_host(
+            lambda can_id, data, node=node: can_id == node and len(data) == 1
+        )
+    assert driven.run(1000) == 1000
+
+
+@pytest.mark.parametrize("node", MOTOR_NODES)
+def test_a_puck_that_leaves_torque_mode_is_told(driven, node):
+    driven.rig.network.lose_mode(node)
+    assert driven.run(PERIODS) < PERIODS
+    assert driven.told == MotorChange(node, "MODE", PuckMode.TORQUE, PuckMode.IDLE)
+
+
+@pytest.mark.parametrize("group", GROUPS)
+def test_torques_that_reach_nobody_are_told(driven, group):
+    lost = group_id(group)
+    driven.rig.network.faults.lose_from_host(lambda can_id, _: can_id == lost)
+    assert driven.run(PERIODS) < PERIODS
+    assert driven.told.name == "T"
+    assert driven.told.motor in GROUPS[group]
+    assert driven.told.value != driven.told.was
+
+
+@pytest.mark.parametrize("node", MOTOR_NODES)
+def test_a_puck_that_missed_idle_is_idled_by_itself_and_told(driven, node):
+    network = driven.rig.network
+    network.deafen(node)
+    assert driven.arm.idle()
+    assert network.driven() == []
+    driven.run(1)
+    assert driven.told == MotorChange(node, "MODE", PuckMode.IDLE, PuckMode.TORQUE)
+
+
+@pytest.mark.parametrize("node", MOTOR_NODES)
+def test_a_puck_that_cannot_be_idled_keeps_its_torque_and_loses_its_power(driven, node):
+    network, motors = driven.rig.network, driven.rig.motors
+    network.deafen(node)
+    network.faults.lose_from_host(
+        lambda can_id, data: can_id == node and len(data) > 1  # what sets, not asks
+    )
+    pulls = motors.units[node - 1]
+    assert not driven.arm.idle()
+    assert motors.units[node - 1] == pulls != 0
+    for _ in range(200):
+        driven.arm.listen(driven.rig.clock.t_ns)
+        driven.rig.rest(CYCLE_NS)
+    assert network.safety_mode is SafetyMode.E_STOP
+    assert network.driven() == []
+    assert driven.arm.safety_mode() is SafetyMode.E_STOP
