@@ -303,6 +303,40 @@ _NAN = "A position or torque was not a number."
 _CANNOT_COUNT = Cell(End.ENDED, "Joint torques are not numbers")
 _HEARTBEAT = f"{_MODULE}heartbeat fault."
 
+_DISOBEYS = "does not do as it is told"
+# All pucks are asked for what they hold within 0.12 s.
+_CAUGHT = replace(_IDLE, limit_ms=130)
+_SET_ANEW = replace(OK, why="the arm's activation sets the mode of every puck")
+
+
+def _disobeying(later: Cell) -> Row:
+    """Return the row of a puck that no longer does what it is told.
+
+    `later` is what comes of it where it strikes before the arm is active.
+    """
+    why = "puck-disobeys"
+    return _ending(_DISOBEYS, _CAUGHT, why, preflight=later, idle=later)
+
+
+_JUMPED = Cell(
+    End.ENDED,
+    "The position of motor 7 jumped by ",
+    arm=replace(_SILENT, seen="driven", text="UNKNOWN - support it"),
+    why="its position is another one, too",
+)
+_UNSEEN_RESTART = replace(
+    OK,
+    why="not seen of an idle arm; on the real one a puck that restarts falls asleep",
+)
+_NO_TORQUES = Cell(End.ENDED, _DISOBEYS, why="found when the arm becomes active")
+_MISSED = _ending(
+    "The pendant or the safety module put the arm to idle",
+    replace(_IDLE, limit_ms=20),
+    "pendant-idle",
+    preflight=replace(OK, why="the arm is idle already"),
+    idle=replace(OK, why="the arm is idle already"),
+)
+
 NOTHING = "nothing"  # what the others are measured by
 
 TABLE: dict[str, Row] = {
@@ -389,6 +423,18 @@ TABLE: dict[str, Row] = {
     "replies-late-2": _late(),
     "replies-late-3": _late(),
     "puck-late": _late(),
+    **{f"mode-lost-{puck}": _disobeying(_SET_ANEW) for puck in (2, 4, 7)},
+    "torques-lost": _disobeying(_NO_TORQUES),
+    "torques-lost-wrist": _disobeying(_NO_TORQUES),
+    **{f"deaf-puck-{puck}": _MISSED for puck in range(1, 8)},
+    "puck-restart": _row(
+        Cell(End.ENDED, _DISOBEYS, arm=_CAUGHT),
+        preflight=_UNSEEN_RESTART,
+        idle=_UNSEEN_RESTART,
+        recording=replace(_JUMPED, rejected=("interrupted: position-jump",)),
+        review=replace(_JUMPED, rejected=AT_REVIEW),
+        end=OK,
+    ),
     "puck-changed": _row(_ASKED_IN_TURN, preflight=_refused("IPNM of puck 3 is ")),
     "wrong-pidx": _said_by("PIDX", 3),
     "wrong-mt": _said_by("MT", 2),

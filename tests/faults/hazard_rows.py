@@ -18,6 +18,13 @@ _CREEPS = tuple(f"creep-of-motor-{motor}" for motor in _MOTORS)
 _DEAD = tuple(f"dead-motor-{motor}" for motor in _MOTORS)
 _REVERSED = tuple(f"reversed-motor-{motor}" for motor in _MOTORS)
 _SAID = ("wrong-pidx", "wrong-mt", "wrong-grp", "wrong-ipnm", "wrong-cts")
+_DISOBEYING = (
+    "torques-lost",
+    "torques-lost-wrist",
+    "puck-restart",
+    *(f"mode-lost-{motor}" for motor in (2, 4, 7)),
+    *(f"deaf-puck-{motor}" for motor in _MOTORS),
+)
 _STUCK = tuple(f"stuck-motor-{motor}" for motor in _MOTORS)
 
 Fields = tuple[str, str, str, str, tuple[str, ...], str, tuple[str, ...]]
@@ -121,9 +128,9 @@ ROWS: dict[str, dict[str, Fields]] = {
         "implausible": (
             "a blow of the motors",
             "no number, or beyond a limit; a puck to which a torque means something else",
-            "every command against limit and finiteness, also the one after a verdict; at every start the properties of each puck against a table, and one asked again every 0.1 s",
+            "every command against limit and finiteness, also the one after a verdict; at every start the properties of each puck against a table, one asked again every 0.1 s, and mode and torque of all seven within 0.12 s",
             "idle for what is no number, or for a puck that changed; damp; as sent a torque is always within its limit; at the start refused",
-            ("not-a-number", "torque-limit", "puck-changed", *_SAID),
+            ("not-a-number", "torque-limit", "puck-changed", *_SAID, *_DISOBEYING),
             "",
             (
                 _GUARD + "test_what_is_no_number_ends_in_idle",

@@ -154,6 +154,16 @@ def _stuck(motor: int) -> Strike:
     return inject
 
 
+def _deaf(motor: int) -> Strike:
+    """Return a strike in which a puck misses that the pendant idles the arm."""
+
+    def inject(scene: SimulatedScene) -> None:
+        scene.rig.network.deafen(motor)
+        scene.rig.network.pendant("idle")
+
+    return inject
+
+
 def _wire(motor: int, share: float) -> Strike:
     """Return a strike after which a motor makes this share of its torque."""
 
@@ -246,6 +256,7 @@ _BY_HAND: dict[str, Strike] = {
     "wrong-grp": _say(3, "GRPB", 2),
     "wrong-ipnm": _say(7, "IPNM", 27000),
     "wrong-cts": _say(4, "CTS", 40960),
+    **{f"deaf-puck-{motor}": _deaf(motor) for motor in MOTOR_NODES},
     **{f"dead-motor-{motor}": _wire(motor, 0.0) for motor in MOTOR_NODES},
     **{f"reversed-motor-{motor}": _wire(motor, -1.0) for motor in MOTOR_NODES},
     **{f"lie-of-motor-{motor}": _step_lie(motor) for motor in MOTOR_NODES},
