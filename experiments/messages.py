@@ -203,6 +203,7 @@ class ComputerLoad:
 # What a computer that comes too late looks like.
 _OF_TIME = {
     Fault.LOOP_LATE,
+    Fault.LOOP_LOST,
     Fault.CONSOLE_SILENT,
     Fault.RECORDER_SILENT,
     Fault.FT_STALE,

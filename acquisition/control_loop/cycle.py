@@ -304,6 +304,7 @@ class Cycle:
             is_recording=self.is_recording,
             is_commanded=status.state not in _UNPOWERED,
             is_late=tick.is_late,
+            skipped=tick.skipped,
             contact=self._contact,
             stuck_motor=self.law.stuck_motor(),
             is_moving=self.law.is_moving(),

@@ -160,6 +160,14 @@ class ForceGrowth:
 
 
 @dataclass(frozen=True, slots=True)
+class LoopGap:
+    """How long no cycle of the loop was in time, and the limit [ms]."""
+
+    ms: float
+    limit: float
+
+
+@dataclass(frozen=True, slots=True)
 class LateCycles:
     """Late cycles within a second, and how many are tolerated."""
 
@@ -172,6 +180,7 @@ FaultDetail = (
     | CircuitCauses
     | ReplySilence
     | LateReplies
+    | LoopGap
     | MotorChange
     | SafetySilence
     | PositionJump

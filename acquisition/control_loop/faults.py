@@ -21,6 +21,7 @@ from acquisition.control_loop.details import (
     JointExcess,
     LateCycles,
     LateReplies,
+    LoopGap,
     MotionExcess,
     NoDetail,
     ReplySilence,
@@ -82,6 +83,7 @@ class Fault(StrEnum):
     CONTACT_GROWTH = "contact-growth"
     CONTACT_MOVE = "contact-move"
     LOOP_LATE = "loop-late"
+    LOOP_LOST = "loop-lost"
     MOVE_REFUSED = "move-refused"
     CONSOLE_SILENT = "console-silent"
     CONSOLE_LOST = "console-lost"
@@ -150,6 +152,7 @@ FAULTS: Mapping[Fault, FaultSpec] = {
     Fault.CONTACT_GROWTH: FaultSpec(_END_TRIAL, ForceGrowth, needs_trial=True),
     Fault.CONTACT_MOVE: FaultSpec(_HOLD, ContactExcess),
     Fault.LOOP_LATE: FaultSpec(_HOLD, LateCycles),
+    Fault.LOOP_LOST: FaultSpec(_IDLE, LoopGap, ends_session=True),
     Fault.MOVE_REFUSED: FaultSpec(_HOLD),
     Fault.CONSOLE_SILENT: FaultSpec(_HOLD),
     Fault.CONSOLE_LOST: FaultSpec(_HOLD),

@@ -19,6 +19,7 @@ from acquisition.control_loop.details import (
     JointExcess,
     LateCycles,
     LateReplies,
+    LoopGap,
     ReplySilence,
     SafetySilence,
     StillMotor,
@@ -55,6 +56,7 @@ class GuardState:
     Attributes:
         armed: bit i set = the position limit of joint i+1 counts.
         late: times of the late cycles of the last second [ns].
+        late_since_ns: since when every cycle has been late [ns]; 0 = the last was not.
         may_drive: since torques are commanded idle was not confirmed once:
             from then on an idle arm is a stop, and no longer the state before
             activation.
@@ -65,6 +67,7 @@ class GuardState:
 
     armed: int = 0
     late: tuple[int, ...] = ()
+    late_since_ns: int = 0
     may_drive: bool = False
     contact: ContactState = _NO_LOAD
     rests: tuple[MotorRest, ...] = ()
@@ -92,6 +95,7 @@ class Observation(NamedTuple):
         state: what is asked of the arm.
         energy: its kinetic energy [J].
         is_starting: torques are ready for a person who activates the arm.
+        skipped: cycles that did not run before this one.
     """
 
     reading: ArmReading
@@ -111,6 +115,7 @@ class Observation(NamedTuple):
     state: ArmState = ArmState.FLOAT
     energy: float = 0.0
     is_starting: bool = False
+    skipped: int = 0
 
 
 @dataclass(slots=True)
@@ -207,12 +212,14 @@ def _remember(
     """Return the next state but for the load; the same object if nothing changed."""
     armed = _armed(limits, state.armed, seen.reading)
     late = _late_cycles(state.late, seen)
+    since_ns = (state.late_since_ns or seen.reading.host_ns) if seen.is_late else 0
     rests = _rests(state.rests, seen) if seen.is_recording else ()
     motion = None if now is None else follow(state.motion, now)
     is_same = armed == state.armed and late is state.late and rests is state.rests
+    is_same = is_same and since_ns == state.late_since_ns
     if is_same and may_drive is state.may_drive and motion is state.motion:
         return state
-    return GuardState(armed, late, may_drive, state.contact, rests, motion)
+    return GuardState(armed, late, since_ns, may_drive, state.contact, rests, motion)
 
 
 def _driven(seen: Observation) -> DrivenMotion:
@@ -433,10 +440,24 @@ def _check_load(facts: Facts) -> GuardVerdict:
 
 
 def _check_cadence(facts: Facts) -> GuardVerdict:
-    """Hold when too many cycles of a second were late, this one among them."""
-    late, most = facts.state.late, facts.limits.late_per_second
-    if len(late) > most and late[-1] == facts.seen.reading.host_ns:
-        return verdict_for(Fault.LOOP_LATE, LateCycles(len(late), most))
+    """Hold when too many cycles of a second were late, this one among them.
+
+    Where none has been in time for a while the arm is idled: it is driven by what it
+    did long ago. Where none ran at all the module's heartbeat has idled it, and if it
+    is active then somebody activated it that was not asked to.
+    """
+    state, limits, now_ns = facts.state, facts.limits, facts.seen.reading.host_ns
+    since_ns, late = state.late_since_ns, state.late
+    late_ms = (now_ns - since_ns) / NS_PER_MS if since_ns else 0.0
+    gap_ms = facts.seen.skipped * PERIOD_NS / NS_PER_MS
+    if gap_ms >= limits.idle_after_gap_ms:
+        return verdict_for(Fault.LOOP_LOST, LoopGap(gap_ms, limits.idle_after_gap_ms))
+    if late_ms >= limits.idle_after_late_ms:
+        return verdict_for(Fault.LOOP_LOST, LoopGap(late_ms, limits.idle_after_late_ms))
+    if len(late) > limits.late_per_second and late[-1] == now_ns:
+        return verdict_for(
+            Fault.LOOP_LATE, LateCycles(len(late), limits.late_per_second)
+        )
     return OK
 
 

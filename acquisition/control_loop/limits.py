@@ -58,6 +58,10 @@ class GuardLimits:
             for, and which end in idle; the first ends in hold.
         idle_after_safety_ms: age of the safety module's last answer that ends in idle
             [ms]; its questions leave every 50 ms, so the mode is unknown after 250.
+        idle_after_late_ms: how long no cycle may have been in time [ms]; then the arm
+            is idled. A stall is one late cycle, and does not count.
+        idle_after_gap_ms: how long the loop may stand still [ms]. The safety module's
+            heartbeat idles the arm after 100 ms.
         armed_inside: a joint's position limit counts after it was this far inside
             [rad]: the home position lies on two stops.
         motion: where a driven arm is taken for one that moves by itself.
@@ -84,6 +88,8 @@ class GuardLimits:
     idle_after_missing: int = 25
     idle_after_late: int = 3
     idle_after_safety_ms: float = 400.0
+    idle_after_late_ms: float = 150.0
+    idle_after_gap_ms: float = 200.0
     armed_inside: float = 0.1
     motion: MotionLimits = _MOTION
 

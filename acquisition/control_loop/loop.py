@@ -17,12 +17,14 @@ class Tick(NamedTuple):
         now_ns: when it began [ns].
         deadline_ns: when it should have begun [ns].
         is_late: it began more than 0.5 ms after its deadline, or cycles were skipped.
+        skipped: cycles that did not run before it.
     """
 
     number: int
     now_ns: int
     deadline_ns: int
     is_late: bool
+    skipped: int = 0
 
 
 @dataclass(slots=True)
@@ -82,7 +84,8 @@ class Loop:
         self.stats.worst_late_ns = max(
             self.stats.worst_late_ns, late_ns + behind * self._period_ns
         )
-        self._cycle(Tick(self._number, now, self._next_ns, is_late))
+        skipped = max(behind, 0)
+        self._cycle(Tick(self._number, now, self._next_ns, is_late, skipped))
         self.stats.cycles += 1
         self._number += 1
         self._next_ns += self._period_ns

@@ -56,6 +56,7 @@ WHY: Mapping[Fault, str] = {
     Fault.CONTACT_GROWTH: _TRUSTED,
     Fault.CONTACT_MOVE: f"{_TRUSTED}; what is in the way is not pressed on",
     Fault.LOOP_LATE: _TRUSTED,
+    Fault.LOOP_LOST: "it is driven by what it did long ago",
     Fault.MOVE_REFUSED: _TRUSTED,
     Fault.CONSOLE_SILENT: f"{_TRUSTED}; nobody watches",
     Fault.CONSOLE_LOST: f"{_TRUSTED}; idle after 1 s without a parent",
@@ -65,6 +66,7 @@ WHY: Mapping[Fault, str] = {
 _ROWS = {
     Fault.NOT_ASKED_ACTIVE: "",
     Fault.NOT_ACTIVE: "",
+    Fault.LOOP_LOST: "suspended-1-s",
     Fault.MOTOR_STUCK: "stuck-motor-2",
     Fault.MOTOR_STILL: "",
     Fault.HOLD_MOTION: "",

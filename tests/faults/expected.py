@@ -303,6 +303,7 @@ _NAN = "A position or torque was not a number."
 _CANNOT_COUNT = Cell(End.ENDED, "Joint torques are not numbers")
 _HEARTBEAT = f"{_MODULE}heartbeat fault."
 
+_EARLY_ANEW = _not_ready("The arm was not activated within 120 s.")
 _DISOBEYS = "does not do as it is told"
 # All pucks are asked for what they hold within 0.12 s.
 _CAUGHT = replace(_IDLE, limit_ms=130)
@@ -333,8 +334,8 @@ _MISSED = _ending(
     "The pendant or the safety module put the arm to idle",
     replace(_IDLE, limit_ms=20),
     "pendant-idle",
-    preflight=replace(OK, why="the arm is idle already"),
-    idle=replace(OK, why="the arm is idle already"),
+    preflight=_NO_TORQUES,
+    idle=_NO_TORQUES,
 )
 
 NOTHING = "nothing"  # what the others are measured by
@@ -423,6 +424,13 @@ TABLE: dict[str, Row] = {
     "replies-late-2": _late(),
     "replies-late-3": _late(),
     "puck-late": _late(),
+    "suspended-1-s": _ending(
+        "No cycle of the loop was in time for 998 ms",
+        replace(_IDLE, limit_ms=1000),
+        "loop-lost",
+        preflight=_EARLY_ANEW,
+        idle=_EARLY_ANEW,
+    ),
     **{f"mode-lost-{puck}": _disobeying(_SET_ANEW) for puck in (2, 4, 7)},
     "torques-lost": _disobeying(_NO_TORQUES),
     "torques-lost-wrist": _disobeying(_NO_TORQUES),

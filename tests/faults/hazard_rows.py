@@ -110,7 +110,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "the loop stands still and another program asks for positions",
             "not detected by the module where its heartbeat is longer than expected; the sensor's age stops a trial",
             "the loop goes on where it was; a trial is interrupted",
-            ("stall-150-ms, heartbeat 1 s",),
+            ("stall-150-ms, heartbeat 1 s", "suspended-1-s"),
             "",
             (_MATRIX,),
         ),

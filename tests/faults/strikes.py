@@ -208,6 +208,14 @@ def _stall_under_a_long_heartbeat(scene: SimulatedScene) -> None:
     _stall(150)(scene)
 
 
+def _suspended(scene: SimulatedScene) -> None:
+    """Take the computer away for 1 s; somebody activates the arm again meanwhile."""
+    _stall(900)(scene)
+    scene.rig.network.pendant("idle")
+    scene.rig.network.pendant("activate")
+    _stall(100)(scene)
+
+
 def _long_heartbeat_and_silence(scene: SimulatedScene) -> None:
     """Silence the arm; the module would wait for a second."""
     scene.rig.network.set_heartbeat(_LONG_BEAT_NS)
@@ -241,6 +249,7 @@ _BY_HAND: dict[str, Strike] = {
     "stall-3-ms": _stall(3),
     "stall-20-ms": _stall(20),
     "stall-150-ms": _stall(150),
+    "suspended-1-s": _suspended,
     "clock-step": _step_utc,
     "second-command": _second_command,
     "disk-full": _no_disk(errno.ENOSPC),

@@ -2,7 +2,10 @@
 
 from dataclasses import dataclass
 
+from acquisition.clock import PERIOD_NS
+
 LOCKED_JOINT = 6  # joint 7
+_LONGEST_NS = 1_000_000_000  # later than this the lock begins anew
 RAMP = 0.5  # the lock takes hold and lets go within this time [s]
 
 
@@ -40,6 +43,8 @@ class JointLock:
         self._moved_ns = 0
         self._share = 0.0  # of the lock's strength at `_since_ns`
         self._since_ns = 0
+        self._cycle_ns = 0  # the cycle in which its torque was asked for last
+        self._slow = 1.0  # periods of the loop that passed before it
 
     @property
     def is_engaged(self) -> bool:
@@ -96,14 +101,29 @@ class JointLock:
         return q7 - self.reference(now_ns) if self._is_engaged else 0.0
 
     def torque(self, q7: float, qd7_raw: float, now_ns: int) -> float:
-        """Return the torque about joint 7 [N m] without gravity, clipped."""
+        """Return the torque about joint 7 [N m] without gravity, clipped.
+
+        A torque is held until the next cycle. Over a longer one the damper would
+        reverse the light joint's motion instead of ending it, and the spring more so:
+        the damping falls with the period, the stiffness with its square.
+        """
         share = self._stiffness_share(now_ns)
         # The damper is there from the start, and fades with the spring at the end.
         damping = 1.0 if self._is_engaged else share
+        slow = self._slowness(now_ns)
         gains = self._gains
-        tau = share * gains.kp * (self.reference(now_ns) - q7)
-        tau -= damping * gains.kd * qd7_raw
+        tau = share * gains.kp / slow**2 * (self.reference(now_ns) - q7)
+        tau -= damping * gains.kd / slow * qd7_raw
         return min(max(tau, -gains.limit), gains.limit)
+
+    def _slowness(self, now_ns: int) -> float:
+        """Return the time since the last cycle in periods of the loop, at least 1."""
+        since_ns = now_ns - self._cycle_ns
+        if since_ns:  # the first torque of this cycle
+            is_known = since_ns < _LONGEST_NS
+            self._slow = max(since_ns / PERIOD_NS, 1.0) if is_known else 1.0
+            self._cycle_ns = now_ns
+        return self._slow
 
     def _stiffness_share(self, now_ns: int) -> float:
         grown = (now_ns - self._since_ns) * 1e-9 / RAMP

@@ -48,6 +48,7 @@ RECORDED_NAMES = {
     "contact-growth",
     "contact-move",
     "loop-late",
+    "loop-lost",
     "move-refused",
     "console-silent",
     "console-lost",

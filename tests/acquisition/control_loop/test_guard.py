@@ -67,6 +67,7 @@ OBSERVED = {
     "state": ArmState.FLOAT,
     "energy": 0.0,
     "is_starting": False,
+    "skipped": 0,
 }
 QUIET = Observation(**OBSERVED)
 
@@ -309,10 +310,11 @@ def test_only_joints_whose_limit_is_armed_are_judged():
 
 
 def late_cycles(times, state=ARMED):
+    """Return what late cycles at `times` come to, a punctual one before each."""
     verdict = OK
     for t_ns in times:
-        changes = {"is_late": True, "host_ns": t_ns}
-        state, verdict = check(LIMITS, state, seen(**changes))
+        state, _ = check(LIMITS, state, seen(host_ns=t_ns - 2 * MS))
+        state, verdict = check(LIMITS, state, seen(is_late=True, host_ns=t_ns))
     return state, verdict
 
 
@@ -339,6 +341,27 @@ def test_a_late_cycle_counts_for_a_second_to_the_nanosecond():
     assert late_cycles(times)[1].detail == LateCycles(11, 10)
     times[-1] += 1
     assert late_cycles(times)[1] is OK
+
+
+@pytest.mark.parametrize(("last_ms", "action"), [(149, "none"), (150, "idle")])
+def test_an_arm_is_idled_when_no_cycle_was_in_time_for_long(last_ms, action):
+    state = ARMED
+    for t_ns in (S, S + 75 * MS, S + last_ms * MS):
+        state, verdict = check(LIMITS, state, seen(is_late=True, host_ns=t_ns))
+    assert verdict.action is Action(action)
+
+
+@pytest.mark.parametrize(("skipped", "action"), [(99, "none"), (100, "idle")])
+def test_an_arm_whose_loop_stood_still_is_idled(skipped, action):
+    verdict = judge(is_late=True, skipped=skipped)
+    assert verdict.action is Action(action)
+
+
+def test_a_punctual_cycle_ends_a_run_of_late_ones():
+    state = ARMED
+    for t_ns, is_late in ((S, True), (S + 149 * MS, False), (S + 151 * MS, True)):
+        state, verdict = check(LIMITS, state, seen(is_late=is_late, host_ns=t_ns))
+    assert verdict is OK
 
 
 def test_a_punctual_cycle_does_not_repeat_the_verdict():

@@ -3,6 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from acquisition.clock import PERIOD_NS
 from wam.control.joint_lock import JointLock, LockGains
 
 S = 1_000_000_000
@@ -75,12 +76,31 @@ def test_a_released_lock_lets_go(lock):
     assert lock.offset(2.0, FULL) == 0.0
 
 
+def in_time(lock, q7, qd7, now_ns):
+    """Return the torque of a lock whose last cycle was a period before."""
+    lock.torque(q7, qd7, now_ns - PERIOD_NS)
+    return lock.torque(q7, qd7, now_ns)
+
+
 @pytest.mark.parametrize(("after", "share"), [(0.0, 1.0), (0.125, 0.75), (0.4, 0.2)])
 def test_a_released_lock_fades_within_half_a_second(lock, after, share):
-    before = lock.torque(0.41, 0.5, FULL)
+    before = in_time(lock, 0.41, 0.5, FULL)
     lock.release(FULL)
-    tau = lock.torque(0.41, 0.5, FULL + int(after * S))
+    tau = in_time(lock, 0.41, 0.5, FULL + int(after * S))
     assert tau == pytest.approx(before * share, abs=1e-9)
+
+
+@pytest.mark.parametrize("periods", [1, 2, 5, 25])
+def test_a_slow_loop_gets_a_softer_lock_of_the_same_stability(lock, periods):
+    usual = in_time(lock, 0.41, 0.0, FULL), in_time(lock, 0.4, 0.5, FULL + S)
+    now_ns = FULL + 2 * S
+    in_time(lock, 0.41, 0.0, now_ns)
+    spring = lock.torque(0.41, 0.0, now_ns + periods * PERIOD_NS)
+    damper = lock.torque(0.4, 0.5, now_ns + 2 * periods * PERIOD_NS)
+    again = lock.torque(0.4, 0.5, now_ns + 2 * periods * PERIOD_NS)
+    assert spring == pytest.approx(usual[0] / periods**2)
+    assert damper == pytest.approx(usual[1] / periods)
+    assert again == damper  # in the same cycle
 
 
 def test_a_lock_released_while_it_grows_fades_from_there(lock):
