@@ -234,8 +234,10 @@ def press(asked) -> str:
     """Press the keys of short trials; keep all that are not interrupted."""
     waits = {Prompt.READY: (0.1, " "), Prompt.RECORDING: (1.0, " ")}
     wait, key = waits.get(asked.prompt, (0.05, "k"))
-    if asked.prompt in {Prompt.SUPPORT, Prompt.PAUSED, Prompt.DAMPED, Prompt.LAY_DOWN}:
+    if asked.prompt in {Prompt.SUPPORT, Prompt.PAUSED, Prompt.DAMPED}:
         return " "
+    if asked.prompt is Prompt.LAY_DOWN:
+        return "i"
     if asked.prompt is Prompt.LIFT:
         return "q" if asked.since > 30.0 else ""
     return key if asked.since > wait else ""

@@ -60,10 +60,11 @@ def _touch_key(state: PromptState) -> str:
 _AUTOMATIC: dict[Prompt, Callable[[PromptState], str]] = {
     Prompt.SUPPORT: lambda _: " ",
     Prompt.CLEAR: lambda _: " ",
+    Prompt.MOVE: lambda _: "g",
     Prompt.LIFT: _lift_key,
     Prompt.READY: _ready_key,
     Prompt.PAUSED: lambda _: " ",
-    Prompt.LAY_DOWN: lambda state: " " if state.since > LAID_DOWN_SECONDS else "",
+    Prompt.LAY_DOWN: lambda state: "i" if state.since > LAID_DOWN_SECONDS else "",
     Prompt.DAMPED: lambda state: " " if state.since > DAMPED_SECONDS else "",
     Prompt.TOUCH: _touch_key,
     Prompt.REVIEW: _review_key,

@@ -93,12 +93,15 @@ KEYS: Mapping[Prompt, tuple[OperatorKey, ...]] = {
         _QUIT,
     ),
     Prompt.CLEAR: (_CONFIRM, _QUIT),
+    # Before a motion of the arm, and before it sinks, no key that was pressed before:
+    # a pedal that sticks, or a key that is held, answers neither.
+    Prompt.MOVE: (OperatorKey("g", KeyAction.CONFIRM, "once it is clear: go"), _QUIT),
     Prompt.MOVING: (_QUIT,),
     Prompt.TOUCH: (_CONFIRM, OperatorKey("d", KeyAction.FINISH), _QUIT),
     Prompt.LIFT: (replace(_UNDO, word="undo"), _QUIT),
     Prompt.UNDO: (_CONFIRM, _UNDO, _QUIT),
     Prompt.LAY_DOWN: (
-        OperatorKey(" ", KeyAction.CONFIRM, "once it is supported: it goes idle"),
+        OperatorKey("i", KeyAction.CONFIRM, "once it is supported: it goes idle"),
     ),
     Prompt.READY: (
         OperatorKey(" ", KeyAction.RECORD, "record", "[space] record"),
@@ -160,6 +163,7 @@ STOP_KEYS = "Ctrl-C finish safely, twice = stop now"
 _EXPLAINED = {
     Prompt.SUPPORT: "the arm is to be activated",
     Prompt.DAMPED: "the arm was too fast, and is damped",
+    Prompt.MOVE: "the arm is to move by itself",
     Prompt.LAY_DOWN: "the arm is to go idle",
     Prompt.READY: "between two trials",
     Prompt.RECORDING: "while recording",

@@ -13,6 +13,7 @@ class Prompt(Enum):
     CHOICE = "choice"
     SUPPORT = "support"
     CLEAR = "clear"
+    MOVE = "move"
     MOVING = "moving"
     TOUCH = "touch"
     LIFT = "lift"

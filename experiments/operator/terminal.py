@@ -8,6 +8,7 @@ import pwd
 import select
 import termios
 import tty
+from collections.abc import Callable
 from types import TracebackType
 from typing import Self
 
@@ -20,6 +21,7 @@ from experiments.operator.keys import (
 )
 from experiments.operator.prompts import OperatorInput, Prompt, PromptState
 
+_RELEASED_NS = 750_000_000  # without a key that would repeat if it were held
 _POLL_NS = 50_000_000  # between two looks at the keyboard while no loop runs
 _AT_ONCE = 256  # bytes
 LONGEST_LINE = 500  # characters of a note
@@ -93,6 +95,27 @@ def wait_for_key(operator: OperatorInput, prompt: Prompt) -> KeyAction:
         return action
 
 
+class HeldKeys:
+    """Tells a key that is pressed from one that repeats: held, or a pedal that sticks.
+
+    A terminal does not tell when a key is released. One that is held comes again after
+    at most 0.7 s and then at least ten times a second. So the same key counts once it
+    has been silent for longer; another key counts at once.
+    """
+
+    def __init__(self, now_ns: Callable[[], int]) -> None:
+        self._now_ns = now_ns
+        self._last = ""
+        self._last_ns = 0
+
+    def is_pressed(self, key: str) -> bool:
+        """Return whether a key that has just come is pressed anew."""
+        now_ns = self._now_ns()
+        is_anew = key != self._last or now_ns - self._last_ns >= _RELEASED_NS
+        self._last, self._last_ns = key, now_ns
+        return is_anew
+
+
 class TerminalInput:
     """Keys as they are pressed, from a keyboard or anything that looks like one.
 
@@ -104,10 +127,13 @@ class TerminalInput:
         draft: what has been typed of a line so far.
     """
 
-    def __init__(self, descriptor: int) -> None:
+    def __init__(
+        self, descriptor: int, now_ns: Callable[[], int] | None = None
+    ) -> None:
         self.descriptor = descriptor
         self.draft = ""
-        self._waiting = ""
+        self._waiting: list[tuple[str, bool]] = []  # (key, it was pressed anew)
+        self._held = HeldKeys(now_ns or SystemClock().now_ns)
         self._decoder = codecs.getincrementaldecoder("utf-8")("ignore")
         self._is_end = False
         self._is_rejecting = False
@@ -121,12 +147,14 @@ class TerminalInput:
     def answer(self, state: PromptState) -> str:
         """Return the next key that was pressed, "" for none, q when all have gone.
 
-        What was typed before the prompt came was not meant for it and is forgotten.
+        What was typed before the prompt came was not meant for it and is forgotten. A
+        key that only repeats, because it is held, answers nothing.
         """
         self._receive(state.prompt)
         while self._waiting:
-            pressed = self._take(self._next().lower(), state.prompt)
-            if pressed:
+            is_anew = self._waiting[0][1]
+            key = self._next().lower()
+            if is_anew and (pressed := self._take(key, state.prompt)):
                 return pressed
         return "q" if self._is_end else ""
 
@@ -156,16 +184,16 @@ class TerminalInput:
         self._read()
         if prompt is not self._prompt:
             self._prompt = prompt
-            self._waiting, self._is_rejecting = "", False
+            self._waiting.clear()
+            self._is_rejecting = False
             self.draft = ""
 
     def _next(self) -> str:
-        key, self._waiting = self._waiting[0], self._waiting[1:]
-        return key
+        return self._waiting.pop(0)[0]
 
     def _skip_sequence(self) -> bool:
         """Pass over the rest of an arrow or function key; return whether it was one."""
-        if self._waiting[:1] not in ("[", "O"):
+        if not self._waiting or self._waiting[0][0] not in ("[", "O"):
             return False
         self._next()
         while self._waiting and not (key := self._next()).isalpha() and key != "~":
@@ -179,7 +207,8 @@ class TerminalInput:
             except OSError:
                 data = b""
             self._is_end = not data
-            self._waiting += self._decoder.decode(data)
+            for key in self._decoder.decode(data):
+                self._waiting.append((key, self._held.is_pressed(key)))
 
     def _take(self, key: str, prompt: Prompt) -> str:
         if key in "\r\n":

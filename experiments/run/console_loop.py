@@ -52,8 +52,8 @@ _REST_TICKS = 50  # of the wall to one of a world at rest
 _SLOW = 0.95  # of real time; below it the screen says so
 _ON_STAND = 0.1  # rad
 _STANDS = 0.3  # s, in which an arm that holds has come to rest
-_SUPPORT = "Support the arm: it goes idle and sinks slowly. [space]"
-_LAY_DOWN = "Lay the foot onto its stand: the arm goes idle and sinks slowly. [space]"
+_SUPPORT = "Support the arm: it goes idle and sinks slowly. [i]dle"
+_LAY_DOWN = "Lay the foot onto its stand: the arm goes idle and sinks slowly. [i]dle"
 _NOBODY = f"No answer for {LAY_DOWN_SECONDS:.0f} s: the arm goes idle. Support it."
 _TOO_LATE = "No verdict to take back. Any trial, any time: traction verdict --help"
 _T = TypeVar("_T")
@@ -357,7 +357,8 @@ class ConsoleLoop:
         requests = self.stop.count
         for _ in range(round(LAY_DOWN_SECONDS / TICK)):
             state = self._advance(prompt, None)
-            if self.operator.answer(state) == " " and is_done():
+            key = self.operator.answer(state)
+            if key_action(prompt, key) is KeyAction.CONFIRM and is_done():
                 return True
             if self.stop.count > requests or self.console.is_lost:
                 return False
@@ -375,7 +376,7 @@ class ConsoleLoop:
             return True
         self.console.say(
             f"Joint {joint + 1} is {apart[joint]:.2f} rad from where the foot lies on "
-            "its stand (arm.rest). Lay it there, then [space]; Ctrl-C: idle all the "
+            "its stand (arm.rest). Lay it there, then [i]dle; Ctrl-C: idle all the "
             "same."
         )
         return False

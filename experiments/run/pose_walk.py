@@ -8,6 +8,7 @@ from acquisition.control_loop.faults import Action
 from acquisition.errors import IDLE_ARM, PreflightError, TractionError
 from acquisition.ipc.shared_sensor import unpack_wrenches
 from experiments.messages import FaultContext, fault_text, rest_text
+from experiments.operator.keys import KeyAction, key_action
 from experiments.operator.prompts import Prompt
 from experiments.run.console_loop import TICK, ConsoleLoop
 from experiments.run.stop import ArmFaultError, StopRequestedError
@@ -119,8 +120,8 @@ class PoseWalk:
         self.ask(
             f"The arm will move by itself through {number} poses, about "
             f"{(way_seconds(start, halts) + stops) / 60:.1f} min. Let go of it and "
-            "clear the space. [space] when clear.",
-            Prompt.CLEAR,
+            "clear the space. [g]o when it is clear.",
+            Prompt.MOVE,
         )
         self._weigh_foot()
         return halts
@@ -213,9 +214,11 @@ class PoseWalk:
         )
 
     def ask(self, text: str, prompt: Prompt) -> None:
-        """Say `text` and wait for [space]."""
+        """Say `text` and wait for the key that confirms it."""
         self._console.say(text)
-        while self.console_loop.tick(prompt) != " ":
+        while (
+            key_action(prompt, self.console_loop.tick(prompt)) is not KeyAction.CONFIRM
+        ):
             pass
 
     def wait(self, seconds: float) -> None:

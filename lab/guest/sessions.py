@@ -14,7 +14,7 @@ _START = 60.0  # s of guest time until the arm is to be activated
 _STEP = 30.0  # s until the program goes on by itself
 _REVIEW = 90.0  # s until a trial is reviewed: what that needs is read from the host
 _REACTION = 0.1  # s from a prompt to the key
-_SUPPORT = "Support the arm: it goes idle"
+_SUPPORT, _IDLE = "Support the arm: it goes idle", "i"
 _REST = 0.7  # s in which the foot comes to rest on the ground
 _PUSH = 1.0  # s of a trial, ended by key: every second costs the host many
 TERRAIN = "TF"
@@ -106,7 +106,7 @@ class LedSession:
         self.program.expect("[space] to end the session", _STEP)
         self._press(" ")
         self.program.expect(_SUPPORT, _STEP)
-        self._press(" ")
+        self._press(_IDLE)
         return self.program.wait(_STEP)
 
     def cut_off(self) -> int:
@@ -118,7 +118,7 @@ class LedSession:
         while self.program.is_running and seconds() < end:
             self.program.run_on(_REACTION)
             if _SUPPORT in self.program.output:
-                self._press(" ")
+                self._press(_IDLE)
                 break
         return self.program.wait(_STEP)
 

@@ -214,8 +214,10 @@ def _press(asked) -> str:
     waits = {Prompt.READY: (0.3, " "), Prompt.RECORDING: (0.5, " ")}
     waits[Prompt.UNDO] = (0.3, " ")
     wait, key = waits.get(asked.prompt, (0.3, "k"))
-    if asked.prompt in {Prompt.SUPPORT, Prompt.PAUSED, Prompt.DAMPED, Prompt.LAY_DOWN}:
+    if asked.prompt in {Prompt.SUPPORT, Prompt.PAUSED, Prompt.DAMPED}:
         return " "
+    if asked.prompt is Prompt.LAY_DOWN:
+        return "i"
     if asked.prompt is Prompt.LIFT:
         return "q" if asked.since > 15.0 else ""
     return key if asked.since > wait else ""

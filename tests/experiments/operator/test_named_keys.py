@@ -32,7 +32,7 @@ SHOWN_AT = {
     "proving/weights.py": {Prompt.CLEAR},
     "run/context.py": {Prompt.LIFT, Prompt.READY, Prompt.UNDO},
     "run/console_loop.py": {Prompt.DAMPED, Prompt.LAY_DOWN},
-    "run/pose_walk.py": {Prompt.CLEAR, Prompt.MOVING},
+    "run/pose_walk.py": {Prompt.MOVE, Prompt.MOVING},
     "run/ready.py": {Prompt.READY, Prompt.PAUSED, Prompt.SUPPORT},
     "run/resume.py": {Prompt.CHOICE},
     "run/verdicts.py": {Prompt.REVIEW, Prompt.UNDO},

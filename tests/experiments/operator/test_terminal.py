@@ -7,6 +7,7 @@ import termios
 import pytest
 
 from experiments.operator.auto_operator import AutoOperator
+from experiments.operator.keys import KEYS, KeyAction
 from experiments.operator.prompts import Prompt, PromptState
 from experiments.operator.terminal import LONGEST_LINE, Cbreak, TerminalInput, keyboard
 
@@ -75,6 +76,61 @@ def test_a_terminal_that_has_gone_is_left_alone():
         os.fstat(program)
 
 
+MS = 1_000_000
+
+
+class Pressed:
+    """Keys that arrive at given times [ms], as a terminal sends them."""
+
+    def __init__(self, terminal):
+        self.person, program = terminal
+        self.now_ms = 0
+        self.keys = TerminalInput(program, lambda: self.now_ms * MS)
+
+    def come(self, key, now_ms, prompt):
+        """Let `key` come; return what is answered at `prompt`."""
+        self.now_ms = now_ms
+        self.keys.answer(asked(prompt))  # which is on the screen before
+        os.write(self.person, key)
+        return self.keys.answer(asked(prompt))
+
+
+@pytest.mark.parametrize("first_ms", [250, 500, 700])
+@pytest.mark.parametrize("every_ms", [33, 100])
+def test_a_key_that_is_held_answers_one_prompt(terminal, first_ms, every_ms):
+    pressed = Pressed(terminal)
+    with Cbreak(pressed.keys.descriptor):
+        assert pressed.come(b" ", 0, Prompt.SUPPORT) == " "
+        times = range(first_ms, 5000, every_ms)
+        prompts = (Prompt.READY, Prompt.RECORDING, Prompt.REVIEW, Prompt.SUPPORT)
+        for number, now_ms in enumerate(times):
+            assert pressed.come(b" ", now_ms, prompts[number % 4]) == ""
+        # Released, and pressed again.
+        assert pressed.come(b" ", times[-1] + 750, Prompt.READY) == " "
+
+
+def test_another_key_counts_at_once(terminal):
+    pressed = Pressed(terminal)
+    with Cbreak(pressed.keys.descriptor):
+        for now_ms, key in ((0, b" "), (10, b"k"), (20, b" ")):
+            assert pressed.come(key, now_ms, Prompt.REVIEW) == key.decode()
+
+
+def test_letters_of_a_note_may_come_twice(terminal):
+    pressed = Pressed(terminal)
+    with Cbreak(pressed.keys.descriptor):
+        pressed.keys.line(asked(Prompt.NOTE))
+        os.write(pressed.person, b"too wet\n")
+        assert pressed.keys.line(asked(Prompt.NOTE)) == "too wet"
+
+
+@pytest.mark.parametrize("prompt", [Prompt.MOVE, Prompt.LAY_DOWN])
+def test_motion_of_the_arm_takes_a_key_that_no_prompt_before_it_takes(prompt):
+    (key,) = [e.key for e in KEYS[prompt] if e.action is KeyAction.CONFIRM]
+    others = set(KEYS) - {prompt}
+    assert all(key != entry.key for other in others for entry in KEYS[other])
+
+
 @pytest.mark.parametrize(
     ("typed", "answers"),
     [
@@ -83,7 +139,9 @@ def test_a_terminal_that_has_gone_is_left_alone():
         (b"K", ["k"]),
         (b"r2", ["r2"]),
         (b"r9k", ["k"]),
-        (b"rr1", ["1"]),
+        (b"rr1", ["r1"]),  # the second only repeats the first
+        (b"rkr1", ["r1"]),
+        (b"   ", [" "]),
         (b"\x1b[A", ["[", "a"]),
         (b"kq", ["k", "q"]),
         ("é".encode()[:1], []),

@@ -403,7 +403,7 @@ class Bystander(Keys):
 
     def answer(self, state):
         self.states.append(state)
-        return " " if state.prompt in {Prompt.CLEAR, Prompt.SUPPORT} else ""
+        return {Prompt.MOVE: "g", Prompt.SUPPORT: " "}.get(state.prompt, "")
 
 
 def wrist(tmp_path, carried, seen, residual=1.0):
