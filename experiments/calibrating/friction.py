@@ -43,7 +43,7 @@ class FrictionGuide:
     """Leads the arm to and fro and identifies the friction of its motors."""
 
     def __init__(self, console_loop: ConsoleLoop) -> None:
-        self._walk = PoseWalk(console_loop)
+        self._walk = PoseWalk(console_loop, is_free=True)
         self._rig = console_loop.rig
         self._console = console_loop.console
 

@@ -45,7 +45,7 @@ class GravityGuide:
     """Leads the arm through the poses of a gravity calibration."""
 
     def __init__(self, console_loop: ConsoleLoop) -> None:
-        self._walk = PoseWalk(console_loop)
+        self._walk = PoseWalk(console_loop, is_free=True)
         self._rig = console_loop.rig
         self._console = console_loop.console
 

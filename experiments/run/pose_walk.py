@@ -77,6 +77,9 @@ STILL = 0.02  # rad/s, largest joint speed while something is averaged
 # rad, how far a joint may be from its place in a move; gravity that is off by a quarter
 # and the friction of another arm make 12 mrad.
 ASTRAY = np.array([0.04, 0.04, 0.04, 0.04, 0.04, 0.04, 0.1])
+# N on the foot beyond its weight, while nothing may touch it. A foot of 1 kg that the
+# sensor sees turned by 5 degrees makes 1.7.
+TOUCH = 3.0
 ATTEMPTS = 4  # at an arm that does not come to rest
 
 HaltPlan = Callable[[Array, FreeSpace], Sequence[MeasurementPose]]
@@ -89,11 +92,20 @@ class PoseWalk:
     is clear.
     """
 
-    def __init__(self, console_loop: ConsoleLoop) -> None:
+    def __init__(self, console_loop: ConsoleLoop, *, is_free: bool = False) -> None:
+        """Go nowhere yet.
+
+        Args:
+            console_loop: of the rig.
+            is_free: what is measured is wrong if something touches the foot; the wrist
+                sensor, which is known already, tells.
+        """
         self.console_loop = console_loop
         self._rig = console_loop.rig
         self._console = console_loop.console
         self._here = np.zeros(7)
+        self._is_free = is_free
+        self._is_weighed = False
 
     def begin(
         self, plan: HaltPlan, seconds_per_pose: float
@@ -146,6 +158,7 @@ class PoseWalk:
         rotation = self._rig.model.sole_pose(position)[1]
         tared = self._rig.payload.tared(np.array(readings).mean(axis=0), rotation)
         loop_client.set_bias(tared.bias.tolist())
+        self._is_weighed = True
 
     def go_to(self, halt: MeasurementPose) -> None:
         """Move to a halt and wait until the arm has settled.
@@ -165,6 +178,28 @@ class PoseWalk:
         except ArmFaultError as fault:
             raise MoveStoppedError(fault.verdict) from fault
         self._here = halt.q
+        self._require_free(WEIGHED)
+
+    def _require_free(self, seconds: float) -> None:
+        """Refuse to go on while something pushes the foot; the arm is idled then.
+
+        Raises:
+            PreflightError: the wrist sensor shows more than the foot's weight.
+        """
+        if not (self._is_free and self._is_weighed):
+            return
+        records = self._rig.backend.loop_client.last(seconds)
+        force = float(np.linalg.norm(records["wrench"][:, :3].mean(axis=0)))
+        if force <= TOUCH:
+            return
+        self.console_loop.make_safe()
+        raise PreflightError(
+            f"Something pushed the foot with {force:.1f} N during the measurement "
+            f"(limit {TOUCH:g}).",
+            hint="Nobody may touch the arm. If nobody did: is the foot's mass in "
+            "rig.toml right, and the sensor calibrated? Then start again.",
+            arm_state=IDLE_ARM,
+        )
 
     def _check_on_the_way(self, move: JointMove, sent_ns: int) -> None:
         """Idle an arm that something holds up, or whose encoder stands still.
@@ -197,7 +232,7 @@ class PoseWalk:
         """Return mean (positions [rad], torques [N m]) of `seconds` at rest, (7,) each.
 
         Raises:
-            PreflightError: the arm does not come to rest.
+            PreflightError: the arm does not come to rest, or something pushes the foot.
         """
         speed = np.zeros(7)
         for _ in range(ATTEMPTS):
@@ -206,6 +241,7 @@ class PoseWalk:
             q = records["position"]
             speed = np.abs(q[-1] - q[0]) / seconds
             if speed.max() <= STILL:
+                self._require_free(seconds)
                 return q.mean(axis=0), records["torque_command"].mean(axis=0)
         raise PreflightError(
             f"Joint {speed.argmax() + 1} moved at {speed.max():.3f} rad/s during the "

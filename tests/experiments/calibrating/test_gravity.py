@@ -285,3 +285,20 @@ def test_how_well_the_zero_is_known_is_told(calibrated):
     (line,) = [row for row in rows if "zero errors estimated" in row]
     assert "joint 2" in line
     assert "1, 6 and 7 are not observable" in line
+
+
+def test_a_hand_on_the_foot_refuses_the_calibration(tmp_path):
+    """Somebody leans on the foot from the second pose on; the torques look perfect."""
+    lean = (0.0, 3.0, -4.0)  # N
+
+    def press(asked, rig):
+        moving = asked.prompt is Prompt.MOVING and asked.since > 2.0
+        rig.plant.finger = lean if moving else (0.0, 0.0, 0.0)
+
+    out = tmp_path / "gravity.toml"
+    done, rig = calibrate(out, "--poses", 3, press=press)
+    assert done.code == 3, done.out
+    assert "Something pushed the foot with 4.9 N" in done.err
+    assert "Nothing was written." in done.err
+    assert not out.exists()
+    assert rig.plant.is_idle
