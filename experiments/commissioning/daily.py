@@ -14,6 +14,7 @@ from acquisition.files import open_directory, read_regular, replace_file
 from acquisition.formats import FORMAT
 from acquisition.validation import Many, first_problem
 from experiments.commissioning.record import Measured, Raw, RecordPart, Word
+from experiments.dates import is_fresh
 
 NAME = "daily.json"
 FIELD = "daily_check"  # of the metadata of a recording
@@ -67,8 +68,8 @@ class DailyHistory(RecordPart):
         return self.model_copy(update={"checks": (*self.checks, check)[-_KEPT:]})
 
     def counts_at(self, now: datetime) -> bool:
-        """Return whether the last check was done at most a day ago."""
-        return bool(self.checks) and now - self.checks[-1].ended <= COUNTS_FOR
+        """Return whether the last check has come and was done at most a day ago."""
+        return bool(self.checks) and is_fresh(self.checks[-1].ended, now, COUNTS_FOR)
 
 
 def read_history(folder: Path, *, is_simulated: bool) -> DailyHistory:

@@ -13,6 +13,7 @@ from experiments.commissioning.steps import (
     ORDER,
     ProofStep,
 )
+from experiments.dates import is_ahead
 
 FIELD = "commissioning"  # of the metadata of a recording
 COMPLETE = "complete"  # what it says of an arm that lacks nothing
@@ -90,8 +91,8 @@ def _cause(
             return f"stale: {BASES[name].words} changed{told}"
     if now - done.ended > timedelta(days=LONGEST_DAYS):
         return f"stale: done more than {LONGEST_DAYS} days ago"
-    if done.ended > now + timedelta(days=1):
-        return f"done on {done.ended:%Y-%m-%d}, which has not come yet"
+    if is_ahead(done.ended, now):
+        return f"done on {done.ended:%Y-%m-%d %H:%M} UTC, which has not come yet"
     return ""
 
 

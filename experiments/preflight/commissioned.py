@@ -14,6 +14,8 @@ from experiments.commissioning.gate import (
 from experiments.commissioning.inputs import present_inputs
 from experiments.commissioning.record import Commissioning, read_commissioning
 from experiments.commissioning.steps import GATED, ProofStep
+from experiments.dates import is_ahead, is_fresh
+from experiments.messages import preflight_error
 from experiments.operator.console import BAD, GOOD, WARNING
 from experiments.preflight.page import Add
 from experiments.rig.rig import Rig
@@ -72,7 +74,7 @@ def _check_daily(
     Where there was none today, that is said. The day of the commissioning needs none.
 
     Raises:
-        PreflightError: the last daily check failed.
+        PreflightError: the last daily check failed, or its date has not come yet.
     """
     try:
         history = daily.read_history(rig.settings.folder, is_simulated=False)
@@ -92,10 +94,14 @@ def _check_daily(
                 hint="Look at what it names, then traction commission --daily.",
                 arm_state=IDLE_ARM,
             )
+        if is_ahead(last.ended, now):
+            refusal = preflight_error("daily-ahead", ended=last.ended, now=now)
+            add(BAD, "daily check", refusal.message)
+            raise refusal
         if history.counts_at(now):
             add(GOOD, "daily check", last.words)
             return last.words
-    elif proved is not None and now - proved <= daily.COUNTS_FOR:
+    elif proved is not None and is_fresh(proved, now, daily.COUNTS_FOR):
         add(GOOD, "daily check", "commissioned today")
         return "commissioned today"
     text = "none today" if last is None else f"none today, the last one {last.words}"

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from acquisition.sample import Record
+from experiments.dates import is_ahead
 from experiments.messages import preflight_error
 from experiments.operator.console import BAD, GOOD, WARNING
 from experiments.preflight.page import Add, CheckResult
@@ -96,32 +97,44 @@ def check_ages(rig: Rig) -> CheckResult | None:
     for name, kind, text in used:
         if not text:
             continue
-        days, most = age_days(text, now), CALIBRATION_DAYS[kind]
-        is_old = days is None or days > most
-        is_due = is_due or is_old
-        age = "of unknown age" if days is None else f"{days} d"
-        again = f" (due after {most}: traction calibrate {kind})" if is_old else ""
+        age, cause = _age(measured_at(text), now, CALIBRATION_DAYS[kind])
+        is_due = is_due or bool(cause)
+        again = f" ({cause} traction calibrate {kind})" if cause else ""
         words.append(f"{name} {age}{again}")
     if not words:
         return None
     return CheckResult(WARNING if is_due else GOOD, "calibrated", ", ".join(words))
 
 
-def age_days(text: str, now: datetime) -> int | None:
-    """Return how many days ago a calibration was made; None where it does not say.
+def measured_at(text: str) -> datetime | None:
+    """Return when a calibration was made, with its zone; None where it does not say.
 
     Args:
         text: of its file, TOML.
-        now: with its zone.
     """
     try:
         stated = tomllib.loads(text).get("measured_utc")
         made = datetime.fromisoformat(stated) if isinstance(stated, str) else None
     except ValueError:
         return None
-    if made is None or made.tzinfo is None:
-        return None
-    return max((now - made).days, 0)
+    return made if made is not None and made.tzinfo is not None else None
+
+
+def _age(made: datetime | None, now: datetime, most: int) -> tuple[str, str]:
+    """Return the age of a calibration in words, and why it is due; "" = it is not.
+
+    Args:
+        made: when it was; None = it does not say.
+        now: with its zone.
+        most: days for which it counts.
+    """
+    due = f"due after {most}:"
+    if made is None:
+        return "of unknown age", due
+    if is_ahead(made, now):
+        return f"dated {made:%Y-%m-%d %H:%M %Z}", "not yet come; set the clock, then"
+    days = max((now - made).days, 0)
+    return f"{days} d", due if days > most else ""
 
 
 def check_wrenches(samples: Record, now_ns: int, stale_ms: float) -> CheckResult:

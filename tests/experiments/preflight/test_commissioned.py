@@ -191,6 +191,33 @@ def test_an_arm_whose_check_failed_is_refused_until_one_passes(config):
     assert said_of_today(config)[0] == GOOD
 
 
+@pytest.mark.parametrize("hours", [-0.2, -24, -90000])
+def test_a_check_whose_date_has_not_come_is_refused_until_another_is_done(
+    config, hours
+):
+    """It would count until its date has come, for years after a wrong clock."""
+    as_of(config, 30)
+    checked(config, hours)
+    refusal = Arm(config).refusal()
+    assert "which has not come yet: this computer's clock says 20" in refusal.message
+    assert "timedatectl" in refusal.hint
+    assert "traction commission --daily" in refusal.hint
+    checked(config, 0)
+    assert said_of_today(config)[0] == GOOD
+
+
+def test_a_clock_that_was_set_back_by_minutes_costs_no_check(config):
+    as_of(config, 30)
+    checked(config, -0.05)
+    assert said_of_today(config)[0] == GOOD
+
+
+@pytest.mark.parametrize("hours", [-0.2, -23, -24 * 400])
+def test_a_commissioning_whose_date_has_not_come_is_refused(config, hours):
+    as_of(config, hours)
+    assert "which has not come yet" in Arm(config).refusal().message
+
+
 def test_what_failed_before_the_arm_was_commissioned_again_does_not_count(config):
     as_of(config, 2)
     checked(config, 3, "lift-off of joint 2.")

@@ -1,5 +1,5 @@
 import re
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -10,13 +10,13 @@ from acquisition.ipc.shared_sensor import WRENCH_DTYPE
 from experiments.operator.console import BAD, GOOD, WARNING
 from experiments.preflight.host_checks import (
     CALIBRATION_DAYS,
-    age_days,
     check_ages,
     check_code,
     check_governor,
     check_origin,
     check_stream,
     check_wrenches,
+    measured_at,
     reach_words,
 )
 from experiments.settings.load import SHIPPED
@@ -194,11 +194,28 @@ def test_calibrations_in_use_are_graded_by_their_age():
     ["rms = 1", "measured_utc = 5", made("2027-99-01"), "= broken", 'a = "'],
 )
 def test_a_calibration_that_states_no_day_is_due(text):
-    assert age_days(text, NOW) is None
+    assert measured_at(text) is None
     found = check_ages(rig_with(friction=text))
     assert found.mark == WARNING
     assert f"of unknown age (due after {CALIBRATION_DAYS['friction']}" in found.text
 
 
-def test_a_calibration_of_tomorrow_is_of_today():
-    assert age_days(made("2027-05-02"), NOW) == 0
+def dated(moment):
+    return f'measured_utc = "{moment.isoformat()}"\n'
+
+
+@pytest.mark.parametrize("minutes", [-1, 0, 4])
+def test_a_calibration_just_ahead_of_the_clock_is_of_today(minutes):
+    made_now = dated(NOW + timedelta(minutes=minutes))
+    found = check_ages(rig_with(friction=made_now))
+    assert (found.mark, found.text) == (GOOD, "friction.toml 0 d")
+
+
+@pytest.mark.parametrize("ahead", [timedelta(minutes=6), timedelta(days=4000)])
+@pytest.mark.parametrize("kind", ["gravity", "friction"])
+def test_a_calibration_whose_date_has_not_come_is_due(kind, ahead):
+    found = check_ages(rig_with(**{kind: dated(NOW + ahead)}))
+    assert found.mark == WARNING
+    day = f"{NOW + ahead:%Y-%m-%d %H:%M} UTC"
+    assert f"{kind}.toml dated {day} (not yet come; set the clock, then" in found.text
+    assert f"traction calibrate {kind})" in found.text

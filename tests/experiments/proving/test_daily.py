@@ -175,3 +175,6 @@ def test_a_history_is_read_as_it_was_written_and_counts_for_a_day(tmp_path):
     assert not read_history(tmp_path, is_simulated=True).checks
     assert history.counts_at(NOON + timedelta(days=1, hours=16))
     assert not history.counts_at(NOON + timedelta(days=1, hours=17))
+    assert history.counts_at(NOON + timedelta(days=1, minutes=-4))
+    assert not history.counts_at(NOON + timedelta(days=1, minutes=-6))
+    assert not DailyHistory().counts_at(NOON)
