@@ -6,7 +6,7 @@ A foot that slips, jams and slips again moves by the very force that is measured
 
 holds at the offset at which it explains most. M and B are those of the arm and the hand
 that pushes it, so neither has to be known. A smooth plate excites nothing, and nothing
-is said.
+is said; nor of a motion so regular that several offsets explain it alike.
 """
 
 from dataclasses import dataclass
@@ -20,9 +20,13 @@ from analysis.data.series import Array
 # damper and little else; a coarse velocity has noise there. In the lower one the
 # ground's force varies too: half of it was explained 4 ms beside the truth.
 BANDS = ((10.0, 80.0, 0.5), (3.0, 40.0, 0.65))
-LONGEST = 0.05  # s
+EARLIEST = 0.05  # s of a force before its motion, as far as is looked
+LATEST = 1.05  # s of a force after it; a second of lag is inside
 _SLOWEST_RATE = 200.0  # Hz
 _SHORTEST = 1.0  # s of a trial
+_COMPARED = 0.9  # s of motion at least, in a trial too short for all offsets
+_APART = 0.1  # s: an offset further off is another one
+_CLEAR = 0.75  # share of the best that no other offset may explain
 _FEWEST_ROWS = 0.5  # share of its rows that a trial may have lost
 _ORDER = 2  # of the band's filter
 _SINGULAR = 1e12  # condition number: a foot that never moves
@@ -76,15 +80,14 @@ def _in_band(
     filtered = butter(_ORDER, cuts, "band", fs=rate, output="sos")
     motion = sosfiltfilt(filtered, np.stack([np.gradient(v, t), v]))
     force = -np.asarray(sosfiltfilt(filtered, F))
-    longest = int(LONGEST * rate)
+    early, late = _reach(force.size, rate)
     # The same rows of motion at every offset, or its ends would decide.
-    inner = slice(longest, force.size - longest)
-    basis = np.asarray(motion)[:, inner]
+    basis = np.asarray(motion)[:, early : force.size - late]
     gram = basis @ basis.T
     if not (np.isfinite(gram).all() and np.linalg.cond(gram) < _SINGULAR):
         return ForceLag(0.0, 0.0)
     inverse = np.linalg.inv(gram)
-    shares = np.empty(2 * longest + 1)
+    shares = np.empty(early + late + 1)
     for k in range(shares.size):
         shifted = force[k : k + basis.shape[1]]
         products = basis @ shifted
@@ -92,8 +95,26 @@ def _in_band(
         explained = float(products @ inverse @ products)
         shares[k] = explained / variance if 0.0 < variance < np.inf else 0.0
     best = int(shares.argmax())
-    if not 0 < best < shares.size - 1:  # further off than was looked
-        return ForceLag((best - longest) / rate, 0.0)
+    if not _is_clear(shares, best, round(_APART * rate)):
+        return ForceLag((best - early) / rate, 0.0)
     before, top, after = shares[best - 1 : best + 2]
     vertex = 0.5 * (before - after) / (before - 2.0 * top + after)
-    return ForceLag((best - longest + float(vertex)) / rate, float(top))
+    return ForceLag((best - early + float(vertex)) / rate, float(top))
+
+
+def _reach(rows: int, rate: float) -> tuple[int, int]:
+    """Return by how many rows the force may be early and late.
+
+    A short trial is searched less far, so that enough of its motion is compared.
+    """
+    early = int(EARLIEST * rate)
+    left = rows - early - int(_COMPARED * rate)
+    return early, max(early, min(int(LATEST * rate), left))
+
+
+def _is_clear(shares: Array, best: int, apart: int) -> bool:
+    """Return whether the best offset was looked beyond and stands out alone."""
+    if not 0 < best < shares.size - 1:  # further off than was looked
+        return False
+    others = np.concatenate([shares[: max(best - apart, 0)], shares[best + apart :]])
+    return bool((others <= _CLEAR * shares[best]).all())

@@ -199,7 +199,7 @@ def _timing(trial: PreparedTrial) -> Iterator[Doubt]:
             "lag",
             f"the force is {abs(late):.0f} ms {'late' if late > 0 else 'early'} "
             f"against the motion (limit {LATEST_MS:g})",
-            "a filter in the sensor, the latency of its port, or two clocks",
+            "a filter in the sensor, a queue or the latency of its port, or two clocks",
             f"--what-if lag={trial.lag.seconds * 1e3:.0f} shows what it changes",
         )
 

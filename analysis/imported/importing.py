@@ -520,6 +520,11 @@ class _Import:
                 "few starts and stops. Give --lag MS"
             )
             return 0.0, Estimate("lag", (0.0,), "ms", (), "not found, taken as 0")
+        if lag.seconds > LONGEST_LAG:
+            self._warnings.append(
+                f"the wrench is stamped {lag.seconds * 1e3:.0f} ms late (limit "
+                f"{LONGEST_LAG * 1e3:.0f}). Set the clocks of both computers"
+            )
         return lag.seconds, _lag_estimate(lag)
 
     def _doubt_lag(self, given: float, shown: Lag | None) -> None:

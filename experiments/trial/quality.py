@@ -113,7 +113,8 @@ class Review:
         Args:
             earlier: `ratio` of the trials kept before, for comparison.
         """
-        timing = GOOD if self.worst_gap < 0.004 and not self.missed else WARNING
+        is_timely = self.worst_gap < 0.004 and not self.missed
+        timing = GOOD if is_timely and self._is_lag_sound() else WARNING
         joint7 = GOOD if self.joint7 < JOINT7_WARNING else WARNING
         kept = GOOD if self.kept >= MINIMUM_KEPT else WARNING
         sensor = WARNING if self.saturated or self.stale > STALE_SHARE else GOOD
@@ -135,9 +136,14 @@ class Review:
             *((BAD, doubt.text) for doubt in self.doubts),
         ]
 
+    def _is_lag_sound(self) -> bool:
+        """Return whether the trial shows when its forces came, and that was in time."""
+        is_doubted = any(doubt.name == "lag" for doubt in self.doubts)
+        return self.lag is not None and not is_doubted
+
     def _lag_words(self) -> str:
         if self.lag is None:
-            return ""
+            return ", lag of the force not vouched for"
         late = self.lag.seconds * 1e3
         return f", force {abs(late):.1f} ms {'late' if late >= 0 else 'early'}"
 

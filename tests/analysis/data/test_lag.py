@@ -39,7 +39,10 @@ def lag_of(series):
     return force_lag(series.t, series.v_t, series.F_t)
 
 
-@pytest.mark.parametrize("late_ms", [-20.0, -3.0, 0.0, 1.3, 5.0, 20.0, 40.0])
+LATE_MS = (50.0, 75.0, 100.0, 200.0, 333.0, 500.0, 750.0, 1000.0)
+
+
+@pytest.mark.parametrize("late_ms", [-20.0, -3.0, 0.0, 1.3, 5.0, 20.0, 40.0, *LATE_MS])
 def test_an_offset_is_found_to_half_a_millisecond(late_ms):
     lag = lag_of(jamming(late_ms * 1e-3))
     assert lag is not None
@@ -128,6 +131,40 @@ def test_a_late_force_is_doubted_with_its_offset():
     doubt = named(jamming(0.020))["lag"]
     assert "20 ms late" in doubt.seen
     assert "--what-if lag=20" in doubt.remedy
+
+
+@pytest.mark.parametrize("late_ms", LATE_MS)
+def test_a_force_is_doubted_however_late_it_is(late_ms):
+    assert f"{late_ms:.0f} ms late" in named(jamming(late_ms * 1e-3))["lag"].seen
+
+
+@pytest.mark.parametrize("late_ms", [1100.0, 3000.0])
+def test_a_force_later_than_is_looked_says_nothing(late_ms):
+    assert lag_of(jamming(late_ms * 1e-3)) is None
+
+
+@pytest.mark.parametrize("late_ms", [0.0, 100.0, 500.0])
+def test_a_short_trial_is_searched_as_far_as_it_reaches(late_ms):
+    found = lag_of(jamming(late_ms * 1e-3, seconds=2.3))
+    assert found is not None
+    assert found.seconds * 1e3 == pytest.approx(late_ms, abs=1.0)
+    assert lag_of(jamming(1.0, seconds=1.8)) is None
+
+
+@pytest.mark.parametrize("late_ms", [0.0, 300.0])
+def test_a_motion_that_repeats_itself_says_nothing(late_ms):
+    """Of a foot that is shaken evenly, one period late looks like in time."""
+    t = np.arange(4000) / 500.0
+    phase = 2.0 * np.pi * 15.0 * t
+    late = phase - 2.0 * np.pi * 15.0 * late_ms * 1e-3
+    series = replace(
+        jamming(),
+        t=t,
+        v_t=0.08 + 0.02 * np.sin(phase),
+        F_t=5.0 - 2.0 * np.sin(late + 0.3),
+        F_n=np.full(t.size, 6.0),
+    )
+    assert lag_of(series) is None
 
 
 def test_an_early_force_is_doubted_too():

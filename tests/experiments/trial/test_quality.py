@@ -7,7 +7,8 @@ import pytest
 from acquisition.sample import Flag
 from acquisition.trial_file.reader import TrialReader
 from analysis.data.lag import ForceLag
-from experiments.operator.console import GOOD, WARNING
+from analysis.data.plausibility import Doubt
+from experiments.operator.console import BAD, GOOD, WARNING
 from experiments.session.store import SessionFolder
 from experiments.trial.quality import review_trial, thin_so_far
 from tests.disturbances.rewriting import rewrite
@@ -24,8 +25,7 @@ def test_a_good_trial_is_reviewed_with_its_numbers(first_trial):
     assert review.missed == 0
     assert review.joint7 < 0.020
     assert review.ratio == pytest.approx(0.8, abs=0.25)  # rubber on a plate
-    marks = [mark for mark, _ in review.lines()]
-    assert marks[:3] == [GOOD, GOOD, GOOD]
+    assert [mark for mark, _ in review.lines()][1:5] == [GOOD, GOOD, GOOD, GOOD]
 
 
 def test_missing_cycles_are_counted_and_marked(first_trial, cycles, tmp_path):
@@ -103,8 +103,25 @@ def test_a_force_that_comes_late_is_shown_with_its_offset(first_trial):
     assert "4.0 ms early" in early.lines()[0][1]
 
 
-def test_a_plate_does_not_show_when_the_force_came(first_trial):
-    assert "force" not in review_trial(first_trial).lines()[0][1]
+def test_a_force_that_comes_in_time_is_ticked(first_trial):
+    review = replace(review_trial(first_trial), lag=ForceLag(0.002, 0.8))
+    assert review.lines()[0][0] == GOOD
+
+
+def test_a_late_force_is_no_tick(first_trial):
+    doubt = Doubt("lag", "the force is 500 ms late", "a queue")
+    late = replace(
+        review_trial(first_trial), lag=ForceLag(0.5, 0.8), doubts=(doubt,)
+    ).lines()
+    assert late[0][0] == WARNING
+    assert "force 500.0 ms late" in late[0][1]
+    assert late[5] == (BAD, doubt.text)
+
+
+def test_a_plate_does_not_show_when_the_force_came_which_is_no_tick(first_trial):
+    mark, words = review_trial(first_trial).lines()[0]
+    assert mark == WARNING
+    assert words.endswith("lag of the force not vouched for")
 
 
 # --- what is thin -------------------------------------------------------------------
