@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.data.frozen_channels import frozen_channels
 from analysis.data.load import RecordedTrial
 from analysis.data.prepare import PreparedTrial, Smoothed
 from analysis.data.series import Array
@@ -55,6 +56,7 @@ DoubtName = Literal[
     "incline",
     "heading",
     "pressure",
+    "frozen",
 ]
 
 
@@ -110,12 +112,14 @@ def doubts_of_record(recorded: RecordedTrial) -> list[Doubt]:
     moment, and the way of the sole itself.
     """
     v_t, F_t, F_n = recorded.traction.T
+    frozen = list(_frozen(recorded))
     moving = (np.abs(v_t) > SLOWEST) & (F_n > PRESSED)
     if np.count_nonzero(moving) < FEWEST:
-        return []
+        return frozen
     raw = np.ascontiguousarray(recorded.cycles["wrench_raw"][moving])
     wrench = recorded.payload.contact(raw, recorded.rotation[moving])
     return [
+        *frozen,
         *_way(recorded, moving),
         *_sideways(recorded.lateral[moving], F_t[moving]),
         *free_moment(wrench[:, :3], wrench[:, 3:]),
@@ -262,6 +266,25 @@ def _signs(v: Array, load: Array, along: Array) -> Iterator[Doubt]:
             "friction",
             f"median F_t/F_n {ratio:.2g} is outside {FRICTION[0]:g} to {FRICTION[1]:g}",
             "F_t and F_n are swapped, or the tare or a calibration is wrong",
+        )
+
+
+def _frozen(recorded: RecordedTrial) -> Iterator[Doubt]:
+    """Judge each channel of the sensor, from the foot's first motion to its last."""
+    moving = np.flatnonzero(np.abs(recorded.traction[:, 0]) > SLOWEST)
+    if moving.size < FEWEST:
+        return
+    slid = slice(int(moving[0]), int(moving[-1]) + 1)
+    taken_ns = recorded.cycles["ft_ns"][slid]
+    is_new = np.concatenate([[True], taken_ns[1:] != taken_ns[:-1]])
+    wrench = recorded.cycles["wrench_raw"][slid][is_new]
+    found = frozen_channels(recorded.t[slid][is_new], wrench)
+    if found:
+        yield Doubt(
+            "frozen",
+            f"{', '.join(channel.text for channel in found)} while the foot slides",
+            "a broken gauge or wire, or a channel at its end; no force is vouched for",
+            "change the cable or the sensor, and record again",
         )
 
 

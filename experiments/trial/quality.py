@@ -14,7 +14,13 @@ from acquisition.sample import Flag
 from analysis.data.events import find_slips
 from analysis.data.lag import ForceLag
 from analysis.data.load import load_trial
-from analysis.data.plausibility import Doubt, doubts_of, doubts_of_record
+from analysis.data.plausibility import (
+    FRICTION,
+    Doubt,
+    DoubtName,
+    doubts_of,
+    doubts_of_record,
+)
 from analysis.data.prepare import (
     MINIMUM_KEPT,
     PreparedTrial,
@@ -81,7 +87,7 @@ class Review:
     @property
     def known_ratio(self) -> float | None:
         """The slope, None where there is none."""
-        return None if np.isnan(self.ratio) else self.ratio
+        return self.ratio if np.isfinite(self.ratio) else None
 
     def plain(self) -> dict[str, object]:
         """Return what the running table and later reviews need, for the sidecar."""
@@ -117,7 +123,8 @@ class Review:
         timing = GOOD if is_timely and self._is_lag_sound() else WARNING
         joint7 = GOOD if self.joint7 < JOINT7_WARNING else WARNING
         kept = GOOD if self.kept >= MINIMUM_KEPT else WARNING
-        sensor = WARNING if self.saturated or self.stale > STALE_SHARE else GOOD
+        is_poor = self.saturated or self.stale > STALE_SHARE or self._doubt("frozen")
+        sensor = WARNING if is_poor else GOOD
         fit, words = self._quick_fit(earlier)
         return [
             (
@@ -138,8 +145,10 @@ class Review:
 
     def _is_lag_sound(self) -> bool:
         """Return whether the trial shows when its forces came, and that was in time."""
-        is_doubted = any(doubt.name == "lag" for doubt in self.doubts)
-        return self.lag is not None and not is_doubted
+        return self.lag is not None and self._doubt("lag") is None
+
+    def _doubt(self, name: DoubtName) -> Doubt | None:
+        return next((doubt for doubt in self.doubts if doubt.name == name), None)
 
     def _lag_words(self) -> str:
         if self.lag is None:
@@ -148,6 +157,8 @@ class Review:
         return f", force {abs(late):.1f} ms {'late' if late >= 0 else 'early'}"
 
     def _sensor_words(self) -> str:
+        if frozen := self._doubt("frozen"):
+            return f"sensor not vouched for: {frozen.seen}"
         if self.saturated:
             return f"sensor saturated in {self.saturated:.1%} of the cycles"
         if self.stale > STALE_SHARE:
@@ -159,7 +170,11 @@ class Review:
         if np.isnan(self.ratio):
             return WARNING, "quick fit impossible: no load"
         words = f"quick fit F_t/F_n {self.ratio:.2f}"
-        known = [ratio for ratio in earlier if not np.isnan(ratio)]
+        if not _is_friction(self.ratio):
+            return BAD, f"{words} cannot be: above 0 and at most {FRICTION[1]:g} can"
+        if self.doubts:
+            return WARNING, f"{words}, not vouched for"
+        known = [ratio for ratio in earlier if _is_friction(ratio)]
         if len(known) < ENOUGH_EARLIER:
             return GOOD, words
         mean, spread = float(np.mean(known)), float(np.std(known, ddof=1))
@@ -198,6 +213,11 @@ def review_trial(path: Path) -> Review:
         v_t=_median_speed(prepared),
         traces=traces_of(trial),
     )
+
+
+def _is_friction(ratio: float) -> bool:
+    """Return whether a ground can have this F_t/F_n; none drives the foot."""
+    return 0.0 < ratio <= FRICTION[1]
 
 
 def _median_speed(prepared: PreparedTrial) -> float:

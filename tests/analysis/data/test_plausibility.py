@@ -130,6 +130,33 @@ def test_a_sensor_turned_by_180_degrees_shows_a_ground_that_drives_the_foot(reco
     assert {doubt.name for doubt in doubts_of(prepared)} == {"power", "ratio"}
 
 
+@pytest.mark.parametrize("axis", range(6))
+def test_a_channel_that_stands_still_is_doubted_by_name(recorded, axis):
+    cycles = recorded.cycles.copy()
+    cycles["wrench_raw"][500:, axis] = cycles["wrench_raw"][500, axis]
+    found = {d.name: d for d in doubts_of_record(replace(recorded, cycles=cycles))}
+    name = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")[axis]
+    assert found["frozen"].seen.startswith(f"{name} stands at ")
+
+
+def test_a_sample_that_several_cycles_show_is_no_frozen_channel(recorded):
+    """A sensor that is slower than the loop, or lost for a while, is not frozen."""
+    cycles = recorded.cycles.copy()
+    held = slice(600, 1000)
+    for field in ("wrench_raw", "ft_ns"):
+        cycles[field][held] = cycles[field][600]
+    assert "frozen" not in kinds(replace(recorded, cycles=cycles))
+
+
+def test_a_foot_that_is_not_pressed_by_a_frozen_channel_is_doubted(recorded):
+    """Without normal force no other doubt is raised."""
+    cycles = recorded.cycles.copy()
+    cycles["wrench_raw"][:, 2] = cycles["wrench_raw"][0, 2]
+    unloaded = recorded.traction * np.array([1.0, 1.0, 0.0])
+    found = replace(recorded, cycles=cycles, traction=unloaded)
+    assert kinds(found) == {"frozen"}
+
+
 def test_swapped_axes_of_the_moment_do_not_belong_to_the_force(recorded):
     cycles = recorded.cycles.copy()
     raw = cycles["wrench_raw"]

@@ -75,6 +75,48 @@ def test_a_sensor_in_trouble_is_marked(
     assert review.lines()[1] == (WARNING, words)
 
 
+AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
+
+
+@pytest.mark.parametrize("axis", range(6))
+def test_a_frozen_channel_is_named_and_nothing_of_the_sensor_is_ticked(
+    first_trial, cycles, tmp_path, axis
+):
+    """Whatever the other five show."""
+    raw = cycles["wrench_raw"]
+    raw[len(raw) // 3 :, axis] = raw[len(raw) // 3, axis]
+    review = review_trial(rewrite(first_trial, tmp_path / "T.mcap", cycles))
+    lines = review.lines()
+    assert lines[1][0] == WARNING
+    assert lines[1][1].startswith(f"sensor not vouched for: {AXES[axis]} stands at ")
+    assert lines[4][0] in {WARNING, BAD}
+    assert any(mark == BAD and AXES[axis] in text for mark, text in lines[5:])
+
+
+@pytest.mark.parametrize("ratio", [-3.59, -0.01, 0.0, 5.1, np.inf, -np.inf])
+def test_a_quick_fit_that_cannot_be_is_never_ticked(first_trial, ratio):
+    review = replace(review_trial(first_trial), ratio=ratio)
+    for earlier in ([], [ratio] * 4, [0.7, 0.8, 0.9]):
+        mark, text = review.lines(earlier)[4]
+        assert mark == BAD
+        assert "cannot be" in text
+    assert (review.known_ratio is None) == np.isinf(ratio)
+
+
+def test_quick_fits_that_cannot_be_are_no_measure_for_others(first_trial):
+    review = review_trial(first_trial)
+    odd = [-3.59, np.inf, np.nan]
+    assert "before" not in review.lines([*odd, 0.8, 0.8])[4][1]
+    assert "(3 before: 0.80" in review.lines([*odd, 0.8, 0.8, 0.8])[4][1]
+
+
+def test_a_quick_fit_of_forces_that_are_doubted_is_not_ticked(first_trial):
+    doubt = Doubt("lag", "the force is 500 ms late", "a queue")
+    mark, text = replace(review_trial(first_trial), doubts=(doubt,)).lines()[4]
+    assert mark == WARNING
+    assert text.endswith("not vouched for")
+
+
 def test_less_than_three_trials_before_say_nothing(first_trial):
     review = review_trial(first_trial)
     for earlier in ([], [0.1, 0.1]):
