@@ -43,6 +43,8 @@ class StreamTiming:
         tick_ns: one step of it [ns].
         frozen_ns: as long the six numbers cannot repeat in a sensor that measures [ns].
         frame_size: [bytes].
+        stuck_ns: as long one of the numbers cannot repeat among others that change
+            [ns]; 0 = its steps are so coarse that it may.
     """
 
     period_ns: float
@@ -51,6 +53,7 @@ class StreamTiming:
     tick_ns: float
     frozen_ns: int
     frame_size: int
+    stuck_ns: int = 0
 
     def unwrap(self, ticks: int, last: int) -> int:
         """Return the count nearest to `last` that the device shows as `ticks`."""

@@ -39,25 +39,34 @@ class StreamFaults:
     def __init__(self) -> None:
         self.is_garbled = False
         self.is_nonsense = False
-        self._is_frozen = False
+        self._frozen: tuple[int, ...] = ()
         self._last: Wrench | None = None
 
-    def freeze(self) -> None:
-        """Repeat the next wrench for ever; the device's clock goes on."""
-        self._is_frozen = True
+    def freeze(self, *axes: int) -> None:
+        """Repeat the next wrench for ever; the device's clock goes on.
+
+        Args:
+            axes: 0 to 5, that are repeated; none = all.
+        """
+        self._frozen = axes or tuple(range(6))
         self._last = None
 
     def clear_faults(self) -> None:
         """Show and send everything as it is."""
-        self.is_garbled = self.is_nonsense = self._is_frozen = False
+        self.is_garbled = self.is_nonsense = False
+        self._frozen = ()
 
     def show(self, wrench: Wrench) -> Wrench:
         """Return what the device makes of `wrench` [N, N m]."""
         if self.is_nonsense:
             return _NOT_A_NUMBER
-        if self._is_frozen:
-            self._last = self._last or wrench
-            return self._last
+        if self._frozen:
+            shown = list(wrench)
+            self._last = last = self._last or wrench
+            for axis in self._frozen:
+                shown[axis] = last[axis]
+            fx, fy, fz, tx, ty, tz = shown
+            return fx, fy, fz, tx, ty, tz
         return wrench
 
     def carry(self, frame: bytes) -> bytes:

@@ -9,6 +9,7 @@ from ft_sensor.serial_line.clock_fit import WINDOW_NS, ClockFit
 LONGEST_STEP_NS = 1_000_000_000  # a clock that moves further at once has jumped
 _UNSEEN = 0.75  # periods too late, for a whole window: a frame was lost unseen
 _SILENT_NS = 30_000_000  # longer than an adapter collects bytes
+_FEWEST = 20  # samples of a span that says something of an axis
 _ALIKE = 0.1  # share by which a pause of the device and of the host may differ
 
 
@@ -124,6 +125,51 @@ class FrameCounter:
         return round(periods * period_ns)
 
 
+class StuckAxes:
+    """Notices axes that repeat one number while others change.
+
+    Span by span: an axis that shows throughout a span what it showed at its beginning
+    is stuck until it shows something else. Noise clears all six with the first samples
+    of a span; what is left of it costs nothing. Exactly zero is what a sensor shows
+    that does not measure an axis, and a number beyond the range is told as saturated.
+    """
+
+    def __init__(self, span_ns: int) -> None:
+        """Take how long a span is [ns]; 0 = nothing is judged."""
+        self._span_ns = span_ns
+        self._begun_ns = 0
+        self._shown: Wrench | None = None
+        self._compared = 0
+        self._still: list[int] = []
+        self._stuck: list[int] = []
+
+    def are_there(self, reading: Reading, t_ns: int) -> bool:
+        """Return whether an axis is stuck at a reading, the next one in order."""
+        shown = self._shown
+        if shown is None or t_ns - self._begun_ns >= self._span_ns:
+            return self._begin(reading, t_ns)
+        if self._still:
+            wrench = reading.wrench
+            self._compared += 1
+            self._still = [axis for axis in self._still if wrench[axis] == shown[axis]]
+            self._stuck = [axis for axis in self._stuck if axis in self._still]
+        return bool(self._stuck)
+
+    def _begin(self, reading: Reading, t_ns: int) -> bool:
+        """End a span with a reading, and begin the next one."""
+        wrench, shown = reading.wrench, self._shown
+        if shown is not None and self._compared >= _FEWEST:
+            self._stuck = [
+                axis
+                for axis in self._still
+                if wrench[axis] == shown[axis] != 0.0
+                and not reading.saturated >> axis & 1
+            ]
+        self._begun_ns, self._shown, self._compared = t_ns, wrench, 0
+        self._still = list(range(len(wrench))) if self._span_ns else []
+        return bool(self._stuck)
+
+
 class SampleTimestamper:
     """Turns readings into dated samples and notices what is missing or frozen.
 
@@ -145,6 +191,7 @@ class SampleTimestamper:
         self._t_ns: int = -(1 << 62)
         self._wrench: Wrench | None = None
         self._unchanged_since_ns = 0
+        self._stuck = StuckAxes(timing.stuck_ns)
 
     @property
     def lost(self) -> int:
@@ -201,6 +248,7 @@ class SampleTimestamper:
             is_running
             and not self._device.jumps
             and t_ns - self._unchanged_since_ns < self._timing.frozen_ns
+            and not self._stuck.are_there(reading, t_ns)
         )
         self.frozen += not is_live
         # Of six numbers of 32 bits no sum overflows: it is finite if all of them are.

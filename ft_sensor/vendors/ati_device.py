@@ -23,6 +23,7 @@ from ft_sensor.vendors import ati
 NETWORK = 100_000_000  # bit/s of its Ethernet
 RATE = 1000  # Hz, as its web page is to be set
 _FROZEN_NS = 50_000_000  # 32-bit counts of noise never repeat that long
+_STUCK_NS = 250_000_000  # nor does one of them
 _ANSWER_NS = NS_PER_S // 2
 _QUIET_NS = 100_000_000  # what was under way when it was told to stop
 _TRIES = 3  # requests may be lost
@@ -70,6 +71,7 @@ class AtiDevice:
             modulus=ati.MODULUS,
             tick_ns=period_ns,
             frozen_ns=_FROZEN_NS,
+            stuck_ns=_STUCK_NS,
             frame_size=ati.FRAME_SIZE,
         )
         self._settings = settings

@@ -20,6 +20,7 @@ BAUDRATE = 460800
 # Of the SensONE as commonly given, in no document at hand: rig.toml may know better.
 RANGES: Wrench = (500.0, 500.0, 1200.0, 15.0, 15.0, 12.0)
 _FROZEN_NS = 50_000_000  # real noise never repeats six floats that long
+_STUCK_NS = 250_000_000  # nor one: a recorded sensor repeated one for 160 ms at 100 Hz
 _LISTEN_NS = 3 * NS_PER_S  # a sensor that the opening reset boots within this
 _SETTLE_NS = NS_PER_S // 2
 _ANSWER_NS = 2 * NS_PER_S
@@ -80,6 +81,7 @@ class BotaDevice:
             modulus=bota.CLOCK_MODULUS,
             tick_ns=1000.0,
             frozen_ns=_FROZEN_NS,
+            stuck_ns=_STUCK_NS,
             frame_size=bota.FRAME_SIZE,
         )
         self._settings = settings

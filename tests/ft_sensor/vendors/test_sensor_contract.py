@@ -196,6 +196,56 @@ def test_numbers_that_stand_still_are_invalid(kind):
     assert bench.sensor.counters.frozen > 0
 
 
+FINE = ["bota", "ati"]  # whose steps are far below their noise
+
+
+@pytest.mark.parametrize("kind", FINE)
+@pytest.mark.parametrize("axis", range(6))
+def test_one_number_that_stands_still_is_invalid_until_it_moves(kind, axis):
+    bench = SensorBench(kind).opened()
+    bench.run(300 * MS)
+    bench.device.faults.freeze(axis)
+    found = bench.run(600 * MS)
+    assert all(sample.is_valid for sample in found[:50])
+    late = [s for s in found if s.t_ns - found[0].t_ns > 510 * MS]  # two spans
+    assert late
+    assert not any(sample.is_valid for sample in late)
+    bench.device.faults.clear_faults()
+    assert all(sample.is_valid for sample in bench.run(600 * MS)[2:])
+
+
+def test_a_sound_sensor_has_no_number_that_stands_still(kind):
+    bench = SensorBench(kind).opened()
+    assert all(sample.is_valid for sample in bench.run(5000 * MS))
+
+
+@pytest.mark.parametrize("kind", FINE)
+def test_an_axis_that_rests_at_exactly_zero_is_no_fault(kind):
+    bench = SensorBench(kind).opened()
+    show = bench.device.faults.show
+    bench.device.faults.show = lambda wrench: show((*wrench[:5], 0.0))
+    assert all(sample.is_valid for sample in bench.run(1200 * MS))
+
+
+@pytest.mark.parametrize("kind", FINE)
+def test_an_axis_at_the_end_of_its_range_is_told_as_saturated(kind):
+    load = [0.1, 0.2, 5.0, 0.1, 0.1, 0.1]
+    bench = SensorBench(kind, load=load).opened()
+    bench.device.ranges = bench.driver.ranges
+    load[2] = 1.5 * bench.driver.ranges[2]
+    found = bench.run(1200 * MS)[50:]
+    assert all(sample.saturated & 0b100 for sample in found)
+    assert all(sample.is_valid for sample in found)
+
+
+@pytest.mark.parametrize("kind", FINE)
+def test_pauses_make_no_axis_stand_still(kind):
+    bench = SensorBench(kind).opened()
+    for _ in range(10):
+        bench.device.pause(bench.clock.now_ns() + 260 * MS)
+        assert all(sample.is_valid for sample in bench.run(300 * MS))
+
+
 @pytest.mark.parametrize("kind", ["bota", "optoforce"])
 def test_a_device_clock_that_stands_still_makes_samples_invalid(kind):
     bench = SensorBench(kind).opened()
