@@ -70,6 +70,7 @@ FAULTS = (
     "pendant-idle",
     "ft-stale",
     "ft-frozen",
+    "ft-stuck",
     "ft-garbled",
     "ft-saturated",
     "ft-not-a-number",

@@ -231,6 +231,7 @@ class Cable(Protocol):
         ...
 
 
+_F_Z = 2  # of a wrench
 CLOCK_JUMP_US = 10_000_000
 _JUMP = (1.5, 0.0, -1.5, 0.0, 0.0, 0.0)  # of the zero: no tare hides so much [N, N m]
 
@@ -250,6 +251,7 @@ def stream_faults(
         "ft-silent": stream.go_silent,
         "ft-stale": stream.go_silent,
         "ft-frozen": faults.freeze,
+        "ft-stuck": lambda: faults.freeze(_F_Z),
         "ft-garbled": lambda: setattr(faults, "is_garbled", True),
         "ft-saturated": stream.saturate,
         "ft-not-a-number": lambda: setattr(faults, "is_nonsense", True),

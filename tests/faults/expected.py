@@ -534,6 +534,17 @@ TABLE: dict[str, Row] = {
     **{f"creep-of-motor-{motor}": _creeping(motor) for motor in range(1, 8)},
     "ft-stale": _sensor(20, _FEW, _NO_DATA),
     "ft-frozen": _sensor(70, _FLAGGED, Cell(End.TOLD, _FLAGGED)),
+    # One number of six: within two spans of 0.25 s, and 20 ms without a valid sample.
+    "ft-stuck": _sensor(
+        520,
+        _FLAGGED,
+        Cell(End.TOLD, _FLAGGED),
+        recording=Cell(
+            End.TOLD,
+            _FLAGGED,
+            why="the trial is over before; its review names the channel",
+        ),
+    ),
     "ft-garbled": _sensor(20, _FEW, _NO_FRAME),
     "ft-saturated": _sensor(
         0,

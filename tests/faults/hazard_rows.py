@@ -263,11 +263,15 @@ ROWS: dict[str, dict[str, Fields]] = {
         "stuck": (
             "an old force is recorded as new",
             "firmware hangs and repeats its sample",
-            "samples that do not change are not vouched for, 70 ms",
+            "samples that do not change are not vouched for, 70 ms; of a Bota and an ATI nor is one of six numbers that repeats, 0.25 to 0.5 s; the review names the channel of any sensor",
             "as lost",
-            ("ft-frozen",),
-            "",
-            (_MATRIX,),
+            ("ft-frozen", "ft-stuck"),
+            "a channel of a coarser sensor is told after the trial only",
+            (
+                _MATRIX,
+                "tests/ft_sensor/vendors/test_sensor_contract.py::test_one_number_that_stands_still_is_invalid_until_it_moves",
+                "tests/experiments/trial/test_quality.py::test_a_frozen_channel_is_named_and_nothing_of_the_sensor_is_ticked",
+            ),
         ),
         "drifting": (
             "F_t and F_n are off",
