@@ -119,8 +119,7 @@ class Review:
         Args:
             earlier: `ratio` of the trials kept before, for comparison.
         """
-        is_timely = self.worst_gap < 0.004 and not self.missed
-        timing = GOOD if is_timely and self._is_lag_sound() else WARNING
+        timing = GOOD if self.worst_gap < 0.004 and not self.missed else WARNING
         joint7 = GOOD if self.joint7 < JOINT7_WARNING else WARNING
         kept = GOOD if self.kept >= MINIMUM_KEPT else WARNING
         is_poor = self.saturated or self.stale > STALE_SHARE or self._doubt("frozen")
@@ -129,8 +128,7 @@ class Review:
         return [
             (
                 timing,
-                f"timing worst gap {self.worst_gap * 1e3:.1f} ms, missed {self.missed}"
-                f"{self._lag_words()}",
+                f"timing worst gap {self.worst_gap * 1e3:.1f} ms, missed {self.missed}",
             ),
             (sensor, self._sensor_words()),
             (joint7, f"joint 7 moved {self.joint7 * 1e3:.0f} mrad"),
@@ -140,21 +138,20 @@ class Review:
                 f"slips {self.slips}",
             ),
             (fit, words),
+            self._lag_line(),
             *((BAD, doubt.text) for doubt in self.doubts),
         ]
-
-    def _is_lag_sound(self) -> bool:
-        """Return whether the trial shows when its forces came, and that was in time."""
-        return self.lag is not None and self._doubt("lag") is None
 
     def _doubt(self, name: DoubtName) -> Doubt | None:
         return next((doubt for doubt in self.doubts if doubt.name == name), None)
 
-    def _lag_words(self) -> str:
+    def _lag_line(self) -> tuple[str, str]:
+        """Return (mark, words) on when the forces came, where the trial shows it."""
         if self.lag is None:
-            return ", lag of the force not vouched for"
+            return WARNING, "lag of the force not vouched for: no motion shows it"
         late = self.lag.seconds * 1e3
-        return f", force {abs(late):.1f} ms {'late' if late >= 0 else 'early'}"
+        words = f"lag force {abs(late):.1f} ms {'late' if late >= 0 else 'early'}"
+        return WARNING if self._doubt("lag") else GOOD, words
 
     def _sensor_words(self) -> str:
         if frozen := self._doubt("frozen"):

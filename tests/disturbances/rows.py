@@ -124,6 +124,7 @@ TABLES = (
     TableRow("F_n and F_t swapped, plate", swapped, FLAGGED, "swapped", "TF"),
     TableRow("force 20 ms late", late(10), FLAGGED, "--what-if lag=2"),
     TableRow("force 8 ms late", late(4), FLAGGED, "lag"),
+    TableRow("force 500 ms late", late(250), FLAGGED, "lag=50"),
     TableRow("clock jumps by 1 s", jumped, FLAGGED, "gap of 1"),
     TableRow("clock goes back by 1 s", backward, REFUSED, "time does not increase"),
     TableRow("every tenth row is no number", spoilt, FLAGGED, "without a value"),
@@ -228,6 +229,11 @@ def saturate(cycles: Record) -> None:
     cycles["flags"][rows] |= np.uint32(Flag.FT_SATURATED)
 
 
+def freeze(cycles: Record) -> None:
+    half = len(cycles) // 2
+    cycles["wrench_raw"][half:, 2] = cycles["wrench_raw"][half, 2]
+
+
 def go_stale(cycles: Record) -> None:
     cycles["flags"][len(cycles) // 2 :: 2] &= ~np.uint32(Flag.FT_FRESH)
 
@@ -273,6 +279,7 @@ RECORDINGS = (
     ),
     RecordingRow("heading wrong by 4 degrees", moved(heading=4.0), HARMLESS, 0.02),
     RecordingRow("an axis saturated", of_cycles(saturate), FLAGGED, "saturated"),
+    RecordingRow("F_z frozen", of_cycles(freeze), FLAGGED, "Fz stands"),
     RecordingRow("force samples stale", of_cycles(go_stale), FLAGGED, "stale"),
     RecordingRow("clock jumps by 1 s", of_cycles(jump), FLAGGED, "worst gap"),
     RecordingRow("foot loose by 0.1 rad", of_cycles(turn_foot), FLAGGED, "joint 7"),
