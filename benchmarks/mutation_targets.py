@@ -76,8 +76,11 @@ TESTS = {
     f"{_DRIVER}/status_poller.py": (
         f"{_DRIVER_TESTS}/test_status_poller.py",
         f"{_DRIVER_TESTS}/test_property_watch.py",
+        f"{_DRIVER_TESTS}/test_command_watch.py",
         f"{_DRIVER_TESTS}/test_arm.py",
     ),
+    f"{_DRIVER}/command_watch.py": (f"{_DRIVER_TESTS}/test_command_watch.py",),
+    f"{_DRIVER}/lost_positions.py": (f"{_DRIVER_TESTS}/test_lost_writes.py",),
     f"{_DRIVER}/joint_estimator.py": (
         f"{_DRIVER_TESTS}/test_joint_estimator.py",
         f"{_DRIVER_TESTS}/test_arm.py",
@@ -96,6 +99,7 @@ TESTS = {
         f"{_DRIVER_TESTS}/test_generations.py",
         f"{_DRIVER_TESTS}/test_lenient_start.py",
         f"{_DRIVER_TESTS}/test_safety_limits.py",
+        f"{_DRIVER_TESTS}/test_lost_writes.py",
     ),
     f"{_DRIVER}/survey.py": (f"{_DRIVER_TESTS}/test_survey.py",),
     f"{_DRIVER}/home.py": (

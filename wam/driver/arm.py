@@ -338,7 +338,8 @@ class WamArm:
         if mode is not SafetyMode.IDLE:
             raise PreflightError(
                 f"Positions can be defined in IDLE only; the arm is {mode.name}.",
-                hint="Press Shift-idle first.",
+                hint="Press Shift-idle, then zero it again.",
+                arm_state="without torque: it sinks, support it",
             )
         counts = motion.transmission.counts(q)
         self._safety.ignore_speed_faults(_IGNORED_SPEED_FAULTS)

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from acquisition.control_loop import contact
+from acquisition.control_loop.cycle import Cycle
 from acquisition.control_loop.proof import ProofGoal, ProofKind
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import SafetyMode
@@ -252,6 +253,22 @@ def _deaf(scene):
 
 def _orphan(scene):
     scene.built.loop_servers[-1].orphan()
+
+
+def _ask_an_idle_arm(scene):
+    loop_client = scene.built.backend.loop_client
+    loop_client.idle()
+    loop_client.request(ArmState.GUIDE)
+
+
+def _stand_still_for_long(scene):
+    """Let the next cycle be the first one for 0.2 s."""
+    usual, gaps = Cycle.__call__, [100]
+
+    def call(cycle, tick):
+        usual(cycle, tick._replace(skipped=gaps.pop() if gaps else 0))
+
+    scene.patch.setattr(Cycle, "__call__", call)
 
 
 def _stuck_recorder(scene):
@@ -561,7 +578,10 @@ CASES = {
     "motor-stuck": acted(Prompt.LIFT, _pull_in_vain, 4, "Motor 2 does not turn"),
     "motor-still": acted(Prompt.RECORDING, _stand_still, 4, "(limit 0)"),
     "not-a-number": acted(Prompt.LIFT, _not_a_number, 4),
-    "console-lost": acted(Prompt.READY, _orphan, since=0.0),
+    "console-lost": acted(Prompt.READY, _orphan, 4, since=0.0),
+    "arm-not-active": acted(Prompt.LIFT, _ask_an_idle_arm, 4),
+    "puck-disobeys": struck("mode-lost-4", words="Puck 4 does not"),
+    "loop-lost": acted(Prompt.LIFT, _stand_still_for_long, 4, "for 200 ms"),
     "process-lost": acted(Prompt.LIFT, _lose_recorder, 4, "recorder process ended"),
     # disk, lock, kill, bug
     "disk-lost": fault("disk-full@T2+0.1s", 6, words="T02 stopped at 0."),
@@ -616,10 +636,13 @@ def files_of_first(scene):
 
 # Depends on what else the computer does: tests/experiments/test_messages.py.
 OF_THE_COMPUTER = {"too-busy"}
+# Of a real arm only: tests/experiments/preflight/test_commissioned.py.
+OF_THE_FIRST_DAY = {"daily-ahead"}
 
 
 def test_every_row_of_the_catalogue_has_a_case():
-    assert set(CASES) | SHARED_ARM | OF_THE_COMPUTER == set(CATALOGUE)
+    elsewhere = SHARED_ARM | OF_THE_COMPUTER | OF_THE_FIRST_DAY
+    assert set(CASES) | elsewhere == set(CATALOGUE)
 
 
 @pytest.mark.parametrize("name", CASES)
