@@ -16,6 +16,7 @@ from typing import Literal
 import numpy as np
 
 from acquisition.errors import SettingsError
+from analysis.data.frozen_channels import FrozenChannel, frozen_channels
 from analysis.data.plausibility import SLOWEST, doubts_of, free_moment
 from analysis.data.prepare import PrepareOptions, moving_average, prepare_trial
 from analysis.data.series import Array, TractionSeries
@@ -295,6 +296,7 @@ class _Import:
         checks = sign_checks(values, lateral)
         self._warnings += side_warnings(values, lateral)
         self._warnings += self._of_moments(payload, raw, values)
+        self._warnings += self._of_channels(strokes)
         self._warnings += [
             text
             for a, b in strokes
@@ -466,6 +468,15 @@ class _Import:
         doubts = free_moment(force[sliding], moment[sliding])
         found = [replace(d, remedy=_CHECK_OPTIONS).text for d in doubts]
         return [*found, *moment_warnings(moment, self._path.lever, force)]
+
+    def _of_channels(self, strokes: list[tuple[int, int]]) -> list[str]:
+        """Judge each channel of the sensor while the foot slides."""
+        times, found = self._motion.t, list[FrozenChannel]()
+        for first, end in strokes:
+            is_in = (self._wrench_t >= times[first]) & (self._wrench_t < times[end - 1])
+            readings = self._wrench.wrench[is_in]
+            found += frozen_channels(self._wrench_t[is_in], readings)
+        return [f"{channel.text} while the foot slides" for channel in found]
 
     def _strokes(self, load: Array) -> list[tuple[int, int]]:
         """Return the stretches in which something presses the foot."""
