@@ -112,7 +112,7 @@ def test_an_arm_with_an_edited_record_is_not_driven(config, tmp_path):
     commissioned(config)
     path = config.parent / NAME
     content = json.loads(path.read_text())
-    content["steps"][8]["verdict"] = "accepted"
+    content["steps"][8]["operator"] = "another"
     path.write_text(json.dumps(content))
     seen = page(config, tmp_path)
     assert "was changed at or before C8 rest pose" in seen
