@@ -245,7 +245,21 @@ class FaultContext:
 
 
 def fault_text(verdict: GuardVerdict, context: FaultContext, saved: str = "") -> str:
-    """Return the message of a verdict.
+    """Return the message of a verdict."""
+    message, values = _filled(verdict, context)
+    return message.text(values, saved)
+
+
+def fault_words(verdict: GuardVerdict) -> str:
+    """Return what happened, in one sentence, of a fault beside a stricter one."""
+    message, values = _filled(verdict, FaultContext(prompt=None))
+    return message.what.format_map(values)
+
+
+def _filled(
+    verdict: GuardVerdict, context: FaultContext
+) -> tuple[Message, dict[str, object]]:
+    """Return the message of a verdict, and what its fields are filled with.
 
     A verdict of the safety circuit is the pendant's unless a monitor is its cause;
     silence is the bus's, or that of the pucks that are silent.
@@ -284,13 +298,7 @@ def fault_text(verdict: GuardVerdict, context: FaultContext, saved: str = "") ->
     for said, state, arm in _ARM_BY_NOW:
         if context.state is state and message.arm.startswith(said):
             message = replace(message, arm=arm)
-    return message.text(values, saved)
-
-
-def fault_words(verdict: GuardVerdict) -> str:
-    """Return what happened, in one sentence, of a fault beside a stricter one."""
-    context = FaultContext(prompt=None)
-    return fault_text(verdict, context).partition(" ARM: ")[0]
+    return message, values
 
 
 def rest_text(mode: SafetyMode, *, is_confirmed: bool) -> str:

@@ -126,9 +126,7 @@ class Cycle:
             known: number of the newest verdict that was told or acted on; None = all.
         """
         if state is not ArmState.IDLE:
-            verdict = self.status.verdict
-            is_latched = verdict is not None and verdict.action is Action.IDLE
-            if is_latched or not self._is_newest(known):
+            if self.status.is_idled or not self._is_newest(known):
                 return
             self.status.clear()
         else:
@@ -242,6 +240,8 @@ class Cycle:
         self._requested = None
         if event is _REQUEST_IDLE or self._known == self.status.number:
             self._handle(event, reading)
+        else:
+            self._is_starting = False
 
     def _begin_move(self, reading: ArmReading) -> None:
         """Begin the move or proof asked for; none if a fault stands."""

@@ -98,13 +98,11 @@ class FaultSpec:
         actions: what the arm does; of two, the second when the fault lasts or goes
             beyond a second limit.
         detail: the type of its numbers.
-        needs_trial: it is a fault only while a trial is recorded.
         ends_session: no trial can follow, the arm has to be activated anew.
     """
 
     actions: tuple[Action, ...]
     detail: type[FaultDetail] = NoDetail
-    needs_trial: bool = False
     ends_session: bool = False
 
 
@@ -126,9 +124,7 @@ FAULTS: Mapping[Fault, FaultSpec] = {
         (Action.HOLD, Action.IDLE), PositionJump, ends_session=True
     ),
     Fault.MOTOR_STUCK: FaultSpec(_IDLE, StuckMotor, ends_session=True),
-    Fault.MOTOR_STILL: FaultSpec(
-        _IDLE, StillMotor, needs_trial=True, ends_session=True
-    ),
+    Fault.MOTOR_STILL: FaultSpec(_IDLE, StillMotor, ends_session=True),
     Fault.BUS_SHARED: FaultSpec(_IDLE, ForeignFrame, ends_session=True),
     Fault.PUCK_CHANGED: FaultSpec(_IDLE, MotorChange, ends_session=True),
     Fault.PUCK_DISOBEYS: FaultSpec(_IDLE, MotorChange, ends_session=True),
@@ -144,19 +140,19 @@ FAULTS: Mapping[Fault, FaultSpec] = {
     Fault.OVERSPEED: FaultSpec(_DAMP, JointExcess),
     Fault.FOOT_SPEED: FaultSpec(_DAMP, FootSpeedExcess),
     Fault.TORQUE_LIMIT: FaultSpec(_DAMP, JointExcess),
-    Fault.JOINT7_SLIP: FaultSpec(_HOLD, Joint7Slip, needs_trial=True),
-    Fault.FT_STALE: FaultSpec(_HOLD, ForceAge, needs_trial=True),
-    Fault.FT_SATURATED: FaultSpec(_END_TRIAL, Saturation, needs_trial=True),
+    Fault.JOINT7_SLIP: FaultSpec(_HOLD, Joint7Slip),
+    Fault.FT_STALE: FaultSpec(_HOLD, ForceAge),
+    Fault.FT_SATURATED: FaultSpec(_END_TRIAL, Saturation),
     Fault.CONTACT_FORCE: FaultSpec((Action.END_TRIAL, Action.HOLD), ContactExcess),
     Fault.CONTACT_MOMENT: FaultSpec((Action.END_TRIAL, Action.HOLD), ContactExcess),
-    Fault.CONTACT_GROWTH: FaultSpec(_END_TRIAL, ForceGrowth, needs_trial=True),
+    Fault.CONTACT_GROWTH: FaultSpec(_END_TRIAL, ForceGrowth),
     Fault.CONTACT_MOVE: FaultSpec(_HOLD, ContactExcess),
     Fault.LOOP_LATE: FaultSpec(_HOLD, LateCycles),
     Fault.LOOP_LOST: FaultSpec(_IDLE, LoopGap, ends_session=True),
     Fault.MOVE_REFUSED: FaultSpec(_HOLD),
     Fault.CONSOLE_SILENT: FaultSpec(_HOLD),
     Fault.CONSOLE_LOST: FaultSpec(_HOLD),
-    Fault.RECORDER_SILENT: FaultSpec(_HOLD, needs_trial=True),
+    Fault.RECORDER_SILENT: FaultSpec(_HOLD),
 }
 _NO_DETAIL = NoDetail()
 

@@ -150,6 +150,11 @@ class ControlStatus:
         """All verdicts that stand, the strictest first."""
         return () if self.verdict is None else (self.verdict, *self.others)
 
+    @property
+    def is_idled(self) -> bool:
+        """Whether a verdict stands that idles the arm."""
+        return any(verdict.action is Action.IDLE for verdict in self.standing)
+
     def latch(self, verdict: GuardVerdict) -> None:
         """Let a verdict stand; a fault that stands already is not told again.
 

@@ -59,7 +59,7 @@ def _touch_key(state: PromptState) -> str:
 
 _AUTOMATIC: dict[Prompt, Callable[[PromptState], str]] = {
     Prompt.SUPPORT: lambda _: " ",
-    Prompt.CLEAR: lambda _: " ",
+    Prompt.CONFIRM: lambda _: " ",
     Prompt.MOVE: lambda _: "g",
     Prompt.LIFT: _lift_key,
     Prompt.READY: _ready_key,

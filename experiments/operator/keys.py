@@ -92,7 +92,7 @@ KEYS: Mapping[Prompt, tuple[OperatorKey, ...]] = {
         OperatorKey(" ", KeyAction.CONFIRM, "once it is supported"),
         _QUIT,
     ),
-    Prompt.CLEAR: (_CONFIRM, _QUIT),
+    Prompt.CONFIRM: (_CONFIRM, _QUIT),
     # Before a motion of the arm, and before it sinks, no key that was pressed before:
     # a pedal that sticks, or a key that is held, answers neither.
     Prompt.MOVE: (OperatorKey("g", KeyAction.CONFIRM, "once it is clear: go"), _QUIT),

@@ -12,7 +12,7 @@ class Prompt(Enum):
 
     CHOICE = "choice"
     SUPPORT = "support"
-    CLEAR = "clear"
+    CONFIRM = "confirm"
     MOVE = "move"
     MOVING = "moving"
     TOUCH = "touch"

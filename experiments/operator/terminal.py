@@ -99,21 +99,20 @@ class HeldKeys:
     """Tells a key that is pressed from one that repeats: held, or a pedal that sticks.
 
     A terminal does not tell when a key is released. One that is held comes again after
-    at most 0.7 s and then at least ten times a second. So the same key counts once it
-    has been silent for longer; another key counts at once.
+    at most 0.7 s and then at least ten times a second. So each key counts once it has
+    been silent for longer, whatever other keys come between.
     """
 
     def __init__(self, now_ns: Callable[[], int]) -> None:
         self._now_ns = now_ns
-        self._last = ""
-        self._last_ns = 0
+        self._last_ns: dict[str, int] = {}  # by key
 
     def is_pressed(self, key: str) -> bool:
         """Return whether a key that has just come is pressed anew."""
         now_ns = self._now_ns()
-        is_anew = key != self._last or now_ns - self._last_ns >= _RELEASED_NS
-        self._last, self._last_ns = key, now_ns
-        return is_anew
+        last_ns = self._last_ns.get(key)
+        self._last_ns[key] = now_ns
+        return last_ns is None or now_ns - last_ns >= _RELEASED_NS
 
 
 class TerminalInput:

@@ -100,7 +100,7 @@ class Scene:
             ArmFaultError, StopRequestedError: as `ConsoleLoop.tick`.
         """
         self.say(text)
-        while self.console_loop.tick(Prompt.CLEAR) != " ":
+        while self.console_loop.tick(Prompt.CONFIRM) != " ":
             pass
 
     def ask_number(self, text: str, simulated: float) -> float:

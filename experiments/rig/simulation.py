@@ -45,7 +45,7 @@ class SimulatedHand:
             self._simulation.pendant("activate")
         elif state.prompt is Prompt.LIFT:
             self._simulation.lift()
-        elif state.prompt in {Prompt.CLEAR, Prompt.MOVE}:
+        elif state.prompt in {Prompt.CONFIRM, Prompt.MOVE}:
             self._simulation.let_go()
         elif state.prompt is Prompt.TOUCH:
             self._simulation.touch(state.trial)

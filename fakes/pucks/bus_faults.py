@@ -14,6 +14,7 @@ from fakes.pucks.event_queue import FRAME_NS, EventQueue
 from wam.bus.frames import (
     HOST,
     Group,
+    Payload,
     compose_id,
     decode_position,
     encode_position,
@@ -54,21 +55,13 @@ class _Rule:
     passed: int = 0
 
 
-@dataclass(slots=True)
-class Unheard:
-    """Frames of the host that reach no device; `left` of them, None = all."""
-
-    is_lost: Callable[[int, bytes], bool]
-    left: int | None
-
-
 class BusFaults:
     """Loses, delays, doubles and spoils the frames of a network's devices.
 
     Devices among themselves are not touched: the faults sit before the host, and
-    `lose_from_host` behind it. Frames of
-    one identifier keep their order, as they do in the queue of a CAN controller.
-    `count` is how many frames a fault strikes, None = all until `clear_faults`.
+    `lose_from_host` behind it. Frames of one identifier keep their order, as they do in
+    the queue of a CAN controller. `count` is how many frames a fault strikes, None =
+    all until `clear_faults`.
 
     Attributes:
         is_down: the host's interface is down: it refuses to send and to receive.
@@ -88,27 +81,18 @@ class BusFaults:
         self._rules: dict[int, list[_Rule]] = {}
         self._released_ns: dict[int, int] = {}
         self._flood = 0  # number of the present one; events of earlier ones are void
-        self._unheard: list[Unheard] = []
+        self._unheard: list[Callable[[int, Payload], bool]] = []
 
-    def lose_from_host(
-        self, is_lost: Callable[[int, bytes], bool], count: int | None = None
-    ) -> None:
+    def lose_from_host(self, is_lost: Callable[[int, Payload], bool]) -> None:
         """Let no device hear the host's frames for which `is_lost(identifier, data)`.
 
-        Args:
-            is_lost: which frames.
-            count: how many of them; None = all until `clear_faults`.
+        It lasts until `clear_faults`.
         """
-        self._unheard.append(Unheard(is_lost, count))
+        self._unheard.append(is_lost)
 
-    def is_heard(self, can_id: int, data: bytes) -> bool:
+    def is_heard(self, can_id: int, data: Payload) -> bool:
         """Return whether devices hear a frame of the host."""
-        for rule in self._unheard:
-            if rule.left != 0 and rule.is_lost(can_id, data):
-                if rule.left is not None:
-                    rule.left -= 1
-                return False
-        return True
+        return not any(is_lost(can_id, data) for is_lost in self._unheard)
 
     def drop(self, can_id: int, count: int | None = 1, share: float = 1.0) -> None:
         """Lose frames, each with probability `share`."""

@@ -93,7 +93,7 @@ class PuckNetwork:
             schedule.advance(t_ns)
         elif schedule.now_ns < t_ns:  # nothing is planned till then
             schedule.now_ns = t_ns
-        if not self.faults.is_heard(can_id, bytes(data)):
+        if not self.faults.is_heard(can_id, data):
             return
         to = can_id & 0x1F
         try:

@@ -363,7 +363,7 @@ class WamArm:
         for _ in range(_IGNORED_SPEED_FAULTS):
             self._properties.pause(_MS)
             self._traffic.exchange(self._clock.now_ns())
-        self._safety.judge_speed()
+        self._safety.heed_speed_faults()
 
     def _look_at_pendant(self) -> None:
         """Learn why the arm is idle; without an answer the last one stands."""

@@ -46,7 +46,18 @@ class LostPositions:
             ) from error
 
     def clear(self) -> None:
-        """Forget it: all positions are defined."""
-        self._nodes = ()
+        """Forget it: all positions are defined.
+
+        Raises:
+            PreflightError: the file cannot be taken away; the arm stays refused.
+        """
         if self._path is not None:
-            self._path.unlink(missing_ok=True)
+            try:
+                self._path.unlink(missing_ok=True)
+            except OSError as error:
+                raise PreflightError(
+                    "The positions are defined, but what notes that they were lost "
+                    f"cannot be removed: {self._path}: {error.strerror or error}.",
+                    hint="Make the folder of rig.toml writable, then: traction zero.",
+                ) from error
+        self._nodes = ()

@@ -178,7 +178,7 @@ class SafetyModule:
         """Let the module ignore `count` samples before something makes a jump."""
         self._set("IFAULT", count)
 
-    def judge_speed(self) -> None:
+    def heed_speed_faults(self) -> None:
         """Let the module ignore no sample any more.
 
         Raises:

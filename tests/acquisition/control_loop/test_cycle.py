@@ -7,6 +7,7 @@ from acquisition.clock import PERIOD_NS
 from acquisition.control_loop.cycle import Cycle, CycleOutputs
 from acquisition.control_loop.details import MotionExcess
 from acquisition.control_loop.faults import (
+    Action,
     CircuitCauses,
     Fault,
     ReplySilence,
@@ -14,7 +15,7 @@ from acquisition.control_loop.faults import (
 )
 from acquisition.control_loop.loop import Tick
 from acquisition.control_loop.proof import ProofGoal, ProofKind
-from acquisition.control_loop.states import ArmState
+from acquisition.control_loop.states import ArmState, ControlStatus
 from acquisition.devices import ArmReading, SafetyMode, WrenchSample
 from acquisition.errors import LinkError
 from acquisition.sample import MOTOR_FRESH_SHIFT, SAFETY_MODE_MASK, Flag
@@ -690,6 +691,27 @@ def test_a_request_that_waits_for_positions_is_refused_by_a_verdict_meanwhile(be
     bench.arm.missing = 0
     bench.run()
     assert (bench.state, bench.reason) == (ArmState.HOLD, "console-silent")
+
+
+def test_a_start_that_a_verdict_overtook_lets_no_torque_follow(bench):
+    bench.arm.mode = SafetyMode.IDLE
+    bench.run()
+    bench.arm.missing = 1
+    bench.cycle.start()
+    bench.cycle.report(fault("console-silent"))
+    bench.run()
+    bench.arm.missing = 0
+    bench.run()
+    bench.enter(ArmState.HOLD)
+    assert (bench.state, bench.reason) == (ArmState.IDLE, "arm-not-active")
+
+
+def test_a_proof_that_was_idled_stays_so_beside_what_ends_the_session():
+    status = ControlStatus()
+    status.latch(replace(fault("console-silent"), action=Action.IDLE))
+    status.latch(fault("can-silence"))
+    assert status.verdict.action is Action.HOLD  # it is told first
+    assert status.is_idled
 
 
 @pytest.mark.parametrize("state", sorted(TORQUE))

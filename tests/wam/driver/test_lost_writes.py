@@ -139,6 +139,23 @@ def test_positions_that_were_lost_are_known_on_the_disk_until_they_are_defined(
     assert WamArm(rig.link, rig.clock, lost=LostPositions(path)).start().is_zeroed
 
 
+def test_a_note_that_cannot_be_removed_keeps_the_arm_refused(tmp_path, monkeypatch):
+    path = tmp_path / "positions-lost.txt"
+    rig, lost = rig_with((3,)), LostPositions(path)
+    arm = WamArm(rig.link, rig.clock, lost=lost)
+    arm.start()
+
+    def refuse(*_, **__):
+        raise PermissionError(13, "Permission denied")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(type(path), "unlink", refuse)
+        with pytest.raises(TractionError, match="cannot be removed"):
+            arm.define_position(HOME)
+    assert lost.is_noted
+    assert not WamArm(rig.link, rig.clock, lost=LostPositions(path)).start().is_zeroed
+
+
 def test_a_puck_that_cannot_be_noted_is_not_woken(tmp_path):
     rig = rig_with((3,))
     lost = LostPositions(tmp_path / "missing" / "positions-lost.txt")
