@@ -117,9 +117,9 @@ class Cycle:
     def request(self, state: ArmState, known: int | None = None) -> None:
         """Ask for a state; it is entered at the next complete reading, IDLE at once.
 
-        IDLE is never refused; it clears no verdict and ends a trial. Another state is
-        refused unless the newest verdict is known to whoever asks, and while one stands
-        that idles: only `start` ends that.
+        IDLE is never refused, and clears no verdict. Another state is refused unless
+        the newest verdict is known to whoever asks, and while one stands that idles:
+        only `start` ends that.
 
         Args:
             state: what the arm is to do.
@@ -130,7 +130,7 @@ class Cycle:
                 return
             self.status.clear()
         else:
-            self._is_starting = self.is_recording = False
+            self._is_starting = False
         self._ask(REQUESTS[state])
 
     def start(self, known: int | None = None) -> None:

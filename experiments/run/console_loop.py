@@ -315,6 +315,7 @@ class ConsoleLoop:
             self._is_stopped = True
             self.loop_client.request(ArmState.DAMP)
             self.loop_client.advance(DAMP_SECONDS)
+            self.loop_client.watch_trial(is_recording=False)  # it ends with the power
             self.loop_client.request(ArmState.IDLE)
             self.loop_client.advance(TICK)
 

@@ -49,6 +49,9 @@ class StubClient:
     def start(self):
         self.requested.append(ArmState.HOLD)
 
+    def watch_trial(self, *, is_recording):
+        assert not is_recording
+
     def note(self, control):
         self.known = control.number
 
