@@ -186,7 +186,7 @@ def boot(
         first_root = folder / "initramfs"
         busybox = Path(program("busybox"))
         first_root.write_bytes(initramfs.build(busybox, kernel.modules, job))
-        names = ("line", "monitor", "memory")
+        names = ("line", "monitor", "memory", "debugger")
         sockets = Sockets(*(folder / name for name in names))
         machine = Machine(kernel, first_root, sockets)
         try:

@@ -10,6 +10,7 @@ from lab.results import (
     Begun,
     Finished,
     ScenarioResult,
+    TimerFound,
     Verdict,
     from_line,
 )
@@ -33,6 +34,10 @@ class ReadConsole(Protocol):
 
     def line(self, until_ns: int) -> str | None:
         """Return the next line; None at its end, TimeoutError after `until_ns`."""
+        ...
+
+    def correct_timer(self, found: TimerFound) -> None:
+        """Tell its kernel the true rate of its local timer."""
         ...
 
 
@@ -91,6 +96,8 @@ class Follower:
             case Begun(name):
                 self._running = name
                 self._allow(LIMIT, machine.processor_seconds())
+            case TimerFound() as found:
+                machine.correct_timer(found)
             case Finished():
                 self._is_over = True
             case ScenarioResult() as result:

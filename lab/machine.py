@@ -11,9 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from acquisition.clock import NS_PER_S, SystemClock
+from lab import local_timer
 from lab.calls import MEMORY_SIZE
 from lab.kernel import Kernel
 from lab.requirements import program
+from lab.results import TimerFound
 
 # With -icount an instruction takes 1 ns. The kernel is given a time stamp counter of
 # six times the true rate, so its time passes six times slower than the processor's,
@@ -38,11 +40,13 @@ class Sockets:
         line: the far end of the serial adapter.
         monitor: QEMU's, to plug devices in and out.
         memory: a file that guest and simulated arm share.
+        debugger: QEMU's gdb stub.
     """
 
     line: Path
     monitor: Path
     memory: Path
+    debugger: Path
 
 
 def command(kernel: Kernel, initramfs: Path, sockets: Sockets, proxy: int) -> list[str]:
@@ -73,6 +77,7 @@ def command(kernel: Kernel, initramfs: Path, sockets: Sockets, proxy: int) -> li
         *_serial_adapter(sockets.line),
         *_monitor(sockets.monitor),
         *_far_side(sockets.memory, proxy),
+        *_options(("-gdb", f"unix:{sockets.debugger},server=on,wait=off")),
     ]
 
 
@@ -157,6 +162,7 @@ class Machine:
                 stderr=subprocess.STDOUT,
                 pass_fds=(here.fileno(),),
             )
+        self._debugger = sockets.debugger
         self._taken = [0.0, 0.0]
         self._lines: queue.Queue[str | None] = queue.Queue()
         self._reader = threading.Thread(target=self._read, daemon=True)
@@ -183,6 +189,10 @@ class Machine:
             with contextlib.suppress(OSError):  # it has ended
                 self._taken[number] = _taken_by(process.pid)
         return sum(self._taken)
+
+    def correct_timer(self, found: TimerFound) -> None:
+        """Tell its kernel the true rate of its local timer; raises DebuggerError."""
+        local_timer.correct(self._debugger, found.events, found.offsets, SLOWNESS)
 
     def close(self) -> None:
         """Switch it off; safe to repeat."""

@@ -64,10 +64,23 @@ class Finished:
     boot_seconds: float
 
 
-Message = ScenarioResult | Begun | Finished
+@dataclass(frozen=True, slots=True)
+class TimerFound:
+    """Where the kernel keeps its local timer: values of two of its symbols.
+
+    Attributes:
+        events: `lapic_events`.
+        offsets: `__per_cpu_offset`.
+    """
+
+    events: int
+    offsets: int
 
 
-_PLAIN = {one.__name__: one for one in (Begun, Finished)}
+Message = ScenarioResult | Begun | Finished | TimerFound
+
+
+_PLAIN = {one.__name__: one for one in (Begun, Finished, TimerFound)}
 
 
 def to_line(message: Message) -> str:

@@ -75,7 +75,11 @@ def _make_fresh(kept: Collection[int]) -> None:
     sys.stdin = os.fdopen(0, "r", closefd=False)
     sys.stdout = os.fdopen(1, "w", closefd=False)
     sys.stderr = os.fdopen(2, "w", buffering=1, closefd=False)
-    # What this process starts begins warm, too.
+    start_warm()
+
+
+def start_warm() -> None:
+    """Let what this process starts of the program begin warm."""
     subprocess.Popen = WarmPopen  # pyright: ignore[reportAttributeAccessIssue]
 
 

@@ -63,7 +63,7 @@ def test_the_machine_has_read_only_files_and_two_cards_on_one_bus(
     monkeypatch, tmp_path
 ):
     monkeypatch.setattr("lab.machine.program", lambda name: f"/usr/bin/{name}")
-    sockets = Sockets(*(tmp_path / name for name in "abc"))
+    sockets = Sockets(*(tmp_path / name for name in "abcd"))
     kernel = Kernel(tmp_path / "vmlinux", ())
     words = command(kernel, tmp_path / "initramfs", sockets, 9)
     assert any("path=/," in word and "readonly=on" in word for word in words)

@@ -9,6 +9,7 @@ from lab.results import (
     Begun,
     Finished,
     ScenarioResult,
+    TimerFound,
     Verdict,
     to_line,
 )
@@ -31,6 +32,9 @@ class Tape:
         self._taken += 1.0
         return self._taken
 
+    def correct_timer(self, found):
+        self.found = found
+
     def line(self, until_ns):
         assert until_ns > 0
         if self._lines:
@@ -47,6 +51,13 @@ def follow(tape, *names):
 def test_results_come_out_in_the_order_in_which_they_came():
     lines = [to_line(Begun("bench")), "[ 1.0] usb", to_line(SENT), FINISHED]
     assert follow(Tape(*lines), "bench") == [PASSED]
+
+
+def test_a_timer_that_the_machine_found_is_corrected():
+    found = TimerFound(0x1FDC0, 0xFFFF_FFFF_8241_CB60)
+    tape = Tape(to_line(found), to_line(Begun("bench")), to_line(SENT), FINISHED)
+    assert follow(tape, "bench") == [PASSED]
+    assert tape.found == found
 
 
 @pytest.mark.parametrize("is_hanging", [True, False])

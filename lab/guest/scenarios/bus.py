@@ -32,7 +32,7 @@ def at_rate(room: MachineRoom) -> Figures:
     room.serve_home_arm()
     room.finish(room.traction("zero", "--yes"), _PATIENCE)
     page = room.finish(
-        room.traction("check", "--loop-test", "2", before=COLD), _PATIENCE
+        room.traction("check", "--loop-test", "1", before=COLD), _PATIENCE
     )
     require("LIVE RIG" in page, "check did not meet a live rig")
     before = counters(CAN)

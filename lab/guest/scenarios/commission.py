@@ -6,8 +6,8 @@ import numpy as np
 
 from experiments.commissioning.record import Commissioning, read_commissioning
 from experiments.commissioning.steps import GATED, ProofStep
-from experiments.proving.recording import Values, read_raw
-from experiments.proving.rest_pose import liftoffs, rest_pose
+from experiments.proving.recording import read_raw
+from experiments.proving.rest_pose import rest_pose
 from experiments.rig.build import build_tool
 from experiments.settings.load import load_settings
 from lab.guest.commands import Program, ScenarioError, require
@@ -20,42 +20,46 @@ from wam.model.arm_model import ArmModel
 from wam.model.constants import load_constants
 
 _STEP = 120.0  # s of guest time until it asks for the next thing, or has ended
-_CARRIED = 2.5  # s, in which hands bring the arm into a pose
-_COMES_TO_REST = 1.0  # s, until an arm that is held or let go of is still
+_CARRIED = 1.0  # s, in which hands bring the arm into a pose
+_COMES_TO_REST = 0.5  # s, until an arm that is held or let go of is still
 _FRICTION = "0.7"  # of the joints, as a share of what was identified on another arm
 _STOPPED = 3  # exit code: a step found something wrong
 _BEFORE_TORQUE = GATED[: GATED.index(ProofStep.REST_POSE)]
-_ON_REST_POSE = GATED[len(_BEFORE_TORQUE) :]
-_WRONG = "motor-3-reversed"
+_BETWEEN = (ProofStep.RAMPS, ProofStep.LIFT)
+_ON_REST_POSE = (ProofStep.REST_POSE, ProofStep.GRAVITY_RAMP)
+_WRONG = "motor-2-weak"
 
 
 def at_rest(room: MachineRoom) -> Figures:
-    """Commission an arm with little torque: C8 to C11 on its rest pose.
+    """Commission an arm on its rest pose: no torque in C8, its whole weight in C11.
 
-    C0 to C7, which send none, are written into the record as sound. The command finds
-    by itself that C8 is next, and nothing before it stale.
+    The steps before and between them, which take longer, are written into the record as
+    sound. The command finds by itself that C8 is next, and then C11.
     """
-    day = _rest_steps(room, _pushed(room))
+    day = _laid_down(room, _pushed(room), *_BEFORE_TORQUE, *_BETWEEN)
+    day.hand("activate")
+    day.program.expect("The module braked", _STEP)
+    day.hand("idle")
+    day.hand("activate")
     room.finish(day.program, _STEP)
     record = _sound_record(room, GATED)
-    lifted = liftoffs(_recorded(room, record, ProofStep.RAMPS))
     return {
-        "lift-off": ", ".join(
-            f"joint {abs(joint)} {torque:.2f} N m" for joint, torque in lifted.items()
-        ),
         "silence": _measured(record, ProofStep.REST_POSE, "a module that brakes"),
         "sole": _farthest(room, record),
     }
 
 
 def wrong_arm(room: MachineRoom) -> Figures:
-    """Commission an arm with a reversed motor: C9 stops, and says which."""
-    day = _rest_steps(room, _pushed(room, "--wrong", _WRONG))
+    """Commission an arm with a weak motor: C11 stops, the arm goes idle."""
+    sound = GATED[: GATED.index(ProofStep.GRAVITY_RAMP)]
+    day = _laid_down(room, _pushed(room, "--wrong", _WRONG), *sound)
+    day.hand("activate")
     room.finish(day.program, _STEP, _STOPPED)
     record = _record(room)
     (wrong,) = [done for done in record.steps if done.cause]
-    require(wrong.step is ProofStep.RAMPS, f"{wrong.name} stopped, in place of C9")
-    require("motor 3" in wrong.cause, wrong.cause)
+    said = f"{wrong.step} stopped, in place of C11"
+    require(wrong.step is ProofStep.GRAVITY_RAMP, said)
+    require("Compensation moves the arm" in wrong.cause, wrong.cause)
     return {_WRONG: wrong.cause, "sole": _farthest(room, record)}
 
 
@@ -64,25 +68,22 @@ def _pushed(room: MachineRoom, *options: str) -> Program:
     return served_arm(room, "--friction", _FRICTION, *options)
 
 
-def _rest_steps(room: MachineRoom, arm: Program) -> LedSession:
-    """Return a commissioning that has its arm activated on the rest pose, in C8.
+def _laid_down(room: MachineRoom, arm: Program, *sound: ProofStep) -> LedSession:
+    """Return a commissioning that waits for its arm, on the rest pose, to be activated.
 
-    Hands lay it down before its pucks are woken: shorted windings would slow them.
+    `sound`: steps that are taken as done. Hands lay the arm down before its pucks are
+    woken: shorted windings would slow them.
     """
     angles = " ".join(f"{angle:.4f}" for angle in rest_pose(load_constants()))
     arm.press(f"pose {angles} {_CARRIED:g}\n")
     arm.run_on(_CARRIED + _COMES_TO_REST)
-    take_as_commissioned(room.config, _BEFORE_TORQUE)
+    take_as_commissioned(room.config, sound)
     day = LedSession(room, room.traction("commission", "--until", GATED[-1]), arm)
     day.program.expect("Lay the arm into its rest pose", _STEP)
     day.hand("release")
     day.program.run_on(_COMES_TO_REST)
     day.confirm()
     day.program.expect("Press Shift-activate", _STEP)
-    day.hand("activate")
-    day.program.expect("The module braked", _STEP)
-    day.hand("idle")
-    day.hand("activate")
     return day
 
 
@@ -102,13 +103,6 @@ def _sound_record(room: MachineRoom, steps: Sequence[ProofStep]) -> Commissionin
     return record
 
 
-def _recorded(room: MachineRoom, record: Commissioning, step: ProofStep) -> Values:
-    done = record.of(step)
-    if done is None or not done.raw:
-        raise ScenarioError(f"{step} has no recording")
-    return read_raw(room.folder, done.raw[0])
-
-
 def _measured(record: Commissioning, step: ProofStep, words: str) -> str:
     """Return the quantity of a step whose name ends with `words`."""
     done = record.of(step)
@@ -118,13 +112,14 @@ def _measured(record: Commissioning, step: ProofStep, words: str) -> str:
 
 
 def _farthest(room: MachineRoom, record: Commissioning) -> str:
-    """Return in words how far the sole went at most in a step of C8 to C11."""
+    """Return in words how far the sole went at most in C8 or C11."""
     settings = load_settings(room.config)
     tool = build_tool(settings.rig, settings.matrix.terrains[0].foot)
     model = ArmModel(load_constants(), tool)
     travel = 0.0
     for step in _ON_REST_POSE:
-        if record.of(step) is not None:
-            path = model.sole_path(_recorded(room, record, step)["q"]).position
+        done = record.of(step)
+        for raw in () if done is None else done.raw:
+            path = model.sole_path(read_raw(room.folder, raw)["q"]).position
             travel = max(travel, float(np.linalg.norm(path - path[0], axis=1).max()))
     return f"{1e3 * travel:.1f} mm at most"

@@ -1,0 +1,125 @@
+"""Tells the guest's kernel the true rate of its local timer, through QEMU's gdb stub.
+
+The kernel's time passes `SLOWNESS` times slower than the timer counts. It calibrates
+the timer against clocks that are not slowed, so each interrupt comes after one sixth of
+what is left to wait, and some thirty come in place of one.
+"""
+
+import socket
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+
+_PATIENCE = 30.0  # s of the host
+_POINTER = struct.Struct("<Q")
+# struct clock_event_device of Linux: three functions, the next event, then these.
+_RATE = struct.Struct("<32x QQ II")  # longest and shortest wait [ns], factor, its shift
+_LONGEST_AT, _FACTOR_AT = 32, 48
+_SHIFT = 32
+_MASK = 2**64 - 1
+
+
+class DebuggerError(Exception):
+    """The stub does not answer, or the kernel is another one than was expected."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rate:
+    """How a clock event device turns nanoseconds into counts.
+
+    Attributes:
+        longest: longest wait [ns].
+        factor: counts of a nanosecond, times 2 ** shift.
+        shift: of the factor.
+    """
+
+    longest: int
+    factor: int
+    shift: int
+
+    def slowed(self, slowness: int) -> "Rate":
+        """Return the rate of the same timer in a kernel whose time passes slower.
+
+        Raises:
+            DebuggerError: it is not the local timer, or its factor has no room.
+        """
+        factor = self.factor * slowness
+        if self.shift != _SHIFT or not 0 < self.factor < factor < 2**32:
+            raise DebuggerError(f"the kernel's local timer is not as expected: {self}.")
+        return Rate(self.longest // slowness, factor, self.shift)
+
+
+class Debugger:
+    """A connection to the stub; the machine stands still while it is open."""
+
+    def __init__(self, path: Path) -> None:
+        """Connect; raises OSError."""
+        self._link = socket.socket(socket.AF_UNIX)
+        self._link.settimeout(_PATIENCE)
+        self._link.connect(str(path))
+        self._bytes = b""
+
+    def __enter__(self) -> "Debugger":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        with self._link:
+            self._ask("D")  # detach: the machine goes on
+
+    def read(self, address: int, size: int) -> bytes:
+        """Return memory at a virtual address; raises DebuggerError."""
+        answer = self._ask(f"m{address:x},{size:x}")
+        try:
+            return bytes.fromhex(answer)
+        except ValueError:
+            raise DebuggerError(f"the stub answered {answer!r}.") from None
+
+    def write(self, address: int, data: bytes) -> None:
+        """Write memory at a virtual address; raises DebuggerError."""
+        answer = self._ask(f"M{address:x},{len(data):x}:{data.hex()}")
+        if answer != "OK":
+            raise DebuggerError(f"the stub answered {answer!r}.")
+
+    def _ask(self, text: str) -> str:
+        """Return the answer to a packet; raises DebuggerError where none comes."""
+        data = text.encode()
+        self._link.sendall(b"$%s#%02x" % (data, sum(data) % 256))
+        while True:
+            answer = self._packet()
+            if not answer.startswith("T"):  # that the machine has stopped: unasked
+                return answer
+
+    def _packet(self) -> str:
+        while (end := self._bytes.find(b"#")) < 0 or len(self._bytes) < end + 3:
+            try:
+                more = self._link.recv(4096)
+            except OSError as error:
+                raise DebuggerError(f"the stub is silent: {error}.") from None
+            if not more:
+                raise DebuggerError("the stub has hung up.")
+            self._bytes += more
+        start = self._bytes.index(b"$") + 1
+        text, self._bytes = self._bytes[start:end], self._bytes[end + 3 :]
+        self._link.sendall(b"+")
+        return text.decode("ascii", "replace")
+
+
+def correct(path: Path, events: int, offsets: int, slowness: int) -> None:
+    """Slow the local timer of the first processor down to its kernel's time.
+
+    Args:
+        path: of the stub's socket.
+        events: the kernel's symbol `lapic_events`, relative to a processor's area.
+        offsets: its symbol `__per_cpu_offset`: where the areas begin.
+        slowness: the kernel's time passes so many times slower than the timer counts.
+
+    Raises:
+        DebuggerError, OSError: there is no stub, or the kernel is another one.
+    """
+    with Debugger(path) as debugger:
+        (area,) = _POINTER.unpack(debugger.read(offsets, _POINTER.size))
+        device = (area + events) & _MASK
+        longest, _, factor, shift = _RATE.unpack(debugger.read(device, _RATE.size))
+        rate = Rate(longest, factor, shift).slowed(slowness)
+        debugger.write(device + _LONGEST_AT, _POINTER.pack(rate.longest))
+        debugger.write(device + _FACTOR_AT, struct.pack("<I", rate.factor))
