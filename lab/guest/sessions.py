@@ -89,26 +89,6 @@ class LedSession:
         """Wait until the next trial can be recorded."""
         self.program.expect("[space] record", _STEP)
 
-    def whole_trial(self) -> None:
-        """Activate the arm, record the only trial that is left, end the session."""
-        self.await_ready()
-        self.record()
-        self.keep()
-        self.end()
-
-    def end(self) -> None:
-        """End the session by key; raises ScenarioError if it does not end well."""
-        code = self.ended()
-        require(code == 0, f"exit code {code} in place of 0")
-
-    def ended(self) -> int:
-        """End the session by key, its last tare taken; return the exit code."""
-        self.program.expect("[space] to end the session", _STEP)
-        self._press(" ")
-        self.program.expect(_SUPPORT, _STEP)
-        self._press(_IDLE)
-        return self.program.wait(_STEP)
-
     def cut_off(self) -> int:
         """Return the exit code of a session that was cut, once it has ended.
 
@@ -121,6 +101,10 @@ class LedSession:
                 self._press(_IDLE)
                 break
         return self.program.wait(_STEP)
+
+    def leave(self) -> None:
+        """Leave the session to be resumed another time."""
+        self._press("q")
 
     def confirm(self) -> None:
         """Press the space bar, as asked."""

@@ -33,9 +33,9 @@ class Scenario:
 
 
 ALL = (
-    Scenario("bus at rate", bus.at_rate, weight=9),
-    Scenario("losses and link down", losses.lossy_and_down, weight=8),
-    Scenario("unplugging", unplugging.in_a_trial, weight=22),
+    Scenario("bus at rate", bus.at_rate, weight=12),
+    Scenario("losses and link down", losses.lossy_and_down, weight=9),
+    Scenario("unplugging", unplugging.in_a_trial, weight=15),
     Scenario("serial line", serial_line.serial_line, weight=4),
     Scenario("commissioning at rest", commission.at_rest, weight=5),
     Scenario("a wrong arm", commission.wrong_arm, weight=4),
