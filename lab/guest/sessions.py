@@ -16,7 +16,8 @@ _REVIEW = 90.0  # s until a trial is reviewed: what that needs is read from the 
 _REACTION = 0.1  # s from a prompt to the key
 _SUPPORT, _IDLE = "Support the arm: it goes idle", "i"
 _REST = 0.7  # s in which the foot comes to rest on the ground
-_PUSH = 0.8  # s of a trial, ended by key: every second costs the host many
+# s of a trial: each costs the host many; sooner the key that ends it counts as held.
+_PUSH = 0.8
 TERRAIN = "TF"
 MOST_MISSED_PPM = 10
 
