@@ -109,6 +109,8 @@ class ArmReading:
         change: of a motor's controller since the start; None = none was seen.
         disobeys: how a motor's controller contradicts what it was told, `was`; told in
             one cycle. None = none does.
+        doubled: motor, 1-7, whose position came more often than it was asked for; 0 =
+            none.
     """
 
     host_ns: int
@@ -128,6 +130,7 @@ class ArmReading:
     late: LatePositions | None = None
     change: MotorChange | None = None
     disobeys: MotorChange | None = None
+    doubled: int = 0
 
 
 @dataclass(slots=True)

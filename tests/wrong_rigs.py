@@ -114,7 +114,7 @@ FOUND: dict[str, tuple[Finding, ...]] = {
     "sensor-20ms-late": (Finding("C12", ("lag",)),),
     "replies-a-cycle-late": (Finding("C2", ("refused",), "C0"),),
     "frames-lost": (Finding("C3", ("incomplete",)),),
-    "duplicate-node": (Finding("C2", ("twice",), "C0"),),
+    "duplicate-node": (Finding("C2", ("twice", "refused"), "C0"),),
     "other-master": (Finding("C1", ("masters", "frames"), "C0"),),
     "stop-button-dead": (Finding("C4", (REFUSED,)),),
     "module-disobeys": (Finding("C4", ("early",)),),

@@ -44,6 +44,13 @@ class LateReplies:
 
 
 @dataclass(frozen=True, slots=True)
+class DoubledPuck:
+    """Number of a motor, 1-7, whose position comes more often than it is asked for."""
+
+    motor: int
+
+
+@dataclass(frozen=True, slots=True)
 class SafetySilence:
     """Age of the safety module's last answer [ms]."""
 
@@ -193,6 +200,7 @@ FaultDetail = (
     | Joint7Slip
     | ForceAge
     | ContactExcess
+    | DoubledPuck
     | Saturation
     | ForceGrowth
     | LateCycles

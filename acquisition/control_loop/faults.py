@@ -12,6 +12,7 @@ from typing import Any
 from acquisition.control_loop.details import (
     CircuitCauses,
     ContactExcess,
+    DoubledPuck,
     FaultDetail,
     FootSpeedExcess,
     ForceAge,
@@ -63,6 +64,7 @@ class Fault(StrEnum):
     BUS_SHARED = "bus-shared"
     PUCK_CHANGED = "puck-changed"
     PUCK_DISOBEYS = "puck-disobeys"
+    PUCK_DOUBLED = "puck-doubled"
     NOT_ASKED_ACTIVE = "not-asked-active"
     NOT_ACTIVE = "arm-not-active"
     ACTIVATION_MOTION = "activation-motion"
@@ -128,6 +130,7 @@ FAULTS: Mapping[Fault, FaultSpec] = {
     Fault.BUS_SHARED: FaultSpec(_IDLE, ForeignFrame, ends_session=True),
     Fault.PUCK_CHANGED: FaultSpec(_IDLE, MotorChange, ends_session=True),
     Fault.PUCK_DISOBEYS: FaultSpec(_IDLE, MotorChange, ends_session=True),
+    Fault.PUCK_DOUBLED: FaultSpec(_IDLE, DoubledPuck, ends_session=True),
     Fault.NOT_ASKED_ACTIVE: FaultSpec(_IDLE, ends_session=True),
     Fault.NOT_ACTIVE: FaultSpec(_IDLE, ends_session=True),
     Fault.ACTIVATION_MOTION: FaultSpec(_IDLE, MotionExcess, ends_session=True),

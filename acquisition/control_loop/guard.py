@@ -12,6 +12,7 @@ from acquisition.clock import NS_PER_MS, NS_PER_S, PERIOD_NS
 from acquisition.control_loop.contact import Contact, ContactState, check_contact
 from acquisition.control_loop.details import (
     CircuitCauses,
+    DoubledPuck,
     FootSpeedExcess,
     ForceAge,
     ForeignFrame,
@@ -194,6 +195,8 @@ def _check_idle(seen: Observation) -> GuardVerdict:
     if seen.state is ArmState.IDLE:
         if seen.reading.foreign_id is not None:
             return verdict_for(Fault.BUS_SHARED, ForeignFrame(seen.reading.foreign_id))
+        if seen.reading.doubled:
+            return verdict_for(Fault.PUCK_DOUBLED, DoubledPuck(seen.reading.doubled))
         if seen.safety is SafetyMode.ACTIVE:
             return verdict_for(Fault.NOT_ASKED_ACTIVE)
     if seen.is_recording or (seen.is_commanded and not seen.is_starting):
@@ -316,6 +319,12 @@ def _check_master(facts: Facts) -> GuardVerdict:
     if foreign_id is None:
         return OK
     return verdict_for(Fault.BUS_SHARED, ForeignFrame(foreign_id))
+
+
+def _check_doubled(facts: Facts) -> GuardVerdict:
+    """Give up an arm whose positions may be another sender's."""
+    motor = facts.seen.reading.doubled
+    return verdict_for(Fault.PUCK_DOUBLED, DoubledPuck(motor)) if motor else OK
 
 
 def _check_change(facts: Facts) -> GuardVerdict:
@@ -468,6 +477,7 @@ CHECKS: tuple[Callable[[Facts], GuardVerdict], ...] = (
     _check_silence,
     _check_late,
     _check_master,
+    _check_doubled,
     _check_change,
     _check_obedience,
     _check_move,

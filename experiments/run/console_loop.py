@@ -40,7 +40,13 @@ _AT_REST = frozenset(
 _DAMPED = "ARM: damped where it is. [space] once you hold it: then it holds again."
 # Faults after which no hand is to lead the arm by what is known of its place.
 _LED_ASTRAY = frozenset(
-    {Fault.REPLIES_LATE, Fault.POSITION_JUMP, Fault.CAN_SILENCE, Fault.PUCK_CHANGED}
+    {
+        Fault.REPLIES_LATE,
+        Fault.POSITION_JUMP,
+        Fault.CAN_SILENCE,
+        Fault.PUCK_CHANGED,
+        Fault.PUCK_DOUBLED,
+    }
 )
 # Of an arm whose motors work.
 _DRIVEN = frozenset({ArmState.FLOAT, ArmState.HOLD, ArmState.DAMP, ArmState.GUIDE})

@@ -17,6 +17,8 @@ from wam.bus.frames import (
     SAFETY_NODE,
     SENSOR_NODE,
     Group,
+    decode_position,
+    encode_position,
     group_id,
     position_reply_id,
 )
@@ -37,6 +39,7 @@ _LATE_EVERY = 50  # cycles
 _PAST_NS, _LONG_PAST_NS = 2_000_000, 3_950_000
 _LOSING_MODE = (2, 4, 7)  # pucks
 LAST_PUCK = 7  # nothing is on the wire after its reply
+_TWIN_NS, _TWIN_COUNTS = 50_000, 100  # of a second puck behind the first one
 _LOST_SHARE = 0.01  # of the replies of each puck
 
 
@@ -115,7 +118,8 @@ def _reply_faults(faults: BusFaults) -> dict[str, Callable[[], None]]:
         "reply-late": lambda: _answer_too_late(faults),
         "replies-late": lambda: _answer_always_late(faults, MOTOR_NODES, _PAST_NS),
         "puck-late": lambda: _answer_always_late(faults, [LAST_PUCK], _LONG_PAST_NS),
-        "reply-doubled": lambda: faults.duplicate(reply, None),
+        "reply-doubled": lambda: faults.duplicate(reply, 3),
+        "puck-doubled": lambda: faults.answer_twice(reply, _off_by_a_bit, _TWIN_NS),
         "reply-swapped": lambda: _swap_replies(faults),
         "reply-spoilt": lambda: faults.corrupt(reply, 0, 3),
     }
@@ -125,6 +129,11 @@ def _answer_always_late(faults: BusFaults, nodes: Iterable[int], late_ns: int) -
     """Let every reply of `nodes` be late by about whole cycles, for ever."""
     for node in nodes:
         faults.delay(position_reply_id(node), late_ns, None)
+
+
+def _off_by_a_bit(reply: bytes) -> bytes:
+    """Return the position of a second puck, some millimetres of the sole away."""
+    return encode_position(decode_position(reply) + _TWIN_COUNTS)
 
 
 def _lose_some(faults: BusFaults) -> None:

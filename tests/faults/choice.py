@@ -36,6 +36,7 @@ WHY: Mapping[Fault, str] = {
     Fault.BUS_SHARED: f"{_TORQUES}: they are another program's too",
     Fault.PUCK_CHANGED: _TORQUES,
     Fault.PUCK_DISOBEYS: _TORQUES,
+    Fault.PUCK_DOUBLED: f"{_POSITIONS}: no second one is to be believed",
     Fault.NOT_ASKED_ACTIVE: "no torque is ready: active, it would fall",
     Fault.NOT_ACTIVE: "the next press of the pendant would drive it",
     Fault.ACTIVATION_MOTION: _TORQUES,

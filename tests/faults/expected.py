@@ -298,6 +298,7 @@ _NEVER_SEEN_ACTIVE = Cell(
     why="the module says idle for ever, and the arm is held",
 )
 _SHARED = "Another program sends to the arm: frame "
+_TWICE = "Puck 3 answers more often than it is asked"
 _EARLY = "The arm was activated before it was asked for."
 _NAN = "A position or torque was not a number."
 _CANNOT_COUNT = Cell(End.ENDED, "Joint torques are not numbers")
@@ -411,6 +412,13 @@ TABLE: dict[str, Row] = {
         "bus-shared",
         preflight=Cell(End.ENDED, _SHARED, why="found as soon as the loop runs"),
         idle=Cell(End.ENDED, _SHARED),
+    ),
+    "puck-doubled": _ending(
+        _TWICE,
+        replace(_IDLE, limit_ms=20),
+        "puck-doubled",
+        preflight=_refused(_TWICE),
+        idle=Cell(End.ENDED, _TWICE),
     ),
     "early-activation": _row(
         replace(OK, why="the arm is active already"),

@@ -82,6 +82,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             (
                 "reply-late",
                 "reply-doubled",
+                "puck-doubled",
                 "reply-swapped",
                 "replies-late",
                 "replies-late-2",

@@ -56,6 +56,7 @@ STRIKES: dict[str, Strike] = {
     "safety-silent": strike_of("safety-silent"),
     # They idle.
     "bus-shared": strike_of("bus-shared"),
+    "puck-doubled": strike_of("puck-doubled"),
     "not-a-number": strike_of("not-a-number"),
     "safety-heartbeat": strike_of("safety-heartbeat"),
     "pendant-idle": strike_of("pendant-idle"),
@@ -195,10 +196,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options.add_argument("--count", type=int, help="so many of them; else all")
     options.add_argument("--seed", type=int, default=1)
     options.add_argument("--jobs", type=int, default=2)
+    options.add_argument("--skip", type=int, default=0, help="so many, run before")
     chosen = options.parse_args(arguments)
     pairs = list(every_pair())
     if chosen.count is not None:
         pairs = random.Random(chosen.seed).sample(pairs, chosen.count)
+    pairs = pairs[chosen.skip :]
     wrong = 0
     with ProcessPoolExecutor(chosen.jobs) as pool:
         for done, (pair, problems) in enumerate(pool.map(_problems, pairs), 1):

@@ -116,7 +116,7 @@ class WamArm:
 
         Raises:
             PreflightError: a puck or the safety module is missing, in E-stop, asleep
-                for good, or of another kind.
+                for good, of another kind, or there twice.
             DeviceFaultError: a device reports an error or nonsense.
             LinkTimeoutError: a device stopped answering on the way.
             LinkError: the bus is down.
@@ -232,6 +232,7 @@ class WamArm:
             is_unasked=is_unasked,
             change=self._poller.watch.change,
             disobeys=self._poller.take_disobedience(),
+            doubled=traffic.balance.doubled(),
         )
 
     def send(self, tau: Vector, tau_gravity: Vector) -> Vector:
@@ -364,6 +365,13 @@ class WamArm:
             self._properties.pause(_MS)
             self._traffic.exchange(self._clock.now_ns())
         self._safety.heed_speed_faults()
+        if motor := self._traffic.balance.doubled():
+            raise PreflightError(
+                f"Puck {motor} answers more often than it is asked: something else "
+                "answers in its name.",
+                hint="Look for a second puck of that number, a second program, or an "
+                "adapter that repeats frames.",
+            )
 
     def _look_at_pendant(self) -> None:
         """Learn why the arm is idle; without an answer the last one stands."""

@@ -21,6 +21,7 @@ from wam.bus.frames import (
 )
 from wam.bus.link import Link
 from wam.bus.properties import MODERN, Device, nearest_documented, property_number
+from wam.driver.reply_balance import ReplyBalance
 from wam.driver.settings import ArmSettings
 from wam.driver.status_poller import StatusPoller
 from wam.driver.transmission import MOTORS
@@ -103,6 +104,7 @@ class CycleTraffic:
         poller: safety module and pucks, asked in the free bus time.
         bus_device: asked right after the positions, while the pucks latch theirs.
         counters: what was dropped so far.
+        balance: of position replies and the questions for them.
         condition: what became of the bus at the last question for positions.
         took_ns: from the last question to the last reply that was awaited [ns].
     """
@@ -116,6 +118,7 @@ class CycleTraffic:
         self.poller = StatusPoller(link, settings)
         self.bus_device: BusDevice | None = None
         self.counters = LinkCounters(link)
+        self.balance = ReplyBalance()
         self.condition = BusCondition.SOUND
         self.took_ns = 0
         self._asked_ns = 0  # when positions were asked for last
@@ -149,6 +152,7 @@ class CycleTraffic:
             self.received = [None] * MOTORS
             self.bus_ns = 0
             self._link.send(_ARM_ID, self._get_p)
+            self.balance.note_question()
             self._asked_ns = now_ns
             self._ask_bus_device()
             self._await_replies(now_ns)
@@ -280,7 +284,7 @@ class CycleTraffic:
 
     def _collect(self) -> int:
         """Sort what has arrived and return how many positions there were."""
-        arrived, received = 0, self.received
+        arrived, received, replies = 0, self.received, self.balance.replies
         for can_id, data, t_ns in self._link.receive():
             index = _POSITION_INDEX.get(can_id)
             try:
@@ -290,6 +294,7 @@ class CycleTraffic:
                         self._owed &= ~(1 << index)
                     received[index] = counts
                     self.bus_ns = t_ns
+                    replies[index] += 1
                     arrived += 1
                 else:
                     if self.bus_device is not None:

@@ -28,6 +28,7 @@ RECORDED_NAMES = {
     "bus-shared",
     "puck-changed",
     "puck-disobeys",
+    "puck-doubled",
     "not-asked-active",
     "arm-not-active",
     "activation-motion",

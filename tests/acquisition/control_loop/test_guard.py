@@ -132,6 +132,7 @@ LIMIT_TABLE = [
     (Fault.REPLIES_LATE, Action.HOLD, {"late": None}, late(2)),
     (Fault.REPLIES_LATE, Action.IDLE, {"late": None}, late(3)),
     (Fault.PUCK_CHANGED, Action.IDLE, {"change": None}, {"change": CHANGE}),
+    (Fault.PUCK_DOUBLED, Action.IDLE, {"doubled": 0}, {"doubled": 3}),
     (Fault.FOOT_SPEED, Action.DAMP, {"foot_speed": 0.8}, {"foot_speed": 0.8 + E}),
     (
         Fault.JOINT7_SLIP,

@@ -581,6 +581,7 @@ CASES = {
     "console-lost": acted(Prompt.READY, _orphan, 4, since=0.0),
     "arm-not-active": acted(Prompt.LIFT, _ask_an_idle_arm, 4),
     "puck-disobeys": struck("mode-lost-4", words="Puck 4 does not"),
+    "puck-doubled": struck("puck-doubled", words="Puck 3 answers more often"),
     "loop-lost": acted(Prompt.LIFT, _stand_still_for_long, 4, "for 200 ms"),
     "process-lost": acted(Prompt.LIFT, _lose_recorder, 4, "recorder process ended"),
     # disk, lock, kill, bug

@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 from acquisition.devices import BusCondition
+from acquisition.errors import PreflightError
 from acquisition.sample import Flag, reading_bits
 from fakes.pucks.bus_faults import BusFaults
 from fakes.pucks.options import NetworkOptions
 from fakes.world.faults import network_faults
 from tests.fakes.stepped import Rig
-from wam.bus.frames import position_reply_id
+from wam.bus.frames import MOTOR_NODES, position_reply_id
 from wam.driver.arm import WamArm
 from wam.driver.settings import ArmSettings
 
@@ -106,6 +107,22 @@ def test_a_doubled_reply_is_counted_and_changes_nothing(bench):
     assert all(r.is_complete for r in readings)
     assert bench.is_true(readings[-1])
     assert bench.arm.counters.stale >= 4  # the last one may still be on the wire
+
+
+@pytest.mark.parametrize("node", MOTOR_NODES)
+@pytest.mark.parametrize("after_ns", [0, 50_000, 1_000_000])
+def test_a_second_sender_is_found_within_ten_cycles(bench, node, after_ns):
+    bench.faults.answer_twice(position_reply_id(node), lambda data: data, after_ns)
+    found = [bench.cycle().doubled for _ in range(10)]
+    assert found[0] == 0
+    assert found[-1] == node
+
+
+@pytest.mark.parametrize("after_ns", [0, 50_000, 1_000_000])
+def test_an_arm_that_has_a_puck_twice_is_not_started(bench, after_ns):
+    bench.faults.answer_twice(position_reply_id(5), lambda data: data, after_ns)
+    with pytest.raises(PreflightError, match="Puck 5 answers more often"):
+        bench.arm.start()
 
 
 def test_swapped_replies_disturb_no_position(bench):

@@ -1,0 +1,37 @@
+"""What answers more often than it is asked is found; what is late or lost is not it."""
+
+import pytest
+
+from wam.driver.reply_balance import ReplyBalance
+
+
+def ask(balance, replies, cycles=1):
+    """Ask so many times, motor 1 answering `replies` times and all others once."""
+    for _ in range(cycles):
+        balance.note_question()
+        for i in range(7):
+            balance.replies[i] += replies if i == 0 else 1
+
+
+@pytest.mark.parametrize("behind", [0, 1, 24])
+def test_replies_that_come_late_and_all_at_once_are_not_a_second_sender(behind):
+    balance = ReplyBalance()
+    ask(balance, 0, cycles=behind)
+    balance.replies[0] += behind
+    ask(balance, 1, cycles=100)
+    assert balance.doubled() == 0
+
+
+def test_a_frame_that_the_bus_repeats_now_and_then_is_no_second_sender():
+    balance = ReplyBalance()
+    for _ in range(100):
+        ask(balance, 2)
+        ask(balance, 1, cycles=59)
+        assert balance.doubled() == 0
+
+
+def test_a_second_sender_is_found_behind_lost_replies():
+    balance = ReplyBalance()
+    ask(balance, 0, cycles=5000)
+    ask(balance, 2, cycles=40)
+    assert balance.doubled() == 1
