@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from acquisition.errors import SettingsError
+from analysis.data.filters import local_polynomial
 from analysis.data.series import Array
 
 WINDOW = 0.03  # s that one parabola spans; faster changes are not seen
@@ -44,7 +45,6 @@ def inertial_force(t: Array, position: Array, mass: float) -> InertialForce:
         SettingsError: the samples are too few, or too far apart for `WINDOW`.
     """
     from scipy.interpolate import CubicSpline
-    from scipy.signal import savgol_filter
 
     period = float(np.median(np.diff(t)))
     count = round((t[-1] - t[0]) / period) + 1
@@ -57,9 +57,8 @@ def inertial_force(t: Array, position: Array, mass: float) -> InertialForce:
         )
     even = t[0] + np.arange(count) * period  # a lost row is no jerk
     evenly = CubicSpline(t, position)(even)
-    smooth = np.asarray(savgol_filter(evenly, width, _ORDER, axis=0))
-    curved = savgol_filter(evenly, width, _ORDER, deriv=2, delta=period, axis=0)
-    force = mass * np.asarray(curved)
+    smooth = local_polynomial(evenly, width, _ORDER)
+    force = mass * local_polynomial(evenly, width, _ORDER, deriv=2, step=period)
     inner = slice(width // 2, count - width // 2)  # the ends hang on one parabola each
     scatter = float(np.sqrt(np.mean((evenly - smooth)[inner] ** 2)))
     # Least squares on an even grid: variance of 2 c2, and of the residual amid it.

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.data.filters import band_pass
 from analysis.data.series import Array
 
 # Bands [Hz] and the share of the force's variance below which each says nothing; the
@@ -74,15 +75,11 @@ def _in_band(
     t: Array, v: Array, F: Array, rate: float, low: float, high: float
 ) -> ForceLag:
     """Return the offset at which motion explains most of the force in a band."""
-    from scipy.signal import butter, sosfiltfilt
-
-    cuts = (low, min(high, 0.4 * rate))
-    filtered = butter(_ORDER, cuts, "band", fs=rate, output="sos")
-    motion = sosfiltfilt(filtered, np.stack([np.gradient(v, t), v]))
-    force = -np.asarray(sosfiltfilt(filtered, F))
+    signals = np.stack([np.gradient(v, t), v, -F])
+    *motion, force = band_pass(signals, low, min(high, 0.4 * rate), rate, _ORDER)
     early, late = _reach(force.size, rate)
     # The same rows of motion at every offset, or its ends would decide.
-    basis = np.asarray(motion)[:, early : force.size - late]
+    basis = np.stack(motion)[:, early : force.size - late]
     gram = basis @ basis.T
     if not (np.isfinite(gram).all() and np.linalg.cond(gram) < _SINGULAR):
         return ForceLag(0.0, 0.0)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.clock import RATE_HZ
+from analysis.data.filters import local_polynomial
 from analysis.data.prepare import PrepareOptions
 from analysis.data.series import Array
 from analysis.imported.channels import JointChannel
@@ -143,11 +143,8 @@ def _stretches(t: Array, step: float) -> list[tuple[int, int]]:
 
 def _slope(q: Array, step: float) -> Array:
     """Return the velocities of a stretch by a local polynomial of 22 ms."""
-    from scipy.signal import savgol_filter
-
     width = max(rows_averaged(step), 3)
     if len(q) < max(width, _ORDER + 1):
         return np.gradient(q, step, axis=0) if len(q) > 1 else np.zeros_like(q)
     order = min(_ORDER, width - 1)
-    slope = savgol_filter(q, width, order, deriv=1, delta=step, axis=0)
-    return cast("Array", slope)
+    return local_polynomial(q, width, order, deriv=1, step=step)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from importlib import import_module
-from threading import Thread
 from typing import Any
 
 from acquisition.clock import Clock, SystemClock
@@ -155,8 +153,6 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
         pace = WallPace(clock, SystemClock())
         if fake.mode == "paced":
             backend.loop_client.on_tick.append(pace.keep)
-            # The first review needs it, and the world would stand still meanwhile.
-            Thread(target=import_module, args=("scipy.signal",), daemon=True).start()
     else:
         fields = world.metadata() if world is not None else None
         clock = SystemClock()

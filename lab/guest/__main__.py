@@ -33,7 +33,6 @@ _WARM = (
     "experiments.run.session",
     "experiments.trial.quality",
     "analysis.data",
-    "scipy.signal",
     "fakes.serving.puck_server",
 )
 # The files' owner and time of change are others in here: git would read them all.
