@@ -16,6 +16,7 @@ from sklearn.gaussian_process.kernels import (
 from analysis.gp.arcsine import Arcsine
 from analysis.gp.kernels import SquaredExponential
 from analysis.gp.noise import ConstantNoise
+from analysis.gp.proposals import initial_points
 from analysis.gp.search import posterior_search
 
 _STARTS = 3
@@ -91,7 +92,7 @@ def three_starts(part: str, X: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, .
     sd = float(y.std())
     design = [
         np.concatenate([point, noise.start(sd)])
-        for point in kernel.design(sd, np.ones(X.shape[1]))
+        for point in initial_points(kernel, sd, np.ones(X.shape[1]))
     ]
     return (*begun, *design)[:_STARTS]
 

@@ -19,6 +19,7 @@ from analysis.data.series import Array
 from analysis.gp.climb import climb
 from analysis.gp.likelihood import Likelihood
 from analysis.gp.noise import ConstantNoise
+from analysis.gp.proposals import bounds
 from analysis.gp.search import Posterior, likeliest
 from analysis.gp.trial_noise import TrialNoise, TrialRows
 from analysis.study.crossval import FoldTask, choose_rows
@@ -88,7 +89,7 @@ def examine(task: FoldTask) -> list[RawRecord]:
 def twenty(likelihood: Likelihood, seed: int) -> float:
     """Return the largest log likelihood that twenty starts reach."""
     kernel, noise, sd = likelihood.kernel, likelihood.noise, float(likelihood.r.std())
-    box = np.vstack([kernel.bounds(sd, np.ones(2)), noise.bounds(sd)])
+    box = np.vstack([bounds(kernel, sd, np.ones(2)), noise.bounds(sd)])
     middle = np.log([sd, *np.ones(len(kernel.names) - 1)])
     middle = np.concatenate([middle, noise.start(sd)])
     near = np.clip(np.column_stack([middle - 2.3, middle + 2.3]).T, *box.T)

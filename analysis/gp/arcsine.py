@@ -11,28 +11,24 @@ very rough.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
 from analysis.data.series import Array
 from analysis.gp.kernels import (
-    ENDLESS,
     Composable,
     Contraction,
     Evaluator,
+    Hyperparameter,
+    Role,
     computed_parts,
-    length_pairs,
+    lengths_of,
 )
 
 Part = tuple[slice, slice]  # rows and columns of a matrix that are computed
 
 _ROOT_2 = np.sqrt(2.0)
-_BIASES = (20.0, 0.05)  # beta that a search may start with
-_SCALES = (-2.5, -1.2, 0.0, 1.2, 2.5)  # moves of log sf and all log l
-_BIAS_STEPS = (-4.0, 0.0, 4.0)  # moves of log beta that go with them
-_BIAS_TO_LENGTH = 2.5  # move of all log l that makes up for the bias from end to end
 
 
 class Augmented(NamedTuple):
@@ -60,10 +56,13 @@ class Arcsine(Composable):
     as_printed: bool = False
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the hyperparameters."""
-        lengths = (f"log_l{d + 1}" for d in range(self.dimensions))
-        return ("log_sf", *lengths, "log_beta")
+    def parameters(self) -> tuple[Hyperparameter, ...]:
+        """The hyperparameters in the order of theta."""
+        return (
+            Hyperparameter("log_sf", Role.SIZE),
+            *lengths_of(self.dimensions),
+            Hyperparameter("log_beta", Role.BIAS),
+        )
 
     @property
     def c(self) -> float:
@@ -89,51 +88,6 @@ class Arcsine(Composable):
         parts = computed_parts(len(X), len(other), is_upper=X_other is None)
         over = _PrintedOver if self.as_printed else _NetworkOver
         return over(self, X, other, parts)
-
-    def design(self, sd_y: float, sd_x: Array) -> Sequence[Array]:
-        """Return sf = sd(y)/2 and a large or small bias with every pair of lengths.
-
-        Short lengths with a large bias, and long ones with next to none, are optima of
-        their own.
-        """
-        return [
-            np.log(np.concatenate([[0.5 * sd_y], lengths, [bias]]))
-            for bias in _BIASES
-            for lengths in length_pairs(sd_x)
-        ]
-
-    def moves(self, theta: Array) -> Sequence[Sequence[Array]]:
-        """Return theta with another scale, the other end of bias, an input not used.
-
-        Where the arcsine is nearly linear, twice the size with twice the lengths is
-        nearly the same function: these change together, and with the bias. The bias
-        makes up for a single length that changes, so no such move leads far. Much bias
-        goes with short lengths, none of it with long ones.
-        """
-        size, *lengths, bias = np.eye(theta.size)
-        every = np.sum(lengths, axis=0)
-        scaled = [
-            theta + a * (size + every) + b * bias
-            for a, b in product(_SCALES, _BIAS_STEPS)
-            if a or b
-        ]
-        turned = [
-            theta + sign * (ENDLESS * bias - shift * every)
-            for sign in (-1.0, 1.0)
-            for shift in (0.0, _BIAS_TO_LENGTH)
-        ]
-        unused = [
-            theta + ENDLESS * length - without * bias
-            for length in lengths
-            for without in (0.0, ENDLESS)
-        ]
-        return [scaled, turned, unused]
-
-    def bounds(self, sd_y: float, sd_x: Array) -> Array:
-        """Return log sf in log sd(y) + [-6, 4], log l_d in [-4, 6], log beta +-6."""
-        centre = np.log(np.concatenate([[sd_y], sd_x, [1.0]]))
-        span = [[-6.0, 4.0], *([[-4.0, 6.0]] * self.dimensions), [-6.0, 6.0]]
-        return centre[:, None] + np.array(span)
 
 
 class _NetworkOver:

@@ -10,10 +10,10 @@ A search evaluates the same rows some hundred times. Fresh memory of a few hundr
 squared costs as much as what is computed in it, so an `Evaluator` keeps its own.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import product
-from typing import Protocol
+from enum import Enum
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -25,21 +25,44 @@ Contraction = Callable[[Array], Array]
 Evaluator = Callable[[Array], tuple[Array, Contraction]]
 
 _STRIP = 40  # rows of a triangle computed at a time
-_LONGER = 3.0  # are the lengths of a second part, or equal parts would stay equal
-_STRETCHES = (0.1, 0.35, 1.0, 3.5)  # l / sd(x) that a search may start with
-ENDLESS = 10.0  # more in a logarithm than a search goes: to its bound
-_LENGTHS = (-2.5, -1.2, 1.2, 2.5, ENDLESS)  # moves of log l; the last: not used
 
 
 KERNELS: dict[str, type] = {}  # by name: results that are kept name their kernel
+
+
+class Role(Enum):
+    """What a hyperparameter is the logarithm of."""
+
+    SIZE = "size"  # standard deviation of the function, in the unit of y
+    LENGTH = "length"  # of an input, in its unit
+    BIAS = "bias"  # without a unit
+
+
+class Hyperparameter(NamedTuple):
+    """One hyperparameter of a kernel, a natural logarithm.
+
+    Attributes:
+        name: as it is recorded.
+        role: what it is the logarithm of.
+        input: index of the input that a length belongs to.
+    """
+
+    name: str
+    role: Role
+    input: int = 0
 
 
 class Kernel(Protocol):
     """A covariance function with hyperparameters theta, natural logarithms."""
 
     @property
+    def parameters(self) -> tuple[Hyperparameter, ...]:
+        """The hyperparameters in the order of theta."""
+        ...
+
+    @property
     def names(self) -> tuple[str, ...]:
-        """Names of the hyperparameters in the order of theta; sizes end in log_sf."""
+        """Names of the hyperparameters in the order of theta."""
         ...
 
     def matrix(self, theta: Array, X: Array, X_other: Array) -> Array:
@@ -61,31 +84,20 @@ class Kernel(Protocol):
         """
         ...
 
-    def design(self, sd_y: float, sd_x: Array) -> Sequence[Array]:
-        """Return points that a search may start with, each of shape (p,)."""
-        ...
-
-    def moves(self, theta: Array) -> Sequence[Sequence[Array]]:
-        """Return points that may belong to another top than theta, each (p,).
-
-        They come in kinds. A search climbs from the likeliest of every kind in turn, of
-        those that are not near to what it has reached by then.
-        """
-        ...
-
-    def bounds(self, sd_y: float, sd_x: Array) -> Array:
-        """Return the bounds of the search relative to the data, shape (p, 2)."""
-        ...
-
 
 class Composable:
-    """Gives a kernel its matrix, `+` and `*`, and a place among the `KERNELS`."""
+    """Gives a kernel names, its matrix, `+` and `*`, and a place among `KERNELS`."""
 
     __slots__ = ()
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
         KERNELS[cls.__name__] = cls
+
+    @property
+    def names(self: Kernel) -> tuple[str, ...]:
+        """Names of the hyperparameters in the order of theta."""
+        return tuple(parameter.name for parameter in self.parameters)
 
     def matrix(self: Kernel, theta: Array, X: Array, X_other: Array) -> Array:
         """Return the covariances of the rows of X (n, d) and X_other (m, d): (n, m)."""
@@ -111,9 +123,9 @@ class SquaredExponential(Composable):
     dimensions: int = 2
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the hyperparameters."""
-        return ("log_sf", *(f"log_l{d + 1}" for d in range(self.dimensions)))
+    def parameters(self) -> tuple[Hyperparameter, ...]:
+        """The hyperparameters in the order of theta."""
+        return (Hyperparameter("log_sf", Role.SIZE), *lengths_of(self.dimensions))
 
     def diagonal(self, theta: Array, X: Array) -> Array:
         """Return sf^2 for every row."""
@@ -122,25 +134,6 @@ class SquaredExponential(Composable):
     def over(self, X: Array, X_other: Array | None = None) -> Evaluator:
         """Return what gives K and its contraction for any theta."""
         return _SquaredExponentialOver(X, X_other)
-
-    def design(self, sd_y: float, sd_x: Array) -> Sequence[Array]:
-        """Return sf = sd(y)/2 with every pair of lengths."""
-        return [
-            np.log(np.concatenate([[0.5 * sd_y], lengths]))
-            for lengths in length_pairs(sd_x)
-        ]
-
-    def moves(self, theta: Array) -> Sequence[Sequence[Array]]:
-        """Return theta with one length changed, twice: the two likeliest are taken."""
-        lengths = np.eye(theta.size)[1:]
-        changed = [theta + size * length for length in lengths for size in _LENGTHS]
-        return [changed, changed]
-
-    def bounds(self, sd_y: float, sd_x: Array) -> Array:
-        """Return log sf in log sd(y) + [-6, 4], log l_d in log sd(x_d) + [-4, 6]."""
-        centre = np.log(np.concatenate([[sd_y], sd_x]))
-        span = np.array([[-6.0, 4.0]] + [[-4.0, 6.0]] * self.dimensions)
-        return centre[:, None] + span
 
 
 class _SquaredExponentialOver:
@@ -197,30 +190,20 @@ class _Pair(Composable):
     right: Kernel
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the hyperparameters, "a." before the left, "b." the right ones."""
-        left = (f"a.{name}" for name in self.left.names)
-        return (*left, *(f"b.{name}" for name in self.right.names))
+    def parameters(self) -> tuple[Hyperparameter, ...]:
+        """The left kernel's, named "a.", and the right one's, named "b."."""
+        left = (p._replace(name=f"a.{p.name}") for p in self.left.parameters)
+        return (*left, *(p._replace(name=f"b.{p.name}") for p in self.right.parameters))
 
-    def moves(self, theta: Array) -> Sequence[Sequence[Array]]:
-        """Return the moves of one part while the other stays."""
-        a, b = self._split(theta)
-        of_left = [
-            [np.concatenate([move, b]) for move in kind] for kind in self.left.moves(a)
-        ]
-        of_right = [
-            [np.concatenate([a, move]) for move in kind] for kind in self.right.moves(b)
-        ]
-        return [*of_left, *of_right]
-
-    def _split(self, theta: Array) -> tuple[Array, Array]:
+    def split(self, theta: Array) -> tuple[Array, Array]:
+        """Return the hyperparameters of both parts."""
         count = len(self.left.names)
         return theta[:count], theta[count:]
 
     def _both(
         self, left: Evaluator, right: Evaluator, theta: Array
     ) -> tuple[tuple[Array, Contraction], tuple[Array, Contraction]]:
-        a, b = self._split(theta)
+        a, b = self.split(theta)
         return left(a), right(b)
 
 
@@ -230,7 +213,7 @@ class Sum(_Pair):
 
     def diagonal(self, theta: Array, X: Array) -> Array:
         """Return the sum of the variances, shape (n,)."""
-        a, b = self._split(theta)
+        a, b = self.split(theta)
         return self.left.diagonal(a, X) + self.right.diagonal(b, X)
 
     def over(self, X: Array, X_other: Array | None = None) -> Evaluator:
@@ -245,16 +228,6 @@ class Sum(_Pair):
 
         return at
 
-    def design(self, sd_y: float, sd_x: Array) -> Sequence[Array]:
-        """Return those of both side by side, the right ones with longer lengths."""
-        return _side_by_side(
-            self.left.design(sd_y, sd_x), self.right.design(sd_y, _LONGER * sd_x)
-        )
-
-    def bounds(self, sd_y: float, sd_x: Array) -> Array:
-        """Return the bounds of both parts, shape (p, 2)."""
-        return np.vstack([self.left.bounds(sd_y, sd_x), self.right.bounds(sd_y, sd_x)])
-
 
 @dataclass(frozen=True, slots=True)
 class Product(_Pair):
@@ -262,7 +235,7 @@ class Product(_Pair):
 
     def diagonal(self, theta: Array, X: Array) -> Array:
         """Return the product of the variances, shape (n,)."""
-        a, b = self._split(theta)
+        a, b = self.split(theta)
         return self.left.diagonal(a, X) * self.right.diagonal(b, X)
 
     def over(self, X: Array, X_other: Array | None = None) -> Evaluator:
@@ -277,16 +250,6 @@ class Product(_Pair):
 
         return at
 
-    def design(self, sd_y: float, sd_x: Array) -> Sequence[Array]:
-        """Return those of both; the right part is dimensionless with sf = 1."""
-        return _side_by_side(
-            self.left.design(sd_y, sd_x), self.right.design(2.0, _LONGER * sd_x)
-        )
-
-    def bounds(self, sd_y: float, sd_x: Array) -> Array:
-        """Return the bounds of both parts, shape (p, 2)."""
-        return np.vstack([self.left.bounds(sd_y, sd_x), self.right.bounds(1.0, sd_x)])
-
 
 def computed_parts(n: int, m: int, *, is_upper: bool) -> list[tuple[slice, slice]]:
     """Return the parts of an (n, m) matrix that are computed, as (rows, columns).
@@ -299,18 +262,8 @@ def computed_parts(n: int, m: int, *, is_upper: bool) -> list[tuple[slice, slice
     return [(slice(a, a + _STRIP), slice(a, m)) for a in range(0, n, _STRIP)]
 
 
-def length_pairs(sd_x: Array) -> list[Array]:
-    """Return lengths of d inputs, each of shape (d,), from rough to smooth.
-
-    Two inputs get every pair of four lengths; further ones take turns with these two.
-    """
-    return [np.resize(pair, sd_x.size) * sd_x for pair in product(_STRETCHES, repeat=2)]
-
-
-def _side_by_side(left: Sequence[Array], right: Sequence[Array]) -> list[Array]:
-    """Return pairs of points; those of the shorter list are used again."""
-    count = max(len(left), len(right))
-    return [
-        np.concatenate([left[k % len(left)], right[k % len(right)]])
-        for k in range(count)
-    ]
+def lengths_of(dimensions: int) -> tuple[Hyperparameter, ...]:
+    """Return one length for each input."""
+    return tuple(
+        Hyperparameter(f"log_l{d + 1}", Role.LENGTH, d) for d in range(dimensions)
+    )

@@ -21,9 +21,10 @@ import numpy as np
 from acquisition.errors import SettingsError
 from analysis.data.series import Array
 from analysis.gp.climb import Climbed, climb
-from analysis.gp.kernels import Kernel
+from analysis.gp.kernels import Kernel, Role
 from analysis.gp.likelihood import Likelihood
 from analysis.gp.noise import Noise
+from analysis.gp.proposals import bounds, initial_points, moves
 from analysis.gp.trial_noise import TrialRows
 
 _DESIGN_ROWS = 150  # rows by whose likelihood the first start is chosen
@@ -122,10 +123,10 @@ class Search:
         self._sd_y, sd_x = float(np.std(likelihood.r)), spread(likelihood.X)
         self._design = [
             np.concatenate([point, self._noise.start(self._sd_y)])
-            for point in self._kernel.design(self._sd_y, sd_x)
+            for point in initial_points(self._kernel, self._sd_y, sd_x)
         ]
         self._bounds = np.vstack(
-            [self._kernel.bounds(self._sd_y, sd_x), self._noise.bounds(self._sd_y)]
+            [bounds(self._kernel, self._sd_y, sd_x), self._noise.bounds(self._sd_y)]
         )
         parts = self._kernel.names, self._noise.names
         self._scale = np.repeat([1.0, _NOISE_SCALE], [len(names) for names in parts])
@@ -133,7 +134,7 @@ class Search:
         self._reached: list[Climbed] = []
 
     def designed_start(self) -> Array:
-        """Return the likeliest of the kernel's points, by a part of the rows."""
+        """Return the likeliest of the kernel's starts, by a part of the rows."""
         rough = Posterior(self._likelihood.thinned(_DESIGN_ROWS))
         return max(self._design, key=rough.value)
 
@@ -201,7 +202,7 @@ class Search:
         """Return moves from theta in the box, kind by kind, with its noise."""
         count = len(self._kernel.names)
         kinds = [
-            *self._kernel.moves(theta[:count]),
+            *moves(self._kernel, theta[:count]),
             [point[:count] for point in self._design],
         ]
         return [
@@ -283,11 +284,11 @@ def spread(X: Array) -> Array:
 
 def _shape_of(kernel: Kernel) -> list[int]:
     """Return which hyperparameters are lengths and biases."""
-    return [k for k, name in enumerate(kernel.names) if not name.endswith("log_sf")]
+    return [k for k, p in enumerate(kernel.parameters) if p.role is not Role.SIZE]
 
 
 def _distance(kernel: Kernel, theta: Array, others: Sequence[Array]) -> float:
     """Return how far theta is from the nearest of others, in lengths and biases."""
     shape = _shape_of(kernel)
     held = np.minimum(np.vstack([theta, *others])[:, shape], _UNUSED)
-    return float(np.abs(held[1:] - held[0]).max(axis=1).min())
+    return float(np.abs(held[1:] - held[0]).max(axis=1, initial=0.0).min())

@@ -5,6 +5,7 @@ from acquisition.errors import SettingsError
 from analysis.gp.arcsine import Arcsine
 from analysis.gp.kernels import SquaredExponential
 from analysis.gp.noise import ConstantNoise, LogLinearNoise
+from analysis.gp.proposals import bounds, moves
 from analysis.gp.search import Search, climb_from, likeliest, posterior_search
 
 SE = SquaredExponential(2)
@@ -111,7 +112,7 @@ def test_points_without_a_likelihood_are_no_starts():
 
 
 def test_hyperparameters_at_the_edge_of_the_search_are_named():
-    edge = SE.bounds(1.0, ROWS.std(axis=0))[2, 1]
+    edge = bounds(SE, 1.0, ROWS.std(axis=0))[2, 1]
     optimum = likeliest(Hills((np.array([0.0, 0.0, edge + 1.0, 0.0]), 9.0, 2.0)))
     assert optimum.at_bound == ("log_l2",)
 
@@ -125,7 +126,7 @@ def test_every_kernel_is_searched_from_one_start_and_its_moves(name, noise, rows
     optimum = posterior_search(kernel, noise, X, y)
     assert len(optimum.starts) == len(optimum.began)
     theta = optimum.theta[: len(kernel.names)]
-    assert 1 <= len(optimum.starts) <= 2 + len(kernel.moves(theta))
+    assert 1 <= len(optimum.starts) <= 2 + len(moves(kernel, theta))
     assert optimum.lml == max(start.lml for start in optimum.starts)
     again = posterior_search(kernel, noise, X, y)
     np.testing.assert_array_equal(again.theta, optimum.theta)
@@ -150,7 +151,7 @@ def test_an_input_that_does_not_vary_is_searched():
 def test_an_input_with_a_long_length_is_tried_unused():
     """On a trend the best top may lie where the length is endless."""
     low = np.array([0.0, -1.0, 1.5, -0.5])
-    bound = SE.bounds(1.0, ROWS.std(axis=0))[2, 1]
+    bound = bounds(SE, 1.0, ROWS.std(axis=0))[2, 1]
     high = np.array([0.0, -1.0, bound, -0.5])
     optimum = likeliest(Hills((low, 9.0, 0.8), (high, 9.5, 0.8), (high, 1.0, 3.0)))
     np.testing.assert_allclose(optimum.theta[2], bound, atol=0.2)
@@ -158,8 +159,8 @@ def test_an_input_with_a_long_length_is_tried_unused():
 
 def test_moves_of_a_sum_are_those_of_one_part_at_a_time():
     theta = np.arange(7.0)
-    kinds = (SE + Arcsine(2)).moves(theta)
-    of_left, of_right = SE.moves(theta[:3]), Arcsine(2).moves(theta[3:])
+    kinds = moves(SE + Arcsine(2), theta)
+    of_left, of_right = moves(SE, theta[:3]), moves(Arcsine(2), theta[3:])
     assert len(kinds) == len(of_left) + len(of_right)
     for kind, alone in zip(kinds, [*of_left, *of_right], strict=True):
         is_left = len(alone[0]) == 3

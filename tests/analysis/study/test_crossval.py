@@ -13,6 +13,7 @@ from analysis.gp.climb import climb
 from analysis.gp.kernels import SquaredExponential
 from analysis.gp.likelihood import Likelihood
 from analysis.gp.noise import ConstantNoise
+from analysis.gp.proposals import bounds
 from analysis.gp.search import posterior_search
 from analysis.study.crossval import (
     MOST_FOLDS,
@@ -188,7 +189,7 @@ def test_the_search_reaches_the_best_of_twenty_starts(trials, kernel):
         X = (rows.inputs - rows.inputs.mean(axis=0)) / rows.inputs.std(axis=0)
         r, noise = rows.F_t - rows.F_t.mean(), ConstantNoise()
         sd = r.std()
-        box = np.vstack([kernel.bounds(sd, np.ones(2)), noise.bounds(sd)])
+        box = np.vstack([bounds(kernel, sd, np.ones(2)), noise.bounds(sd)])
         rng = np.random.default_rng(task.fold)
         likelihood = Likelihood(kernel, noise, X, r)
         starts = rng.uniform(*box.T, (20, len(box)))
