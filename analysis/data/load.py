@@ -29,6 +29,9 @@ from wam.model.tool import Tool
 
 Array = NDArray[np.float64]
 Frame = Literal["terrain", "sole"]
+_CALIBRATION, _TERRAIN = "ft_calibration.toml", "terrain.toml"
+_ARM_MODEL = "arm_model.toml"
+ATTACHMENTS = (_CALIBRATION, _TERRAIN, _ARM_MODEL)  # without one nothing is computed
 _LONGEST_AGE = 0.1  # s; stamps further apart are none
 _LARGEST_ANGLE = 10.0  # rad, beyond every joint stop
 _LONGEST_NUMBER = 20  # digits of 64 bits
@@ -251,9 +254,9 @@ def _calibrated(reader: TrialReader) -> _Calibrated:
         TrialFileError: one of them is missing or impossible.
     """
     try:
-        payload, sole_point = payload_from_toml(_text(reader, "ft_calibration.toml"))
-        terrain, frame = terrain_from_toml(_text(reader, "terrain.toml"))
-        model = _arm(_text(reader, "arm_model.toml"), tuple(sole_point.tolist()))
+        payload, sole_point = payload_from_toml(_text(reader, _CALIBRATION))
+        terrain, frame = terrain_from_toml(_text(reader, _TERRAIN))
+        model = _arm(_text(reader, _ARM_MODEL), tuple(sole_point.tolist()))
     except SettingsError as error:
         raise TrialFileError(reader.path, error.message.rstrip(".")) from error
     except (ValueError, ArithmeticError, RuntimeError) as error:

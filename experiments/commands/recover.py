@@ -53,9 +53,10 @@ def run(args: argparse.Namespace) -> int:
             results.append({"source": str(source), "state": "failed"})
             results[-1]["reason"] = error.reason
         else:
-            _tell(recovery, console)
-            results.append(_plain(recovery))
-    failed = sum(result["state"] == "failed" for result in results)
+            obstacle = obstacle_to_analysis(recovery)
+            _tell(recovery, obstacle, console)
+            results.append(_plain(recovery, obstacle))
+    failed = sum(result["state"] in {"failed", "copied"} for result in results)
     if len(sources) > 1:
         console.say(
             f"{len(sources)} files: {len(sources) - failed} done, {failed} not."
@@ -65,14 +66,24 @@ def run(args: argparse.Namespace) -> int:
     return _NOTHING_SAVED if failed else 0
 
 
-def _plain(recovery: Recovery) -> dict[str, object]:
+def obstacle_to_analysis(recovery: Recovery) -> str:
+    """Return what the analysis needs of a trial and its copy has lost; empty = none."""
+    from analysis.data.load import ATTACHMENTS
+
+    return ", ".join(n for n in recovery.missing_attachments if n in ATTACHMENTS)
+
+
+def _plain(recovery: Recovery, obstacle: str) -> dict[str, object]:
     """Return what became of a file, for a program."""
     is_whole = recovery.path == recovery.source
     saved = "saved" if recovery.is_new else "saved before"
+    if obstacle:
+        saved = "copied"
     return {
         "source": str(recovery.source),
         "state": "whole" if is_whole else saved,
         "reason": recovery.reason,
+        "obstacle": obstacle,
         "is_doubtful": recovery.is_doubtful,
         "path": str(recovery.path),
         "cycles": recovery.verified.cycles,
@@ -120,7 +131,7 @@ def _matching(pattern: Path) -> list[Path]:
     return sorted(p for p in Path(pattern.anchor).glob(str(relative)) if p.is_file())
 
 
-def _tell(recovery: Recovery, console: Console) -> None:
+def _tell(recovery: Recovery, obstacle: str, console: Console) -> None:
     from experiments.operator.console import GOOD, WARNING
 
     source, verified = recovery.source, recovery.verified
@@ -132,7 +143,14 @@ def _tell(recovery: Recovery, console: Console) -> None:
         console.say(f"{GOOD} {source}: is {kind}, nothing to recover ({held}).")
         return
     verb = "saved" if recovery.is_new else "was recovered before,"
-    console.say(f"{GOOD} {source}: {verb} {held} -> {recovery.path.name}, read-only.")
+    if obstacle:
+        console.problem(
+            f"{WARNING} {source}: copied {held} -> {recovery.path.name}, but it "
+            f"cannot be analysed: it lacks {obstacle}."
+        )
+    else:
+        saved = f"{verb} {held} -> {recovery.path.name}, read-only."
+        console.say(f"{GOOD} {source}: {saved}")
     console.say(f"{WARNING} It {recovery.reason}. {lost_text(recovery)}")
     if recovery.is_doubtful:
         console.say(

@@ -173,3 +173,19 @@ def test_an_attachment_that_is_gone_is_named(folder):
     assert json.loads(traction("recover", path, "--json").out)[0][
         "attachments_missing"
     ] == ["config.toml"]
+
+
+def test_a_copy_that_cannot_be_analysed_is_not_called_saved(folder):
+    path = folder / "trials" / "T09.mcap"
+    header = make_header(attachments={"ft_calibration.toml": b"# no other file has it"})
+    seal(write_trial(path, make_cycles(300), header), "travel")
+    data = bytearray(path.read_bytes())
+    data[span_of(bytes(data), ATTACHMENT).end - 6] ^= 1
+    path.chmod(0o644)
+    path.write_bytes(bytes(data))
+    done = traction("recover", path)
+    assert done.code == 6
+    assert "saved" not in done.out
+    assert "it cannot be analysed: it lacks ft_cal" in done.err
+    (again,) = json.loads(traction("recover", path, "--json").out)
+    assert (again["state"], again["obstacle"]) == ("copied", "ft_calibration.toml")
