@@ -2,9 +2,9 @@
 
 import pytest
 
-from experiments.commissioning.steps import ProofStep
-from experiments.proving.limits import LIMITS
-from experiments.proving.work import WORK
+from experiments.commissioning.judging import LIMITS
+from experiments.commissioning.order import StepId
+from experiments.commissioning.procedure import STEPS
 from fakes.world.wrong_rigs import catalogue
 from tests.wrong_rigs import FOUND, REFUSED, WARNED, found_by
 
@@ -13,8 +13,8 @@ OF_THE_WORK = {
     *("listened", "answered", "cycles", "seen", "active", "rocked", "turned"),
     *("corners", "flat", "pressed", "pulled"),
 }
-# Judged on made recordings and held arms in tests/experiments/proving: a start refuses
-# the rig, another quantity is sooner, or rig.toml alone is wrong.
+# Judged on made recordings and held arms in tests/experiments/commissioning: a start
+# refuses the rig, another quantity is sooner, or rig.toml alone is wrong.
 OF_RECORDINGS = {
     *("load", "drawings", "error_frames", "module", "serials"),
     *("late", "jumps", "answer", "stop", "stays", "idles", "asleep"),
@@ -32,7 +32,7 @@ OF_RECORDINGS = {
 # Only in the check of every day.
 OF_THE_DAY = {"changed", "exchange", "zero", "hang_force", "hang_way", "drift"}
 ROWS = [(name, finding) for name, row in FOUND.items() for finding in row]
-_QUICK = {ProofStep.CONFIGURATION, ProofStep.LISTEN, ProofStep.IDENTITY}
+_QUICK = {StepId.CONFIGURATION, StepId.LISTEN, StepId.IDENTITY}
 
 
 def marked():
@@ -53,9 +53,9 @@ def test_every_rig_of_the_catalogue_is_found_and_no_other():
 
 
 def test_every_judge_is_tripped_by_a_rig():
-    assert {finding.step for _, finding in ROWS} == set(WORK)
+    assert {finding.step for _, finding in ROWS} == set(STEPS)
     judged = {finding.step for _, finding in ROWS if finding.by != (REFUSED,)}
-    assert judged == set(WORK)
+    assert judged == set(STEPS)
 
 
 def test_every_quantity_is_tripped_by_a_rig_or_judged_elsewhere():

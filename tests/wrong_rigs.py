@@ -21,15 +21,15 @@ from pathlib import Path
 import numpy as np
 
 from experiments.commands.commission import FAKE_FOLDER
+from experiments.commissioning.judging import LIMITS
+from experiments.commissioning.order import StepId
+from experiments.commissioning.procedure import STEPS
 from experiments.commissioning.record import (
     Commissioning,
     StepRecord,
     read_commissioning,
 )
-from experiments.commissioning.steps import ProofStep
-from experiments.proving.limits import LIMITS
-from experiments.proving.recording import Values, read_raw
-from experiments.proving.work import WORK
+from experiments.commissioning.recording import Values, read_raw
 from experiments.rig.build import build_tool
 from experiments.settings.load import load_settings
 from fakes.world.wrong_rigs import catalogue, wrong_rig
@@ -53,7 +53,7 @@ class Finding:
 
     Attributes:
         step: it finds it.
-        by: quantities of `limits.LIMITS` that are beyond their limits then; REFUSED =
+        by: quantities of `judging.LIMITS` that are beyond their limits then; REFUSED =
             the step ends without a judgement; WARNED = it passes with a note.
         first: step to begin with; "" = the same.
     """
@@ -231,7 +231,7 @@ def _ending(
     if code == 0:
         step, note = _note(folder, steps)
         return Ending(step, (WARNED,) if step else (), note, *moved)
-    began = list(WORK)[list(WORK).index(ProofStep(first)) :]
+    began = list(STEPS)[list(STEPS).index(StepId(first)) :]
     missing = next(step for step in began if all(one.step != step for one in steps))
     return Ending(missing, (REFUSED,), words.strip(), *moved)
 
@@ -257,17 +257,17 @@ _NAMES = {
 def _note(folder: Path, steps: Sequence[StepRecord]) -> tuple[str, str]:
     """Return the first step that warned of something, and of what; "" = none."""
     for done in steps:
-        if notes := WORK[done.step].judge(read_raw(folder, done.raw[0])).notes:
+        if notes := STEPS[done.step].judge(read_raw(folder, done.raw[0])).notes:
             return done.step, "; ".join(notes)
     return "", ""
 
 
 # Steps in which the arm is active; their recordings hold positions in time.
 _ACTIVE = (
-    ProofStep.REST_POSE,
-    ProofStep.RAMPS,
-    ProofStep.LIFT,
-    ProofStep.GRAVITY_RAMP,
+    StepId.REST_POSE,
+    StepId.RAMPS,
+    StepId.LIFT,
+    StepId.GRAVITY_RAMP,
 )
 
 

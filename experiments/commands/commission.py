@@ -16,11 +16,12 @@ from experiments.rig.truth_options import check_truth, mount_of
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from experiments.commissioning.steps import ProofStep
+    from experiments.commissioning.guide import RecordFolder
+    from experiments.commissioning.order import StepId
+    from experiments.commissioning.scene import Scene
+    from experiments.commissioning.step import Step
     from experiments.operator.console import Console
     from experiments.operator.prompts import OperatorInput
-    from experiments.proving.guide import RecordFolder
-    from experiments.proving.scene import Scene
     from experiments.rig.rig import FakeOptions
     from experiments.settings.load import Settings
     from experiments.settings.matrix import TerrainRow
@@ -74,9 +75,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Do the steps that are due and return the exit code."""
+    from experiments.commissioning.guide import RecordFolder, recheck
     from experiments.operator.console import Console
     from experiments.operator.scripted import choose_operator
-    from experiments.proving.guide import RecordFolder, recheck
     from experiments.rig.rig import FakeOptions
     from experiments.settings.load import load_settings
 
@@ -123,12 +124,12 @@ def _terrain(args: argparse.Namespace, settings: Settings) -> str:
 def _say_end(files: RecordFolder, terrain: str, console: Console) -> None:
     """Say what is left to do, or that the arm is commissioned."""
     from experiments.commissioning.gate import lacks
+    from experiments.commissioning.procedure import STEPS
     from experiments.commissioning.record import NAME
-    from experiments.proving.work import WORK
 
     last = max(done.ended for done in files.record.steps)
     lacking = {lack.step for lack in lacks(files.record, {}, last, terrain)}
-    missing = [step for step in WORK if step in lacking]
+    missing = [step for step in STEPS if step in lacking]
     if missing:
         console.say(f"Still to do: {', '.join(missing)}.")
     else:
@@ -140,7 +141,7 @@ def _note_changes(args: argparse.Namespace, files: RecordFolder) -> None:
     from datetime import UTC, datetime
 
     from acquisition.clock import SystemClock
-    from experiments.commissioning.steps import TOLD
+    from experiments.commissioning.order import TOLD
 
     if not files.record.steps:
         return
@@ -154,23 +155,23 @@ def _sittings(
     args: argparse.Namespace,
     settings: Settings,
     fake: FakeOptions | None,
-    steps: Sequence[ProofStep],
+    steps: Sequence[StepId],
     files: RecordFolder,
     who: str,
     console: Console,
     operator: OperatorInput,
 ) -> int:
     """Do the steps, as many on one connection as can be; return the exit code."""
-    from experiments.proving.guide import do_step, wanted
-    from experiments.proving.work import SITTINGS
+    from experiments.commissioning.guide import do_step, wanted
+    from experiments.commissioning.procedure import SITTINGS
     from experiments.run.stop import StopRequestedError
 
     row = settings.row(_terrain(args, settings)).as_container()
     is_anew = args.first is not None
     for sitting in SITTINGS:
-        due = [step for step in sitting if step in steps]
+        due = [step for step in sitting if step.id in steps]
 
-        def work(scene: Scene, due: Sequence[ProofStep] = due) -> int:
+        def work(scene: Scene, due: Sequence[Step] = due) -> int:
             for step in wanted(scene, due, files, is_anew=is_anew):
                 if do_step(scene, step, files, who).cause:
                     return 3
@@ -193,7 +194,7 @@ def _daily(
     operator: OperatorInput,
 ) -> int:
     """Do the daily check and return the exit code."""
-    from experiments.proving.daily import do_daily, reference_of
+    from experiments.commissioning.daily import do_daily, reference_of
 
     reference_of(files)  # before anything is touched
     row = settings.row(_terrain(args, settings)).as_container()
@@ -214,9 +215,9 @@ def _on_rig(
     work: Callable[[Scene], int],
 ) -> int:
     """Do `work` on one connection and return its exit code, or that of its end."""
+    from experiments.commissioning.scene import Scene
     from experiments.operator.terminal import keyboard
     from experiments.preflight.connecting import connect_rig
-    from experiments.proving.scene import Scene
     from experiments.rig.bus_log import logging_bus
     from experiments.run.console_loop import ConsoleLoop
     from experiments.run.pose_walk import INTERRUPTED
@@ -246,16 +247,16 @@ def _on_rig(
             scene.console_loop.make_safe()
 
 
-def _steps(args: argparse.Namespace) -> list[ProofStep]:
+def _steps(args: argparse.Namespace) -> list[StepId]:
     from acquisition.errors import SettingsError
-    from experiments.proving.work import WORK
+    from experiments.commissioning.procedure import STEPS
 
     if not args.fake and (asked_time(args) or args.operator_script):
         raise SettingsError(
             "--fast, --processes and --operator-script work only with --fake.",
             hint="Nothing was started.",
         )
-    known = list(WORK)
+    known = list(STEPS)
     ends = [args.first or known[0], args.last or known[-1]]
     for name in ends:
         if name not in known:

@@ -1,5 +1,6 @@
-"""The first day of an arm, step by step: what is kept of it, and what that is worth.
+"""The first day of an arm, step by step, and the check of every day after it.
 
-`steps` has the steps and what makes them stale, `record` the file, `gate` what is
-missing. How the steps are done stands in `experiments.proving`.
+A step is a `Step` of its module, C0 to C14 in `procedure`; limits.toml has what each
+quantity may be, `record` what was measured, `gate` whether torque may be sent. Begin
+with `procedure`.
 """

@@ -1,111 +1,282 @@
-"""daily.json: what the short check of every day measured, day after day.
+"""The check of every day: is the arm still the one that was commissioned?
 
-It is compared with the commissioning of the same arm; what drifts is seen before it
-fails.
+Bus, pucks and replies first, then the foot's weight in four poses held by hand: in one
+the sensor's bias would hide it, and two readings differ by 6 degrees of it anyway. The
+first activation of the day is that of an arm that lies on its stops without torque;
+then joints 2 and 4 are lifted off them. What they need says more of motors, cables and
+drives than anything that can be seen with the arm idle.
 """
 
-import json
-from datetime import datetime, timedelta
-from pathlib import Path
-from typing import Literal, Self
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from acquisition.errors import SettingsError
-from acquisition.files import open_directory, read_regular, replace_file
-from acquisition.formats import FORMAT
-from acquisition.validation import Many, first_problem
-from experiments.commissioning.record import Measured, Raw, RecordPart, Word
-from experiments.dates import is_fresh
+from experiments.commissioning import rest_pose
+from experiments.commissioning.bus import listen
+from experiments.commissioning.daily_record import (
+    DailyCheck,
+    read_history,
+    write_history,
+)
+from experiments.commissioning.fits import angle, fit_foot, orientations
+from experiments.commissioning.gate import lacks, require
+from experiments.commissioning.guide import RecordFolder
+from experiments.commissioning.judging import Found, Judgement, found, judged
+from experiments.commissioning.order import BASES, StepId
+from experiments.commissioning.recording import (
+    Values,
+    number,
+    read_raw,
+    words,
+    write_raw,
+)
+from experiments.commissioning.scene import Scene
+from experiments.commissioning.weights import POSES, bring, measure
+from experiments.messages import preflight_error
+from experiments.operator.console import BAD, GOOD
+from experiments.preflight.zero import zero_errors
+from wam.model.arm_model import ArmModel
+from wam.model.constants import Array, load_constants
 
-NAME = "daily.json"
-FIELD = "daily_check"  # of the metadata of a recording
-_LARGEST = 16_000_000  # bytes
-_KEPT = 2000  # checks; older ones go
-COUNTS_FOR = timedelta(hours=16)  # a day in the laboratory
-_HINT = "Put back the file as it was written, or move it away: its history begins anew."
-
-
-class DailyCheck(RecordPart):
-    """One check.
-
-    Attributes:
-        started: UTC.
-        ended: UTC.
-        operator: who did it.
-        raw: what was recorded.
-        quantities: what came of it, with its limits.
-        cause: the first contradiction, in words; "" = none.
-    """
-
-    started: datetime
-    ended: datetime
-    operator: Word
-    raw: Raw
-    quantities: Many[Measured]
-    cause: Word = ""
-
-    @property
-    def words(self) -> str:
-        """When it was done and what came of it."""
-        when = f"{self.ended:%Y-%m-%d %H:%M} UTC"
-        return f"{when}, {self.cause or 'sound'}"
+HANGING = (0, 2, 3, 4)  # of POSES: the foot down, to both sides, ahead
+LIFTED = (2, -4)  # joints, with the sense in which they are lifted
+_LISTENED = 2.0  # s
+_DEVICES = ("pucks", "motors", "module", "sensor")  # of `BASES`
+_WAY_BACK = (
+    "Look at what is named. What changed for good is commissioned again, from the step "
+    "that measures it: traction commission --from STEP."
+)
 
 
-class DailyHistory(RecordPart):
-    """All checks of an arm, the oldest first.
-
-    Attributes:
-        version: of the file.
-        is_simulated: the arm is.
-        checks: what was done.
-    """
-
-    version: Literal["1.0"] = FORMAT
-    is_simulated: bool = False
-    checks: Many[DailyCheck] = ()
-
-    def with_check(self, check: DailyCheck) -> Self:
-        """Return it with a check at its end."""
-        return self.model_copy(update={"checks": (*self.checks, check)[-_KEPT:]})
-
-    def counts_at(self, now: datetime) -> bool:
-        """Return whether the last check has come and was done at most a day ago."""
-        return bool(self.checks) and is_fresh(self.checks[-1].ended, now, COUNTS_FOR)
-
-
-def read_history(folder: Path, *, is_simulated: bool) -> DailyHistory:
-    """Return what stands in `folder`, or an empty history.
+def do_daily(
+    scene: Scene, files: RecordFolder, operator: str, *, is_simulated: bool
+) -> DailyCheck:
+    """Do the check, write what came of it and return that.
 
     Args:
-        folder: of commissioning.json.
-        is_simulated: the arm is; the history of the other kind is none of this arm.
+        scene: the rig and the terminal.
+        files: the commissioning that it is compared with.
+        operator: who does it.
+        is_simulated: the arm is.
 
     Raises:
-        SettingsError: it cannot be read, or is no such file.
+        SettingsError: the arm was not commissioned as far as C9.
+        PreflightError: the arm is not fit, or a person did not do what was asked.
+        StopRequestedError, ArmFaultError: as `ConsoleLoop.tick`.
     """
-    path = folder / NAME
-    try:
-        history = DailyHistory.model_validate_json(read_regular(path, _LARGEST))
-    except FileNotFoundError:
-        return DailyHistory(is_simulated=is_simulated)
-    except OSError as error:
-        raise _unreadable(path, error.strerror or str(error)) from error
-    except ValueError as error:
-        raise _unreadable(path, first_problem(error)) from error
-    if history.is_simulated is not is_simulated:
-        return DailyHistory(is_simulated=is_simulated)
-    return history
+    reference = reference_of(files)
+    history = read_history(files.folder, is_simulated=is_simulated)
+    started = _now(scene)
+    values = collect(scene, files, reference)
+    judgement = judge(values)
+    ended = _now(scene)
+    raw = write_raw(files.folder, f"daily_{ended:%Y%m%dT%H%M%S}.npz", values)
+    check = DailyCheck(
+        started=started,
+        ended=ended,
+        operator=operator,
+        raw=raw,
+        quantities=judgement.quantities,
+        cause=judgement.cause,
+    )
+    write_history(files.folder, history.with_check(check))
+    _say(scene, judgement)
+    return check
 
 
-def _unreadable(path: Path, why: str) -> SettingsError:
-    return SettingsError(f"{path} cannot be read: {why}.", hint=_HINT)
-
-
-def write_history(folder: Path, history: DailyHistory) -> None:
-    """Write it whole, or leave the earlier one.
+def reference_of(files: RecordFolder) -> Values:
+    """Return what the commissioning measured of what is looked at every day.
 
     Raises:
-        OSError: it cannot be written.
+        SettingsError: C6 or C9 was not done, or its recording is missing.
     """
-    text = json.dumps(history.model_dump(mode="json"), indent=1) + "\n"
-    with open_directory(folder) as directory:
-        replace_file(directory, NAME, text.encode())
+    raws: dict[StepId, Values] = {}
+    for step in (StepId.OWN_WEIGHT, StepId.RAMPS):
+        done = files.record.of(step)
+        if done is None or not done.raw or done.verdict == "wrong":
+            raise SettingsError(
+                f"{step} {step.words} was not passed: there is nothing to compare "
+                "with.",
+                hint=f"traction commission --from {step}. Nothing was started.",
+            )
+        raws[step] = read_raw(files.folder, done.raw[0])
+    lifted = rest_pose.liftoffs(raws[StepId.RAMPS])
+    return {
+        "weight": fit_foot(raws[StepId.OWN_WEIGHT]).weight,
+        "lifted": np.array([lifted[joint] for joint in LIFTED]),
+    }
+
+
+def collect(scene: Scene, files: RecordFolder, reference: Values) -> Values:
+    """Return what was recorded; it ends with what does not let it go on.
+
+    Raises:
+        PreflightError, StopRequestedError, ArmFaultError: as `do_daily`.
+    """
+    scene.say("Daily check, about 2 min   [q]uit. The arm is idle: support it.")
+    heard = _heard(scene)
+    scene.rig.backend.start_arm()
+    times = scene.rig.backend.arm.measure_exchange()
+    scene.start()
+    assert scene.info is not None
+    changed = _changed(files, scene.inputs())
+    if scene.simulation is None:
+        require(lacks(files.record, scene.inputs(), _now(scene)))
+    if not scene.info.is_zeroed:
+        raise preflight_error("not-zeroed")
+    off = zero_errors(scene.rig, scene.info)
+    held = _hang(scene, reference)
+    values: dict[str, NDArray[Any]] = {
+        **{f"heard_{name}": each for name, each in heard.items()},
+        "replies_ns": np.array(times.replies_ns, dtype=np.int64),
+        "unasked": np.array(times.unasked),
+        "late": np.array(times.late),
+        "answer_ns": np.array(times.answer_ns),
+        "changed": np.array(changed, dtype=np.str_),
+        "zero": np.zeros(0) if off is None else off,
+        **held,
+        **{f"reference_{name}": each for name, each in reference.items()},
+    }
+    if judge(values).cause:
+        return values  # nothing is activated after a contradiction
+    rest = rest_pose.rest(scene)
+    values |= {f"rest_{name}": each for name, each in rest.items()}
+    if not rest_pose.judge_rest(rest).cause:
+        ramps = rest_pose.ramps(scene, LIFTED)
+        values |= {f"ramp_{name}": each for name, each in ramps.items()}
+    return values
+
+
+def _heard(scene: Scene) -> Values:
+    values: Values = {}
+    for share, values in listen(scene.rig, _LISTENED):  # noqa: B007
+        scene.show_share(share, "listening, nothing is sent")
+    return values
+
+
+def _hang(scene: Scene, reference: Values) -> Values:
+    """Have the foot held in four poses; return joints, readings, what is believed.
+
+    The sensor's drift alone looks like another weight on one day in thirty: what does
+    not fit is held once more, and then all eight are judged together.
+    """
+    payload = scene.rig.payload
+    believed = {"sign": np.array(payload.sign), "mounting": payload.rotation}
+    believed["reference_weight"] = reference["weight"]
+    parts: list[tuple[Array, Array]] = []
+    for is_again in (False, True):
+        if is_again:
+            scene.say("The foot's weight is beside the commissioning's: once more.")
+        for k, at in enumerate(HANGING, 1):
+            bring(scene, POSES[at], f"pose {k} of {len(HANGING)}")
+            parts.append(measure(scene))
+        held = {
+            "q": np.array([q for q, _ in parts]),
+            "readings": np.array([reading for _, reading in parts]),
+            **believed,
+        }
+        if all(row.measured.is_within for row in _hanging(held)):
+            break
+    return held
+
+
+def judge(values: Values) -> Judgement:
+    """Judge a recording of `collect`: bus and devices, pose, rest, lift-off."""
+    changed, replies = words(values, "changed"), values["replies_ns"]
+    master = int(number(values, "heard_master"))
+    rows = [
+        found("masters", int(master >= 0), id=max(master, 0)),
+        found("error_frames", number(values, "heard_error_frames")),
+        found("frames", number(values, "heard_frames")),
+        found("changed", len(changed), text=", ".join(changed)),
+        found("answered", number(values, "unasked")),
+        found("late", number(values, "late")),
+        found("answer", number(values, "answer_ns") / 1e6),
+        found("exchange", float(np.median(replies)) / 1e6 if len(replies) else 99.0),
+    ]
+    if values["zero"].size:
+        rows.append(found("zero", np.degrees(np.abs(values["zero"]).max())))
+    rows += [*_hanging(values), *_lying(values)]
+    return judged(rows)
+
+
+def _hanging(values: Values) -> list[Found]:
+    """Judge the foot's weight beside the one that C6 fitted.
+
+    The sensor's bias is another one every day: it is fitted from pose to pose.
+    """
+    weight = values["reference_weight"]
+    R = orientations(values, ArmModel(load_constants()))
+    loads = number(values, "sign") * values["readings"][:, :3]
+    left = loads - R.transpose(0, 2, 1) @ weight
+    left = left - left.mean(axis=0)
+    free = left.size - left.shape[1]
+    return [
+        found("hang_force", float(np.sqrt((left**2).sum() / free))),
+        found("hang_way", angle(fit_foot(values).weight, weight)),
+    ]
+
+
+def _lying(values: Values) -> list[Found]:
+    rest, ramp = _part(values, "rest_"), _part(values, "ramp_")
+    if not rest:
+        return []
+    rows = rest_pose.rest_rows(rest)
+    if not ramp:
+        return rows
+    rows += rest_pose.ramp_rows(ramp)
+    if not all(row.measured.is_within for row in rows):
+        return rows  # nothing was lifted off
+    lifted = rest_pose.liftoffs(ramp)
+    pairs = zip(LIFTED, values["reference_lifted"].tolist(), strict=True)
+    drifts = [
+        found("drift", lifted.get(joint, 0.0) / before, joint=abs(joint))
+        for joint, before in pairs
+    ]
+    return [*rows, *drifts]
+
+
+def _part(values: Values, prefix: str) -> Values:
+    return {
+        name.removeprefix(prefix): each
+        for name, each in values.items()
+        if name.startswith(prefix)
+    }
+
+
+def _changed(files: RecordFolder, present: Mapping[str, str]) -> list[str]:
+    """Return what says something else of itself than when it was commissioned."""
+    return [
+        BASES[name].words
+        for name in _DEVICES
+        if any(
+            name in present and done.inputs.get(name, present[name]) != present[name]
+            for done in files.record.steps
+        )
+    ]
+
+
+def _say(scene: Scene, judgement: Judgement) -> None:
+    """Say what came of it: a line each, and what to do where it failed."""
+    scene.console.end_panel()
+    for each in judgement.quantities:
+        if each.name.startswith(_SHOWN) or not each.is_within:
+            mark = GOOD if each.is_within else BAD
+            scene.console.check(mark, "daily", each.text)
+    if judgement.cause:
+        scene.console.check(BAD, "daily check", judgement.cause)
+        scene.console.say(f"   {_WAY_BACK}")
+    else:
+        scene.console.check(GOOD, "daily check", "the arm is as it was commissioned")
+
+
+_SHOWN = ("from a question", "seven positions", "zero", "weight", "lift-off")
+
+
+def _now(scene: Scene) -> datetime:
+    seconds = scene.rig.clock.utc_ns() // 1_000_000_000
+    return datetime.fromtimestamp(seconds, UTC)

@@ -1,4 +1,4 @@
-"""What the steps stand on, as it is now: digests by the names of `steps.BASES`."""
+"""What the steps stand on, as it is now: digests by the names of `order.BASES`."""
 
 import hashlib
 import json
@@ -6,8 +6,7 @@ import platform
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from experiments.commissioning.gate import bases_of
-from experiments.commissioning.steps import ProofStep
+from experiments.commissioning.order import StepId, bases_of
 from experiments.rig.rig import Rig
 from experiments.settings.calibrations import PREFIX
 from wam.driver.startup import ArmInfo
@@ -73,7 +72,7 @@ def present_inputs(
     return {name: _digest(each) for name, each in content.items()}
 
 
-def inputs_of(step: ProofStep, present: Mapping[str, str]) -> dict[str, str]:
+def inputs_of(step: StepId, present: Mapping[str, str]) -> dict[str, str]:
     """Return of the present digests those that a step stands on."""
     return {name: present[name] for name in bases_of(step) if name in present}
 

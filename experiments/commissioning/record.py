@@ -16,7 +16,7 @@ from acquisition.errors import SettingsError
 from acquisition.files import open_directory, read_regular, replace_file
 from acquisition.formats import FORMAT
 from acquisition.validation import Entries, Many, first_problem
-from experiments.commissioning.steps import ORDER, ProofStep
+from experiments.commissioning.order import ORDER, StepId
 
 NAME = "commissioning.json"
 _LARGEST = 4_000_000  # bytes
@@ -95,7 +95,7 @@ class StepRecord(RecordPart):
         started: UTC.
         ended: UTC.
         operator: who did it.
-        inputs: digests of what it stands on, by the names of `steps.BASES`.
+        inputs: digests of what it stands on, by the names of `order.BASES`.
         raw: what was recorded.
         quantities: what came of it.
         verdict: "wrong" = a quantity is beyond its limits.
@@ -103,7 +103,7 @@ class StepRecord(RecordPart):
         digest: of all this and of the step before.
     """
 
-    step: ProofStep
+    step: StepId
     subject: Word = ""
     started: datetime
     ended: datetime
@@ -137,7 +137,7 @@ class Commissioning(RecordPart):
         program: version that wrote it.
         is_simulated: the arm is.
         steps: what was done.
-        told: when a person last said of a basis of `steps.BASES` that it changed, UTC.
+        told: when a person last said of a basis of `order.BASES` that it changed, UTC.
     """
 
     version: Literal["1.0"] = FORMAT
@@ -153,7 +153,7 @@ class Commissioning(RecordPart):
             raise ValueError("its steps are not in order, or one stands twice")
         return self
 
-    def of(self, step: ProofStep, subject: str = "") -> StepRecord | None:
+    def of(self, step: StepId, subject: str = "") -> StepRecord | None:
         """Return what was done of a step; None = nothing.
 
         Args:
@@ -180,10 +180,10 @@ class Commissioning(RecordPart):
         return self.model_copy(update={"told": told, "steps": _chain(self.steps, told)})
 
     def told_inputs(self) -> dict[str, str]:
-        """Return digests of what a person said, by the names of `steps.BASES`."""
+        """Return digests of what a person said, by the names of `order.BASES`."""
         return {name: _first({name: when}) for name, when in self.told.items()}
 
-    def first_broken(self) -> ProofStep | None:
+    def first_broken(self) -> StepId | None:
         """Return the first step whose digest is not that of what stands there."""
         pairs = zip(self.steps, _chain(self.steps, self.told), strict=True)
         return next((is_.step for is_, was in pairs if is_.digest != was.digest), None)

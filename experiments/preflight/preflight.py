@@ -10,9 +10,9 @@ from acquisition.control_loop.timing import SLOW_EXCHANGE_NS, loop_report
 from acquisition.devices import SafetyMode
 from acquisition.errors import IDLE_ARM, TractionError
 from experiments import provenance
+from experiments.commissioning.gate import check_commissioned
 from experiments.messages import preflight_error
 from experiments.operator.console import BAD, GOOD, WARNING, Console
-from experiments.preflight.commissioned import check_commissioned
 from experiments.preflight.connecting import as_preflight, not_reached
 from experiments.preflight.host_checks import (
     DiskProbe,

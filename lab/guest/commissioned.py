@@ -5,20 +5,20 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from experiments.commissioning.inputs import inputs_of, present_inputs
+from experiments.commissioning.order import GATED, StepId
 from experiments.commissioning.record import (
     NAME,
     Commissioning,
     StepRecord,
     write_commissioning,
 )
-from experiments.commissioning.steps import GATED, ProofStep
 from experiments.preflight.connecting import connect_rig
 from experiments.rig.rig import Rig
 from experiments.settings.load import load_settings
 from wam.driver.startup import ArmInfo
 
 
-def take_as_commissioned(config: Path, steps: Sequence[ProofStep] = GATED) -> None:
+def take_as_commissioned(config: Path, steps: Sequence[StepId] = GATED) -> None:
     """Write a record of sound `steps` beside `config` for the arm that it names.
 
     The arm is asked what it is, as a command would; nothing is done where there is a
@@ -39,7 +39,7 @@ def take_as_commissioned(config: Path, steps: Sequence[ProofStep] = GATED) -> No
 
 
 def sound_record(
-    rig: Rig, info: ArmInfo, steps: Sequence[ProofStep] = GATED
+    rig: Rig, info: ArmInfo, steps: Sequence[StepId] = GATED
 ) -> Commissioning:
     """Return a record of `steps` for an arm that was started; all: it may be driven."""
     present = present_inputs(rig, rig.backend.arm.answers(), info)
@@ -48,7 +48,7 @@ def sound_record(
 
 
 def record_of(
-    steps: Iterable[ProofStep], present: Mapping[str, str], when: datetime
+    steps: Iterable[StepId], present: Mapping[str, str], when: datetime
 ) -> Commissioning:
     """Return a record in which these steps were sound on what was `present`."""
     record = Commissioning(program="a test")

@@ -6,7 +6,7 @@
 from dataclasses import dataclass
 from enum import Enum
 
-from experiments.commissioning.steps import ProofStep
+from experiments.commissioning.order import StepId
 from tests.faults.bounds import BOUND_PHASES, PrintedBound, read_bounds
 from tests.faults.expected import NOTHING
 from tests.faults.hazard_rows import ROWS
@@ -22,9 +22,9 @@ arm: largest joint speed as a share of the joint's limit, travel of the sole wit
 0.5 s, force of the motors on the person who holds the sole. "As without it" stands
 where that is not more than what is measured when nothing happens at all.
 """
-_S = ProofStep
+_S = StepId
 # Steps of `traction commission` by the signal that they prove sound on the arm at hand.
-PROOFS: dict[str, tuple[ProofStep, ...]] = {
+PROOFS: dict[str, tuple[StepId, ...]] = {
     "joint position": (_S.IDENTITY, _S.TIMING, _S.BY_HAND),
     "joint torque command": (_S.IDENTITY, _S.RAMPS, _S.LIFT, _S.GRAVITY_RAMP),
     "safety mode": (_S.IDENTITY, _S.STOP_CIRCUIT, _S.REST_POSE),

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.proving.work import WORK
+from experiments.commissioning.procedure import STEPS
 from tests.faults.expected import TABLE
 from tests.faults.hazards import (
     OF_THE_COMPUTER,
@@ -46,7 +46,7 @@ def functions_of(path):
 def test_every_signal_of_the_arm_is_proved_by_steps_that_are_done():
     assert set(PROOFS) | OF_THE_COMPUTER == SIGNALS
     assert not set(PROOFS) & OF_THE_COMPUTER
-    assert all(set(steps) <= set(WORK) and steps for steps in PROOFS.values())
+    assert all(set(steps) <= set(STEPS) and steps for steps in PROOFS.values())
 
 
 def test_the_page_of_hazards_has_every_signal():

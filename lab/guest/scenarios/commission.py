@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from experiments.commissioning.order import GATED, StepId
 from experiments.commissioning.record import Commissioning, read_commissioning
-from experiments.commissioning.steps import GATED, ProofStep
-from experiments.proving.recording import read_raw
-from experiments.proving.rest_pose import rest_pose
+from experiments.commissioning.recording import read_raw
+from experiments.commissioning.rest_pose import rest_pose
 from experiments.rig.build import build_tool
 from experiments.settings.load import load_settings
 from lab.guest.commands import Program, ScenarioError, require
@@ -24,9 +24,9 @@ _CARRIED = 1.0  # s, in which hands bring the arm into a pose
 _COMES_TO_REST = 0.5  # s, until an arm that is held or let go of is still
 _FRICTION = "0.7"  # of the joints, as a share of what was identified on another arm
 _STOPPED = 3  # exit code: a step found something wrong
-_BEFORE_TORQUE = GATED[: GATED.index(ProofStep.REST_POSE)]
-_BETWEEN = (ProofStep.RAMPS, ProofStep.LIFT)
-_ON_REST_POSE = (ProofStep.REST_POSE, ProofStep.GRAVITY_RAMP)
+_BEFORE_TORQUE = GATED[: GATED.index(StepId.REST_POSE)]
+_BETWEEN = (StepId.RAMPS, StepId.LIFT)
+_ON_REST_POSE = (StepId.REST_POSE, StepId.GRAVITY_RAMP)
 _WRONG = "motor-2-weak"
 
 
@@ -44,21 +44,21 @@ def at_rest(room: MachineRoom) -> Figures:
     room.finish(day.program, _STEP)
     record = _sound_record(room, GATED)
     return {
-        "silence": _measured(record, ProofStep.REST_POSE, "a module that brakes"),
+        "silence": _measured(record, StepId.REST_POSE, "a module that brakes"),
         "sole": _farthest(room, record),
     }
 
 
 def wrong_arm(room: MachineRoom) -> Figures:
     """Commission an arm with a weak motor: C11 stops, the arm goes idle."""
-    sound = GATED[: GATED.index(ProofStep.GRAVITY_RAMP)]
+    sound = GATED[: GATED.index(StepId.GRAVITY_RAMP)]
     day = _laid_down(room, _pushed(room, "--wrong", _WRONG), *sound)
     day.hand("activate")
     room.finish(day.program, _STEP, _STOPPED)
     record = _record(room)
     (wrong,) = [done for done in record.steps if done.cause]
     said = f"{wrong.step} stopped, in place of C11"
-    require(wrong.step is ProofStep.GRAVITY_RAMP, said)
+    require(wrong.step is StepId.GRAVITY_RAMP, said)
     require("Compensation moves the arm" in wrong.cause, wrong.cause)
     return {_WRONG: wrong.cause, "sole": _farthest(room, record)}
 
@@ -68,7 +68,7 @@ def _pushed(room: MachineRoom, *options: str) -> Program:
     return served_arm(room, "--friction", _FRICTION, *options)
 
 
-def _laid_down(room: MachineRoom, arm: Program, *sound: ProofStep) -> LedSession:
+def _laid_down(room: MachineRoom, arm: Program, *sound: StepId) -> LedSession:
     """Return a commissioning that waits for its arm, on the rest pose, to be activated.
 
     `sound`: steps that are taken as done. Hands lay the arm down before its pucks are
@@ -94,7 +94,7 @@ def _record(room: MachineRoom) -> Commissioning:
     return record
 
 
-def _sound_record(room: MachineRoom, steps: Sequence[ProofStep]) -> Commissioning:
+def _sound_record(room: MachineRoom, steps: Sequence[StepId]) -> Commissioning:
     """Return the record; raise ScenarioError where one of `steps` is not sound."""
     record = _record(room)
     sound = {done.step for done in record.steps if done.verdict == "sound"}
@@ -103,7 +103,7 @@ def _sound_record(room: MachineRoom, steps: Sequence[ProofStep]) -> Commissionin
     return record
 
 
-def _measured(record: Commissioning, step: ProofStep, words: str) -> str:
+def _measured(record: Commissioning, step: StepId, words: str) -> str:
     """Return the quantity of a step whose name ends with `words`."""
     done = record.of(step)
     quantities = () if done is None else done.quantities

@@ -3,11 +3,11 @@
 import pytest
 
 from experiments.commands.commission import FAKE_FOLDER
-from experiments.commissioning.daily import read_history
+from experiments.commissioning.daily_record import read_history
 from experiments.commissioning.gate import lacks
+from experiments.commissioning.order import StepId
+from experiments.commissioning.procedure import STEPS
 from experiments.commissioning.record import read_commissioning, write_commissioning
-from experiments.commissioning.steps import ProofStep
-from experiments.proving.work import WORK
 from tests.experiments.program import traction, write_config
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(1800)]
@@ -35,7 +35,7 @@ def test_a_sound_arm_passes_every_step_in_one_run(day):
     folder, done = day
     record = read_commissioning(folder / FAKE_FOLDER)
     assert [(each.step, each.cause) for each in record.steps] == [
-        (step, "") for step in WORK
+        (step, "") for step in STEPS
     ]
     assert {each.operator for each in record.steps} == {"Ada"}
     assert lacks(record, {}, record.steps[-1].ended, "S0") == []
@@ -82,8 +82,8 @@ def test_a_weak_motor_is_seen_the_next_day(day):
 def test_what_was_left_after_a_step_goes_on_with_the_next(day):
     kept = day[0] / FAKE_FOLDER
     record = read_commissioning(kept)
-    middle = ProofStep.HUNG_WEIGHT
-    count = list(WORK).index(middle) + 1
+    middle = StepId.HUNG_WEIGHT
+    count = list(STEPS).index(middle) + 1
     first = record.steps[:count]
     assert first[-1].step is middle
     left = record.model_copy(update={"steps": first})
@@ -93,5 +93,5 @@ def test_what_was_left_after_a_step_goes_on_with_the_next(day):
     again = read_commissioning(kept)
     assert again.steps[: len(first)] == first
     gone_on = [done.step for done in again.steps[len(first) :]]
-    assert gone_on == [ProofStep.REST_POSE, ProofStep.RAMPS]
+    assert gone_on == [StepId.REST_POSE, StepId.RAMPS]
     assert "Still to do: C10, C11, C12, C13, C14." in done.out

@@ -7,6 +7,7 @@ import pytest
 
 from acquisition.errors import PreflightError, SettingsError
 from experiments.commissioning.gate import bases_of, lacks, require
+from experiments.commissioning.order import BASES, GATED, ORDER, TOLD, StepId
 from experiments.commissioning.record import (
     NAME,
     Commissioning,
@@ -15,7 +16,6 @@ from experiments.commissioning.record import (
     read_commissioning,
     write_commissioning,
 )
-from experiments.commissioning.steps import BASES, GATED, ORDER, TOLD, ProofStep
 
 NOON = datetime(2026, 11, 26, 12, tzinfo=UTC)
 INPUTS = {name: f"{number:064x}" for number, name in enumerate(BASES)}
@@ -52,9 +52,9 @@ def test_a_folder_without_the_file_has_none(tmp_path):
 
 
 def test_a_step_that_is_done_again_takes_its_place():
-    again = whole().with_step(done(ProofStep.TIMING, cause="a slow adapter"))
+    again = whole().with_step(done(StepId.TIMING, cause="a slow adapter"))
     assert [one.step for one in again.steps] == list(ORDER)
-    assert again.of(ProofStep.TIMING).cause == "a slow adapter"
+    assert again.of(StepId.TIMING).cause == "a slow adapter"
     assert again.first_broken() is None
 
 
@@ -108,7 +108,7 @@ def test_a_link_is_not_followed(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "order", [(ProofStep.TIMING, ProofStep.LISTEN), (ProofStep.LISTEN,) * 2]
+    "order", [(StepId.TIMING, StepId.LISTEN), (StepId.LISTEN,) * 2]
 )
 def test_steps_stand_in_order_and_once(order):
     steps = tuple(done(step) for step in order)
@@ -182,7 +182,7 @@ def test_a_record_of_the_future_does_not_count():
 
 def test_a_step_that_failed_is_named_with_its_cause():
     record = whole().with_step(
-        done(ProofStep.RAMPS, verdict="wrong", cause="joint 3 moves the other way")
+        done(StepId.RAMPS, verdict="wrong", cause="joint 3 moves the other way")
     )
     with pytest.raises(PreflightError, match="C9 ramps: joint 3 moves the other way"):
         require(lacks(record, INPUTS, NOON))
@@ -213,15 +213,15 @@ def test_a_quantity_stands_beside_its_limits(value, low, high, passes, text):
 
 
 def test_every_terrain_keeps_its_own_container():
-    first = done(ProofStep.CONTAINER, subject="S0")
+    first = done(StepId.CONTAINER, subject="S0")
     other = {**INPUTS, "terrain": "e" * 64}
     second = done(
-        ProofStep.CONTAINER,
+        StepId.CONTAINER,
         subject="S10",
-        inputs={name: other[name] for name in bases_of(ProofStep.CONTAINER)},
+        inputs={name: other[name] for name in bases_of(StepId.CONTAINER)},
     )
     record = whole(*ORDER[:-2]).with_step(second).with_step(first)
-    record = record.with_step(done(ProofStep.PLATE))
+    record = record.with_step(done(StepId.PLATE))
     assert [one.subject for one in record.steps if one.subject] == ["S0", "S10"]
     assert lacks(record, INPUTS, NOON, "S0") == []
     assert lacks(record, other, NOON, "S10") == []
@@ -229,6 +229,6 @@ def test_every_terrain_keeps_its_own_container():
     assert stale.text.startswith("C13 container of S0: stale: row of the terrain")
     (missing,) = lacks(record, INPUTS, NOON, "TF")
     assert missing.text == "C13 container of TF: not done"
-    again = record.with_step(done(ProofStep.CONTAINER, subject="S0", cause="moved"))
-    assert again.of(ProofStep.CONTAINER, "S0").cause == "moved"
-    assert again.of(ProofStep.CONTAINER, "S10") is not None
+    again = record.with_step(done(StepId.CONTAINER, subject="S0", cause="moved"))
+    assert again.of(StepId.CONTAINER, "S0").cause == "moved"
+    assert again.of(StepId.CONTAINER, "S10") is not None

@@ -10,7 +10,7 @@ import pytest
 
 from experiments.commissioning.gate import lacks
 from experiments.commissioning.inputs import present_inputs
-from experiments.commissioning.steps import BASES, ORDER, TOLD
+from experiments.commissioning.order import BASES, ORDER, TOLD
 from experiments.preflight.connecting import connect_rig
 from experiments.rig.rig import FakeOptions
 from experiments.settings.calibrations import PREFIX

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 
-class ProofStep(StrEnum):
+class StepId(StrEnum):
     """A step by its number; in the order in which they are done."""
 
     CONFIGURATION = "C0"
@@ -33,12 +33,12 @@ class ProofStep(StrEnum):
         return self.name.replace("_", " ").lower()
 
 
-ORDER = tuple(ProofStep)
+ORDER = tuple(StepId)
 # Without these no torque is sent to a real arm.
-GATED = ORDER[: ORDER.index(ProofStep.GRAVITY_RAMP) + 1]
+GATED = ORDER[: ORDER.index(StepId.GRAVITY_RAMP) + 1]
 
 
-def _from(first: ProofStep, last: ProofStep = ProofStep.PLATE) -> tuple[ProofStep, ...]:
+def _from(first: StepId, last: StepId = StepId.PLATE) -> tuple[StepId, ...]:
     return ORDER[ORDER.index(first) : ORDER.index(last) + 1]
 
 
@@ -54,11 +54,11 @@ class Basis:
     """
 
     words: str
-    steps: tuple[ProofStep, ...]
+    steps: tuple[StepId, ...]
     may_be_untold: bool = False
 
 
-_S = ProofStep
+_S = StepId
 BASES: dict[str, Basis] = {
     "pucks": Basis(
         "serial number, firmware, role, counts, slot or groups of a motor puck",
@@ -113,3 +113,8 @@ BASES: dict[str, Basis] = {
 }
 TOLD = ("mounting", "cables")  # bases that only a person knows of
 LONGEST_DAYS = 30  # after which all steps are stale
+
+
+def bases_of(step: StepId) -> list[str]:
+    """Return the names of what a step stands on."""
+    return [name for name, basis in BASES.items() if step in basis.steps]

@@ -6,16 +6,16 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from acquisition.errors import PreflightError
-from experiments.commissioning.daily import (
+from experiments.commissioning.daily_record import (
     DailyCheck,
     read_history,
     write_history,
 )
+from experiments.commissioning.gate import check_commissioned
 from experiments.commissioning.inputs import inputs_of, present_inputs
+from experiments.commissioning.order import GATED, ORDER, StepId
 from experiments.commissioning.record import NAME, Raw, write_commissioning
-from experiments.commissioning.steps import GATED, ORDER, ProofStep
 from experiments.operator.console import BAD, GOOD, WARNING
-from experiments.preflight.commissioned import check_commissioned
 from experiments.preflight.connecting import connect_rig
 from experiments.rig.rig import FakeOptions
 from experiments.settings.load import load_settings
@@ -116,7 +116,7 @@ def test_a_record_of_every_step_is_complete(config):
     record = sound_record(arm.rig, arm.info)
     present = present_inputs(arm.rig, arm.rig.backend.arm.answers(), arm.info)
     for step in ORDER[len(GATED) :]:
-        subject = "S0" if step is ProofStep.CONTAINER else ""
+        subject = "S0" if step is StepId.CONTAINER else ""
         inputs = inputs_of(step, present)
         changes = {"step": step, "subject": subject, "inputs": inputs}
         record = record.with_step(record.steps[0].model_copy(update=changes))

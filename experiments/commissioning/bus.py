@@ -7,8 +7,11 @@ import numpy as np
 
 from acquisition.errors import TractionError, UnfitDeviceError
 from acquisition.sample import Flag
-from experiments.proving.limits import Judgement, found, judged
-from experiments.proving.recording import Values, number, texts, words
+from experiments.commissioning.judging import Judgement, found, judged
+from experiments.commissioning.order import StepId
+from experiments.commissioning.recording import Values, number, texts, words
+from experiments.commissioning.scene import Scene
+from experiments.commissioning.step import Step
 from experiments.rig.build import read_properties
 from experiments.rig.rig import Rig
 from wam.bus.frames import MOTOR_NODES, SAFETY_NODE
@@ -215,3 +218,45 @@ def judge_timing(values: Values) -> Judgement:
             found("incomplete", number(values, "incomplete")),
         ]
     )
+
+
+def _collect_silence(scene: Scene) -> Values:
+    return scene.show(listen(scene.rig), "listening, nothing is sent")
+
+
+def _collect_identity(scene: Scene) -> Values:
+    values = identify(scene.rig, scene.serials)
+    scene.answers = scene.rig.backend.arm.answers()
+    return values
+
+
+def _collect_times(scene: Scene) -> Values:
+    if scene.info is None:
+        scene.info = scene.rig.backend.start_arm()
+        scene.answers = scene.rig.backend.arm.answers()
+    return scene.show(time_replies(scene.rig), "the loop runs, the arm idle")
+
+
+LISTEN = Step(
+    StepId.LISTEN,
+    _collect_silence,
+    judge_silence,
+    minutes=1,
+    remedy="End the other program; look at cable, terminators and bit rate.",
+)
+IDENTITY = Step(
+    StepId.IDENTITY,
+    _collect_identity,
+    judge_identity,
+    minutes=1,
+    remedy="Is this the arm and the puck it should be? What is right as it is goes "
+    "into the file that [arm] properties of rig.toml names. Where a puck was replaced, "
+    "move commissioning.json away: every step is done again.",
+)
+TIMING = Step(
+    StepId.TIMING,
+    _collect_times,
+    judge_timing,
+    minutes=2,
+    remedy="Use another adapter or computer, and end other programs on the bus.",
+)

@@ -5,7 +5,7 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from experiments.proving import container
+from experiments.commissioning import container
 from experiments.rig.build import terrain_frame
 from experiments.settings.load import load_settings
 

@@ -10,9 +10,11 @@ from acquisition.control_loop.faults import Fault
 from acquisition.devices import SafetyMode
 from acquisition.errors import PreflightError
 from acquisition.sample import MOTOR_FRESH_SHIFT, SAFETY_MODE_MASK
-from experiments.proving.limits import Judgement, found, judged
-from experiments.proving.recording import Values
-from experiments.proving.scene import Scene
+from experiments.commissioning.judging import Judgement, found, judged
+from experiments.commissioning.order import StepId
+from experiments.commissioning.recording import Values
+from experiments.commissioning.scene import Scene
+from experiments.commissioning.step import Step
 
 _PATIENCE = 60.0  # s, for each press
 _RELEASED = 2.0  # s, that a released stop has to last
@@ -160,3 +162,13 @@ def _silent_since(fresh: NDArray[np.int64], stop: int) -> int | None:
         if run == _SILENT_CYCLES:
             return i - _SILENT_CYCLES + 1
     return None
+
+
+STOP_CIRCUIT = Step(
+    StepId.STOP_CIRCUIT,
+    collect,
+    judge,
+    minutes=5,
+    remedy="Do not go on without a stop that works: pendant, its cable, the module.",
+    needs_loop=True,
+)

@@ -5,13 +5,14 @@ from dataclasses import replace
 import pytest
 
 from acquisition.errors import PreflightError
+from experiments.commissioning.guide import RecordFolder, do_step
+from experiments.commissioning.order import StepId
+from experiments.commissioning.procedure import STEPS
 from experiments.commissioning.record import write_commissioning
-from experiments.commissioning.steps import ProofStep
+from experiments.commissioning.scene import Scene
 from experiments.operator.auto_operator import AutoOperator
 from experiments.operator.console import Console
 from experiments.preflight.connecting import connect_rig
-from experiments.proving.guide import RecordFolder, do_step
-from experiments.proving.scene import Scene
 from experiments.rig.rig import FakeOptions
 from experiments.run.console_loop import ConsoleLoop
 from experiments.run.stop import StopFlag
@@ -33,17 +34,17 @@ def scene():
 def test_an_arm_without_its_proofs_is_not_driven(scene, tmp_path):
     files = RecordFolder.open(tmp_path, is_simulated=False)
     with pytest.raises(PreflightError, match="C0 configuration: not done"):
-        do_step(scene, ProofStep.CONTAINER, files, ("Ada", "Grace"))
+        do_step(scene, STEPS[StepId.CONTAINER], files, ("Ada", "Grace"))
     assert not files.record.steps
 
 
 def test_a_stale_proof_is_named(scene, tmp_path):
     scene.start()
     record = sound_record(scene.rig, scene.info)
-    lift = record.of(ProofStep.LIFT)
+    lift = record.of(StepId.LIFT)
     assert lift is not None
     stale = lift.model_copy(update={"inputs": {**lift.inputs, "[gravity]": "0" * 64}})
     write_commissioning(tmp_path, record.with_step(stale))
     files = RecordFolder.open(tmp_path, is_simulated=False)
     with pytest.raises(PreflightError, match=r"C10 lift: stale: \[gravity"):
-        do_step(scene, ProofStep.CONTAINER, files, ("Ada", "Grace"))
+        do_step(scene, STEPS[StepId.CONTAINER], files, ("Ada", "Grace"))

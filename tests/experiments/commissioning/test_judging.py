@@ -4,8 +4,15 @@ import pytest
 from acquisition.control_loop.faults import CircuitCauses, Fault, verdict_for
 from acquisition.devices import SafetyMode
 from acquisition.errors import SettingsError
-from experiments.proving import bus, by_hand, configuration, rest_pose, stop_circuit
-from experiments.proving.recording import read_raw, texts, write_raw
+from experiments.commissioning import (
+    bus,
+    by_hand,
+    configuration,
+    rest_pose,
+    stop_circuit,
+)
+from experiments.commissioning.judging import LIMITS
+from experiments.commissioning.recording import read_raw, texts, write_raw
 from wam.model.constants import load_constants
 
 CONSTANTS = load_constants()
@@ -209,3 +216,12 @@ def test_a_recording_is_read_as_written_or_refused(tmp_path):
     (tmp_path / "one.npz").write_bytes(b"other")
     with pytest.raises(SettingsError, match="not what was recorded"):
         read_raw(tmp_path, raw)
+
+
+def test_every_limit_has_values_words_and_a_source():
+    for name, limit in LIMITS.items():
+        assert limit.name, name
+        assert limit.wrong, name
+        assert limit.source, name
+        if limit.low is None and limit.high is None:
+            assert "computed" in limit.source, name

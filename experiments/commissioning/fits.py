@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.proving.recording import Values, number
+from experiments.commissioning.recording import Values, number
 from ft_sensor.payload import cross_matrix
 from wam.model.arm_model import ArmModel
 from wam.model.constants import GRAVITY, Array, load_constants

@@ -9,10 +9,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from experiments.proving.by_hand import CARRIED
-from experiments.proving.recording import Values
-from experiments.proving.scales import PRESSED, PULLED
-from experiments.proving.weights import AVERAGE, HUNG, HUNG_AT, POSES, SETTLED
+from experiments.commissioning.by_hand import CARRIED
+from experiments.commissioning.recording import Values
+from experiments.commissioning.scales import PRESSED, PULLED
+from experiments.commissioning.weights import AVERAGE, HUNG, HUNG_AT, POSES, SETTLED
 from fakes.plant.gauges import WristGauges
 from fakes.randomness import trial_generator
 from fakes.sensor.errors import SensorErrors

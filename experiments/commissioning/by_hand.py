@@ -2,9 +2,11 @@
 
 import numpy as np
 
-from experiments.proving.limits import Found, Judgement, found, judged
-from experiments.proving.recording import Values
-from experiments.proving.scene import Scene
+from experiments.commissioning.judging import Found, Judgement, found, judged
+from experiments.commissioning.order import StepId
+from experiments.commissioning.recording import Values
+from experiments.commissioning.scene import Scene
+from experiments.commissioning.step import Step
 from wam.model.constants import Array
 
 # Where the arm is before its joints are turned [rad]: nothing is in the way of one.
@@ -95,3 +97,14 @@ def stop_errors(values: Values) -> Array:
     """Return by how much the zero of each joint is off by its stops [rad], (7,)."""
     low, high = np.diag(values["low"]), np.diag(values["high"])
     return ((low - values["q_lower"]) + (high - values["q_upper"])) / 2
+
+
+BY_HAND = Step(
+    StepId.BY_HAND,
+    collect,
+    judge,
+    minutes=10,
+    remedy="Zero the arm again at home; look at the encoder that is named.",
+    needs_loop=True,
+    needs_zero=True,
+)

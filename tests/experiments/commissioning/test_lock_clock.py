@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from experiments.proving import lock_clock
-from experiments.proving.recording import texts
-from experiments.proving.weights import POSES
+from experiments.commissioning import lock_clock
+from experiments.commissioning.recording import texts
+from experiments.commissioning.weights import POSES
 from fakes.plant.gauges import WristGauges
 from tests.fakes.scenes import TOOL
 from wam.model.arm_model import ArmModel

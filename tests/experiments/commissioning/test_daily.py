@@ -6,21 +6,21 @@ import numpy as np
 import pytest
 
 from acquisition.errors import SettingsError
-from experiments.commissioning.daily import (
+from experiments.commissioning import daily
+from experiments.commissioning.daily_record import (
     DailyCheck,
     DailyHistory,
     read_history,
     write_history,
 )
+from experiments.commissioning.fits import fit_foot
+from experiments.commissioning.guide import RecordFolder
 from experiments.commissioning.record import Measured, Raw
-from experiments.proving import daily
-from experiments.proving.fits import fit_foot
-from experiments.proving.guide import RecordFolder
-from experiments.proving.recording import texts
-from experiments.proving.weights import POSES
+from experiments.commissioning.recording import texts
+from experiments.commissioning.weights import POSES
 from experiments.rig.build import build_tool
 from experiments.settings.load import load_settings
-from tests.experiments.proving.held_arm import HeldArm
+from tests.experiments.commissioning.held_arm import HeldArm
 from wam.model.constants import load_constants
 
 SOUND = 40

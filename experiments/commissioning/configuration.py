@@ -2,13 +2,16 @@
 
 import numpy as np
 
-from experiments.proving.limits import Judgement, found, judged
-from experiments.proving.recording import Values, number, texts, words
-from experiments.rig.rig import Rig
+from experiments.commissioning.judging import Judgement, found, judged
+from experiments.commissioning.order import StepId
+from experiments.commissioning.recording import Values, number, texts, words
+from experiments.commissioning.scene import Scene
+from experiments.commissioning.step import Step
 
 
-def collect(rig: Rig) -> Values:
+def collect(scene: Scene) -> Values:
     """Return what the settings say."""
+    rig = scene.rig
     tool = rig.model.tool
     assert tool is not None
     apart = [
@@ -32,3 +35,12 @@ def judge(values: Values) -> Judgement:
             found("drawings", float(values["gravity_apart"].max())),
         ]
     )
+
+
+CONFIGURATION = Step(
+    StepId.CONFIGURATION,
+    collect,
+    judge,
+    minutes=1,
+    remedy="Correct the file, or measure again what it says.",
+)

@@ -16,10 +16,12 @@ from acquisition.devices import SHORTED, SafetyMode
 from acquisition.errors import PreflightError
 from acquisition.sample import MOTOR_FRESH_SHIFT, SAFETY_MODE_MASK
 from acquisition.simulation import PendantAction
+from experiments.commissioning.judging import Found, Judgement, found, judged
+from experiments.commissioning.order import StepId
+from experiments.commissioning.recording import Values, texts, words
+from experiments.commissioning.scene import Scene
+from experiments.commissioning.step import Step
 from experiments.messages import preflight_error
-from experiments.proving.limits import Found, Judgement, found, judged
-from experiments.proving.recording import Values, texts, words
-from experiments.proving.scene import Scene
 from experiments.run.stop import ArmFaultError
 from wam.model.constants import ArmConstants, Array
 
@@ -371,3 +373,41 @@ def _seconds(t_ns: NDArray[Any]) -> float:
 def _ended(values: Values) -> list[Found]:
     ended = words(values, "ended")
     return [found("ended", len(ended), text=" ".join(ended))]
+
+
+REST_POSE = Step(
+    StepId.REST_POSE,
+    rest_and_silence,
+    judge_rest,
+    minutes=5,
+    remedy="Lay the arm down again with nothing leaning on it; look at the mounting.",
+    needs_loop=True,
+    needs_zero=True,
+)
+RAMPS_UNDER_LITTLE_TORQUE = Step(
+    StepId.RAMPS,
+    ramps,
+    judge_ramps,
+    minutes=2,
+    remedy="Switch the arm off and look at the motor that is named, and its cables.",
+    needs_loop=True,
+    needs_zero=True,
+)
+LIFT = Step(
+    StepId.LIFT,
+    lift,
+    judge_lift,
+    minutes=2,
+    remedy="Weigh the foot; look at the zero position and at the drive cables.",
+    needs_loop=True,
+    needs_zero=True,
+)
+GRAVITY_RAMP = Step(
+    StepId.GRAVITY_RAMP,
+    gravity_ramp,
+    judge_gravity_ramp,
+    minutes=1,
+    remedy="Weigh the foot; look at mounting, zero position and gravity calibration.",
+    needs_loop=True,
+    needs_zero=True,
+)

@@ -10,9 +10,11 @@ import numpy as np
 
 from acquisition.errors import SettingsError
 from experiments.calibrating.terrain import TerrainGuide
-from experiments.proving.limits import Judgement, found, judged
-from experiments.proving.recording import Values, number
-from experiments.proving.scene import Scene
+from experiments.commissioning.judging import Judgement, found, judged
+from experiments.commissioning.order import StepId
+from experiments.commissioning.recording import Values, number
+from experiments.commissioning.scene import Scene
+from experiments.commissioning.step import Step
 from ft_sensor.calibration.fit import fit_terrain
 
 
@@ -55,3 +57,16 @@ def judge(values: Values) -> Judgement:
             found("short", 1e3 * (number(values, "travel") - touched.travel)),
         ]
     )
+
+
+CONTAINER = Step(
+    StepId.CONTAINER,
+    collect,
+    judge,
+    minutes=5,
+    remedy="Correct the terrain's row of the matrix, or put the container where it "
+    "says.",
+    needs_loop=True,
+    needs_zero=True,
+    needs_torque=True,
+)

@@ -2,10 +2,10 @@
 
 import pytest
 
-from experiments.proving import by_hand, weights
+from experiments.commissioning import by_hand, weights
 from experiments.rig.build import build_tool
 from experiments.settings.load import load_settings
-from tests.experiments.proving.held_arm import HeldArm
+from tests.experiments.commissioning.held_arm import HeldArm
 
 SOUND = 40
 WRONG = {  # name of the catalogue: words of the first cause, one of them

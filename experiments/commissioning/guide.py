@@ -6,8 +6,12 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from experiments import provenance
+from experiments.commissioning import bus, by_hand
 from experiments.commissioning.gate import lacks, require
 from experiments.commissioning.inputs import inputs_of
+from experiments.commissioning.judging import Judgement
+from experiments.commissioning.order import StepId
+from experiments.commissioning.procedure import STEPS
 from experiments.commissioning.record import (
     Commissioning,
     Measured,
@@ -15,14 +19,11 @@ from experiments.commissioning.record import (
     read_commissioning,
     write_commissioning,
 )
-from experiments.commissioning.steps import ProofStep
+from experiments.commissioning.recording import read_raw, write_raw
+from experiments.commissioning.scene import Scene
+from experiments.commissioning.step import Step
 from experiments.messages import preflight_error
 from experiments.operator.console import BAD, GOOD, WARNING, Console
-from experiments.proving import bus, by_hand
-from experiments.proving.limits import Judgement
-from experiments.proving.recording import read_raw, write_raw
-from experiments.proving.scene import Scene
-from experiments.proving.work import WORK
 from experiments.rig.rig import Rig
 
 SHOWN = 4  # quantities of a step that passed, on the screen
@@ -59,14 +60,12 @@ class RecordFolder:
         write_commissioning(self.folder, self.record)
 
     def tell(self, name: str, when: datetime) -> None:
-        """Write that a basis of `steps.BASES` changed, as a person says."""
+        """Write that a basis of `order.BASES` changed, as a person says."""
         self.record = self.record.with_told(name, when)
         write_commissioning(self.folder, self.record)
 
 
-def do_step(
-    scene: Scene, step: ProofStep, files: RecordFolder, operator: str
-) -> Judgement:
+def do_step(scene: Scene, step: Step, files: RecordFolder, operator: str) -> Judgement:
     """Do one step and write what came of it.
 
     Args:
@@ -79,38 +78,36 @@ def do_step(
         PreflightError: the arm is not fit, or a person did not do what was asked.
         StopRequestedError: as `ConsoleLoop.tick`.
     """
-    work = WORK[step]
     scene.say("")
-    scene.say(
-        f"{step} {step.words}, about {work.minutes:g} min   [q]uit, to go on later"
-    )
-    if work.needs_loop:
+    title = f"{step.id} {step.id.words}, about {step.minutes:g} min"
+    scene.say(f"{title}   [q]uit, to go on later")
+    if step.needs_loop:
         scene.start()
-    if work.needs_zero and scene.info is not None and not scene.info.is_zeroed:
+    if step.needs_zero and scene.info is not None and not scene.info.is_zeroed:
         raise preflight_error("not-zeroed")
-    if work.needs_proof and scene.simulation is None:
+    if step.needs_torque and scene.simulation is None:
         require(lacks(files.record, scene.inputs(), _now(scene.rig)))
     scene.serials = _commissioned_with(files)
-    by_hand_before = files.record.of(ProofStep.BY_HAND)
+    by_hand_before = files.record.of(StepId.BY_HAND)
     if by_hand_before is not None and by_hand_before.raw:
         stops = read_raw(files.folder, by_hand_before.raw[0])
         scene.stops = by_hand.stop_errors(stops)
     started = _now(scene.rig)
-    values = work.collect(scene)
-    judgement = work.judge(values)
+    values = step.collect(scene)
+    judgement = step.judge(values)
     ended = _now(scene.rig)
-    name = f"commissioning_{step}_{ended:%Y%m%dT%H%M%S}.npz"
+    name = f"commissioning_{step.id}_{ended:%Y%m%dT%H%M%S}.npz"
     raw = write_raw(files.folder, name, values)
     present = scene.inputs()
     present |= files.record.told_inputs()
     files.keep(
         StepRecord(
-            step=step,
-            subject=scene.rig.row.name if step is ProofStep.CONTAINER else "",
+            step=step.id,
+            subject=scene.rig.row.name if step.id is StepId.CONTAINER else "",
             started=started,
             ended=ended,
             operator=operator,
-            inputs=inputs_of(step, present),
+            inputs=inputs_of(step.id, present),
             raw=(raw,),
             quantities=judgement.quantities,
             verdict="wrong" if judgement.cause else "sound",
@@ -123,7 +120,7 @@ def do_step(
 
 def _commissioned_with(files: RecordFolder) -> list[int | None]:
     """Return the serial numbers of the arm when C2 was last sound; [] = it was not."""
-    identity = files.record.of(ProofStep.IDENTITY)
+    identity = files.record.of(StepId.IDENTITY)
     if identity is None or not identity.raw:
         return []
     values = read_raw(files.folder, identity.raw[0])
@@ -132,26 +129,26 @@ def _commissioned_with(files: RecordFolder) -> list[int | None]:
 
 
 def wanted(
-    scene: Scene, steps: Sequence[ProofStep], files: RecordFolder, *, is_anew: bool
-) -> list[ProofStep]:
+    scene: Scene, steps: Sequence[Step], files: RecordFolder, *, is_anew: bool
+) -> list[Step]:
     """Return those of `steps` that have to be done; all of them where `is_anew`."""
     if is_anew:
         return list(steps)
     now, terrain = _now(scene.rig), scene.rig.row.name
     found = lacks(files.record, scene.inputs(), now, terrain)
     lacking = {lack.step for lack in found}
-    return [step for step in steps if step in lacking]
+    return [step for step in steps if step.id in lacking]
 
 
-def say_judgement(console: Console, step: ProofStep, judgement: Judgement) -> None:
+def say_judgement(console: Console, step: Step, judgement: Judgement) -> None:
     """Say what came of a step in a line, and what to do where it failed."""
     console.end_panel()
-    name = f"{step} {step.words}"
+    name = f"{step.id} {step.id.words}"
     for note in judgement.notes:
         console.check(WARNING, name, note)
     if judgement.cause:
         console.check(BAD, name, judgement.cause)
-        console.say(f"   {WORK[step].way_back}")
+        console.say(f"   {step.remedy}")
         return
     most = sorted(judgement.quantities, key=_nearness, reverse=True)[:SHOWN]
     text = ", ".join(each.text for each in judgement.quantities if each in most)
@@ -174,8 +171,9 @@ def recheck(files: RecordFolder, console: Console) -> bool:
     is_sound = True
     for done in files.record.steps:
         (raw,) = done.raw
-        judgement = WORK[done.step].judge(read_raw(files.folder, raw))
-        say_judgement(console, done.step, judgement)
+        step = STEPS[done.step]
+        judgement = step.judge(read_raw(files.folder, raw))
+        say_judgement(console, step, judgement)
         is_sound = is_sound and not judgement.cause
         verdict = "wrong" if judgement.cause else "sound"
         if (judgement.quantities, verdict) != (done.quantities, done.verdict):

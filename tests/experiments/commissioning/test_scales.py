@@ -2,10 +2,10 @@
 
 import pytest
 
-from experiments.proving import scales
+from experiments.commissioning import scales
 from experiments.rig.build import build_tool
 from experiments.settings.load import load_settings
-from tests.experiments.proving.held_arm import HeldArm
+from tests.experiments.commissioning.held_arm import HeldArm
 from wam.model.constants import GRAVITY
 
 

@@ -9,11 +9,13 @@ import numpy as np
 
 from acquisition.errors import PreflightError
 from acquisition.ipc.shared_sensor import unpack_wrenches
-from experiments.proving.by_hand import CARRIED
-from experiments.proving.fits import FITTED, fit_foot, fit_hung
-from experiments.proving.limits import Judgement, found, judged
-from experiments.proving.recording import Values, number
-from experiments.proving.scene import Scene
+from experiments.commissioning.by_hand import CARRIED
+from experiments.commissioning.fits import FITTED, fit_foot, fit_hung
+from experiments.commissioning.judging import Judgement, found, judged
+from experiments.commissioning.order import StepId
+from experiments.commissioning.recording import Values, number
+from experiments.commissioning.scene import Scene
+from experiments.commissioning.step import Step
 from wam.model.constants import Array
 
 # Poses in which the foot points down, ahead, to the sides and up [rad].
@@ -175,3 +177,23 @@ def judge_hung_weight(values: Values) -> Judgement:
             found("hung_way", fit.way),
         ]
     )
+
+
+OWN_WEIGHT = Step(
+    StepId.OWN_WEIGHT,
+    own_weight,
+    judge_own_weight,
+    minutes=8,
+    remedy="Weigh the foot; look at the sensor's mounting, sign, sheet and cable.",
+    needs_loop=True,
+    needs_zero=True,
+)
+HUNG_WEIGHT = Step(
+    StepId.HUNG_WEIGHT,
+    hung_weight,
+    judge_hung_weight,
+    minutes=12,
+    remedy="Zero the arm again where a zero is named; look at base and sensor.",
+    needs_loop=True,
+    needs_zero=True,
+)

@@ -6,11 +6,13 @@ is the same before and while it presses, so differences are of the scale alone.
 
 import numpy as np
 
-from experiments.proving.fits import orientations
-from experiments.proving.limits import Found, Judgement, found, judged
-from experiments.proving.recording import Values, number
-from experiments.proving.scene import Scene
-from experiments.proving.weights import POSES, bring, measure
+from experiments.commissioning.fits import orientations
+from experiments.commissioning.judging import Found, Judgement, found, judged
+from experiments.commissioning.order import StepId
+from experiments.commissioning.recording import Values, number
+from experiments.commissioning.scene import Scene
+from experiments.commissioning.step import Step
+from experiments.commissioning.weights import POSES, bring, measure
 from wam.model.arm_model import ArmModel
 from wam.model.constants import GRAVITY, Array, load_constants
 
@@ -92,3 +94,14 @@ def judge(values: Values) -> Judgement:
 def _beside(key: str, apart: float, shown: float) -> Found:
     most = _SHARE * abs(shown) + _LEAST
     return found(key, apart, low=-most, high=most)
+
+
+PLATE = Step(
+    StepId.PLATE,
+    collect,
+    judge,
+    minutes=5,
+    remedy="Read the scale again; compare the sensor's calibration sheet.",
+    needs_loop=True,
+    needs_zero=True,
+)

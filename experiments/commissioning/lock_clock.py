@@ -13,13 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.ipc.shared_sensor import unpack_wrenches
+from experiments.commissioning.by_hand import CARRIED
+from experiments.commissioning.fits import orientations
+from experiments.commissioning.judging import Judgement, found, judged
+from experiments.commissioning.order import StepId
+from experiments.commissioning.recording import Values, number, texts, words
+from experiments.commissioning.scene import Scene
+from experiments.commissioning.step import Step
+from experiments.commissioning.weights import POSES, bring
 from experiments.operator.prompts import Prompt
-from experiments.proving.by_hand import CARRIED
-from experiments.proving.fits import orientations
-from experiments.proving.limits import Judgement, found, judged
-from experiments.proving.recording import Values, number, texts, words
-from experiments.proving.scene import Scene
-from experiments.proving.weights import POSES, bring
 from experiments.rig.build import start_of
 from experiments.run.ready import activate
 from wam.model.arm_model import ArmModel
@@ -220,3 +222,16 @@ def ringing(values: Values) -> float:
     rest = float(q[-_RESTS:].mean())
     beyond = np.sign(low - turned) * (q - rest)
     return float(max(beyond.max(), 0.0) / max(abs(turned - rest), 1e-9))
+
+
+LOCK_AND_CLOCK = Step(
+    StepId.LOCK_AND_CLOCK,
+    collect,
+    judge,
+    minutes=4,
+    remedy="Look at the sensor's buffer and filter, at motor 7, and at lock_kp, "
+    "lock_kd.",
+    needs_loop=True,
+    needs_zero=True,
+    needs_torque=True,
+)

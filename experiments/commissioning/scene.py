@@ -1,6 +1,6 @@
 """What a step works with: the rig, the terminal, the hands of a simulation."""
 
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -8,6 +8,7 @@ from acquisition.control_loop.proof import ProofGoal
 from acquisition.ipc.loop_client import LoopClient
 from acquisition.simulation import SimulationControl
 from experiments.commissioning.inputs import present_inputs
+from experiments.commissioning.recording import Values
 from experiments.messages import FaultContext, fault_text
 from experiments.operator.console import Console
 from experiments.operator.prompts import Prompt
@@ -92,6 +93,15 @@ class Scene:
         full = round(_BAR * min(share, 1.0))
         bar = "█" * full + "░" * (_BAR - full)
         self.console.panel([f" {bar} {share:4.0%}  {what}"])
+
+    def show(self, work: Iterator[tuple[float, Values]], what: str) -> Values:
+        """Do `work`, of which the share done is shown; return what came last."""
+        values: Values = {}
+        for share, values in work:  # noqa: B007
+            self.show_share(share, what)
+            if self.console_loop.stop.count:
+                break
+        return values
 
     def ask(self, text: str) -> None:
         """Say `text` and wait for [space].
