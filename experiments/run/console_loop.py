@@ -330,7 +330,8 @@ class ConsoleLoop:
 
         It stands still, weakly enough for a hand that carries the foot onto its stand;
         an arm that is damped for its motion stays so before somebody has it. Without
-        an answer, or at a request to stop, it goes idle all the same.
+        an answer, or at a request to stop, it goes idle all the same; at once after an
+        urgent one, however it came to be here.
         """
         loop_client = self.loop_client
         is_driven = loop_client.status.state in _DRIVEN
@@ -338,6 +339,9 @@ class ConsoleLoop:
         if not is_driven or is_shorted or self.console.is_lost:
             return
         self.show(None)
+        if self.stop.is_urgent:
+            self.stop_arm()
+            return
         rest = self.rig.settings.rig.arm.rest
         verdict = loop_client.status.verdict
         try:
@@ -367,7 +371,8 @@ class ConsoleLoop:
             key = self.operator.answer(state)
             if key_action(prompt, key) is KeyAction.CONFIRM and is_done():
                 return True
-            if self.stop.count > requests or self.console.is_lost:
+            is_stopped = self.stop.count > requests or self.stop.is_urgent
+            if is_stopped or self.console.is_lost:
                 return False
         self.console.say(_NOBODY)
         return False

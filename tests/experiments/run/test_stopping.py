@@ -106,6 +106,37 @@ def test_ctrl_c_twice_damps_and_brakes_the_arm_before_the_file_is_closed(twice):
     assert twice.rig.network.safety_mode is SafetyMode.IDLE
 
 
+@pytest.mark.parametrize(
+    "prompt", [Prompt.LIFT, Prompt.READY, Prompt.RECORDING, Prompt.REVIEW]
+)
+@pytest.mark.parametrize("apart", [0.0, 0.3])
+def test_ctrl_c_twice_idles_the_arm_without_waiting_for_a_hand(
+    tmp_path, config, prompt, apart
+):
+    asked_for, pressed = [], []
+
+    def press(asked, rig):
+        asked_for.append(asked.prompt)
+        if asked.prompt is prompt and not pressed:
+            if asked.since > 0.1:
+                pressed.append(asked.since)
+                signal.raise_signal(signal.SIGINT)
+                if not apart:
+                    signal.raise_signal(signal.SIGINT)
+            return ""
+        if asked.prompt is Prompt.LAY_DOWN and asked.since > apart:
+            signal.raise_signal(signal.SIGINT)
+            return ""
+        return "" if asked.prompt is Prompt.LAY_DOWN else short_trial(asked)
+
+    seen = run_watched(config, tmp_path, 1, press=press)
+    assert pressed
+    assert seen.done.code == 5
+    assert seen.rig.network.safety_mode is SafetyMode.IDLE
+    waited = asked_for.count(Prompt.LAY_DOWN) * 0.02
+    assert waited <= (apart + 0.1 if apart else 0.0)
+
+
 def test_signals_are_given_back_after_a_session(once, twice):
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
     assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
