@@ -24,7 +24,6 @@ OF_RECORDINGS = {
         "fitted",
         "hung_way",
         "rest",
-        "stiffness",
         "ringing",
         "balance",
     ),

@@ -81,7 +81,7 @@ FOUND: dict[str, tuple[Finding, ...]] = {
         Finding("C10", ("weight",)),
         Finding("C11", ("gravity", "ended", "share")),
     ),
-    "motor-7-half": (Finding("C12", ("ended",)),),
+    "motor-7-half": (Finding("C12", ("stiffness",)),),
     "encoder-4-reversed": (Finding("C5", ("sense", "travel", "stop_angle")),),
     "encoders-6-7-swapped": (
         Finding("C5", ("sense", "beside", "travel", "stop_angle")),

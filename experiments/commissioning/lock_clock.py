@@ -31,7 +31,7 @@ ROCKED = 10.0  # s
 _POSE = 1  # of `POSES`: the foot ahead
 # At 1 Hz the hysteresis of a sound sensor looks like a lag of up to 4 ms.
 _WAY, _HALF = 0.3, 1.0 / 3.0  # rad to both sides, s from side to side
-TURNED = 0.9  # N m, 9 N at 100 mm: friction bears a fifth of it
+TURNED = 0.6  # N m, 6 N at 100 mm: friction bears a third of it
 _TURN_SECONDS = 60.0  # that simulated hands turn
 _SETTLED, _MEANT = 0.8, 0.3  # s
 _SWINGS = 2.0  # s, in which a person lets go and the foot comes to rest
@@ -99,7 +99,7 @@ def _turn(scene: Scene) -> dict[str, NDArray[Any]]:
     """
     parts = [_held(scene, "Hands off the foot, the arm holds itself. [space]", 0.0)]
     text = (
-        f"Turn the foot about its own axis with about {TURNED:g} N m (9 N at 100 mm) "
+        f"Turn the foot about its own axis with about {TURNED:g} N m (6 N at 100 mm) "
         "and keep it there. [space] while it is turned."
     )
     parts.append(_held(scene, text, TURNED))
