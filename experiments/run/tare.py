@@ -105,9 +105,7 @@ def prove_mounting(services: RunServices) -> None:
             continue
         reader = services.loop_client.wrenches()
         q, _ = walk.rest(TARE_SECONDS)
-        mean = _mean(
-            unpack_wrenches(reader.read()), rig.settings.rig.limits.tare_spread
-        )
+        mean = _mean(services, unpack_wrenches(reader.read()))
         rotations.append(rig.model.plate_pose(q)[1])
         readings.append(np.array(mean.wrench))
     change = weight_change(rig.payload, rotations, readings)
@@ -166,23 +164,29 @@ def _measure(services: RunServices, name: TrialName) -> TareResult:
     services.loop_client.request(ArmState.GUIDE)
     _wait_still(services, name)
     services.loop_client.request(ArmState.HOLD)
-    console_loop, rig = services.console_loop, services.rig
+    console_loop = services.console_loop
     reader = services.loop_client.wrenches()
     for tick in range(round(TARE_SECONDS / TICK) + 1):
         console_loop.tick(Prompt.LIFT, name)
         console_loop.inject_faults(FaultTrigger.TARE, name.number, tick * TICK)
-    return _mean(unpack_wrenches(reader.read()), rig.settings.rig.limits.tare_spread)
+    return _mean(services, unpack_wrenches(reader.read()))
 
 
-def _mean(samples: Sequence[WrenchSample], limit: float) -> TareResult:
+def _mean(services: RunServices, samples: Sequence[WrenchSample]) -> TareResult:
     """Return the mean of one second.
 
     Raises:
-        PreflightError: the force varied, or samples were lost or flagged.
+        PreflightError: the force varied, samples were lost or flagged, or the sensor is
+            not read at all.
     """
+    rig = services.rig
+    limit = rig.settings.rig.limits.tare_spread
     try:
         return take_mean(samples, limit)
     except TareError as error:
+        stream = services.console_loop.run_aside(rig.backend.sensor_metadata)
+        if why := stream.get("trouble", "").rstrip("."):
+            raise preflight_error("tare-without-sensor", why=why) from error
         if error.spread is None:
             raise preflight_error("tare-poor", detail=error.message) from error
         fields = {"spread": error.spread, "limit": limit}

@@ -374,6 +374,13 @@ def _saturate(scene):
     scene.rig.faults()["ft-saturated"]()
 
 
+def _plug_in_another(scene):
+    """Take the sensor away, as the process that reads it on a rig reports it."""
+    scene.rig.faults()["ft-unplugged"]()
+    told = {"trouble": "Another F/T sensor was plugged in: 7, not 3."}
+    scene.patch.setattr(InProcessBackend, "sensor_metadata", lambda _: told)
+
+
 def _no_exchange(scene):
     scene.patch.setattr(ArmOperations, "measure_exchange", lambda _: ExchangeTimes([]))
     return resume(scene)
@@ -557,6 +564,9 @@ CASES = {
     # what is wrong with a tare
     "tare-moved": tared(text="tare-moved@T2+0.25s", words="Force varied "),
     "residual": tared(text="residual@T2+0s", words="feet.tread.mass 0.450 kg"),
+    "tare-without-sensor": replace(
+        tared(_plug_in_another, words="at present: Another F/T sensor was"), code=3
+    ),
     "tare-poor": tared(_saturate, words="were flagged during tare"),
     "mounting": Case(_turned_sensor, 3, words="degrees about z"),
     "no-end-tare": Case(_no_end_tare, 0, words="left out as asked."),
@@ -637,7 +647,7 @@ def files_of_first(scene):
 
 # Depends on what else the computer does: tests/experiments/test_messages.py.
 OF_THE_COMPUTER = {"too-busy"}
-# Of a real arm only: tests/experiments/preflight/test_commissioned.py.
+# Of a real arm only: tests/experiments/commissioning/test_gate.py.
 OF_THE_FIRST_DAY = {"daily-ahead"}
 
 

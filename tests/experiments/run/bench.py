@@ -88,6 +88,10 @@ class StubBackend:
     def __init__(self, client):
         self.loop_client = client
         self.recorder = SimpleNamespace(abandon=lambda: None)
+        self.stream: dict[str, str] = {}
+
+    def sensor_metadata(self):
+        return self.stream
 
     def idle(self):
         return True

@@ -332,6 +332,16 @@ def test_a_last_tare_that_is_refused_costs_the_bracket_only(tmp_path, capsys):
     assert "flagged" in capsys.readouterr().out
 
 
+def test_a_tare_without_a_sensor_says_why_there_is_none(tmp_path, capsys):
+    context = lifted(tmp_path)
+    context.loop_client.is_valid = False
+    context.rig.backend.stream = {"trouble": "Another F/T sensor was plugged in: 7."}
+    take_end_tare(context)
+    said = capsys.readouterr().out
+    assert "not read at present: Another F/T sensor was plugged in: 7." in said
+    assert "flagged" not in said
+
+
 def test_other_texts_of_the_settings_are_no_calibration():
     text = calibration("tread")["calibration:ft_sensor.toml"]
     assert known_bias({"rig": text}, "tread", is_simulated=False) is None
