@@ -11,8 +11,8 @@ import numpy as np
 from acquisition.errors import SettingsError
 from analysis.data.prepare import PreparedTrial
 from analysis.data.terrain_kinds import terrain_kind
-from experiments.report.quantities import KEPT
-from experiments.report.table_columns import columns_of
+from experiments.export.quantities import KEPT
+from experiments.export.table_columns import columns_of
 from traction.frames import data_frame
 from traction.trials import SERIES_UNITS, Trial
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from analysis.data.load import RecordedTrial
 from analysis.data.prepare import PreparedTrial, PrepareOptions, prepare_trial
 from analysis.data.series import Array, TractionSeries
-from experiments.report.quantities import KEPT, QUANTITIES
-from experiments.report.table_columns import TableColumn, columns_of
+from experiments.export.quantities import KEPT, QUANTITIES
+from experiments.export.table_columns import TableColumn, columns_of
 from traction.frames import data_frame
 
 if TYPE_CHECKING:

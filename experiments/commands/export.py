@@ -149,7 +149,7 @@ def _is_given(args: argparse.Namespace, name: str) -> bool:
 def _export_for(args: argparse.Namespace, console: Console) -> int:
     from acquisition.errors import SettingsError
     from analysis.exports.folder import parse_targets
-    from experiments.report.terrain_targets import TargetRequest, export_for
+    from experiments.export.terrain_targets import TargetRequest, export_for
 
     targets, names = parse_targets(args.targets), _names(args.terrain)
     if args.terrain is not None and not names:
@@ -180,10 +180,11 @@ def _names(text: str | None) -> tuple[str, ...]:
 
 def _export_sessions(args: argparse.Namespace, console: Console) -> int:
     from acquisition.errors import SettingsError
+    from experiments.export.standard_topics import export_standard_topics
+    from experiments.export.terrain_database import export_terrains
+    from experiments.export.trial_tables import export_sessions
     from experiments.report.choices import choose_sessions, tell_missing
-    from experiments.report.export import export_sessions
-    from experiments.report.sessions import ReportRequest, export_terrains
-    from experiments.report.standard_topics import export_standard_topics
+    from experiments.report.sessions import ReportRequest
     from experiments.settings.load import load_settings
 
     every = args.to is None and not args.sessions

@@ -43,10 +43,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the publication and return the exit code."""
+    from experiments.export.credits import LICENCES, parse_author
+    from experiments.export.publication import PublishRequest, publish_sessions
     from experiments.operator.console import Console
     from experiments.report.choices import choose_sessions, tell_missing
-    from experiments.report.credits import LICENCES, parse_author
-    from experiments.report.publication import PublishRequest, publish_sessions
     from experiments.report.sessions import ReportRequest
     from experiments.settings.load import load_settings
 

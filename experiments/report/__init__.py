@@ -1,5 +1,5 @@
-"""Recorded sessions to reports and exports.
+"""Recorded sessions, or tables from elsewhere, to the studies and pages of `report`.
 
-`sessions` chooses and analyses, `truth_errors` holds simulated sessions against their
-truth, `export` writes tables. Begin with `sessions`.
+What a person chooses, the trials that are loaded, and what only sessions can tell of
+them: cells, checks, provenance, simulated truth. Begin with `sessions`.
 """

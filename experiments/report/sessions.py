@@ -26,16 +26,9 @@ from analysis.report.page_model import ReportContext
 from analysis.report.what_if import StudyVariant
 from analysis.report.what_if_tables import plain_choice, side_by_side
 from analysis.study.jobs import Shard
-from analysis.study.models import (
-    GP_SE,
-    GP_SE_TRIAL,
-    PAPER_MODELS,
-    FitOptions,
-)
+from analysis.study.models import FitOptions
 from analysis.study.store import MOST_BYTES, TYPES, ResultStore
 from analysis.study.study import Study, StudyOptions
-from analysis.terrains.export import database_of
-from analysis.terrains.identify import identify_study
 from experiments.operator.console import Console
 from experiments.report.cells import cells_table
 from experiments.report.choices import AnalysisChoices, repeat_study
@@ -48,11 +41,9 @@ from experiments.report.truth_errors import (
     compare_with_truth,
     truth_tables,
 )
-from experiments.session.data_files import write_new_text
 from experiments.session.store import FOLDS, SessionFolder, iso_utc
 
 _SHARE_OF_DISK = 4  # one part in so many of what is free may be results
-EXPORTED = (*PAPER_MODELS, GP_SE_TRIAL)
 
 
 @dataclass(frozen=True, slots=True)
@@ -291,35 +282,6 @@ def require_samples(study: Study) -> None:
         f"to {fast:.3g} m/s.",
         hint=" ".join([hint, *study.warnings]),
     )
-
-
-def export_terrains(
-    sessions: Sequence[SessionFolder],
-    data: Path,
-    out: Path,
-    order: ReportRequest,
-    console: Console,
-) -> None:
-    """Write a terrain database of all models of the sessions' terrains to `out`.
-
-    Raises:
-        SessionError: no session has a kept trial.
-        TrialFileError: `out` exists or cannot be written.
-    """
-    judged = FitOptions(seed=order.seed, models=(GP_SE,), draws=0)
-    analysed = study_sessions(sessions, data, order, console, judged)
-    study = analysed.study
-    options = replace(
-        study.options, fit=FitOptions(seed=order.seed, models=EXPORTED, draws=0)
-    )
-    text = database_of(
-        replace(study, options=options),
-        identify_study(study),
-        iso_utc(SystemClock().utc_ns()),
-        store=results_below(data),
-    )
-    write_new_text(out, text)
-    console.say(f"{len(study.terrains)} terrains: {out}")
 
 
 def report_sessions(

@@ -8,7 +8,7 @@ import pytest
 from acquisition.errors import TrialFileError
 from acquisition.recording.recorder import seal
 from acquisition.trial_file.writer import FLIGHT_TOPICS
-from experiments.report.bundle import MANIFEST, write_bundle
+from experiments.export.bundle import MANIFEST, write_bundle
 from experiments.session.store import find_session
 from tests.acquisition.trials import make_cycles, write_trial
 from tests.corpus.used_session import lay_out
@@ -71,7 +71,7 @@ def test_files_of_one_name_and_links_that_a_person_names_are_taken(data):
 
 
 def test_what_is_too_large_is_left_out_by_name(data, monkeypatch):
-    monkeypatch.setattr("experiments.report.bundle.LARGEST", 50_000)
+    monkeypatch.setattr("experiments.export.bundle.LARGEST", 50_000)
     left_out, files = bundled(data)
     assert left_out["faults/T03.flight.mcap"].startswith("is larger than")
     assert json.loads(files[MANIFEST])["left_out"] == left_out

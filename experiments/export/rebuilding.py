@@ -16,8 +16,8 @@ from analysis.findings.findings import compute_results, findings_rows
 from analysis.findings.rig_health import with_tares
 from analysis.study.fits import to_csv
 from analysis.study.models import REPORTED, FitOptions
+from experiments.export.publication import ANALYSIS, TABLE
 from experiments.operator.console import Console
-from experiments.report.publication import ANALYSIS, TABLE
 from experiments.report.sessions import ReportRequest, study_sessions
 from experiments.session.data_files import read_json, reading
 from experiments.session.store import list_sessions

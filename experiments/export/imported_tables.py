@@ -22,8 +22,9 @@ from analysis.imported.record import (
 from analysis.logs.log_file import LogTopic
 from analysis.logs.opening import log_files
 from experiments import provenance
-from experiments.operator.console import WARNING, Console
-from experiments.report.export import (
+from experiments.export.quantities import KEPT, QUANTITIES, kept_rule
+from experiments.export.table_columns import Quantity, Values, columns_of
+from experiments.export.trial_tables import (
     DICTIONARY,
     DICTIONARY_MEANINGS,
     INDEX,
@@ -31,8 +32,7 @@ from experiments.report.export import (
     column_rows,
     make_empty,
 )
-from experiments.report.quantities import KEPT, QUANTITIES, kept_rule
-from experiments.report.table_columns import Quantity, Values, columns_of
+from experiments.operator.console import WARNING, Console
 from experiments.session.data_files import write_new
 
 _Read = Callable[[ImportedTrial], Values]

@@ -14,10 +14,10 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from experiments.report.checksums import SUMS, digest_of
+from experiments.export.checksums import SUMS, digest_of
 
 if TYPE_CHECKING:
-    from experiments.report.credits import Credits
+    from experiments.export.credits import Credits
 
 METADATA = "ro-crate-metadata.json"
 _PROFILE = "https://w3id.org/ro/wfrun/process/0.5"

@@ -5,9 +5,9 @@ import json
 import pytest
 
 from acquisition.errors import TrialFileError
-from experiments.report.checksums import SUMS, write_sums
-from experiments.report.crate import METADATA
-from experiments.report.witnesses import changed_publication
+from experiments.export.checksums import SUMS, write_sums
+from experiments.export.crate import METADATA
+from experiments.export.witnesses import changed_publication
 from tests.corpus.used_session import session_files
 
 SESSION = "sessions/2027-01-15_S001_TF.fake"

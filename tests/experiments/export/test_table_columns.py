@@ -1,6 +1,6 @@
 import pytest
 
-from experiments.report.table_columns import plain_cell
+from experiments.export.table_columns import plain_cell
 
 
 @pytest.mark.parametrize("cell", ["=1+1", "+cmd", "-x", "@sum", "\t=1"])

@@ -13,8 +13,8 @@ from acquisition.trial_file.reader import TrialReader
 from analysis.data.load import load_trial
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.tables import load_tables
-from experiments.report.quantities import KEPT, QUANTITIES, kept_rule
-from experiments.report.table_columns import columns_of, decimals_of
+from experiments.export.quantities import KEPT, QUANTITIES, kept_rule
+from experiments.export.table_columns import columns_of, decimals_of
 from tests.experiments.program import digest, traction
 
 COLUMNS = ("t", "v_t", "F_n", "F_t")

@@ -11,14 +11,14 @@ from pathlib import Path
 import pytest
 
 from acquisition.errors import SettingsError
-from experiments.report.crate import (
+from experiments.export.crate import (
     METADATA,
     RecordingAction,
     StudyAction,
     crate_text,
 )
-from experiments.report.credits import LICENCES, Author, Credits
-from experiments.report.rebuilding import compare_tables
+from experiments.export.credits import LICENCES, Author, Credits
+from experiments.export.rebuilding import compare_tables
 from tests.experiments.program import digest, traction
 
 ROOT = Path(__file__).parents[3]

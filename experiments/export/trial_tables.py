@@ -20,16 +20,16 @@ from analysis.data.load import RecordedTrial, load_trial
 from analysis.data.parquet_tables import to_parquet
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.recorded_factors import FOOT, StatedFactors, value_text
-from experiments.operator.console import WARNING, Console
-from experiments.report.checksums import SUMS, digest_of, write_sums
-from experiments.report.quantities import KEPT, QUANTITIES, kept_rule
-from experiments.report.table_columns import (
+from experiments.export.checksums import SUMS, digest_of, write_sums
+from experiments.export.quantities import KEPT, QUANTITIES, kept_rule
+from experiments.export.table_columns import (
     Quantity,
     TableColumn,
     columns_of,
     csv_of,
     csv_of_rows,
 )
+from experiments.operator.console import WARNING, Console
 from experiments.session.data_files import write_new
 from experiments.session.store import SessionFolder, iso_utc
 

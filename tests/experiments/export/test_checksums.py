@@ -6,8 +6,8 @@ import shutil
 import pytest
 
 from acquisition.errors import TrialFileError
-from experiments.report import checksums
-from experiments.report.checksums import SUMS, changed_files, write_sums
+from experiments.export import checksums
+from experiments.export.checksums import SUMS, changed_files, write_sums
 
 
 @pytest.fixture

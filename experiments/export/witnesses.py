@@ -6,8 +6,8 @@ from urllib.parse import unquote
 
 from acquisition.errors import TrialFileError
 from acquisition.files import read_regular
-from experiments.report.checksums import ChangedFile, changed_files
-from experiments.report.crate import METADATA
+from experiments.export.checksums import ChangedFile, changed_files
+from experiments.export.crate import METADATA
 from experiments.session.data_files import parse_object, reading
 from experiments.session.kept_files import compare_kept
 from experiments.session.store import list_sessions

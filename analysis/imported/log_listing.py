@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from array import array
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,7 +14,6 @@ from analysis.imported.channels import stamp_of, wrench_fields
 from analysis.imported.robot import read_urdf
 from analysis.logs.log_file import LogTopic
 from analysis.logs.opening import open_log
-from experiments.operator.console import WARNING, Console
 
 _NS = 1e-9
 _MOST = 200  # topics and names that are shown
@@ -24,8 +24,8 @@ class _Times(NamedTuple):
     received: array[int]
 
 
-def list_log(path: Path, urdf: Path | None, console: Console) -> None:
-    """Print topics, types, counts, rates and frames of a log, and the robot's links.
+def listing(path: Path, urdf: Path | None) -> Iterator[str]:
+    """Yield topics, types, counts, rates and frames of a log, and the robot's links.
 
     Raises:
         SettingsError: a file is missing, or no log or URDF.
@@ -39,19 +39,18 @@ def list_log(path: Path, urdf: Path | None, console: Console) -> None:
             frames.setdefault(message.topic, frame)
             each.stamps.append(stamp_ns)
             each.received.append(message.received_ns)
-        console.say(f"{path}: {log.format}, {len(log.topics)} topics")
+        yield f"{path}: {log.format}, {len(log.topics)} topics"
         for name, topic in list(log.topics.items())[:_MOST]:
-            console.say(_line(topic, times[name], frames.get(name, "")))
+            yield _line(topic, times[name], frames.get(name, ""))
         for name, about in list(log.unread.items())[:_MOST]:
-            console.say(f"  {name}  {about}: not read")
-        for loss in log.losses:
-            console.say(f"{WARNING} {loss}")
+            yield f"  {name}  {about}: not read"
+        yield from (f"▲ {loss}" for loss in log.losses)
     if urdf is not None:
         robot = read_urdf(urdf)
-        console.say(f"{urdf}: {robot.name or 'a robot'}")
-        console.say(f"  links: {', '.join(robot.links[:_MOST])}")
+        yield f"{urdf}: {robot.name or 'a robot'}"
+        yield f"  links: {', '.join(robot.links[:_MOST])}"
         moving = robot.joint_names[:_MOST]
-        console.say(f"  joints that move: {', '.join(moving) or 'none'}")
+        yield f"  joints that move: {', '.join(moving) or 'none'}"
 
 
 def _line(topic: LogTopic, times: _Times, frame: str) -> str:

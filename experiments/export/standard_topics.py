@@ -14,9 +14,9 @@ from acquisition.errors import SessionError
 from acquisition.trial_file.bag import BagMessage, bag_bytes
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.views import VIEW_TOPICS, encode_views
+from experiments.export.checksums import SUMS, digest_of, write_sums
+from experiments.export.trial_tables import make_empty
 from experiments.operator.console import WARNING, Console
-from experiments.report.checksums import SUMS, digest_of, write_sums
-from experiments.report.export import make_empty
 from experiments.session.data_files import write_new
 from experiments.session.store import SessionFolder
 

@@ -9,8 +9,8 @@ from acquisition.files import read_regular
 from analysis.exports.folder import require_target, target_files
 from analysis.exports.source import TerrainExport
 from analysis.terrains.database import LARGEST, load
+from experiments.export.trial_tables import make_empty
 from experiments.operator.console import WARNING, Console
-from experiments.report.export import make_empty
 from experiments.session.data_files import write_new
 
 

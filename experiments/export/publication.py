@@ -16,15 +16,14 @@ from acquisition.formats import FORMAT
 from acquisition.trial_file.data_files import list_folder, open_data
 from analysis.data.load import RecordedTrial, load_trial
 from experiments import provenance
-from experiments.operator.console import WARNING, Console
-from experiments.report.checksums import SUMS, write_sums
-from experiments.report.crate import (
+from experiments.export.checksums import SUMS, write_sums
+from experiments.export.crate import (
     METADATA,
     RecordingAction,
     StudyAction,
     crate_text,
 )
-from experiments.report.credits import (
+from experiments.export.credits import (
     Author,
     Credits,
     Licence,
@@ -33,7 +32,8 @@ from experiments.report.credits import (
     licence_text,
     readme_text,
 )
-from experiments.report.export import export_sessions, make_empty
+from experiments.export.trial_tables import export_sessions, make_empty
+from experiments.operator.console import WARNING, Console
 from experiments.report.sessions import ReportRequest, report_sessions
 from experiments.session.data_files import reading, write_new
 from experiments.session.store import SessionFolder, iso_utc

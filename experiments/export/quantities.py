@@ -16,7 +16,7 @@ from analysis.data.prepare import (
     PreparedTrial,
     PrepareOptions,
 )
-from experiments.report.table_columns import Quantity, Values
+from experiments.export.table_columns import Quantity, Values
 
 _JOINTS = tuple(str(joint) for joint in range(1, 8))
 _AXES = ("x", "y", "z")

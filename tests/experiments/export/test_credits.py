@@ -8,7 +8,7 @@ import yaml
 
 from acquisition.errors import SettingsError
 from experiments.commands import publish
-from experiments.report.credits import (
+from experiments.export.credits import (
     LICENCES,
     Author,
     Credits,

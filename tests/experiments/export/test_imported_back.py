@@ -15,7 +15,7 @@ from analysis.data.prepare import PrepareOptions, moving_average, prepare_trial
 from analysis.data.tables import load_tables
 from analysis.imported.importing import ImportRequest, import_log
 from analysis.logs.opening import open_log
-from experiments.report.standard_topics import standard_topics
+from experiments.export.standard_topics import standard_topics
 from tests.disturbances.measure import recorded_trial
 from tests.disturbances.rows import RECORDINGS, Outcome, Recording
 from tests.experiments.program import traction
