@@ -17,7 +17,7 @@ from traction.frames import data_frame
 from traction.trials import SERIES_UNITS, Trial
 
 if TYPE_CHECKING:
-    from analysis.figures.style import Figure
+    from analysis.report.style import Figure
     from traction.frames import DataFrame
 
 
@@ -125,14 +125,14 @@ class TrialSet(Sequence[Trial]):
         Raises:
             SettingsError: there is no trial.
         """
-        from analysis.figures import trials as drawing
+        from analysis.report.sections.beyond_paper.trials import plot_trials
 
         _require(self)
         kinds = {
             name: terrain_kind(name, [trial.series.stones for trial in self.on(name)])
             for name in self.terrains
         }
-        return drawing.plot_trials(
+        return plot_trials(
             by_terrain(self),
             kinds,
             is_simulated=any(trial.is_simulated for trial in self.trials),

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from analysis.data.series import TractionSeries
-    from analysis.report.page_model import ReportTable
+    from analysis.report.section import ReportTable
 
 EXAMPLES = """\
   traction fit trials.npz --to fit
@@ -74,12 +74,12 @@ def run(args: argparse.Namespace) -> int:
 
     start_workers(args.scheduler)
     from analysis.dialects.columns import parse_covariates, parse_inputs
-    from analysis.findings.beside import run_whole_study
-    from analysis.findings.covariates import WAY
-    from analysis.findings.findings import compute_results
-    from analysis.report.covariate_table import covariate_tables
     from analysis.report.page import ReportContext, write_report
-    from analysis.report.what_if_tables import plain_choice, side_by_side
+    from analysis.report.results import compute_results
+    from analysis.report.sections.beyond_paper.further_columns import covariate_tables
+    from analysis.report.sections.sensitivity import plain_choice, side_by_side
+    from analysis.report.whole_study import run_whole_study
+    from analysis.study.covariates import WAY
     from analysis.study.models import FitOptions
     from analysis.study.study import StudyOptions, notes_of_tables
     from experiments.operator.console import Console
@@ -175,7 +175,7 @@ def _load(
 def _import_tables(files: Sequence[Path]) -> list[ReportTable]:
     """Return what the folders of imported trials tell of themselves."""
     from analysis.imported.record import read_record
-    from analysis.report.import_page import import_tables
+    from analysis.report.sections.imported import import_tables
 
     folders = dict.fromkeys(path if path.is_dir() else path.parent for path in files)
     records = [read_record(folder) for folder in folders]

@@ -4,9 +4,8 @@ from collections.abc import Mapping
 
 from analysis.data.recorded_factors import FOOT, value_text
 from analysis.data.terrain_kinds import kind_title
-from analysis.figures.sections import ReportSection
-from analysis.findings.trends import traction_ratio
-from analysis.report.page_model import ReportTable
+from analysis.report.section import ReportSection, ReportTable
+from analysis.report.traction_ratio import traction_ratio
 from analysis.study.study import Study
 
 

@@ -10,7 +10,11 @@ from acquisition.errors import SessionError, SettingsError
 from analysis.data.load import RecordedTrial
 from analysis.data.prepare import PrepareOptions
 from analysis.data.series import TractionSeries
-from analysis.report.what_if import StudyVariant, parse_choice, parse_window
+from analysis.report.sections.sensitivity import (
+    StudyVariant,
+    parse_choice,
+    parse_window,
+)
 from analysis.study.models import REPORTED, parse_models
 from analysis.study.store import ResultStore
 from analysis.study.study import Study, run_study

@@ -15,16 +15,19 @@ from analysis.data.load import load_trial
 from analysis.data.plausibility import summed_up
 from analysis.data.recorded_factors import stated_factors
 from analysis.data.series import TractionSeries
-from analysis.findings.beside import run_whole_study, run_whole_study_shard
-from analysis.findings.covariates import COVARIATE_TYPES, CovariateResult
-from analysis.findings.findings import compute_results
-from analysis.findings.held_trial import HeldTrial, TrialFiles
-from analysis.findings.rig_health import with_tares
-from analysis.report.covariate_table import covariate_tables
 from analysis.report.drawing import DRAWN_TYPES
+from analysis.report.held_trial import HeldTrial, TrialFiles
 from analysis.report.page_model import ReportContext
-from analysis.report.what_if import StudyVariant
-from analysis.report.what_if_tables import plain_choice, side_by_side
+from analysis.report.results import compute_results
+from analysis.report.sections.beyond_paper.further_columns import covariate_tables
+from analysis.report.sections.rig_health.health import with_tares
+from analysis.report.sections.sensitivity import (
+    StudyVariant,
+    plain_choice,
+    side_by_side,
+)
+from analysis.report.whole_study import run_whole_study, run_whole_study_shard
+from analysis.study.covariates import COVARIATE_TYPES, CovariateResult
 from analysis.study.jobs import Shard
 from analysis.study.models import FitOptions
 from analysis.study.store import MOST_BYTES, TYPES, ResultStore

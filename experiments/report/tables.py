@@ -6,10 +6,9 @@ from typing import cast
 import numpy as np
 
 from acquisition.trial_file.data_files import list_folder
-from analysis.figures.sections import ReportSection
-from analysis.findings.held_trial import HeldTrial
-from analysis.findings.trends import traction_ratio
-from analysis.report.page_model import ReportTable
+from analysis.report.held_trial import HeldTrial
+from analysis.report.section import ReportSection, ReportTable
+from analysis.report.traction_ratio import traction_ratio
 from analysis.study.models import GP_SE, TUSTIN
 from analysis.study.study import Study
 from experiments.session.data_files import read_json
