@@ -25,7 +25,7 @@ from analysis.report.sections.beyond_paper.residuals import (
 )
 from analysis.report.sections.beyond_paper.trends import TREND_UNITS, Trend, trends_of
 from analysis.report.sections.paper.claims import PaperClaim, paper_claims
-from analysis.report.sections.paper.measures import gather_evidence
+from analysis.report.sections.paper.evidence import gather_evidence
 from analysis.report.sections.rig_health.health import HEALTH_UNITS, RigTrial
 from analysis.report.surfaces import (
     CoverageMap,

@@ -1,30 +1,76 @@
-"""The checkable statements of the paper, each held against a study.
+"""The checkable statements of the paper as rows of data, each held against a study.
 
-A statement agrees, partly or not, by a limit that stands beside it; one whose terrains
-the study lacks cannot be shown.
+A row has the statement, the quantities that it is about, and the bounds on them within
+which a study agrees or agrees partly. One whose terrains a study lacks is not shown.
 """
 
+import operator
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from enum import Enum
 
-import numpy as np
+from analysis.data.quality import SENSOR_ERROR
+from analysis.report.sections.paper import model_quantities as models
+from analysis.report.sections.paper import trial_quantities as trials
+from analysis.report.sections.paper.evidence import PaperEvidence
+from analysis.report.sections.paper.quantities import ClaimResult
 
-from analysis.report.sections.paper import model_claims
-from analysis.report.sections.paper.measures import (
-    Agreement,
-    ClaimResult,
-    PaperEvidence,
-    ends_of,
-    graded,
-    more_rows_claim,
-    signs_of_b,
-    slips_of,
-)
-from analysis.study.terrain_fit import mean_of
 
-_HOLDS = 0.95  # share from which a bound holds
-_NEAR_ZERO, _LOW = 0.25, 0.3  # of the peak before
+class Agreement(Enum):
+    """Whether a study agrees with a statement."""
+
+    YES = "yes"
+    PARTLY = "partly"
+    NO = "no"
+    OPEN = "not shown"
+
+
+@dataclass(frozen=True, slots=True)
+class Bound:
+    """A bound on a quantity.
+
+    Attributes:
+        quantity: its name in what was measured.
+        relation: of the quantity to the limit.
+        limit: of the quantity, in its unit.
+    """
+
+    quantity: str
+    relation: Callable[[float, float], bool]
+    limit: float
+
+    def holds(self, quantities: Mapping[str, float]) -> bool:
+        """Return whether the quantity is within the bound."""
+        return self.relation(quantities[self.quantity], self.limit)
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """A statement of the paper, and what it takes to agree with it.
+
+    Attributes:
+        reference: where the paper makes it.
+        statement: what it says.
+        needs: what a study must have to be held against it.
+        measure: returns its quantities; None where the study lacks them.
+        agrees: bounds that all hold where a study agrees.
+        partly: bounds that all hold where it agrees partly; none = it never does.
+    """
+
+    reference: str
+    statement: str
+    needs: str
+    measure: Callable[[PaperEvidence], ClaimResult | None]
+    agrees: Sequence[Bound]
+    partly: Sequence[Bound] = ()
+
+    def verdict(self, quantities: Mapping[str, float]) -> Agreement:
+        """Return whether a study with these quantities agrees."""
+        if all(bound.holds(quantities) for bound in self.agrees):
+            return Agreement.YES
+        if self.partly and all(bound.holds(quantities) for bound in self.partly):
+            return Agreement.PARTLY
+        return Agreement.NO
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,15 +92,6 @@ class PaperClaim:
     numbers: Mapping[str, float]
 
 
-class _Statement(NamedTuple):
-    """A statement of the paper, what it takes to show it, and how."""
-
-    reference: str
-    text: str
-    needs: str
-    show: Callable[[PaperEvidence], ClaimResult | None]
-
-
 def paper_claims(evidence: PaperEvidence) -> list[PaperClaim]:
     """Return every statement.
 
@@ -64,241 +101,215 @@ def paper_claims(evidence: PaperEvidence) -> list[PaperClaim]:
     terrains = evidence.study.terrains.values()
     if len(terrains) < 2 or not all(terrain.is_papers for terrain in terrains):
         return []
-    return [_held(evidence, statement) for statement in _STATEMENTS]
+    return [evaluate(claim, evidence) for claim in CLAIMS]
 
 
-def _held(evidence: PaperEvidence, statement: _Statement) -> PaperClaim:
-    reference, text, needs, show = statement
-    shown = show(evidence)
-    if shown is None:
-        missing = f"Not testable in this study: it needs {needs}."
-        return PaperClaim(reference, text, missing, Agreement.OPEN, {})
-    return PaperClaim(reference, text, *shown)
-
-
-def _sticking(evidence: PaperEvidence) -> ClaimResult | None:
-    parts, numbers = [], {}
-    for kind, results in (("stones", evidence.stones), ("plates", evidence.plates)):
-        names = [result.terrain for result in results]
-        entries = [entry for entry in evidence.sticking if entry.terrain in names]
-        if not entries:
-            continue
-        printed = [entry.as_printed for entry in entries]
-        static = [entry.with_static for entry in entries]
-        parts.append(
-            f"{kind}: |F_t| ≤ μ F_n in {ends_of(printed, '.0%')} of a terrain's "
-            f"sticking samples, |F_t| ≤ max(F_s, μ F_n) in {ends_of(static, '.0%')}"
-        )
-        numbers[f"as printed, {kind}"] = min(printed)
-        numbers[f"with F_s, {kind}"] = min(static)
-    if not parts:
-        return None
-    shares = [value for name, value in numbers.items() if name.startswith("as")]
-    agreement = graded(min(shares) >= _HOLDS, is_partly=max(shares) >= _HOLDS)
-    return ClaimResult(f"{'; '.join(parts)}.", agreement, numbers)
-
-
-def _floor(evidence: PaperEvidence) -> ClaimResult | None:
-    ratios = [slip.floor / slip.peak for slip in slips_of(evidence.stones)]
-    if not ratios:
-        return None
-    middle, low = float(np.median(ratios)), float(np.mean(np.less(ratios, _LOW)))
-    text = (
-        f"Median floor {middle:.0%} of the peak before; below {_LOW:.0%} of it in "
-        f"{low:.0%} of {len(ratios)} slips."
-    )
-    numbers = {"median floor": middle, "below 30%": low}
-    return ClaimResult(text, graded(middle < _NEAR_ZERO, is_partly=low > 0.5), numbers)
-
-
-def _bounce(evidence: PaperEvidence) -> ClaimResult | None:
-    slips, on_plates = slips_of(evidence.stones), slips_of(evidence.plates)
-    if not slips:
-        return None
-    thrown = [sum(s.has_bounce for s in group) for group in (slips, on_plates)]
-    share = thrown[0] / len(slips)
-    text = f"{thrown[0]} of {len(slips)} slips on stones ({share:.0%})"
-    if on_plates:
-        text += f"; {thrown[1]} of {len(on_plates)} on plates"
-    elif evidence.plates:
-        text += "; no slip on plates"
-    numbers = {"slips": len(slips), "bounce-backs": thrown[0], "share": share}
-    return ClaimResult(
-        f"{text}.", graded(share > 1 / 3, is_partly=share > 0.0), numbers
+def evaluate(claim: Claim, evidence: PaperEvidence) -> PaperClaim:
+    """Return what a study shows of a statement."""
+    measured = claim.measure(evidence)
+    if measured is None:
+        missing = f"Not testable in this study: it needs {claim.needs}."
+        return PaperClaim(claim.reference, claim.statement, missing, Agreement.OPEN, {})
+    return PaperClaim(
+        claim.reference,
+        claim.statement,
+        measured.text,
+        claim.verdict({**measured.numbers, **measured.further}),
+        measured.numbers,
     )
 
 
-def _spike(evidence: PaperEvidence) -> ClaimResult | None:
-    slips = slips_of(evidence.stones)
-    spikes = [slip.spike / slip.peak for slip in slips if slip.spike is not None]
-    if not spikes:
-        return None
-    middle = float(np.median(spikes))
-    text = (
-        f"The force rises by {middle:.0%} of the peak before the slip (median of "
-        f"{len(spikes)} bounce-backs)."
-    )
-    return ClaimResult(text, graded(middle > 0.2), {"median spike": middle})
+def _above(quantity: str, limit: float) -> Bound:
+    return Bound(quantity, operator.gt, limit)
 
 
-def _sag(evidence: PaperEvidence) -> ClaimResult | None:
-    slips = slips_of(evidence.stones)
-    if not slips:
-        return None
-    count = sum(slip.has_sag for slip in slips)
-    share = count / len(slips)
-    text = f"{count} of {len(slips)} slips on stones ({share:.0%}) follow such a sag."
-    return ClaimResult(
-        text, graded(share > 0.5, is_partly=share > 0.08), {"share": share}
-    )
+def _below(quantity: str, limit: float) -> Bound:
+    return Bound(quantity, operator.lt, limit)
 
 
-def _window(evidence: PaperEvidence) -> ClaimResult | None:
-    results = [*evidence.stones, *evidence.plates]
-    shares = [[trial.shares for trial in result.trials] for result in results]
-    every = [float(np.mean([s.window for s in row])) for row in shares]
-    moving = [mean_of([s.window_of_moving for s in row]) or 0.0 for row in shares]
-    if not every:
-        return None
-    text = (
-        f"{ends_of(every, '.0%')} of all samples of a terrain, "
-        f"{ends_of(moving, '.0%')} of those that move."
-    )
-    agreement = graded(min(every) > 0.5, is_partly=min(moving) > 0.5)
-    return ClaimResult(text, agreement, {"all": min(every), "moving": min(moving)})
+def _at_least(quantity: str, limit: float) -> Bound:
+    return Bound(quantity, operator.ge, limit)
 
 
-_STATEMENTS: Sequence[_Statement] = (
-    _Statement(
+def _at_most(quantity: str, limit: float) -> Bound:
+    return Bound(quantity, operator.le, limit)
+
+
+_SIMILAR = 0.15  # relative difference of errors that are called similar
+_MUCH = 2.0  # ratio that is called much higher
+
+CLAIMS: Sequence[Claim] = (
+    Claim(
         "eq. 2",
         "While the foot sticks, |F_t| ≤ μ F_n.",
         "stones or plates that stick",
-        _sticking,
+        trials.sticking,
+        agrees=[_at_least("smallest share", 0.95)],
+        partly=[_at_least("largest share", 0.95)],
     ),
-    _Statement(
+    Claim(
         "IV, Fig. 4",
         "In a slip the traction force drops to near zero.",
         "slips on stones",
-        _floor,
+        trials.floor,
+        agrees=[_below("median floor", 0.25)],
+        partly=[_above("below 30%", 0.5)],
     ),
-    _Statement(
+    Claim(
         "IV, Fig. 4",
         "The foot bounces back after slips (two of the three printed).",
         "slips on stones",
-        _bounce,
+        trials.bounce,
+        agrees=[_above("share", 1 / 3)],
+        partly=[_above("share", 0.0)],
     ),
-    _Statement(
+    Claim(
         "IV, Fig. 4",
         "Bounce-back comes with an opposing spike of the force.",
         "bounce-backs on stones",
-        _spike,
+        trials.spike,
+        agrees=[_above("median spike", 0.2)],
     ),
-    _Statement(
+    Claim(
         "IV, Fig. 4",
         "F_t decreases before a slip (two of the three printed).",
         "slips on stones",
-        _sag,
+        trials.sag,
+        agrees=[_above("share", 0.5)],
+        partly=[_above("share", 0.08)],
     ),
-    _Statement(
+    Claim(
         "IV",
         "The window of velocities holds the majority of the data.",
         "stones or plates",
-        _window,
+        trials.window,
+        agrees=[_above("all", 0.5)],
+        partly=[_above("moving", 0.5)],
     ),
-    _Statement(
+    Claim(
         "Table I",
         "The viscous coefficient b is negative on stones, positive on plates.",
         "stones and plates",
-        signs_of_b,
+        models.signs_of_b,
+        agrees=[_at_least("share of terrains", 1.0)],
+        partly=[_above("share of terrains", 0.0)],
     ),
-    _Statement(
+    Claim(
         "Table I",
         "On stones δ_s is near zero: a straight line, no Stribeck shape.",
         "stones",
-        model_claims.shapeless_stones,
+        models.shapeless_stones,
+        agrees=[_above("share", 0.5)],
+        partly=[_above("share", 0.0)],
     ),
-    _Statement(
+    Claim(
         "IV-B",
         "More than 300 training points do not increase the accuracy.",
         "trials with more rows than a process was given",
-        more_rows_claim,
+        models.gain_of_more_rows,
+        agrees=[_below("largest gain", 0.05)],
+        partly=[_at_most("better", 0)],
     ),
-    _Statement(
+    Claim(
         "II-B",
         "The NN covariance adapts better to non-smooth data.",
         "stones",
-        model_claims.kernels_on_stones,
+        models.kernels_on_stones,
+        agrees=[_above("better", 0)],
     ),
-    _Statement(
+    Claim(
         "IV-C, Fig. 9",
         "The models perform similarly on stones.",
         "stones",
-        model_claims.alike_on_stones,
+        models.spread_on_stones,
+        agrees=[_below("gap", _SIMILAR)],
     ),
-    _Statement(
+    Claim(
         "IV-C, Fig. 9",
         "The models perform similarly on plates.",
         "plates",
-        model_claims.alike_on_plates,
+        models.spread_on_plates,
+        agrees=[_below("gap", _SIMILAR)],
     ),
-    _Statement(
+    Claim(
         "IV-C, Fig. 9",
         "The error is much higher on stones than on plates.",
         "stones and plates",
-        model_claims.much_worse_on_stones,
+        models.error_ratio,
+        agrees=[_above("ratio", _MUCH)],
+        partly=[_above("ratio", 1.0)],
     ),
-    _Statement(
+    Claim(
         "IV-C, Fig. 8",
         "The GP's variance is much higher on stones than on plates.",
         "stones and plates",
-        model_claims.larger_variance,
+        models.variance_ratio,
+        agrees=[_above("ratio", _MUCH)],
+        partly=[_above("ratio", 1.0)],
     ),
-    _Statement(
+    Claim(
         "IV-C",
         "The GP takes the noise of the stones into its variance.",
         "two trials on stones",
-        model_claims.band_coverage,
+        models.band_coverage,
+        agrees=[_below("off nominal beyond its slack", 0.0)],
     ),
-    _Statement(
+    Claim(
         "IV-D",
         "The error on plates is about that of the force sensor, 0.4 N.",
         "plates",
-        model_claims.plate_error,
+        models.plate_error,
+        agrees=[
+            _at_least("error [N]", 0.5 * SENSOR_ERROR),
+            _at_most("error [N]", 1.5 * SENSOR_ERROR),
+        ],
     ),
-    _Statement(
+    Claim(
         "IV-D, Fig. 10",
         "Models of stones are not specific: similar errors on other stones.",
         "two terrains of stones",
-        model_claims.unspecific_stones,
+        models.foreign_stones,
+        agrees=[_below("mean", 1.0 + _SIMILAR)],
+        partly=[_below("smallest", 1.0 + _SIMILAR)],
     ),
-    _Statement(
+    Claim(
         "IV-D, Fig. 10",
         "The inclination hardly matters.",
         "two inclines of the same stones",
-        model_claims.inclination,
+        models.other_inclines,
+        agrees=[_below("mean", 1.0 + _SIMILAR)],
+        partly=[_below("smallest", 1.0 + _SIMILAR)],
     ),
-    _Statement(
+    Claim(
         "IV-D, Fig. 10",
         "In general plate models are significantly worse on stones, and vice versa.",
         "stones and plates",
-        model_claims.unlike_surfaces,
+        models.foreign_surfaces,
+        agrees=[_at_least("share of pairs", 0.8)],
+        partly=[_above("smallest ratio", 1.0)],
     ),
-    _Statement(
+    Claim(
         "IV-D",
         "Flat and rocky ground can be distinguished by the smallest error.",
         "stones and plates",
-        model_claims.flat_or_rocky,
+        models.flat_or_rocky,
+        agrees=[_above("best share", 0.8)],
+        partly=[_above("best share", 0.6)],
     ),
-    _Statement(
+    Claim(
         "IV-D",
         "v_t and F_n do not fully capture the friction on stones.",
         "stones and plates",
-        model_claims.unexplained,
+        models.unexplained,
+        agrees=[_below("R²", 0.8), _above("stones over plates", _MUCH)],
+        partly=[_below("R²", 0.8)],
     ),
-    _Statement(
+    Claim(
         "V",
         "Input-dependent noise may help on stones.",
         "stones, and the model with chosen noise",
-        model_claims.noise_by_input,
+        models.gain_of_chosen_noise,
+        agrees=[_above("better", 0)],
+        partly=[_above("smallest gain", 0.0)],
     ),
 )

@@ -9,17 +9,16 @@ import pytest
 from analysis.data.samples import SampleTable
 from analysis.gp.regression import fit_gp
 from analysis.report.results import compute_results, plain_findings
-from analysis.report.sections.paper.claims import paper_claims
-from analysis.report.sections.paper.measures import (
-    Agreement,
+from analysis.report.sections.paper.claims import CLAIMS, Agreement, paper_claims
+from analysis.report.sections.paper.evidence import (
     MoreRows,
     MoreRowsTask,
     PaperEvidence,
     StickingBound,
-    beyond_chance,
     errors_of_more,
     gather_evidence,
 )
+from analysis.report.sections.paper.quantities import beyond_chance
 from analysis.report.sections.paper.statements import statements
 from analysis.study.fits import to_plain
 from analysis.study.metrics import PairedComparison, adjusted_by_holm, smallest_adjusted
@@ -172,3 +171,33 @@ def test_statements_about_missing_terrains_are_not_shown(slice_trials):
 def test_one_terrain_is_held_against_nothing(small_study):
     alone = replace(small_study, terrains={"S0": small_study.terrains["S0"]})
     assert paper_claims(gather_evidence(alone, None, [])) == []
+
+
+def test_bounds_are_on_quantities_that_are_measured(evidence):
+    for claim in CLAIMS:
+        if (measured := claim.measure(evidence)) is not None:
+            known = {**measured.numbers, **measured.further}
+            assert {b.quantity for b in (*claim.agrees, *claim.partly)} <= set(known)
+
+
+@pytest.mark.parametrize(
+    ("explained", "ratio", "agreement"),
+    [
+        (0.79, 2.1, Agreement.YES),
+        (0.79, 2.0, Agreement.PARTLY),
+        (0.8, 2.1, Agreement.NO),
+    ],
+)
+def test_a_study_agrees_where_every_bound_holds(explained, ratio, agreement):
+    claim = next(claim for claim in CLAIMS if claim.statement.startswith("v_t and F_n"))
+    quantities = {"R²": explained, "stones over plates": ratio}
+    assert claim.verdict(quantities) is agreement
+
+
+@pytest.mark.parametrize(
+    ("error", "agreement"),
+    [(0.19, Agreement.NO), (0.2, Agreement.YES), (0.61, Agreement.NO)],
+)
+def test_a_quantity_may_have_a_bound_on_either_side(error, agreement):
+    claim = next(claim for claim in CLAIMS if "force sensor" in claim.statement)
+    assert claim.verdict({"error [N]": error}) is agreement

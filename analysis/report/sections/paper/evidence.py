@@ -4,28 +4,22 @@ The paper sees stones and plates; a terrain of unknown kind counts as neither.
 """
 
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import Enum
-from typing import NamedTuple
 
 import numpy as np
 
 from acquisition.worker_processes import running_workers
-from analysis.data.events import Slip
 from analysis.data.prepare import PreparedTrial
 from analysis.data.samples import SampleTable
 from analysis.data.terrain_kinds import BIG, FLAT, SMALL
 from analysis.gp.regression import GaussianProcess
 from analysis.report.sections.beyond_paper.noise import NoiseSummary
 from analysis.study.crossval import FoldResult
-from analysis.study.fits import tustin_medians
 from analysis.study.jobs import Batch, run_batches
 from analysis.study.metrics import (
     PairedComparison,
-    adjusted_by_holm,
     compare,
-    smallest_adjusted,
 )
 from analysis.study.models import GP_SE, GpModel
 from analysis.study.study import Study
@@ -34,32 +28,7 @@ from analysis.terrains.identify import Identification
 from analysis.tustin.model import bound
 
 _MORE = 4  # times as many rows as the process was fitted to
-SIGNIFICANT = 0.05  # adjusted p below which a difference is one
-_NOT_HELPING = 0.05  # relative gain below which more rows do not help
 _STREAM = 2_000_000  # apart from the folds, which have the same kind of seed
-
-
-class Agreement(Enum):
-    """Whether a study agrees with a statement."""
-
-    YES = "yes"
-    PARTLY = "partly"
-    NO = "no"
-    OPEN = "not shown"
-
-
-class ClaimResult(NamedTuple):
-    """What a study shows of one statement.
-
-    Attributes:
-        text: in words, with numbers.
-        agreement: whether that agrees with the statement.
-        numbers: the same as numbers, SI units, shares as 1.
-    """
-
-    text: str
-    agreement: Agreement
-    numbers: Mapping[str, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -254,76 +223,3 @@ def more_rows(study: Study) -> list[MoreRows]:
             count = max(task.rows.count for task in given)
             found.append(MoreRows(name, count, mean, paired))
     return found
-
-
-def slips_of(results: Sequence[TerrainResult]) -> list[Slip]:
-    """Return the slips of all trials of some terrains."""
-    return [slip for result in results for trial in result.slips for slip in trial]
-
-
-def graded(is_so: bool, *, is_partly: bool = False) -> Agreement:
-    """Return yes, else partly where that holds, else no."""
-    if is_so:
-        return Agreement.YES
-    return Agreement.PARTLY if is_partly else Agreement.NO
-
-
-def ends_of(values: Sequence[float], form: str) -> str:
-    """Return the smallest and the largest value as text, one where they agree."""
-    low, high = (format(end, form) for end in (min(values), max(values)))
-    return low if low == high else f"{low} to {high}"
-
-
-def beyond_chance(pairs: Sequence[PairedComparison], sign: int, unit: str) -> str:
-    """Return how many of the pairs differ beyond chance, and whether they could."""
-    text = f"{count_significant(pairs, sign)} of {len(pairs)} {unit}"
-    if smallest_adjusted(pairs) < SIGNIFICANT:
-        return text
-    trials = min(pair.trials for pair in pairs)
-    return f"{text} ({trials} trials are too few to show it of {len(pairs)})"
-
-
-def count_significant(pairs: Sequence[PairedComparison], sign: int) -> int:
-    """Return how many differences of a sign hold for all comparisons together."""
-    adjusted = adjusted_by_holm([pair.p for pair in pairs])
-    return sum(
-        p < SIGNIFICANT and sign * pair.difference > 0
-        for p, pair in zip(adjusted, pairs, strict=True)
-    )
-
-
-def more_rows_claim(evidence: PaperEvidence) -> ClaimResult | None:
-    """Return what more training rows change."""
-    entries = evidence.more_rows
-    if not entries:
-        return None
-    gains = [entry.gain for entry in entries]
-    better = count_significant([entry.paired for entry in entries], -1)
-    points = evidence.study.options.fit.gp_points
-    text = (
-        f"With {max(entry.rows for entry in entries)} rows in the place of {points} "
-        "(hyperparameters kept) the error of GP (SE) changes by "
-        f"{ends_of([-gain for gain in gains], '+.1%')}; smaller beyond chance on "
-        f"{beyond_chance([entry.paired for entry in entries], -1, 'terrains')}."
-    )
-    agreement = graded(max(gains) < _NOT_HELPING, is_partly=not better)
-    return ClaimResult(text, agreement, {"largest gain": max(gains), "better": better})
-
-
-def signs_of_b(evidence: PaperEvidence) -> ClaimResult | None:
-    """Return the sign of the viscous coefficient on stones and on plates."""
-    b = [
-        [v for r in results if (v := tustin_medians(r)["b"]) is not None]
-        for results in (evidence.stones, evidence.plates)
-    ]
-    if not all(b):
-        return None
-    falling, rising = sum(v < 0 for v in b[0]), sum(v > 0 for v in b[1])
-    text = (
-        f"b is {ends_of(b[0], '.3g')} kg/s on stones, negative on {falling} of "
-        f"{len(b[0])} terrains; {ends_of(b[1], '.3g')} kg/s on plates, positive on "
-        f"{rising} of {len(b[1])}."
-    )
-    is_so = falling == len(b[0]) and rising == len(b[1])
-    numbers = {"largest b, stones": max(b[0]), "smallest b, plates": min(b[1])}
-    return ClaimResult(text, graded(is_so, is_partly=falling + rising > 0), numbers)
