@@ -183,8 +183,7 @@ def _export_sessions(args: argparse.Namespace, console: Console) -> int:
     from experiments.export.standard_topics import export_standard_topics
     from experiments.export.terrain_database import export_terrains
     from experiments.export.trial_tables import export_sessions
-    from experiments.report.choices import choose_sessions, tell_missing
-    from experiments.report.sessions import ReportRequest
+    from experiments.report.choices import ReportRequest, choose_sessions, tell_missing
     from experiments.settings.load import load_settings
 
     every = args.to is None and not args.sessions
@@ -202,6 +201,6 @@ def _export_sessions(args: argparse.Namespace, console: Console) -> int:
             hint=f"Choose another name. {_NOTHING}",
         )
     order = [row.name for row in load_settings(args.config).matrix.terrains]
-    wanted = ReportRequest(order, args.seed)
+    wanted = ReportRequest(args.seed, order)
     export_terrains(sessions, args.data, args.terrain_db, wanted, console)
     return 0

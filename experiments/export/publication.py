@@ -34,7 +34,8 @@ from experiments.export.credits import (
 )
 from experiments.export.trial_tables import export_sessions, make_empty
 from experiments.operator.console import WARNING, Console
-from experiments.report.sessions import ReportRequest, report_sessions
+from experiments.report.choices import ReportRequest
+from experiments.report.sessions import report_sessions
 from experiments.session.data_files import reading, write_new
 from experiments.session.store import SessionFolder, iso_utc
 

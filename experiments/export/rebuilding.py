@@ -18,7 +18,8 @@ from analysis.study.fits import to_csv
 from analysis.study.models import REPORTED, FitOptions
 from experiments.export.publication import ANALYSIS, TABLE
 from experiments.operator.console import Console
-from experiments.report.sessions import ReportRequest, study_sessions
+from experiments.report.choices import ReportRequest
+from experiments.report.sessions import study_sessions
 from experiments.session.data_files import read_json, reading
 from experiments.session.store import list_sessions
 
@@ -64,7 +65,7 @@ def rebuild(folder: Path, console: Console) -> TableComparison:
             hint="Only a folder that traction publish wrote can be rebuilt.",
         )
     names = [str(name) for name in cast("list[object]", terrains)]
-    order = ReportRequest(names, seed)
+    order = ReportRequest(seed, names)
     fit = FitOptions(seed=seed, models=REPORTED)
     with tempfile.TemporaryDirectory(prefix="traction-rebuild-") as empty:
         sessions, data = list_sessions(folder), Path(empty)

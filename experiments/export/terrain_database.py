@@ -9,7 +9,8 @@ from analysis.study.models import GP_SE, GP_SE_TRIAL, PAPER_MODELS, FitOptions
 from analysis.terrains.export import database_of
 from analysis.terrains.identify import identify_study
 from experiments.operator.console import Console
-from experiments.report.sessions import ReportRequest, results_below, study_sessions
+from experiments.report.choices import ReportRequest
+from experiments.report.sessions import results_below, study_sessions
 from experiments.session.data_files import write_new_text
 from experiments.session.store import SessionFolder, iso_utc
 

@@ -1,5 +1,5 @@
-"""Recorded sessions, or tables from elsewhere, to the studies and pages of `report`.
+"""Recorded sessions, or tables from elsewhere, to studies and their pages.
 
-What a person chooses, the trials that are loaded, and what only sessions can tell of
-them: cells, checks, provenance, simulated truth. Begin with `sessions`.
+`sessions` and `external_tables` load the trials and fit them, `study_report` makes the
+page of either. Begin with `study_report`.
 """
