@@ -46,6 +46,16 @@ addEventListener("load", () => {
 });
 </script>"""
 
+SUMMARY = """<script>
+addEventListener("load", () => {
+  const table = document.querySelector("#summary [aria-label='Samples and errors']");
+  document.title = "probe " + JSON.stringify({
+    hidden: table.scrollWidth - table.clientWidth,
+    columns: table.querySelectorAll("thead th").length,
+  });
+});
+</script>"""
+
 USE = """<script>
 addEventListener("load", () => {
   const column = () => [...document.querySelectorAll("tbody tr")].map(
@@ -155,6 +165,11 @@ def written(study, folder: Path) -> Path:
 
 def test_a_report_is_readable_on_screen_and_paper(small_study, tmp_path):
     assert_readable(written(small_study, tmp_path), tmp_path, least=16)
+
+
+def test_the_summary_needs_no_scrolling_on_a_small_desk(small_study, tmp_path):
+    found = probe(written(small_study, tmp_path), tmp_path, 1280, SUMMARY)
+    assert found == {"hidden": 0, "columns": 12}
 
 
 def small_page(folder: Path) -> Path:
