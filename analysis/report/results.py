@@ -33,6 +33,8 @@ from analysis.report.surfaces import (
     SurfaceAxes,
     cell_edges,
     coverages,
+    plain_coverage,
+    plain_surfaces,
     surface_axes,
     surfaces,
 )
@@ -126,9 +128,6 @@ def _compute(
     )
 
 
-_DIGITS = 5  # of the surfaces in fits.json
-
-
 def plain_findings(results: StudyResults) -> dict[str, Any]:
     """Return the findings as plain values for fits.json, with units."""
     return {
@@ -136,22 +135,22 @@ def plain_findings(results: StudyResults) -> dict[str, Any]:
         if results.identification is None
         else results.identification.numbers(),
         "break_away": {n: found.numbers() for n, found in results.break_away.items()},
-        "noise": {summary.terrain: _noise(summary) for summary in results.noise},
+        "noise": {summary.terrain: summary.numbers() for summary in results.noise},
         "new_trial": {
             shares.terrain: plain_shares(shares) for shares in results.shares
         },
         "trends": {
-            name: {key: _trend(trend) for key, trend in trends.items()}
+            name: {key: trend.numbers() for key, trend in trends.items()}
             for name, trends in results.trends.items()
         },
         "residuals": {
-            name: {model: _residuals(band) for model, band in bands.items()}
+            name: {model: band.numbers() for model, band in bands.items()}
             for name, bands in results.residuals.items()
         },
-        "surfaces": _surfaces(results),
-        "coverage": _coverage(results),
+        "surfaces": plain_surfaces(results),
+        "coverage": plain_coverage(results),
         "rig": [trial.numbers() for trial in results.rig],
-        "paper": [_claim(claim) for claim in results.claims],
+        "paper": [claim.plain() for claim in results.claims],
         "units": {
             "nlpd_constant": "nat",
             "nlpd_chosen": "nat",
@@ -222,74 +221,3 @@ def _rig_rows(
         for key, value in trial.numbers().items()
         if key in HEALTH_UNITS and isinstance(value, int | float)
     ]
-
-
-def _claim(claim: PaperClaim) -> dict[str, Any]:
-    return {
-        "place": claim.reference,
-        "statement": claim.statement,
-        "shown": claim.shown,
-        "agrees": claim.agreement.value,
-        "numbers": dict(claim.numbers),
-    }
-
-
-def _noise(summary: NoiseSummary) -> dict[str, Any]:
-    return {
-        "folds": summary.counts,
-        "nlpd_constant": summary.before,
-        "nlpd_chosen": summary.after,
-        "paired": summary.paired._asdict(),
-    }
-
-
-def _residuals(band: ResidualBand) -> dict[str, Any]:
-    return {
-        "v_t": band.v.tolist(),
-        "quantiles": band.quantiles.tolist(),
-        "bias": band.bias,
-        "sd": band.sd,
-        "samples": band.samples,
-        "neighbour_correlation": band.correlation,
-        "autocorrelation_samples": band.time,
-        "independent_samples": band.independent,
-    }
-
-
-def _surfaces(results: StudyResults) -> dict[str, Any]:
-    return {
-        "F_n": _short(results.axes.F_n),
-        "v_t": _short(results.axes.v_t),
-        "terrains": {
-            s.terrain: {"mean": _short(s.mean), "variance": _short(s.variance)}
-            for s in results.surfaces
-        },
-    }
-
-
-def _coverage(results: StudyResults) -> dict[str, Any]:
-    return {
-        "F_n_edges": _short(results.edges.F_n),
-        "v_t_edges": _short(results.edges.v_t),
-        "terrains": {
-            c.terrain: {"counts": c.counts.astype(int).tolist(), "beyond": c.outside}
-            for c in results.coverage
-        },
-    }
-
-
-def _trend(trend: Trend) -> dict[str, Any]:
-    return {
-        "trials": trend.trials.astype(int).tolist(),
-        "means": trend.means.tolist(),
-        "slope": trend.slope,
-        "slope_error": trend.slope_error,
-        "spread": trend.spread,
-    }
-
-
-def _short(values: np.ndarray) -> Any:  # noqa: ANN401
-    """Return an array as nested lists of few digits."""
-    if values.ndim > 1:
-        return [_short(row) for row in values]
-    return [float(f"{value:.{_DIGITS}g}") for value in values.tolist()]

@@ -1,7 +1,10 @@
 """Mean and variance of a model over velocity and load, and where samples lie there."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -9,6 +12,9 @@ from analysis.data.samples import SampleTable
 from analysis.data.series import Array
 from analysis.study.study import Study
 from analysis.study.terrain_fit import TerrainResult
+
+if TYPE_CHECKING:
+    from analysis.report.results import StudyResults
 
 _POINTS = 41  # along each axis of a surface
 _CELLS = 20  # along each axis of a coverage map
@@ -125,3 +131,37 @@ def _axes(study: Study, count: int) -> SurfaceAxes:
         v_t=np.linspace(options.slowest, options.fastest, count),
         F_n=np.linspace(low, high, count),
     )
+
+
+_DIGITS = 5  # of the surfaces in fits.json
+
+
+def plain_surfaces(results: StudyResults) -> dict[str, Any]:
+    """Return the surfaces as plain values, for fits.json."""
+    return {
+        "F_n": _short(results.axes.F_n),
+        "v_t": _short(results.axes.v_t),
+        "terrains": {
+            s.terrain: {"mean": _short(s.mean), "variance": _short(s.variance)}
+            for s in results.surfaces
+        },
+    }
+
+
+def plain_coverage(results: StudyResults) -> dict[str, Any]:
+    """Return the coverage maps as plain values, for fits.json."""
+    return {
+        "F_n_edges": _short(results.edges.F_n),
+        "v_t_edges": _short(results.edges.v_t),
+        "terrains": {
+            c.terrain: {"counts": c.counts.astype(int).tolist(), "beyond": c.outside}
+            for c in results.coverage
+        },
+    }
+
+
+def _short(values: np.ndarray) -> Any:  # noqa: ANN401
+    """Return an array as nested lists of few digits."""
+    if values.ndim > 1:
+        return [_short(row) for row in values]
+    return [float(f"{value:.{_DIGITS}g}") for value in values.tolist()]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from analysis.report.cell_texts import holm_note, paired_cells
 from analysis.report.section import FigureSpec, ReportSection, ReportTable
@@ -37,6 +37,15 @@ class NoiseSummary:
     before: float
     after: float
     paired: PairedComparison
+
+    def numbers(self) -> dict[str, Any]:
+        """Return it as plain values, for fits.json."""
+        return {
+            "folds": self.counts,
+            "nlpd_constant": self.before,
+            "nlpd_chosen": self.after,
+            "paired": self.paired._asdict(),
+        }
 
 
 def noise_summaries(study: Study) -> list[NoiseSummary]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -58,6 +58,19 @@ class ResidualBand:
     def independent(self) -> float:
         """Number of independent samples that the residuals are worth."""
         return self.samples / self.time
+
+    def numbers(self) -> dict[str, Any]:
+        """Return it as plain values, for fits.json."""
+        return {
+            "v_t": self.v.tolist(),
+            "quantiles": self.quantiles.tolist(),
+            "bias": self.bias,
+            "sd": self.sd,
+            "samples": self.samples,
+            "neighbour_correlation": self.correlation,
+            "autocorrelation_samples": self.time,
+            "independent_samples": self.independent,
+        }
 
 
 def residual_band(result: TerrainResult, model: str) -> ResidualBand | None:

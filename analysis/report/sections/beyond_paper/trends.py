@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -52,6 +52,16 @@ class Trend:
         if self.slope is None or self.slope_error is None:
             return False
         return abs(self.slope) > SIGNIFICANT * self.slope_error
+
+    def numbers(self) -> dict[str, Any]:
+        """Return it as plain values, for fits.json."""
+        return {
+            "trials": self.trials.astype(int).tolist(),
+            "means": self.means.tolist(),
+            "slope": self.slope,
+            "slope_error": self.slope_error,
+            "spread": self.spread,
+        }
 
 
 def trends_of(result: TerrainResult) -> dict[str, Trend]:

@@ -8,6 +8,7 @@ import operator
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from typing import Any
 
 from analysis.data.quality import SENSOR_ERROR
 from analysis.report.sections.paper import model_quantities as models
@@ -90,6 +91,16 @@ class PaperClaim:
     shown: str
     agreement: Agreement
     numbers: Mapping[str, float]
+
+    def plain(self) -> dict[str, Any]:
+        """Return it as plain values, for fits.json."""
+        return {
+            "place": self.reference,
+            "statement": self.statement,
+            "shown": self.shown,
+            "agrees": self.agreement.value,
+            "numbers": dict(self.numbers),
+        }
 
 
 def paper_claims(evidence: PaperEvidence) -> list[PaperClaim]:
