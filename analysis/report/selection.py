@@ -1,4 +1,4 @@
-"""What the figures show, chosen and computed without drawing anything."""
+"""The terrains that a figure shows where it cannot show all of them."""
 
 from analysis.study.study import Study
 from analysis.study.terrain_fit import TerrainResult
