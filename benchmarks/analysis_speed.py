@@ -18,7 +18,7 @@ from threadpoolctl import threadpool_limits
 from acquisition.linear_algebra import keep_memory
 from analysis.data.load import load_trial
 from analysis.data.prepare import PreparedTrial, PrepareOptions, prepare_trial
-from analysis.findings.held_trial import HeldTrial
+from analysis.report.held_trial import HeldTrial
 from analysis.study.crossval import run_fold
 from analysis.study.models import REPORTED
 from analysis.terrains.table import Table

@@ -17,8 +17,8 @@ _SALVAGED = (
     "tests/corpus/test_stated_limits.py",
 )
 _PUBLISHED = (
-    "tests/experiments/report/test_checksums.py",
-    "tests/experiments/report/test_witnesses.py",
+    "tests/experiments/export/test_checksums.py",
+    "tests/experiments/export/test_witnesses.py",
 )
 
 TESTS = {
@@ -135,8 +135,8 @@ TESTS = {
     "experiments/session/kept_files.py": (
         "tests/experiments/session/test_witnesses.py",
     ),
-    "experiments/report/checksums.py": _PUBLISHED,
-    "experiments/report/witnesses.py": _PUBLISHED,
+    "experiments/export/checksums.py": _PUBLISHED,
+    "experiments/export/witnesses.py": _PUBLISHED,
     "experiments/session/crash_recovery.py": (
         "tests/experiments/session/test_crash_recovery.py",
     ),

@@ -11,13 +11,13 @@ import numpy as np
 from acquisition.errors import SettingsError
 from analysis.data.prepare import PreparedTrial
 from analysis.data.terrain_kinds import terrain_kind
-from experiments.report.quantities import KEPT
-from experiments.report.table_columns import columns_of
+from experiments.export.quantities import KEPT
+from experiments.export.table_columns import columns_of
 from traction.frames import data_frame
 from traction.trials import SERIES_UNITS, Trial
 
 if TYPE_CHECKING:
-    from analysis.figures.style import Figure
+    from analysis.report.style import Figure
     from traction.frames import DataFrame
 
 
@@ -125,14 +125,14 @@ class TrialSet(Sequence[Trial]):
         Raises:
             SettingsError: there is no trial.
         """
-        from analysis.figures import trials as drawing
+        from analysis.report.sections.beyond_paper.trials import plot_trials
 
         _require(self)
         kinds = {
             name: terrain_kind(name, [trial.series.stones for trial in self.on(name)])
             for name in self.terrains
         }
-        return drawing.plot_trials(
+        return plot_trials(
             by_terrain(self),
             kinds,
             is_simulated=any(trial.is_simulated for trial in self.trials),

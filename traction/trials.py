@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 from analysis.data.load import RecordedTrial
 from analysis.data.prepare import PreparedTrial, PrepareOptions, prepare_trial
 from analysis.data.series import Array, TractionSeries
-from experiments.report.quantities import KEPT, QUANTITIES
-from experiments.report.table_columns import TableColumn, columns_of
+from experiments.export.quantities import KEPT, QUANTITIES
+from experiments.export.table_columns import TableColumn, columns_of
 from traction.frames import data_frame
 
 if TYPE_CHECKING:
-    from analysis.figures.style import Figure
+    from analysis.report.style import Figure
     from traction.frames import DataFrame
 
 SERIES_UNITS = {"t": "s", "v_t": "m/s", "F_n": "N", "F_t": "N"}
@@ -121,7 +121,7 @@ class Trial:
 
         A notebook shows the figure; `figure.savefig("T01.pdf")` keeps it.
         """
-        from analysis.figures import excerpts
+        from analysis.report.sections.paper import excerpts
 
         return excerpts.plot_trial(self.kept, is_simulated=self.is_simulated)
 

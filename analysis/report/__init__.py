@@ -1,5 +1,5 @@
-"""The report page: sections, tables, figures in order, what-if variants.
+"""The report: the results of a study, the sections that show them, and the page.
 
-`page` writes the folder, `page_model` is what a page consists of, `drawing` makes
-the figures. Begin with `page`.
+`results` has every number, `sections` a module or package for each heading, `drawing`
+makes the figures, `page` writes the folder. Begin with `sections`.
 """

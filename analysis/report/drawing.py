@@ -8,20 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
-from typing import TYPE_CHECKING, overload
+from typing import overload
 
 from acquisition.worker_processes import available_cores
-from analysis.figures.pictures import Picture
-from analysis.figures.sections import PAGE_ORDER, ReportSection
 from analysis.report.page_model import ReportFigure, ShownNumbers
+from analysis.report.pictures import Picture
+from analysis.report.section import ReportSection
+from analysis.report.sections.order import FIGURES, SECTION_OF
 from analysis.study.jobs import Store, run_tasks
 from analysis.study.study import Study
 
-if TYPE_CHECKING:
-    from analysis.figures.spec import FigureSpec
-
 _MOST_DRAWING = 4  # processes
+_SLOWEST_FIRST = tuple(FIGURES)[::-1]
 _MANY_TERRAINS = 2  # from which on they pay: the workers are there, of the fits
 DRAWN_TYPES: Mapping[str, type] = {
     kind.__name__: kind for kind in (Picture, ReportFigure, ReportSection)
@@ -39,7 +37,7 @@ def report_figures(shown: ShownNumbers) -> list[ReportFigure]:
         for figure in run_tasks(draw_figure, FigureTasks(shown), n_jobs)
         if figure is not None
     }
-    return [drawn[key] for key in PAGE_ORDER if key in drawn]
+    return [drawn[key] for key in FIGURES if key in drawn]
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +61,7 @@ class FigureTasks(Sequence[FigureTask]):
 
     def __len__(self) -> int:
         """Return the number of figures."""
-        return len(PAGE_ORDER)
+        return len(FIGURES)
 
     @overload
     def __getitem__(self, index: int) -> FigureTask: ...
@@ -71,14 +69,14 @@ class FigureTasks(Sequence[FigureTask]):
     def __getitem__(self, index: slice) -> list[FigureTask]: ...
     def __getitem__(self, index: int | slice) -> FigureTask | list[FigureTask]:
         """Return a figure with what it shows."""
-        keys = PAGE_ORDER[::-1][index]
+        keys = _SLOWEST_FIRST[index]
         if isinstance(keys, str):
             return FigureTask(self._shown, keys)
         return [FigureTask(self._shown, key) for key in keys]
 
     def outline(self, index: int) -> object:
         """Return the key of the figure."""
-        return PAGE_ORDER[::-1][index]
+        return _SLOWEST_FIRST[index]
 
 
 def draw_figure(task: FigureTask) -> ReportFigure | None:
@@ -87,11 +85,11 @@ def draw_figure(task: FigureTask) -> ReportFigure | None:
 
 
 def _draw(key: str, shown: ShownNumbers) -> ReportFigure | None:
-    from analysis.figures.style import render, styled
+    from analysis.report.style import render, styled
 
     results, with_pdf = shown.results, shown.with_pdf
     is_simulated = results.study.simulated
-    spec = figure_specs()[key]
+    spec = FIGURES[key]
     with styled():
         figure = spec.draw(results)
         if figure is None:
@@ -99,39 +97,8 @@ def _draw(key: str, shown: ShownNumbers) -> ReportFigure | None:
         vector = {"is_vector": spec.is_vector, "with_pdf": with_pdf}
         picture = render(key, figure, is_simulated, **vector)
     return ReportFigure(
-        spec.section, spec.title, spec.alt, spec.caption(results), picture
+        SECTION_OF[key].heading, spec.title, spec.alt, spec.caption(results), picture
     )
-
-
-@cache
-def figure_specs() -> Mapping[str, FigureSpec]:
-    """Return the figures of a study by their keys; whoever asks loads matplotlib."""
-    from analysis.figures import (
-        break_away,
-        confusion,
-        curves,
-        errors,
-        excerpts,
-        factors,
-        rig,
-        surfaces,
-        trials,
-        uncertainty,
-    )
-
-    families = (
-        excerpts,
-        curves,
-        surfaces,
-        errors,
-        uncertainty,
-        break_away,
-        confusion,
-        factors,
-        trials,
-        rig,
-    )
-    return {spec.key: spec for family in families for spec in family.FIGURES}
 
 
 def kept_figures(shown: ShownNumbers, store: Store | None) -> list[ReportFigure]:

@@ -11,33 +11,23 @@ from pathlib import Path
 from typing import Any
 
 from acquisition.errors import MissingLibraryError
-from analysis.figures.sections import PAGE_ORDER, ReportSection
-from analysis.findings.findings import (
+from analysis.report.drawing import kept_figures
+from analysis.report.page_model import (
+    PageSection,
+    ReportContext,
+    ReportFigure,
+    ShownNumbers,
+    cell_text,
+    number_columns,
+)
+from analysis.report.results import (
     StudyResults,
     compute_results,
     findings_rows,
     plain_findings,
 )
-from analysis.report.drawing import kept_figures
-from analysis.report.further_tables import beyond_tables, look_first_tables
-from analysis.report.page_model import (
-    PageSection,
-    ReportContext,
-    ReportFigure,
-    ReportTable,
-    ShownNumbers,
-    cell_text,
-    number_columns,
-)
-from analysis.report.paper_tables import (
-    parameters,
-    statements,
-    summary,
-    table_one,
-    velocity_shares,
-    verdicts,
-)
-from analysis.report.rig_tables import choices, rig_tables
+from analysis.report.section import ReportTable
+from analysis.report.sections.order import FIGURES, SECTIONS
 from analysis.study.fits import to_csv, to_fits, to_plain
 from analysis.study.store import write_atomic
 from analysis.study.study import Study
@@ -82,7 +72,7 @@ def _file_figures(folder: Path, shown: Sequence[ReportFigure]) -> None:
     for name, content in files.items():
         if content:
             write_atomic(folder / name, content)
-    for key in PAGE_ORDER:
+    for key in FIGURES:
         for name in (f"{key}.png", f"{key}.pdf"):
             if not files.get(name):
                 (folder / name).unlink(missing_ok=True)
@@ -148,26 +138,16 @@ def sections(
     results: StudyResults, shown: Sequence[ReportFigure], context: ReportContext
 ) -> list[PageSection]:
     """Return the sections that have something to show, in the order of the page."""
-    study = results.study
-    tables = [
-        *look_first_tables(study),
-        summary(study),
-        parameters(study),
-        *statements(results),
-        table_one(study),
-        *beyond_tables(results),
-        velocity_shares(study),
-        *rig_tables(results),
-        choices(study, is_foreign=context.is_foreign),
-        *context.tables,
-    ]
     every = [
         PageSection(
-            heading,
-            verdicts(study) if heading is ReportSection.SUMMARY else (),
-            [table for table in tables if table.section is heading],
-            [figure for figure in shown if figure.section is heading],
+            section.heading,
+            section.sentences(results),
+            [
+                *section.tables(results, context),
+                *(t for t in context.tables if t.section is section.heading),
+            ],
+            [figure for figure in shown if figure.section is section.heading],
         )
-        for heading in ReportSection
+        for section in SECTIONS
     ]
     return [section for section in every if section.tables or section.figures]

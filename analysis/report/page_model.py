@@ -1,35 +1,19 @@
 """What stands on the page of a report: tables and figures, each in its section."""
 
+from __future__ import annotations
+
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from analysis.figures.pictures import Picture
-from analysis.figures.sections import ReportSection
-from analysis.findings.findings import StudyResults
-from analysis.findings.rig_health import RigTrial
+from analysis.report.pictures import Picture
+from analysis.report.section import ReportSection, ReportTable
+from analysis.report.sections.rig_health.health import RigTrial
 from analysis.study.jobs import Store
 
-
-@dataclass(frozen=True, slots=True)
-class ReportTable:
-    """A table of the report.
-
-    Attributes:
-        name: its heading.
-        header: names of the columns, with units.
-        rows: cells as text, each row as long as the header.
-        note: a remark below it; empty for none.
-        section: where it stands.
-    """
-
-    name: str
-    header: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    note: str = ""
-    section: ReportSection = ReportSection.ORIGIN
-
+if TYPE_CHECKING:
+    from analysis.report.results import StudyResults
 
 _MINUS = re.compile(r"(?<![\w.\u2212-])-(?=\.?\d)")
 _NUMBER = re.compile(r"[<>≤≥~]? ?[-+\u2212]?\.?\d[\d.,]*( ?(%|±.*|\(.*\)|×.*))?")

@@ -26,8 +26,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the bundle; say what is in it and what is not."""
     from acquisition.errors import SettingsError
+    from experiments.export.bundle import write_bundle
     from experiments.operator.console import WARNING, Console
-    from experiments.report.bundle import write_bundle
     from experiments.session.store import find_session
 
     folder = find_session(args.data, args.session)

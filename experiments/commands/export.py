@@ -149,7 +149,7 @@ def _is_given(args: argparse.Namespace, name: str) -> bool:
 def _export_for(args: argparse.Namespace, console: Console) -> int:
     from acquisition.errors import SettingsError
     from analysis.exports.folder import parse_targets
-    from experiments.report.terrain_targets import TargetRequest, export_for
+    from experiments.export.terrain_targets import TargetRequest, export_for
 
     targets, names = parse_targets(args.targets), _names(args.terrain)
     if args.terrain is not None and not names:
@@ -180,10 +180,10 @@ def _names(text: str | None) -> tuple[str, ...]:
 
 def _export_sessions(args: argparse.Namespace, console: Console) -> int:
     from acquisition.errors import SettingsError
-    from experiments.report.choices import choose_sessions, tell_missing
-    from experiments.report.export import export_sessions
-    from experiments.report.sessions import ReportRequest, export_terrains
-    from experiments.report.standard_topics import export_standard_topics
+    from experiments.export.standard_topics import export_standard_topics
+    from experiments.export.terrain_database import export_terrains
+    from experiments.export.trial_tables import export_sessions
+    from experiments.report.choices import ReportRequest, choose_sessions, tell_missing
     from experiments.settings.load import load_settings
 
     every = args.to is None and not args.sessions
@@ -201,6 +201,6 @@ def _export_sessions(args: argparse.Namespace, console: Console) -> int:
             hint=f"Choose another name. {_NOTHING}",
         )
     order = [row.name for row in load_settings(args.config).matrix.terrains]
-    wanted = ReportRequest(order, args.seed)
+    wanted = ReportRequest(args.seed, order)
     export_terrains(sessions, args.data, args.terrain_db, wanted, console)
     return 0

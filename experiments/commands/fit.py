@@ -16,10 +16,9 @@ from experiments.arguments import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from analysis.data.series import TractionSeries
-    from analysis.report.page_model import ReportTable
 
 EXAMPLES = """\
   traction fit trials.npz --to fit
@@ -63,7 +62,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Fit tables and write the report."""
-    from acquisition.clock import SystemClock
     from acquisition.errors import SettingsError
     from acquisition.extras import require_extra
 
@@ -74,25 +72,22 @@ def run(args: argparse.Namespace) -> int:
 
     start_workers(args.scheduler)
     from analysis.dialects.columns import parse_covariates, parse_inputs
-    from analysis.findings.beside import run_whole_study
-    from analysis.findings.covariates import WAY
-    from analysis.findings.findings import compute_results
-    from analysis.report.covariate_table import covariate_tables
-    from analysis.report.page import ReportContext, write_report
-    from analysis.report.what_if_tables import plain_choice, side_by_side
-    from analysis.study.models import FitOptions
-    from analysis.study.study import StudyOptions, notes_of_tables
+    from analysis.study.covariates import WAY
     from experiments.operator.console import Console
-    from experiments.report.choices import analysis_choices, repeat_study
-    from experiments.report.covariates import columns_tested
-    from experiments.report.progress import fitting
-    from experiments.report.sessions import require_samples
-    from experiments.session.store import iso_utc
+    from experiments.report.choices import ReportRequest, analysis_choices
+    from experiments.report.external_tables import report_tables_of_trials
 
     console = Console(color=not args.no_color)
     choices = analysis_choices(args)
     columns = () if args.covariate is None else parse_covariates(args.covariate)
     inputs = () if args.inputs is None else parse_inputs(args.inputs)
+    order = ReportRequest(
+        args.seed,
+        scheduler=args.scheduler,
+        choices=choices,
+        covariates=columns,
+        with_pdf=args.pdf,
+    )
     if both := ", ".join(name for name in columns if name in inputs):
         raise SettingsError(
             f"--covariate and --inputs both name {both}.", hint="Leave one out."
@@ -100,46 +95,7 @@ def run(args: argparse.Namespace) -> int:
     trials = _load(args, inputs)
     beside = [name for name in columns if name != WAY]
     tested = _load(args, (*inputs, *beside)) if beside else trials
-    for choice in choices.variants:  # refused before anything is fitted
-        choice.series(next(iter(trials.values()))[0])
-    is_simulated = _is_simulated(trials)
-    _refuse_repeated(trials)
-    told = notes_of_tables(trials)
-    for note in told:  # before the work: a wrong unit shows here
-        console.say(f"▲ {note}")
-    count = sum(len(series) for series in trials.values())
-    console.say(f"{count} trials on {len(trials)} terrains: fitting ...")
-    fit = FitOptions(bounds=choices.bounds, seed=args.seed, models=choices.models)
-    options = StudyOptions(choices.prepare, fit=fit, scheduler=args.scheduler)
-    with fitting(console) as progress:
-        study, break_away = run_whole_study(trials, options, is_simulated, progress)
-    require_samples(study)
-    others = repeat_study(study, trials, choices.variants, console)
-    found = columns_tested(study, tested, columns, console)
-    context = ReportContext(
-        "Traction from external data",
-        f"{count} trials from {len(args.files)} files",
-        is_simulated=study.simulated,
-        is_foreign=True,
-        generated_utc=iso_utc(SystemClock().utc_ns()),
-        tables=[
-            *(side_by_side(choice, study, other) for choice, other in others),
-            *covariate_tables(found),
-            *_import_tables(args.files),
-        ],
-        further_numbers={
-            "what_if": [plain_choice(c, study, other) for c, other in others],
-            "covariates": [one.numbers() for one in found],
-        },
-        with_pdf=args.pdf,
-        results=compute_results(study, break_away=break_away),
-    )
-    page = write_report(study, args.to, context)
-    for note in study.groups:
-        console.say(note)
-    for warning in study.warnings:
-        if warning not in told:
-            console.say(f"▲ {warning}")
+    page = report_tables_of_trials(args.files, args.to, trials, tested, order, console)
     console.say(str(page))
     return 0
 
@@ -170,46 +126,3 @@ def _load(
         decimal=args.decimal,
         inputs=inputs,
     )
-
-
-def _import_tables(files: Sequence[Path]) -> list[ReportTable]:
-    """Return what the folders of imported trials tell of themselves."""
-    from analysis.imported.record import read_record
-    from analysis.report.import_page import import_tables
-
-    folders = dict.fromkeys(path if path.is_dir() else path.parent for path in files)
-    records = [read_record(folder) for folder in folders]
-    return [t for record in records if record for t in import_tables(record)]
-
-
-def _refuse_repeated(trials: Mapping[str, Sequence[TractionSeries]]) -> None:
-    """Refuse a trial that is there twice: left out, it would be fitted all the same."""
-    from hashlib import blake2b
-
-    from acquisition.errors import SettingsError
-
-    first: dict[bytes, str] = {}
-    for series in (one for group in trials.values() for one in group):
-        digest = blake2b()
-        for column in (series.t - series.t[0], series.v_t, series.F_n, series.F_t):
-            digest.update(column.tobytes())
-        name = f"{series.terrain} {series.name}"
-        original = first.setdefault(digest.digest(), name)
-        if original is not name:
-            raise SettingsError(
-                f"{name} holds the same trial as {original}.",
-                hint="Give each trial once.",
-            )
-
-
-def _is_simulated(trials: Mapping[str, Sequence[TractionSeries]]) -> bool:
-    """Return whether the trials are simulated ones; a mixture is refused."""
-    from acquisition.errors import SettingsError
-
-    kinds = {trial.is_simulated for series in trials.values() for trial in series}
-    if len(kinds) > 1:
-        raise SettingsError(
-            "A report cannot mix simulated and recorded trials.",
-            hint="Give the tables of one kind only.",
-        )
-    return True in kinds

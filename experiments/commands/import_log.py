@@ -135,9 +135,10 @@ def run(args: argparse.Namespace) -> int:
 
     console = Console(color=not args.no_color)
     if args.list:
-        from experiments.report.log_listing import list_log
+        from analysis.imported.log_listing import listing
 
-        list_log(args.log, args.urdf, console)
+        for line in listing(args.log, args.urdf):
+            console.say(line)
         return 0
     missing = [f"--{name}" for name in _NEEDED if getattr(args, name) is None]
     if missing:
@@ -150,7 +151,7 @@ def run(args: argparse.Namespace) -> int:
 
         require_extra("parquet")
     from analysis.imported.importing import import_log
-    from experiments.report.imported_tables import write_imported
+    from experiments.export.imported_tables import write_imported
 
     imported = import_log(request_of(args))
     for estimate in imported.estimates:

@@ -43,11 +43,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the publication and return the exit code."""
+    from experiments.export.credits import LICENCES, parse_author
+    from experiments.export.publication import PublishRequest, publish_sessions
     from experiments.operator.console import Console
-    from experiments.report.choices import choose_sessions, tell_missing
-    from experiments.report.credits import LICENCES, parse_author
-    from experiments.report.publication import PublishRequest, publish_sessions
-    from experiments.report.sessions import ReportRequest
+    from experiments.report.choices import ReportRequest, choose_sessions, tell_missing
     from experiments.settings.load import load_settings
 
     authors = [parse_author(text) for text in args.author]
@@ -58,6 +57,6 @@ def run(args: argparse.Namespace) -> int:
     sessions = choose_sessions(args.data, args.sessions, every=args.all)
     order = [row.name for row in load_settings(args.config).matrix.terrains]
     missing = tell_missing(sessions, console, allow_missing=args.allow_missing)
-    wanted = ReportRequest(order, args.seed, missing=missing)
+    wanted = ReportRequest(args.seed, order, missing=missing)
     publish_sessions(sessions, args.data, args.to, wanted, request, console)
     return 0

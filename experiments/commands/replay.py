@@ -71,8 +71,8 @@ def run(args: argparse.Namespace) -> int:
 
 def _show_trial(args: argparse.Namespace) -> int:
     from acquisition.clock import SystemClock
+    from experiments.live.playback import play
     from experiments.operator.console import Console
-    from experiments.report.playback import play
     from experiments.session.annotations import trial_path
     from experiments.session.kept_files import compare_trial, kept_data_error
     from experiments.session.store import find_session
@@ -91,7 +91,7 @@ def _show_trial(args: argparse.Namespace) -> int:
 
 def _serve_trial(args: argparse.Namespace, path: Path, console: Console) -> int:
     from acquisition.clock import SystemClock
-    from experiments.report.playback import serve
+    from experiments.live.playback import serve
     from experiments.run.stop import StopFlag, handle_signals
 
     stop = StopFlag()

@@ -53,12 +53,13 @@ def run(args: argparse.Namespace) -> int:
     from analysis.study.jobs import Shard
     from experiments.operator.console import Console, PageRecorder
     from experiments.report.choices import (
+        ReportRequest,
         analysis_choices,
         choose_sessions,
         tell_missing,
     )
     from experiments.report.covariates import KNOWN
-    from experiments.report.sessions import ReportRequest, fit_shard, report_sessions
+    from experiments.report.sessions import fit_shard, report_sessions
     from experiments.settings.load import load_settings
 
     choices = analysis_choices(args)
@@ -68,8 +69,8 @@ def run(args: argparse.Namespace) -> int:
     order = [row.name for row in load_settings(args.config).matrix.terrains]
     missing = tell_missing(sessions, console, allow_missing=args.allow_missing)
     wanted = ReportRequest(
-        order,
         args.seed,
+        order,
         args.scheduler,
         choices,
         missing,

@@ -41,8 +41,8 @@ def run(args: argparse.Namespace) -> int:
     from dataclasses import asdict
 
     from acquisition.errors import SessionError
+    from experiments.export.crate import is_publication
     from experiments.operator.console import BAD, GOOD, Console
-    from experiments.report.crate import is_publication
     from experiments.session.kept_files import compare_kept, repeated_numbers
     from experiments.session.store import find_session, list_sessions
 
@@ -103,8 +103,8 @@ def _verify_published(folders: list[Path], args: argparse.Namespace) -> int:
     from dataclasses import asdict
 
     from acquisition.errors import SessionError
+    from experiments.export.witnesses import changed_publication
     from experiments.operator.console import BAD, GOOD, Console
-    from experiments.report.witnesses import changed_publication
 
     if len(folders) != 1 or len(args.sessions) != 1:
         raise SessionError(
@@ -125,8 +125,8 @@ def _verify_published(folders: list[Path], args: argparse.Namespace) -> int:
 
 
 def _rebuild(folder: Path, console: Console) -> int:
+    from experiments.export.rebuilding import TOLERANCE, rebuild
     from experiments.operator.console import BAD, GOOD
-    from experiments.report.rebuilding import TOLERANCE, rebuild
 
     result = rebuild(folder, console)
     for text in result.different[:_SHOWN]:

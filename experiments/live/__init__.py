@@ -1,5 +1,6 @@
 """The second screen: a session or a trial for viewers that speak Foxglove's protocol.
 
 `channels` turns samples into messages, `server` imports foxglove-sdk, `watching`
-follows a session that another process records.
+follows a session that another process records, `playback` shows a recorded trial
+again, also in the terminal.
 """

@@ -1,5 +1,5 @@
-"""Recorded sessions to reports and exports.
+"""Recorded sessions, or tables from elsewhere, to studies and their pages.
 
-`sessions` chooses and analyses, `truth_errors` holds simulated sessions against their
-truth, `export` writes tables. Begin with `sessions`.
+`sessions` and `external_tables` load the trials and fit them, `study_report` makes the
+page of either. Begin with `study_report`.
 """

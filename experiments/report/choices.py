@@ -1,4 +1,4 @@
-"""Choices of a report, from the command line: its sessions, and its analysis."""
+"""Choices of a report: its sessions, its analysis, and what else is asked for."""
 
 import argparse
 from collections.abc import Iterable, Mapping, Sequence
@@ -10,8 +10,12 @@ from acquisition.errors import SessionError, SettingsError
 from analysis.data.load import RecordedTrial
 from analysis.data.prepare import PrepareOptions
 from analysis.data.series import TractionSeries
-from analysis.report.what_if import StudyVariant, parse_choice, parse_window
-from analysis.study.models import REPORTED, parse_models
+from analysis.report.sections.sensitivity import (
+    StudyVariant,
+    parse_choice,
+    parse_window,
+)
+from analysis.study.models import REPORTED, FitOptions, parse_models
 from analysis.study.store import ResultStore
 from analysis.study.study import Study, run_study
 from analysis.tustin.model import TustinBounds
@@ -38,6 +42,43 @@ class AnalysisChoices:
     bounds: TustinBounds = field(default_factory=TustinBounds)
     models: tuple[str, ...] = REPORTED
     variants: tuple[StudyVariant, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class ReportRequest:
+    """How a report is made.
+
+    Attributes:
+        seed: seed of the points of the Gaussian processes.
+        terrains: names in the matrix's order; none for tables.
+        scheduler: address of a Dask scheduler to fit on; None for this machine.
+        choices: of the analysis.
+        missing: kept trials that are missing or changed, in words.
+        covariates: names of columns that are tested.
+        out: folder of the report; None = that of the session, or `data`/study.
+        with_pdf: figures are wanted as PDF, too.
+    """
+
+    seed: int
+    terrains: Sequence[str] = ()
+    scheduler: str | None = None
+    choices: AnalysisChoices = field(default_factory=AnalysisChoices)
+    missing: Sequence[str] = ()
+    covariates: Sequence[str] = ()
+    out: Path | None = None
+    with_pdf: bool = False
+
+    def sorted(self, names: Iterable[str]) -> list[str]:
+        """Return `names` in the matrix's order, others last by name."""
+        rank = {name: i for i, name in enumerate(self.terrains)}
+        return sorted(names, key=lambda name: (rank.get(name, len(rank)), name))
+
+    @property
+    def fit(self) -> FitOptions:
+        """How the models are fitted."""
+        return FitOptions(
+            self.choices.bounds, seed=self.seed, models=self.choices.models
+        )
 
 
 def analysis_choices(args: argparse.Namespace) -> AnalysisChoices:

@@ -5,7 +5,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from analysis.data.prepare import prepare_trial
 from analysis.data.recorded_covariates import RECORDED, with_covariates
 from analysis.data.series import TractionSeries
-from analysis.findings.covariates import (
+from analysis.report.held_trial import TrialFiles
+from analysis.study.covariates import (
     FEWEST,
     WAY,
     CovariateResult,
@@ -13,7 +14,6 @@ from analysis.findings.covariates import (
     covariate_results,
     least_drop,
 )
-from analysis.findings.held_trial import TrialFiles
 from analysis.study.jobs import Store, Workers
 from analysis.study.study import Study
 from experiments.operator.console import WARNING, Console

@@ -1,88 +1,41 @@
-"""From sessions to a report: the trials, their study and the page."""
+"""From sessions to a report: the trials that are loaded, and their study."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from hashlib import blake2b
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from shutil import disk_usage
 
-import numpy as np
-
-from acquisition.clock import SystemClock
-from acquisition.errors import SessionError, SettingsError, TrialFileError
+from acquisition.errors import SessionError, TrialFileError
 from analysis.breakaway.model import BreakAwayModel
 from analysis.data.load import load_trial
 from analysis.data.plausibility import summed_up
 from analysis.data.recorded_factors import stated_factors
 from analysis.data.series import TractionSeries
-from analysis.findings.beside import run_whole_study, run_whole_study_shard
-from analysis.findings.covariates import COVARIATE_TYPES, CovariateResult
-from analysis.findings.findings import compute_results
-from analysis.findings.held_trial import HeldTrial, TrialFiles
-from analysis.findings.rig_health import with_tares
-from analysis.report.covariate_table import covariate_tables
 from analysis.report.drawing import DRAWN_TYPES
-from analysis.report.page_model import ReportContext
-from analysis.report.what_if import StudyVariant
-from analysis.report.what_if_tables import plain_choice, side_by_side
+from analysis.report.held_trial import HeldTrial, TrialFiles
+from analysis.report.sections.rig_health.health import with_tares
+from analysis.report.whole_study import run_whole_study, run_whole_study_shard
+from analysis.study.covariates import COVARIATE_TYPES
 from analysis.study.jobs import Shard
-from analysis.study.models import (
-    GP_SE,
-    GP_SE_TRIAL,
-    PAPER_MODELS,
-    FitOptions,
-)
+from analysis.study.models import FitOptions
 from analysis.study.store import MOST_BYTES, TYPES, ResultStore
 from analysis.study.study import Study, StudyOptions
-from analysis.terrains.export import database_of
-from analysis.terrains.identify import identify_study
 from experiments.operator.console import Console
-from experiments.report.cells import cells_table
-from experiments.report.choices import AnalysisChoices, repeat_study
+from experiments.report.choices import ReportRequest
 from experiments.report.commissioned import uncommissioned
-from experiments.report.covariates import columns_tested, recorded_columns
+from experiments.report.covariates import recorded_columns
+from experiments.report.duplicates import TrialDigests
 from experiments.report.progress import fitting
-from experiments.report.tables import report_tables, summary_table
+from experiments.report.study_report import ReportedStudy, report_study
+from experiments.report.tables import cells_table, report_tables, summary_table
 from experiments.report.truth_errors import (
     TruthErrors,
     compare_with_truth,
     truth_tables,
 )
-from experiments.session.data_files import write_new_text
-from experiments.session.store import FOLDS, SessionFolder, iso_utc
+from experiments.session.store import FOLDS, SessionFolder
 
 _SHARE_OF_DISK = 4  # one part in so many of what is free may be results
-EXPORTED = (*PAPER_MODELS, GP_SE_TRIAL)
-
-
-@dataclass(frozen=True, slots=True)
-class ReportRequest:
-    """How a report is made.
-
-    Attributes:
-        terrains: names in the matrix's order.
-        seed: seed of the points of the Gaussian processes.
-        scheduler: address of a Dask scheduler to fit on; None for this machine.
-        choices: of the analysis.
-        missing: kept trials that are missing or changed, in words.
-        covariates: names of columns that are tested.
-        out: folder of the report; None = that of the session, or `data`/study.
-        with_pdf: figures are wanted as PDF, too.
-    """
-
-    terrains: Sequence[str]
-    seed: int
-    scheduler: str | None = None
-    choices: AnalysisChoices = field(default_factory=AnalysisChoices)
-    missing: Sequence[str] = ()
-    covariates: Sequence[str] = ()
-    out: Path | None = None
-    with_pdf: bool = False
-
-    def sorted(self, names: Iterable[str]) -> list[str]:
-        """Return `names` in the matrix's order, others last by name."""
-        rank = {name: i for i, name in enumerate(self.terrains)}
-        return sorted(names, key=lambda name: (rank.get(name, len(rank)), name))
 
 
 def _load_trials(
@@ -92,7 +45,7 @@ def _load_trials(
     trials: dict[str, list[HeldTrial]] = {}
     truths: dict[Path, TruthErrors] = {}
     left_out: list[str] = []
-    first: dict[bytes, str] = {}  # by what was recorded, whatever file it is in
+    digests = TrialDigests()  # of what was recorded, whatever file it is in
     for session in sorted(sessions, key=lambda s: (s.path.name[:10], int(s.id[1:]))):
         for path in session.kept_trials():
             try:
@@ -109,8 +62,7 @@ def _load_trials(
                     hint="Put the file back where it came from.",
                 )
             name = f"{session.id} {path.stem}"
-            original = first.setdefault(blake2b(trial.cycles.tobytes()).digest(), name)
-            if original is not name:
+            if (original := digests.original(name, trial.cycles)) is not None:
                 left_out.append(f"{name} is the same recording as {original}")
                 console.say(f"▲ left out: {left_out[-1]}")
                 continue
@@ -248,8 +200,7 @@ def fit_shard(
     Raises:
         SessionError: no session has a kept trial.
     """
-    fit = _fit_options(order)
-    given = StudyInputs.of(sessions, data, order, console, fit)
+    given = StudyInputs.of(sessions, data, order, console, order.fit)
     with fitting(console) as progress:
         count = run_whole_study_shard(
             given.series, given.options, shard, given.store, progress
@@ -258,68 +209,6 @@ def fit_shard(
         f"Shard {shard.number} of {shard.of}: {count} results are kept. When all have "
         "ended, traction report without --shard finds them."
     )
-
-
-def _fit_options(order: ReportRequest) -> FitOptions:
-    choices = order.choices
-    return FitOptions(choices.bounds, seed=order.seed, models=choices.models)
-
-
-def require_samples(study: Study) -> None:
-    """Refuse a study of which nothing is left to fit.
-
-    Raises:
-        SettingsError: no terrain has a sample inside the window.
-    """
-    if any(result.kept for result in study.terrains.values()):
-        return
-    prepare = study.options.prepare
-    present = np.concatenate(
-        [trial.smooth.v_t for r in study.terrains.values() for trial in r.trials]
-    )
-    slow, fast = float(present.min()), float(present.max())
-    forward = np.quantile(present[present > 0.0], (0.05, 0.95)) if fast > 0 else None
-    hint = (
-        "No row moves forward: --negate v_t turns its sign."
-        if forward is None
-        else f"--window {forward[0]:.3g}:{forward[1]:.3g} keeps nine in ten of those "
-        "that move forward; or check the unit of v_t."
-    )
-    raise SettingsError(
-        "No sample is left to fit: none moves forward at "
-        f"{prepare.slowest:g} to {prepare.fastest:g} m/s (--window); v_t is {slow:.3g} "
-        f"to {fast:.3g} m/s.",
-        hint=" ".join([hint, *study.warnings]),
-    )
-
-
-def export_terrains(
-    sessions: Sequence[SessionFolder],
-    data: Path,
-    out: Path,
-    order: ReportRequest,
-    console: Console,
-) -> None:
-    """Write a terrain database of all models of the sessions' terrains to `out`.
-
-    Raises:
-        SessionError: no session has a kept trial.
-        TrialFileError: `out` exists or cannot be written.
-    """
-    judged = FitOptions(seed=order.seed, models=(GP_SE,), draws=0)
-    analysed = study_sessions(sessions, data, order, console, judged)
-    study = analysed.study
-    options = replace(
-        study.options, fit=FitOptions(seed=order.seed, models=EXPORTED, draws=0)
-    )
-    text = database_of(
-        replace(study, options=options),
-        identify_study(study),
-        iso_utc(SystemClock().utc_ns()),
-        store=results_below(data),
-    )
-    write_new_text(out, text)
-    console.say(f"{len(study.terrains)} terrains: {out}")
 
 
 def report_sessions(
@@ -337,73 +226,47 @@ def report_sessions(
         SessionError: no session has a kept trial.
         MissingLibraryError: the extra `report` is not installed.
     """
-    from analysis.report.page import write_report  # exporting needs no page
-
-    analysed = study_sessions(sessions, data, order, console, _fit_options(order))
-    study, trials = analysed.study, analysed.trials
-    store = results_below(data)
-    others = repeat_study(study, analysed.files, order.choices.variants, console, store)
-    every = [trial for group in trials.values() for trial in group]
-    rig = with_tares([trial.health for trial in every], every)
+    analysed = study_sessions(sessions, data, order, console, order.fit)
     own = sessions[0].path if len(sessions) == 1 else data / "study"
-    tested = columns_tested(
-        study,
-        recorded_columns(analysed.files, order.covariates),
-        order.covariates,
-        console,
-        store,
-    )
-    results = compute_results(study, rig, analysed.break_away)
-    context = _context(sessions, order, analysed, others, tested)
-    context = replace(context, rig=rig, results=results, store=store)
-    page = write_report(study, order.out or own, context)
-    console.table(*summary_table(study))
-    for note in study.groups:
+    reported = _reported(sessions, order, analysed)
+    store = results_below(data)
+    page = report_study(reported, order.out or own, order, console, store)
+    console.table(*summary_table(analysed.study))
+    for note in analysed.study.groups:
         console.say(note)
     return page
 
 
-def _context(
-    sessions: Sequence[SessionFolder],
-    order: ReportRequest,
-    analysed: StudySession,
-    others: Sequence[tuple[StudyVariant, Study]],
-    tested: Sequence[CovariateResult],
-) -> ReportContext:
-    """Return what the report shows beyond the study."""
+def _reported(
+    sessions: Sequence[SessionFolder], order: ReportRequest, analysed: StudySession
+) -> ReportedStudy:
+    """Return a study with what only its sessions can tell."""
     study, trials = analysed.study, analysed.trials
+    every = [trial for group in trials.values() for trial in group]
     units = {
         name: unit
-        for group in trials.values()
-        for trial in group
+        for trial in every
         for name, unit in stated_factors(trial.metadata["trial"]).units.items()
     }
-    count = sum(len(group) for group in trials.values())
-    return ReportContext(
+    return ReportedStudy(
+        study,
+        analysed.break_away,
         title="Traction " + (sessions[0].id if len(sessions) == 1 else "study"),
-        subtitle=f"{count} trials on {', '.join(trials)}",
-        is_simulated=study.simulated,
+        subtitle=f"{len(every)} trials on {', '.join(trials)}",
         is_foreign=False,
-        generated_utc=iso_utc(SystemClock().utc_ns()),
+        trials=analysed.files,
+        with_columns=recorded_columns(analysed.files, order.covariates),
+        cells=cells_table(study, units),
         tables=[
-            *cells_table(study, units),
-            *(side_by_side(choice, study, other) for choice, other in others),
-            *covariate_tables(tested),
             *truth_tables(study, trials, analysed.truths),
             *report_tables(sessions, trials),
         ],
-        further_numbers={
-            "what_if": [plain_choice(c, study, other) for c, other in others],
-            "covariates": [one.numbers() for one in tested],
-            "left_out": analysed.left_out,
-        },
+        rig=with_tares([trial.health for trial in every], every),
         warnings=[
-            *uncommissioned(
-                (t.name, t.metadata) for group in trials.values() for t in group
-            ),
+            *uncommissioned((trial.name, trial.metadata) for trial in every),
             *order.missing,
             *analysed.left_out,
             *analysed.doubts,
         ],
-        with_pdf=order.with_pdf,
+        numbers={"left_out": analysed.left_out},
     )

@@ -11,14 +11,13 @@ from acquisition.errors import TrialFileError
 from acquisition.trial_file.reader import TrialReader
 from analysis.data.load import RecordedTrial
 from analysis.data.prepare import moving_average
-from analysis.figures.sections import ReportSection
-from analysis.findings.force_uncertainty import (
+from analysis.report.force_uncertainty import (
     TaredTrial,
     uncertainties_of,
     uncertainty_of,
 )
-from analysis.findings.held_trial import HeldTrial
-from analysis.report.page_model import ReportTable
+from analysis.report.held_trial import HeldTrial
+from analysis.report.section import ReportSection, ReportTable
 from analysis.study.study import Study
 from analysis.study.terrain_fit import TerrainResult
 

@@ -9,8 +9,9 @@ _WORK = (  # what fits and figures need, the first needed first
     "analysis.terrains.export",
     "analysis.report.page",
     "scipy.signal",
+    "matplotlib.figure",
     "matplotlib.backends.backend_agg",
-    "analysis.figures.curves",
+    "matplotlib.backends.backend_svg",
 )
 
 

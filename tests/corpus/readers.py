@@ -14,9 +14,9 @@ from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.recover import recover_file
 from analysis.data.tables import load_tables
 from analysis.terrains import database as terrain_db
+from experiments.export.checksums import SUMS, changed_files
+from experiments.export.rebuilding import compare_tables
 from experiments.operator.scripted import ScriptedOperator
-from experiments.report.checksums import SUMS, changed_files
-from experiments.report.rebuilding import compare_tables
 from experiments.rig.law_calibrations import build_compensation
 from experiments.run.surroundings import read_poses
 from experiments.session.crash_recovery import recover_session

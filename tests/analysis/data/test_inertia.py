@@ -7,7 +7,7 @@ from acquisition.errors import SettingsError
 from acquisition.trial_file.reader import TrialReader
 from analysis.data.inertia import WINDOW, inertial_force
 from analysis.data.load import load_trial
-from analysis.report.what_if import parse_choice
+from analysis.report.sections.sensitivity import parse_choice
 from tests.analysis.data.test_load import (
     BIAS,
     FORCE,

@@ -10,7 +10,7 @@ from acquisition.schema import CYCLE
 from acquisition.trial_file.recover import recover_file
 from acquisition.trial_file.writer import TrialHeader, TrialWriter
 from analysis.data.load import load_trial
-from analysis.findings.rig_health import health_of, with_tares
+from analysis.report.sections.rig_health.health import health_of, with_tares
 from ft_sensor.calibration.files import payload_to_toml, terrain_to_toml
 from ft_sensor.payload import TerrainFrame, payload_of
 from wam.model.arm_model import ArmModel

@@ -9,7 +9,8 @@ from analysis.data.prepare import PrepareOptions
 from analysis.data.series import TractionSeries
 from analysis.data.tables import load_tables
 from analysis.dialects.columns import parse_columns
-from analysis.report.paper_tables import table_one, verdicts
+from analysis.report.sections.paper.table_one import table_one
+from analysis.report.sections.summary.section import verdicts
 from analysis.study.fits import to_fits
 from analysis.study.models import GP_SE, GP_SE_NOISE, PAPER_MODELS, TUSTIN, FitOptions
 from analysis.study.study import StudyOptions, run_study

@@ -4,9 +4,6 @@ from functools import wraps
 import numpy as np
 import pytest
 
-from analysis.figures.pictures import Picture
-from analysis.figures.sections import ReportSection
-from analysis.findings.findings import compute_results
 from analysis.report import drawing
 from analysis.report.drawing import (
     DRAWN_TYPES,
@@ -15,6 +12,9 @@ from analysis.report.drawing import (
     kept_figures,
 )
 from analysis.report.page_model import ReportFigure, ShownNumbers
+from analysis.report.pictures import Picture
+from analysis.report.results import compute_results
+from analysis.report.section import ReportSection
 from analysis.study.digests import value_digest
 from analysis.study.jobs import run_tasks
 from analysis.study.store import TYPES, ResultStore

@@ -1,10 +1,11 @@
 import pytest
 
-from analysis.figures.sections import PAGE_ORDER, ReportSection
-from analysis.figures.style import styled
-from analysis.figures.surfaces import distinct_labels, round_ticks
-from analysis.findings.findings import compute_results
-from analysis.report.drawing import figure_specs
+from analysis.report.page_model import ReportContext
+from analysis.report.results import compute_results
+from analysis.report.section import ReportSection
+from analysis.report.sections.order import FIGURES, SECTIONS
+from analysis.report.sections.paper.surfaces import distinct_labels, round_ticks
+from analysis.report.style import styled
 from analysis.study.models import FitOptions
 from analysis.study.study import StudyOptions, run_study
 
@@ -39,9 +40,7 @@ def is_whole(figure):
 @pytest.mark.parametrize(("count", "figures"), [("three", 18), ("one", 13)])
 def test_nothing_of_a_figure_is_cut(findings, count, figures):
     with styled():
-        drawn = {
-            spec.key: spec.draw(findings[count]) for spec in figure_specs().values()
-        }
+        drawn = {key: spec.draw(findings[count]) for key, spec in FIGURES.items()}
         shown = {key: figure for key, figure in drawn.items() if figure is not None}
         assert len(shown) >= figures
         assert [key for key, figure in shown.items() if not is_whole(figure)] == []
@@ -68,9 +67,15 @@ def test_numbers_that_differ_have_distinct_labels():
     assert distinct_labels([1.0, 1.0]) == ["1", "1"]
 
 
-def test_figures_of_one_section_stand_together_and_keys_are_unique():
-    assert len(PAGE_ORDER) == len(set(PAGE_ORDER))
-    assert set(figure_specs()) == set(PAGE_ORDER)
-    sections = [figure_specs()[key].section for key in PAGE_ORDER]
-    positions = [list(ReportSection).index(section) for section in sections]
-    assert positions == sorted(positions)
+def test_sections_stand_in_their_order_and_keys_of_figures_are_unique():
+    assert [section.heading for section in SECTIONS] == list(ReportSection)
+    keys = [figure.key for section in SECTIONS for figure in section.figures]
+    assert len(keys) == len(set(keys))
+    assert list(FIGURES) == keys
+
+
+@pytest.mark.parametrize("section", SECTIONS, ids=lambda section: section.heading.name)
+def test_tables_of_a_section_name_it(findings, section):
+    context = ReportContext("", "", True, False, "")
+    tables = section.tables(findings["three"], context)
+    assert {table.section for table in tables} <= {section.heading}

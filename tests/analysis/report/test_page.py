@@ -10,15 +10,10 @@ from pathlib import Path
 import pytest
 
 from analysis.data.tables import load_tables
-from analysis.figures.sections import ReportSection
-from analysis.figures.style import new_figure, render, styled
 from analysis.report.page import html_page, write_report
-from analysis.report.page_model import (
-    PageSection,
-    ReportContext,
-    ReportFigure,
-    ReportTable,
-)
+from analysis.report.page_model import PageSection, ReportContext, ReportFigure
+from analysis.report.section import ReportSection, ReportTable
+from analysis.report.style import new_figure, render, styled
 from analysis.study.models import GP_SE_NOISE, PAPER_MODELS, FitOptions
 from analysis.study.study import StudyOptions, run_study
 
@@ -47,6 +42,16 @@ addEventListener("load", () => {
     overflow: document.documentElement.scrollWidth - innerWidth,
     dead: [...document.querySelectorAll("nav a")].filter(
       link => !document.querySelector(link.getAttribute("href"))).length,
+  });
+});
+</script>"""
+
+SUMMARY = """<script>
+addEventListener("load", () => {
+  const table = document.querySelector("#summary [aria-label='Samples and errors']");
+  document.title = "probe " + JSON.stringify({
+    hidden: table.scrollWidth - table.clientWidth,
+    columns: table.querySelectorAll("thead th").length,
   });
 });
 </script>"""
@@ -160,6 +165,11 @@ def written(study, folder: Path) -> Path:
 
 def test_a_report_is_readable_on_screen_and_paper(small_study, tmp_path):
     assert_readable(written(small_study, tmp_path), tmp_path, least=16)
+
+
+def test_the_summary_needs_no_scrolling_on_a_small_desk(small_study, tmp_path):
+    found = probe(written(small_study, tmp_path), tmp_path, 1280, SUMMARY)
+    assert found == {"hidden": 0, "columns": 12}
 
 
 def small_page(folder: Path) -> Path:

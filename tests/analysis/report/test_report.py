@@ -5,18 +5,24 @@ import numpy as np
 import pytest
 
 from acquisition.errors import SettingsError
-from analysis.figures.curves import caption_gp, draw_tustin_model
-from analysis.figures.errors import draw_cross_bars, draw_cross_map, draw_errors
-from analysis.figures.excerpts import draw_excerpts
-from analysis.figures.pictures import Picture
-from analysis.figures.selection import busiest_window, panels
-from analysis.figures.style import render, styled
-from analysis.figures.surfaces import near_samples
-from analysis.findings.findings import compute_results
 from analysis.report.page import ReportContext, ReportTable, render_page, write_report
 from analysis.report.page_model import cell_text, number_columns
-from analysis.report.paper_tables import summary, table_one, verdicts
-from analysis.report.rig_tables import choices
+from analysis.report.pictures import Picture
+from analysis.report.results import compute_results
+from analysis.report.sections.paper.curves import caption_gp
+from analysis.report.sections.paper.errors import (
+    draw_cross_bars,
+    draw_cross_map,
+    draw_errors,
+)
+from analysis.report.sections.paper.excerpts import busiest_window, draw_excerpts
+from analysis.report.sections.paper.surfaces import near_samples
+from analysis.report.sections.paper.table_one import table_one
+from analysis.report.sections.paper.tustin_model import draw_tustin_model
+from analysis.report.sections.provenance import choices
+from analysis.report.sections.summary.section import summary, verdicts
+from analysis.report.style import render, styled
+from analysis.report.velocity_panels import panels
 from analysis.study.fits import to_fits
 from analysis.study.models import GP_SE, FitOptions
 from analysis.study.store import write_atomic
@@ -154,7 +160,7 @@ def test_a_report_without_pdfs_leaves_none_of_an_earlier_one(
     def drawn(key, *_, with_pdf, **__):
         return Picture(key, b"png", b"pdf" if with_pdf else b"")
 
-    monkeypatch.setattr("analysis.figures.style.render", drawn)
+    monkeypatch.setattr("analysis.report.style.render", drawn)
     write_report(small_study, tmp_path, context(with_pdf=True))
     figures = tmp_path / "figures"
     assert {file.suffix for file in figures.iterdir()} == {".pdf", ".png"}

@@ -6,14 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.findings.findings import compute_results
-from analysis.report.further_tables import (
-    independent_samples,
-    paired_cells,
-    paired_table,
-    uncertainty,
-)
-from analysis.report.paper_tables import interval_text, parameters
+from analysis.report.cell_texts import interval_text, paired_cells
+from analysis.report.results import compute_results
+from analysis.report.sections.beyond_paper.paired_comparisons import paired_table
+from analysis.report.sections.beyond_paper.predicted_uncertainty import uncertainty
+from analysis.report.sections.beyond_paper.residuals import independent_samples
+from analysis.report.sections.summary.section import parameters
 from analysis.study.metrics import PairedComparison, standard_error
 from analysis.study.models import GP_SE, TITLES
 from analysis.tustin.identifiability import Interval, Profiles, correlation_samples

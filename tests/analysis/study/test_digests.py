@@ -43,7 +43,7 @@ def test_equal_sources_elsewhere_have_an_equal_digest(copy):
 
 
 def test_what_a_fold_does_not_use_leaves_its_digest(copy):
-    for name in ("figures/style.py", "report/page.py"):
+    for name in ("report/style.py", "report/page.py"):
         path = copy / "analysis" / name
         path.write_text(path.read_text() + "\n")
     assert code_digest(FOLDS, copy) == code_digest(FOLDS)
@@ -57,7 +57,10 @@ def test_what_a_fold_does_not_use_leaves_its_digest(copy):
         (fit_components, "analysis.data.series"),
         (fit_planned, "analysis.breakaway.censored"),
         (tabulate, "analysis.study.models"),
-        (report_figures, "analysis.figures.curves"),  # imported when drawn
+        (
+            report_figures,
+            "analysis.report.sections.paper.curves",
+        ),  # imported when drawn
         (report_figures, "ft_sensor.payload"),  # through other modules
     ],
 )

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from acquisition.trial_file.reader import TrialReader
-from experiments.report.checksums import ChangedFile, write_sums
-from experiments.report.crate import METADATA
+from experiments.export.checksums import ChangedFile, write_sums
+from experiments.export.crate import METADATA
 from experiments.session.kept_files import Deviation
 from experiments.tools.bench import BenchReport
 from tests.acquisition.trials import make_cycles, write_trial

@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 
-from analysis.figures.pictures import Picture
+from analysis.report.pictures import Picture
 from tests.experiments.program import traction
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
@@ -65,7 +65,7 @@ def odd(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         # what is said is tested here; pictures cost seconds, see the long test
         patch.setattr(
-            "analysis.figures.style.render",
+            "analysis.report.style.render",
             lambda key, *_, **__: Picture(key, b"png", b"pdf"),
         )
         patch.setattr("analysis.study.jobs.available_cores", lambda: 1)

@@ -13,10 +13,10 @@ from acquisition.ipc.layout import SharedLayout
 from acquisition.ipc.shared_memory import SharedMemory
 from acquisition.schema import CYCLE
 from experiments.live.channels import LIVE_TOPICS
+from experiments.live.playback import serve
 from experiments.live.server import LiveServer
 from experiments.live.watching import WatchedSession, event_text, find_open, watch
 from experiments.operator.console import Console
-from experiments.report.playback import serve
 from experiments.session.lock import session_lock
 from experiments.session.store import create_session
 from tests.acquisition.ros import decode

@@ -3,8 +3,8 @@ import tracemalloc
 import numpy as np
 
 from analysis.data.load import load_trial
-from analysis.findings.held_trial import HeldTrial, TrialFiles
-from analysis.findings.rig_health import health_of, with_tares
+from analysis.report.held_trial import HeldTrial, TrialFiles
+from analysis.report.sections.rig_health.health import health_of, with_tares
 
 MOST_BYTES = 40  # of a cycle: time, velocity, two forces, and what is small
 

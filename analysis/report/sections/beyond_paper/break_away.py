@@ -1,0 +1,386 @@
+"""What the ground gives before it goes: models of break-away beside the pushes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from analysis.breakaway.model import BREAK_AWAY, SLIDING, BreakAwayModel
+from analysis.breakaway.pushes import FootPush, find_pushes
+from analysis.breakaway.survival import SurvivalCurve, kaplan_meier, pit_limit
+from analysis.data.series import Array
+from analysis.report.section import FigureSpec, ReportSection, ReportTable
+from analysis.report.style import LOAD_LABEL, Axes, Figure, panel_grid, plain
+from analysis.study.models import GP_SE
+from analysis.study.study import Study
+from analysis.study.terrain_fit import TerrainResult
+from analysis.terrains.export import break_away_of
+
+if TYPE_CHECKING:
+    from analysis.report.results import StudyResults
+
+RISKS = (0.05, 0.1, 0.5)  # at which forces are stated
+BREAK_AWAY_UNITS = {
+    "law": "log N (sliding: N), 1, log N, log N",
+    "v_slip": "m/s",
+    "F_n, loads, forces, available, in_motion": "N",
+    "pushes": "peak N, F_n N, held",
+}
+_POINTS = 60  # of a curve
+_CURVES = ("#0072B2", "#D55E00", "#009E73")
+_STYLES = ("-", "--", "-.")
+_SLIP, _HELD = "#4d4d4d", "#CC79A7"
+_MIDDLE = RISKS[1]  # the curve with an interval
+
+
+@dataclass(frozen=True, slots=True)
+class TerrainBreakAway:
+    """A terrain's break-away model and the pushes that it was fitted to.
+
+    Attributes:
+        terrain: name of the terrain.
+        title: its name with its kind in words.
+        model: the fit of all trials.
+        pushes: of all trials, in order.
+        motion: mean and standard deviation [N] of F_t at the slowest velocity of the
+            window and the median load; None without a Gaussian process.
+    """
+
+    terrain: str
+    title: str
+    model: BreakAwayModel
+    pushes: tuple[FootPush, ...]
+    motion: tuple[float, float] | None
+
+    @property
+    def peaks(self) -> Array:
+        """Peaks of the pushes [N], shape (n,)."""
+        return np.array([push.peak for push in self.pushes])
+
+    @property
+    def F_n(self) -> Array:
+        """Their normal forces [N], shape (n,)."""
+        return np.array([push.F_n for push in self.pushes])
+
+    @property
+    def is_held(self) -> np.ndarray:
+        """Which of them held, shape (n,)."""
+        return np.array([push.is_held for push in self.pushes], dtype=bool)
+
+    @property
+    def load(self) -> float:
+        """Median F_n of the pushes, or the middle of the model's range [N]."""
+        return float(np.median(self.F_n if self.pushes else self.model.loads))
+
+    @property
+    def loads(self) -> Array:
+        """Normal forces of curves [N], over the range that is not extrapolated."""
+        return np.linspace(*self.model.loads, _POINTS)
+
+    @property
+    def forces(self) -> Array:
+        """Traction forces of curves [N], from zero to beyond every peak."""
+        most = max([self.model.forces[1], *self.peaks.tolist()])
+        return np.linspace(0.0, most, _POINTS)
+
+    @property
+    def survival(self) -> SurvivalCurve | None:
+        """Kaplan and Meier's curve of the peaks; None without a slip."""
+        if self.is_held.all():
+            return None
+        return kaplan_meier(self.peaks, self.is_held)
+
+    @property
+    def mean_risk(self) -> Array:
+        """The model's risk at `forces`, mean over the loads of the pushes."""
+        risks = [
+            self.model.risks(np.full(self.F_n.size, force), self.F_n)
+            for force in self.forces
+        ]
+        return np.array([float(np.mean(risk)) for risk in risks])
+
+    @property
+    def limit(self) -> float | None:
+        """Distance from Kaplan and Meier's curve that chance exceeds in 5 %."""
+        if self.model.kind != BREAK_AWAY:
+            return None
+        return pit_limit(self.model.slips)
+
+    def motion_quantile(self, share: float) -> float | None:
+        """Return the force in motion [N] that is not reached with that probability."""
+        from scipy.special import ndtri
+
+        if self.motion is None:
+            return None
+        return self.motion[0] + self.motion[1] * float(ndtri(share))
+
+    def numbers(self) -> dict[str, Any]:
+        """Return what is stated of the terrain as plain values, for fits.json."""
+        model = self.model
+        available = [model.available(self.load, risk) for risk in RISKS]
+        return {
+            **{k: v for k, v in model.to_dict().items() if k != "draws"},
+            "F_n": self.load,
+            "available": [
+                {"risk": risk, "force": a.force, "low": a.low, "high": a.high}
+                for risk, a in zip(RISKS, available, strict=True)
+            ],
+            "in_motion": {str(risk): self.motion_quantile(risk) for risk in RISKS},
+            "limit": self.limit,
+            "pushes": [
+                [push.peak, push.F_n, float(push.is_held)] for push in self.pushes
+            ],
+        }
+
+
+def break_away_findings(
+    study: Study, models: Mapping[str, BreakAwayModel] | None = None
+) -> Mapping[str, TerrainBreakAway]:
+    """Return what every terrain gives before it slips, where that is known.
+
+    Args:
+        study: the trials.
+        models: fitted to them by terrain; None = they are fitted here.
+    """
+    models = break_away_of(study) if models is None else models
+    return {
+        name: _of_terrain(study.terrains[name], model, study.options.prepare.slowest)
+        for name, model in models.items()
+    }
+
+
+def _of_terrain(
+    result: TerrainResult, model: BreakAwayModel, slowest: float
+) -> TerrainBreakAway:
+    pushes = tuple(
+        push
+        for trial in result.trials
+        if trial.kept
+        for push in find_pushes(trial, model.v_slip)
+    )
+    quiet = TerrainBreakAway(result.terrain, result.title, model, pushes, None)
+    folds = result.models(GP_SE)
+    if not folds:
+        return quiet
+    found = folds[0].model.predict(np.array([quiet.load]), np.array([slowest]))
+    motion = (float(found.mean[0]), float(found.sd[0]))
+    return TerrainBreakAway(result.terrain, result.title, model, pushes, motion)
+
+
+def break_away_table(results: StudyResults) -> ReportTable:
+    """Return the force available from rest and in motion, and what it rests on."""
+    speeds = sorted({f.model.v_slip for f in results.break_away.values()})
+    return ReportTable(
+        name="Force available from rest and in motion",
+        header=(
+            "terrain",
+            "from rest",
+            "slipped",
+            "held",
+            "F_n [N]",
+            *(f"F_t at risk {risk:g} [N]" for risk in RISKS),
+            *(f"in motion at {risk:g} [N]" for risk in RISKS),
+            "distance (limit)",
+            "effect of the trial",
+        ),
+        rows=[_break_away_row(found) for found in results.break_away.values()],
+        note="From rest: a push at a new place in a new trial slips with that "
+        f"probability (v_slip {', '.join(f'{v:g}' for v in speeds)} m/s) before F_t "
+        "reaches the force; brackets: 90 % interval by resampled trials. "
+        '"sliding": too few pushes slipped, the force is that of slow motion. In '
+        "motion: the force at the slowest velocity of the window is below it with that "
+        "probability, by GP-SE. F_n: median of the pushes. Distance: of the model from "
+        "the Kaplan-Meier curve, and its critical value at 5 %. The effect of the "
+        "trial is the standard deviation of log force between trials, of force where "
+        "sliding.",
+        section=ReportSection.BEYOND,
+    )
+
+
+def _break_away_row(found: TerrainBreakAway) -> list[str]:
+    model, load = found.model, found.load
+    answers = [model.available(load, risk) for risk in RISKS]
+    motion = [found.motion_quantile(risk) for risk in RISKS]
+    limit = found.limit
+    distance = "–" if limit is None else f"{model.distance:.2f} ({limit:.2f})"
+    unit = " N" if model.kind == SLIDING else ""
+    trial_sd = f"{model.law.trial_sd:.2f}{unit}"
+    return [
+        found.terrain,
+        model.kind,
+        str(model.slips),
+        str(model.held),
+        f"{load:.1f}",
+        *(f"{a.force:.1f} ({a.low:.1f} to {a.high:.1f})" for a in answers),
+        *("–" if force is None else f"{force:.1f}" for force in motion),
+        distance,
+        trial_sd if model.is_trial_seen else "not distinguishable from 0",
+    ]
+
+
+def draw_available(results: StudyResults) -> Figure | None:
+    """Return the force available over F_n, a panel per terrain, with the peaks."""
+    shown = list(results.break_away.values())
+    if not shown:
+        return None
+    figure, axes = panel_grid(len(shown), 2.1)
+    for ax, found in zip(axes, shown, strict=True):
+        _draw_peaks(ax, found)
+        for risk, colour, style in zip(RISKS, _CURVES, _STYLES, strict=True):
+            curve = found.model.curve(found.loads, risk)
+            ax.plot(
+                found.loads, curve, style, color=colour, lw=1.6, label=f"risk {risk:g}"
+            )
+        _draw_interval(ax, found)
+        _name(ax, found)
+    axes[0].set_ylim(0.0, 1.15 * max(float(found.forces[-1]) for found in shown))
+    axes[0].set_xlim(left=0.0)
+    figure.supxlabel(LOAD_LABEL, fontsize=8)
+    figure.supylabel("traction force from rest [N]", fontsize=8)
+    _legend(figure, axes)
+    return figure
+
+
+def caption_available(results: StudyResults) -> str:
+    """State the forces at the median load and what is in motion beside them."""
+    parts = []
+    for name, found in results.break_away.items():
+        answer = found.model.available(found.load, _MIDDLE)
+        motion = found.motion_quantile(_MIDDLE)
+        parts.append(
+            f"{name} {answer.force:.1f} N ({answer.low:.1f} to {answer.high:.1f}) at "
+            f"{found.load:.1f} N"
+            + ("" if motion is None else f", in motion {motion:.1f} N")
+        )
+    speeds = {found.model.v_slip for found in results.break_away.values()}
+    limits = ", ".join(f"{speed:g}" for speed in sorted(speeds))
+    return (
+        f"Peaks of pushes from rest; a slip is faster than {limits} m/s. A push that "
+        "held says only that break-away lies above its peak. Curves: force at which a "
+        "push at a new place in a new trial slips with that probability; band: 90 % "
+        f"interval at {_MIDDLE:g} by resampled trials. With risk {_MIDDLE:g}: "
+        f"{'; '.join(parts)}."
+    )
+
+
+def draw_risk(results: StudyResults) -> Figure | None:
+    """Return the risk over the force asked for, with Kaplan and Meier's steps."""
+    shown = [f for f in results.break_away.values() if f.survival is not None]
+    if not shown:
+        return None
+    figure, axes = panel_grid(len(shown), 1.8)
+    for ax, found in zip(axes, shown, strict=True):
+        _draw_survival(ax, found)
+        ax.plot(
+            found.forces,
+            found.mean_risk,
+            color=_CURVES[1],
+            lw=1.6,
+            label="model, mean over the loads",
+        )
+        _name(ax, found)
+    axes[0].set_ylim(0.0, 1.25)  # room for the words
+    axes[0].set_yticks(np.linspace(0.0, 1.0, 6))
+    axes[0].set_xlim(left=0.0)
+    figure.supxlabel("traction force asked for [N]", fontsize=8)
+    figure.supylabel("probability of a slip before it", fontsize=8)
+    _legend(figure, axes)
+    return figure
+
+
+def caption_risk(results: StudyResults) -> str:
+    """State how far the models are from Kaplan and Meier's curves."""
+    parts = [
+        f"{name} {found.model.distance:.2f} ({found.limit:.2f})"
+        for name, found in results.break_away.items()
+        if found.limit is not None
+    ]
+    return (
+        "Steps: share of pushes that slipped below a force, those that held censored "
+        "at their peak (Kaplan-Meier); line: the model at the loads of the same "
+        "pushes. Largest difference of the probability transforms, and its critical "
+        f"value at 5 %: {', '.join(parts) or 'none'}."
+    )
+
+
+def _draw_peaks(ax: Axes, found: TerrainBreakAway) -> None:
+    is_held = found.is_held
+    for chosen, mark, colour, label in (
+        (~is_held, "o", _SLIP, "slipped"),
+        (is_held, "^", _HELD, "held"),
+    ):
+        ax.plot(
+            found.F_n[chosen],
+            found.peaks[chosen],
+            mark,
+            ms=3.4,
+            mfc="none" if mark == "^" else colour,
+            mec=colour,
+            mew=0.9,
+            alpha=0.75,
+            label=label,
+        )
+
+
+def _draw_interval(ax: Axes, found: TerrainBreakAway) -> None:
+    answers = [found.model.available(float(load), _MIDDLE) for load in found.loads]
+    ax.fill_between(
+        found.loads,
+        [answer.low for answer in answers],
+        [answer.high for answer in answers],
+        color=_CURVES[1],
+        alpha=0.2,
+        lw=0,
+    )
+
+
+def _draw_survival(ax: Axes, found: TerrainBreakAway) -> None:
+    curve = found.survival
+    if curve is None:
+        return
+    at = np.concatenate([[0.0], curve.at, [found.forces[-1]]])
+    below = np.concatenate([[0.0], curve.below, curve.below[-1:]])
+    ax.step(at, below, where="post", color=_CURVES[0], lw=1.1, label="Kaplan-Meier")
+    held = found.peaks[found.is_held]
+    ax.plot(held, curve.share_below(held), "|", ms=5, color=_HELD, label="held")
+
+
+def _name(ax: Axes, found: TerrainBreakAway) -> None:
+    ax.set_title(plain(found.title), loc="left")
+    ax.text(
+        0.03,
+        0.97,
+        f"{found.model.kind}\n{found.model.slips} slipped, {found.model.held} held",
+        transform=ax.transAxes,
+        va="top",
+        fontsize=6,
+    )
+
+
+def _legend(figure: Figure, axes: list[Axes]) -> None:
+    handles, labels = axes[0].get_legend_handles_labels()
+    columns = len(labels) if len(axes) > 1 else 2
+    figure.legend(handles, labels, loc="outside upper center", ncols=columns)
+
+
+BREAK_AWAY_FIGURE = FigureSpec(
+    "break_away",
+    "From rest: available force over normal force",
+    "Peaks of traction force over normal force, pushes that slipped and pushes "
+    "that held, with curves of the force available at three risks, one panel per "
+    "terrain.",
+    draw_available,
+    caption_available,
+)
+
+BREAK_AWAY_RISK_FIGURE = FigureSpec(
+    "break_away_risk",
+    "From rest: slip probability over required force",
+    "Probability of a slip over the traction force that is asked for, by "
+    "Kaplan-Meier and by the model, one panel per terrain.",
+    draw_risk,
+    caption_risk,
+)

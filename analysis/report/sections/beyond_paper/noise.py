@@ -1,0 +1,151 @@
+"""Constant noise of the Gaussian process against noise that is chosen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from analysis.report.cell_texts import holm_note, paired_cells
+from analysis.report.section import FigureSpec, ReportSection, ReportTable
+from analysis.report.style import FIRST_COLOUR, ONE_COLUMN, Figure, new_figure, plain
+from analysis.study.metrics import PairedComparison, compare
+from analysis.study.models import GP_SE, GP_SE_NOISE, GpModel
+from analysis.study.noise_selection import NAMES
+from analysis.study.study import Study
+from analysis.study.terrain_fit import TerrainResult, mean_of
+
+if TYPE_CHECKING:
+    from analysis.report.results import StudyResults
+
+_ROW = 0.32  # inches of one terrain's gain
+
+
+@dataclass(frozen=True, slots=True)
+class NoiseSummary:
+    """Constant noise beside the noise that was chosen, on trials left out.
+
+    Attributes:
+        terrain: its terrain.
+        counts: folds that chose each noise, by its name.
+        before: NLPD with constant noise [nat], mean over trials.
+        after: NLPD with the chosen noise.
+        paired: the second minus the first, trial by trial.
+    """
+
+    terrain: str
+    counts: dict[str, int]
+    before: float
+    after: float
+    paired: PairedComparison
+
+    def numbers(self) -> dict[str, Any]:
+        """Return it as plain values, for fits.json."""
+        return {
+            "folds": self.counts,
+            "nlpd_constant": self.before,
+            "nlpd_chosen": self.after,
+            "paired": self.paired._asdict(),
+        }
+
+
+def noise_summaries(study: Study) -> list[NoiseSummary]:
+    """Return one summary per terrain that has both models; none if not fitted."""
+    summaries = (_summary(result) for result in study.terrains.values())
+    return [summary for summary in summaries if summary is not None]
+
+
+def _summary(result: TerrainResult) -> NoiseSummary | None:
+    before, after = (result.scores(model, "nlpd") for model in (GP_SE, GP_SE_NOISE))
+    paired, means = compare(before, after), (mean_of(before), mean_of(after))
+    if paired is None or means[0] is None or means[1] is None:
+        return None
+    fitted = [fold.model for fold in result.models(GP_SE_NOISE)]
+    chosen = [
+        model.choice.chosen
+        for model in fitted
+        if isinstance(model, GpModel) and model.choice is not None
+    ]
+    counts = {str(name): chosen.count(name) for name in NAMES}
+    return NoiseSummary(result.terrain, counts, means[0], means[1], paired)
+
+
+def noise_table(results: StudyResults) -> ReportTable:
+    """Return which noise was chosen per terrain, and NLPD before and after."""
+    rows = [
+        [
+            s.terrain,
+            ", ".join(f"{name} in {n}" for name, n in s.counts.items() if n),
+            f"{s.before:.3f}",
+            f"{s.after:.3f}",
+            cell,
+        ]
+        for s, cell in zip(
+            results.noise, paired_cells([s.paired for s in results.noise]), strict=True
+        )
+    ]
+    pairs = [s.paired for s in results.noise]
+    return ReportTable(
+        name="Noise chosen",
+        header=("terrain", "folds", "NLPD constant", "NLPD chosen", "difference"),
+        rows=rows,
+        note=holm_note(pairs),
+        section=ReportSection.BEYOND,
+    )
+
+
+def draw_noise(results: StudyResults) -> Figure | None:
+    """Return what the chosen noise gains in log density, and what was chosen."""
+    if not results.noise:
+        return None
+    count = len(results.noise)
+    figure = new_figure(_ROW * count + 0.7, ONE_COLUMN)
+    ax = figure.subplots()
+    ax.axvline(0.0, color="#808080", lw=0.8)
+    gains = [-summary.paired.difference for summary in results.noise]
+    errors = [summary.paired.standard_error or 0.0 for summary in results.noise]
+    ax.errorbar(
+        gains, range(count), xerr=errors, fmt="o", ms=4, capsize=2.5, color=FIRST_COLOUR
+    )
+    for k, summary in enumerate(results.noise):
+        chosen = [f"{name} {n}" for name, n in summary.counts.items() if n]
+        numbers = f"{summary.before:.3f} to {summary.after:.3f} nat"
+        ax.annotate(
+            "\n".join([", ".join(chosen), numbers]),
+            (1.0, k),
+            xycoords=("axes fraction", "data"),
+            xytext=(4, 0),
+            textcoords="offset points",
+            va="center",
+            fontsize=6.5,
+        )
+    ax.set_ylim(count - 0.5, -0.5)
+    ax.set_yticks(range(count), [plain(summary.terrain) for summary in results.noise])
+    ax.set_xlabel("gain in log density by chosen noise [nat]")
+    ax.grid(visible=False, axis="y")
+    return figure
+
+
+def caption_noise(results: StudyResults) -> str:
+    """State where input-dependent noise helps."""
+    better = [
+        f"{s.terrain} {-s.paired.difference:.3f} (p = {s.paired.p:.2g})"
+        for s in results.noise
+        if s.paired.difference < 0
+    ]
+    return (
+        "Constant noise against noise chosen among the training trials of each fold: "
+        "constant, log-linear in F_n and v_t, or that with heavy tails (Student's t). "
+        "On the right: how many folds chose what, and NLPD before and after on trials "
+        "left out; whiskers: standard error over trials. "
+        + (f"Gain: {', '.join(better)}." if better else "No gain in this study.")
+    )
+
+
+NOISE_FIGURE = FigureSpec(
+    "noise",
+    "Input-dependent noise",
+    "Gain in log predictive density by chosen noise for every terrain with its "
+    "standard error, and the number of folds per choice.",
+    draw_noise,
+    caption_noise,
+)

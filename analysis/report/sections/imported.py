@@ -1,0 +1,102 @@
+"""What the report says of imported trials: files, topics, estimates, warnings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from analysis.imported.record import ImportedFigure, ImportedTopic, ImportRecord
+from analysis.report.section import ReportSection, ReportTable, Section
+
+_ESTIMATED = "The wrench was estimated by the robot, not measured at the foot."
+_NOTHING = "–"
+
+
+def import_tables(record: ImportRecord) -> list[ReportTable]:
+    """Return the tables of one import."""
+    name = record.files[0].path if record.files else record.log_format
+    return [
+        _table(
+            f"Imported from {name}",
+            ("what", "value", "spread", "how"),
+            [_figure_row(each) for each in (*record.estimates, *record.checks)],
+            _ESTIMATED if record.is_estimated else "",
+        ),
+        _table(
+            f"Topics of {name}",
+            (
+                "topic",
+                "type",
+                "messages read",
+                "used",
+                "dropped",
+                "out of order",
+                "rate by stamp [Hz]",
+                "by receipt [Hz]",
+                "receipt less stamp [ms]",
+                "times",
+            ),
+            [_topic_row(topic) for topic in record.topics],
+        ),
+        _table(
+            f"Made from {name}",
+            ("what", "value"),
+            [
+                ("log", record.log_format),
+                ("robot", f"{record.robot}: {', '.join(record.joints)}"),
+                *(
+                    (
+                        each.what,
+                        f"{each.path}, {each.bytes} bytes, SHA-256 {each.sha256}",
+                    )
+                    for each in record.files
+                ),
+                *((f"--{key}", value) for key, value in record.arguments.items()),
+                *(
+                    (trial, f"{start:.2f} to {end:.2f} s of the log")
+                    for trial, (start, end) in record.trials.items()
+                ),
+                *(("not read", loss) for loss in record.losses),
+                *(("warning", warning) for warning in record.warnings),
+            ],
+        ),
+    ]
+
+
+def _table(
+    name: str, header: Sequence[str], rows: Sequence[Sequence[str]], note: str = ""
+) -> ReportTable:
+    return ReportTable(name, header, rows, note, ReportSection.IMPORTED)
+
+
+def _figure_row(figure: ImportedFigure) -> tuple[str, str, str, str]:
+    value = f"{_numbers(figure.value)} {figure.unit}".strip()
+    return figure.name, value, _numbers(figure.spread), figure.how
+
+
+def _numbers(values: Sequence[float]) -> str:
+    return ", ".join(_number(value) for value in values) or _NOTHING
+
+
+def _number(value: float) -> str:
+    return f"{value:.4g}" if math.isfinite(value) else _NOTHING
+
+
+def _topic_row(topic: ImportedTopic) -> tuple[str, ...]:
+    median, most = topic.late_ms
+    where = f"{topic.type}, {topic.field}" if topic.field else topic.type
+    return (
+        topic.name,
+        where,
+        str(topic.read),
+        str(topic.used),
+        str(topic.dropped),
+        str(topic.overtaken),
+        _number(topic.rate_by_stamp),
+        _number(topic.rate_by_receipt),
+        f"{_number(median)}, at most {_number(most)}",
+        topic.times,
+    )
+
+
+SECTION = Section(ReportSection.IMPORTED)  # its tables come with the records

@@ -1,0 +1,103 @@
+"""Measurement limits: what the rig could have seen, beside the errors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from analysis.report.cell_texts import number_text
+from analysis.report.section import ReportSection, ReportTable, Section
+from analysis.report.sections.rig_health.health import RigTrial
+
+if TYPE_CHECKING:
+    from analysis.report.page_model import ReportContext
+    from analysis.report.results import StudyResults
+
+_SATURATED = 1e-9  # share of cycles
+_REACH_NOTE = (
+    "Measurable: by the sensor's ranges and the lever of the foot; – where "
+    "unknown: without a sample out of range it is at least the largest observed. "
+    "Uncertainty: standard uncertainty of a trial's mean F_t and F_n, "
+    "from the changes between the tares of its session; "
+    "with the zero between two tares (drift=interpolated) "
+    "it is four fifths of that. Floor: mean |error| of smoothed "
+    "F_t by these changes and by the noise at rest, which no model can be better than; "
+    "by the noise alone where a session has one tare only. "
+    "Drag: Coulomb friction of the joints as seen by the hand's push, "
+    "from the recorded friction calibration, less the compensation; "
+    "without a calibration, from the arm model. F_t and F_n are measured at the wrist, "
+    "below the joints, and v_t at the joints: friction biases no model, but limits the "
+    "loads and speeds that are reached. Medians over trials."
+)
+
+
+def reach(results: StudyResults) -> ReportTable:
+    """Return for every terrain what the rig could have seen, beside the errors."""
+    rows = []
+    for name, result in results.study.terrains.items():
+        trials = [trial for trial in results.rig if trial.terrain == name]
+        if not trials:
+            continue
+        errors = [
+            mae
+            for model in results.study.options.fit.models
+            if (mae := result.mae(model)) is not None
+        ]
+        floor = _median(trials, lambda trial: trial.floor)
+        ratio = min(errors) / floor if errors and floor else None
+        rows.append(
+            (
+                name,
+                _largest(trials),
+                number_text(_median(trials, lambda trial: trial.measurable_F_t), 0),
+                number_text(floor),
+                number_text(_median(trials, lambda trial: trial.tare_bracket)),
+                number_text(_median(trials, lambda trial: trial.force_uncertainty)),
+                number_text(min(errors, default=None)),
+                number_text(ratio, 1),
+                number_text(_median(trials, lambda trial: trial.load_bias)),
+                number_text(_median(trials, lambda trial: trial.drag)),
+            )
+        )
+    return ReportTable(
+        "Limits of the rig and results",
+        (
+            "terrain",
+            "largest |F_t| observed [N]",
+            "measurable [N]",
+            "sensor floor [N]",
+            "drift of the tare [N]",
+            "uncertainty of mean F_t, F_n [N]",
+            "best model's error [N]",
+            "error over floor",
+            "F_n above set load [N]",
+            "drag of the joints [N]",
+        ),
+        rows,
+        note=_REACH_NOTE,
+        section=ReportSection.REACH,
+    )
+
+
+def _largest(trials: Sequence[RigTrial]) -> str:
+    largest = max(trial.largest_F_t for trial in trials)
+    share = float(np.mean([trial.saturated for trial in trials]))
+    if share > _SATURATED:
+        return f"{largest:.1f}, out of range in {share:.2%} of cycles"
+    return f"{largest:.1f}, none out of range"
+
+
+def _median(
+    trials: Sequence[RigTrial], measure: Callable[[RigTrial], float | None]
+) -> float | None:
+    values = [value for trial in trials if (value := measure(trial)) is not None]
+    return float(np.median(values)) if values else None
+
+
+def _tables(results: StudyResults, _: ReportContext) -> list[ReportTable]:
+    return [reach(results)] if results.rig else []
+
+
+SECTION = Section(ReportSection.REACH, _tables)

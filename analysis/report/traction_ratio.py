@@ -1,0 +1,33 @@
+"""F_t/F_n of trials and terrains."""
+
+import numpy as np
+
+from analysis.data.prepare import PreparedTrial
+from analysis.data.series import Array
+from analysis.study.terrain_fit import TerrainResult
+
+
+def trial_ratio(trial: PreparedTrial) -> float:
+    """Return the mean of F_t over the mean of F_n of a trial."""
+    # a ratio of means: single samples may have F_n near zero
+    load = float(trial.F_n.mean())
+    return float(trial.F_t.mean()) / load if load > 0 else float("nan")
+
+
+def ratios_of(result: TerrainResult) -> Array:
+    """Return F_t/F_n of the trials of a terrain, the ratio of the means of each."""
+    ratios = np.array([trial_ratio(trial) for trial in result.trials if trial.kept])
+    return ratios[np.isfinite(ratios)]
+
+
+def traction_ratio(result: TerrainResult) -> str:
+    """Return F_t/F_n of a terrain as text: mean of its trials ± their deviation.
+
+    Of a trial it is the ratio of its means. A dash where there is none.
+    """
+    ratios = ratios_of(result)
+    if not ratios.size:
+        return "–"
+    if ratios.size == 1:
+        return f"{ratios[0]:.2f}"
+    return f"{ratios.mean():.2f} ± {ratios.std(ddof=1):.2f}"

@@ -1,0 +1,257 @@
+"""A data package of imported trials, as `traction export` writes one."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from acquisition.files import open_regular
+from analysis.data.data_package import TableOrigin
+from analysis.data.prepare import PrepareOptions, prepare_trial
+from analysis.data.recorded_factors import value_text
+from analysis.imported.channels import Clocked, JointChannel, WrenchChannel
+from analysis.imported.importing import ImportedLog, ImportedTrial
+from analysis.imported.record import (
+    RECORD,
+    ImportedFigure,
+    ImportedFile,
+    ImportedTopic,
+    ImportRecord,
+)
+from analysis.logs.log_file import LogTopic
+from analysis.logs.opening import log_files
+from experiments import provenance
+from experiments.export.quantities import KEPT, QUANTITIES, kept_rule
+from experiments.export.table_columns import Quantity, Values, columns_of
+from experiments.export.trial_tables import (
+    DICTIONARY,
+    DICTIONARY_MEANINGS,
+    INDEX,
+    TableWriter,
+    column_rows,
+    make_empty,
+)
+from experiments.operator.console import WARNING, Console
+from experiments.session.data_files import write_new
+
+_Read = Callable[[ImportedTrial], Values]
+# From the recordings of this program: unit, frame, meaning, digits.
+_KNOWN = {name: q for q in QUANTITIES for name in q.names}
+_AXES = ("x", "y", "z")
+_ANGLE = 1e-6  # rad, m: finer than the encoder of any joint
+_INDEX_MEANINGS = {
+    "table": "file of the trial at the rate of the joints",
+    "log": "name of the log",
+    "terrain": "name of the terrain",
+    "start": "of the trial, in seconds of the log",
+    "end": "of the trial, in seconds of the log",
+    "sha256 of the log": "SHA-256 of the log, of the first file of several",
+}
+
+
+def write_imported(
+    imported: ImportedLog,
+    arguments: Mapping[str, str],
+    to: Path,
+    form: str,
+    console: Console,
+) -> None:
+    """Write the trials of a log below `to`, which must be empty.
+
+    Args:
+        imported: what came of the log.
+        arguments: of the command, for `import.json`.
+        to: the folder.
+        form: "csv" or "parquet".
+        console: what is written is named there.
+
+    Raises:
+        SessionError: `to` holds something.
+        TrialFileError: a table cannot be written.
+        MissingLibraryError: Parquet is wanted and pyarrow is not installed.
+    """
+    record = record_of(imported, arguments)
+    make_empty(to)
+    writer = TableWriter(to, form)
+    digest = record.files[0].sha256
+    rows: list[list[str]] = []
+    for trial in imported.trials:
+        file = _write_trial(writer, imported, trial, digest)
+        ends = (f"{trial.start:.3f}", f"{trial.start + trial.t[-1]:.3f}")
+        stated = [value_text(v, 12) for v in imported.request.factors.values()]
+        log = imported.request.log.name
+        rows.append([file, log, imported.request.terrain, *ends, digest, *stated])
+        console.say(f"{trial.name}: {len(trial.t)} rows from {ends[0]} s")
+    factors = dict.fromkeys(imported.request.factors, "factor")
+    index = {**_INDEX_MEANINGS, **factors}
+    writer.add_texts(INDEX, rows, index, "The trials.")
+    meanings = column_rows(f"T01.{form}", quantities_of(imported))
+    meanings += column_rows(f"T01.kept.{form}", KEPT)
+    writer.add_texts(DICTIONARY, meanings, DICTIONARY_MEANINGS, "Every column.")
+    write_new(to / RECORD, record.text().encode())
+    kind = "Imported SIMULATED trials" if imported.is_simulated else "Imported trials"
+    about = f"{kind}; {RECORD} tells how."
+    writer.finish(f"Trials imported from {imported.request.log.name}", about)
+    if imported.is_simulated:
+        console.say(f"{WARNING} SIMULATED by the metadata of the log.")
+    for warning in imported.warnings:
+        console.say(f"{WARNING} {warning}")
+
+
+def quantities_of(imported: ImportedLog) -> tuple[Quantity[ImportedTrial], ...]:
+    """Return the columns of an imported trial."""
+    joints = imported.joint_names
+    names = tuple(f"q{k + 1}" for k in range(len(joints)))
+    base = f"base of {imported.urdf.name or 'the robot'}"
+    sensor = imported.request.sensor
+    return (
+        _like("t", ("t",), lambda x: x.t, "joints' clock", "since the first row"),
+        Quantity(
+            names,
+            "rad",
+            "joints",
+            f"positions of {', '.join(joints)}; m where a joint slides",
+            lambda x: x.q,
+            _ANGLE,
+            "number",
+        ),
+        _like("raw_fx", _named("raw_f"), lambda x: x.raw[:, :3], sensor),
+        _like("raw_tx", _named("raw_t"), lambda x: x.raw[:, 3:], sensor),
+        _like("sole_x", _named("foot_"), lambda x: x.foot, base, "the foot's frame"),
+        _like("v_x", _named("v_"), lambda x: x.velocity, base, "velocity of the foot"),
+        _like("F_x", _named("F_"), lambda x: x.force, base),
+        _like("v_t", ("v_t",), lambda x: x.traction[:, 0]),
+        _like("F_t", ("F_t",), lambda x: x.traction[:, 1]),
+        _like("F_n", ("F_n",), lambda x: x.traction[:, 2]),
+    )
+
+
+def _named(prefix: str) -> tuple[str, ...]:
+    return tuple(prefix + axis for axis in _AXES)
+
+
+def _like(
+    known: str,
+    names: tuple[str, ...],
+    values: _Read,
+    frame: str = "",
+    meaning: str = "",
+) -> Quantity[ImportedTrial]:
+    """Return a quantity with the unit and digits of one of this program's own."""
+    q = _KNOWN[known]
+    return Quantity(
+        names,
+        q.unit,
+        frame or q.frame,
+        meaning or q.meaning,
+        values,
+        q.resolution,
+        "number",
+        q.more_digits,
+    )
+
+
+def _write_trial(
+    writer: TableWriter, imported: ImportedLog, trial: ImportedTrial, digest: str
+) -> str:
+    """Write both tables of a trial; return the file of the whole one."""
+    request, series = imported.request, trial.series
+    origin = TableOrigin(
+        table="trial",
+        session=request.log.name[:60],
+        trial=trial.name,
+        terrain=series.terrain,
+        incline_deg=series.incline_deg,
+        factors=dict(series.factors),
+        recording=digest,
+        imported=True,
+        rig=imported.urdf.name,
+        simulated=imported.is_simulated,
+    )
+    whole = columns_of(quantities_of(imported), trial)
+    file = writer.add(trial.name, whole, origin, "A trial at the rate of the joints.")
+    options = PrepareOptions()
+    kept = columns_of(KEPT, prepare_trial(series, options))
+    rule = f"Samples that models are fitted to: {kept_rule(options)}."
+    of_kept = origin.model_copy(update={"table": "kept"})
+    writer.add(f"{trial.name}.kept", kept, of_kept, rule)
+    return file
+
+
+def record_of(imported: ImportedLog, arguments: Mapping[str, str]) -> ImportRecord:
+    """Return what `import.json` says of an import; raises SettingsError."""
+    request = imported.request
+    files = [("log", path) for path in log_files(request.log)]
+    files.append(("urdf", request.urdf))
+    if isinstance(request.tare, Path):
+        files += [("tare", path) for path in log_files(request.tare)]
+    joints, wrench = imported.joints, imported.wrench
+    return ImportRecord(
+        log_format=imported.format,
+        robot=imported.urdf.name,
+        joints=tuple(imported.joint_names),
+        is_estimated=request.is_estimated,
+        files=tuple(_file(what, path) for what, path in files),
+        topics=(
+            _topic("joints", joints, "", "", joints.incomplete),
+            _topic(
+                "wrench", wrench, wrench.field, wrench.frame_id, wrench.lost_numbers
+            ),
+        ),
+        arguments=dict(arguments),
+        estimates=tuple(
+            ImportedFigure(
+                name=e.name, value=e.value, unit=e.unit, spread=e.spread, how=e.how
+            )
+            for e in imported.estimates
+        ),
+        checks=tuple(
+            ImportedFigure(name=c.name, value=(c.value,), how=f"limit {c.limit}")
+            for c in imported.checks
+        ),
+        trials={
+            trial.name: (trial.start, trial.start + float(trial.t[-1]))
+            for trial in imported.trials
+        },
+        warnings=tuple(imported.warnings),
+        losses=tuple(imported.losses),
+        versions=provenance.collect(),
+    )
+
+
+def _file(what: str, path: Path) -> ImportedFile:
+    with open_regular(path, is_link_followed=True) as file:
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+        return ImportedFile(what=what, path=path.name, bytes=file.tell(), sha256=digest)
+
+
+def _topic(
+    what: str,
+    channel: JointChannel | WrenchChannel,
+    field: str,
+    frame_id: str,
+    dropped: int,
+) -> ImportedTopic:
+    topic: LogTopic = channel.topic
+    clock: Clocked = channel.clock
+    text = topic.definition.encode()
+    median, most = clock.late
+    return ImportedTopic(
+        what=what,
+        name=topic.name,
+        type=topic.type_name,
+        field=field,
+        definition_sha256=hashlib.sha256(text).hexdigest() if text else "",
+        frame_id=frame_id,
+        times="stamp" if clock.by == "stamp" else "receipt",
+        read=clock.read,
+        used=len(clock.times_ns),
+        dropped=dropped,
+        repeated=clock.repeated,
+        overtaken=clock.overtaken,
+        rate_by_stamp=clock.rate_by_stamp,
+        rate_by_receipt=clock.rate_by_receipt,
+        late_ms=(median * 1e3, most * 1e3),
+        longest_gap_ms=clock.widest * 1e3,
+    )

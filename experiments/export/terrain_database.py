@@ -1,0 +1,46 @@
+"""The terrain database of recorded sessions, for programs that know no sessions."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from acquisition.clock import SystemClock
+from analysis.study.models import GP_SE, GP_SE_TRIAL, PAPER_MODELS, FitOptions
+from analysis.terrains.export import database_of
+from analysis.terrains.identify import identify_study
+from experiments.operator.console import Console
+from experiments.report.choices import ReportRequest
+from experiments.report.sessions import results_below, study_sessions
+from experiments.session.data_files import write_new_text
+from experiments.session.store import SessionFolder, iso_utc
+
+EXPORTED = (*PAPER_MODELS, GP_SE_TRIAL)
+
+
+def export_terrains(
+    sessions: Sequence[SessionFolder],
+    data: Path,
+    out: Path,
+    order: ReportRequest,
+    console: Console,
+) -> None:
+    """Write a terrain database of all models of the sessions' terrains to `out`.
+
+    Raises:
+        SessionError: no session has a kept trial.
+        TrialFileError: `out` exists or cannot be written.
+    """
+    judged = FitOptions(seed=order.seed, models=(GP_SE,), draws=0)
+    analysed = study_sessions(sessions, data, order, console, judged)
+    study = analysed.study
+    options = replace(
+        study.options, fit=FitOptions(seed=order.seed, models=EXPORTED, draws=0)
+    )
+    text = database_of(
+        replace(study, options=options),
+        identify_study(study),
+        iso_utc(SystemClock().utc_ns()),
+        store=results_below(data),
+    )
+    write_new_text(out, text)
+    console.say(f"{len(study.terrains)} terrains: {out}")

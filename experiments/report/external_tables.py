@@ -1,0 +1,135 @@
+"""From tables of trials to a report: what is refused, their study and the page."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from acquisition.errors import SettingsError
+from analysis.data.series import TractionSeries
+from analysis.imported.record import read_record
+from analysis.report.section import ReportTable
+from analysis.report.sections.imported import import_tables
+from analysis.report.whole_study import run_whole_study
+from analysis.study.study import Study, StudyOptions, notes_of_tables
+from experiments.operator.console import WARNING, Console
+from experiments.report.choices import ReportRequest
+from experiments.report.duplicates import TrialDigests
+from experiments.report.progress import fitting
+from experiments.report.study_report import ReportedStudy, report_study
+
+Trials = Mapping[str, Sequence[TractionSeries]]
+
+
+def report_tables_of_trials(
+    files: Sequence[Path],
+    out: Path,
+    trials: Trials,
+    with_columns: Trials,
+    order: ReportRequest,
+    console: Console,
+) -> Path:
+    """Fit trials from tables and write the report; return the page.
+
+    Args:
+        files: where the trials come from.
+        out: folder of the report.
+        trials: by terrain.
+        with_columns: the same with the columns that are tested.
+        order: how the report is made.
+        console: is told what is done, and what is odd.
+
+    Raises:
+        SettingsError: a choice does not suit tables, trials are simulated and recorded
+            ones or given twice, or none has a sample to fit.
+    """
+    for choice in order.choices.variants:  # refused before anything is fitted
+        choice.series(next(iter(trials.values()))[0])
+    is_simulated = _is_simulated(trials)
+    _refuse_repeated(trials)
+    told = notes_of_tables(trials)
+    for note in told:  # before the work: a wrong unit shows here
+        console.say(f"{WARNING} {note}")
+    count = sum(len(series) for series in trials.values())
+    console.say(f"{count} trials on {len(trials)} terrains: fitting ...")
+    options = StudyOptions(
+        order.choices.prepare, fit=order.fit, scheduler=order.scheduler
+    )
+    with fitting(console) as progress:
+        study, break_away = run_whole_study(trials, options, is_simulated, progress)
+    require_samples(study)
+    reported = ReportedStudy(
+        study,
+        break_away,
+        title="Traction from external data",
+        subtitle=f"{count} trials from {len(files)} files",
+        is_foreign=True,
+        trials=trials,
+        with_columns=with_columns,
+        tables=_import_tables(files),
+    )
+    page = report_study(reported, out, order, console)
+    for note in study.groups:
+        console.say(note)
+    for warning in study.warnings:
+        if warning not in told:
+            console.say(f"{WARNING} {warning}")
+    return page
+
+
+def require_samples(study: Study) -> None:
+    """Refuse a study of which nothing is left to fit.
+
+    Raises:
+        SettingsError: no terrain has a sample inside the window.
+    """
+    if any(result.kept for result in study.terrains.values()):
+        return
+    prepare = study.options.prepare
+    present = np.concatenate(
+        [trial.smooth.v_t for r in study.terrains.values() for trial in r.trials]
+    )
+    slow, fast = float(present.min()), float(present.max())
+    forward = np.quantile(present[present > 0.0], (0.05, 0.95)) if fast > 0 else None
+    hint = (
+        "No row moves forward: --negate v_t turns its sign."
+        if forward is None
+        else f"--window {forward[0]:.3g}:{forward[1]:.3g} keeps nine in ten of those "
+        "that move forward; or check the unit of v_t."
+    )
+    raise SettingsError(
+        "No sample is left to fit: none moves forward at "
+        f"{prepare.slowest:g} to {prepare.fastest:g} m/s (--window); v_t is {slow:.3g} "
+        f"to {fast:.3g} m/s.",
+        hint=" ".join([hint, *study.warnings]),
+    )
+
+
+def _import_tables(files: Sequence[Path]) -> list[ReportTable]:
+    """Return what the folders of imported trials tell of themselves."""
+    folders = dict.fromkeys(path if path.is_dir() else path.parent for path in files)
+    records = [read_record(folder) for folder in folders]
+    return [t for record in records if record for t in import_tables(record)]
+
+
+def _refuse_repeated(trials: Trials) -> None:
+    digests = TrialDigests()
+    for series in (one for group in trials.values() for one in group):
+        name = f"{series.terrain} {series.name}"
+        columns = (series.t - series.t[0], series.v_t, series.F_n, series.F_t)
+        if (original := digests.original(name, *columns)) is not None:
+            raise SettingsError(
+                f"{name} holds the same trial as {original}.",
+                hint="Give each trial once.",
+            )
+
+
+def _is_simulated(trials: Trials) -> bool:
+    """Return whether the trials are simulated ones; a mixture is refused."""
+    kinds = {trial.is_simulated for series in trials.values() for trial in series}
+    if len(kinds) > 1:
+        raise SettingsError(
+            "A report cannot mix simulated and recorded trials.",
+            hint="Give the tables of one kind only.",
+        )
+    return True in kinds

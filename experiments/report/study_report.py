@@ -1,0 +1,110 @@
+"""The one place that makes a page: of a study of sessions, or of tables."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from acquisition.clock import SystemClock
+from analysis.breakaway.model import BreakAwayModel
+from analysis.data.load import RecordedTrial
+from analysis.data.series import TractionSeries
+from analysis.report.page_model import ReportContext
+from analysis.report.results import compute_results
+from analysis.report.section import ReportTable
+from analysis.report.sections.beyond_paper.further_columns import covariate_tables
+from analysis.report.sections.rig_health.health import RigTrial
+from analysis.report.sections.sensitivity import plain_choice, side_by_side
+from analysis.study.store import ResultStore
+from analysis.study.study import Study
+from experiments.operator.console import Console
+from experiments.report.choices import ReportRequest, repeat_study
+from experiments.report.covariates import columns_tested
+from experiments.session.store import iso_utc
+
+
+@dataclass(frozen=True, slots=True)
+class ReportedStudy:
+    """A study with what only the source of its trials can tell.
+
+    Attributes:
+        study: the study.
+        break_away: models of break-away, by terrain that has one.
+        title: heading of the page.
+        subtitle: line below it.
+        is_foreign: the trials come from elsewhere, not from this rig.
+        trials: by terrain, for the same study under other choices.
+        with_columns: the same with the columns that are tested.
+        cells: the table of the cells of a matrix, where there are any.
+        tables: further tables, each for its section.
+        rig: health of the rig by trial.
+        warnings: shown first.
+        numbers: further plain values for fits.json, by name.
+    """
+
+    study: Study
+    break_away: Mapping[str, BreakAwayModel]
+    title: str
+    subtitle: str
+    is_foreign: bool
+    trials: Mapping[str, Iterable[RecordedTrial | TractionSeries]]
+    with_columns: Mapping[str, Iterable[TractionSeries]]
+    cells: Sequence[ReportTable] = ()
+    tables: Sequence[ReportTable] = ()
+    rig: Sequence[RigTrial] = ()
+    warnings: Sequence[str] = ()
+    numbers: Mapping[str, Any] = field(default_factory=dict[str, Any])
+
+
+def report_study(
+    reported: ReportedStudy,
+    out: Path,
+    order: ReportRequest,
+    console: Console,
+    store: ResultStore | None = None,
+) -> Path:
+    """Repeat a study under other choices, test its columns, write and return its page.
+
+    Args:
+        reported: the study.
+        out: folder of the report.
+        order: what is asked for beyond the study.
+        console: is told what is fitted.
+        store: results of earlier runs; None = everything is computed.
+
+    Raises:
+        SettingsError: the folder cannot be written.
+        MissingLibraryError: the extra `report` is not installed.
+    """
+    from analysis.report.page import write_report  # exporting needs no page
+
+    study = reported.study
+    variants = order.choices.variants
+    others = repeat_study(study, reported.trials, variants, console, store)
+    tested = columns_tested(
+        study, reported.with_columns, order.covariates, console, store
+    )
+    context = ReportContext(
+        title=reported.title,
+        subtitle=reported.subtitle,
+        is_simulated=study.simulated,
+        is_foreign=reported.is_foreign,
+        generated_utc=iso_utc(SystemClock().utc_ns()),
+        tables=[
+            *reported.cells,
+            *(side_by_side(choice, study, other) for choice, other in others),
+            *covariate_tables(tested),
+            *reported.tables,
+        ],
+        warnings=reported.warnings,
+        rig=reported.rig,
+        further_numbers={
+            "what_if": [plain_choice(c, study, other) for c, other in others],
+            "covariates": [one.numbers() for one in tested],
+            **reported.numbers,
+        },
+        with_pdf=order.with_pdf,
+        results=compute_results(study, reported.rig, reported.break_away),
+        store=store,
+    )
+    return write_report(study, out, context)

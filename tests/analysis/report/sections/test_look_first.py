@@ -1,0 +1,135 @@
+"""Trials that stand out are named with the reason, and no others."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.data.prepare import PrepareOptions
+from analysis.data.series import TractionSeries
+from analysis.report.sections.summary.look_first import (
+    look_first,
+    look_first_tables,
+    qn_scale,
+)
+from analysis.study.models import TUSTIN, FitOptions
+from analysis.study.study import StudyOptions, run_study
+
+OPTIONS = StudyOptions(
+    PrepareOptions(), fit=FitOptions(models=(TUSTIN,), draws=0), n_jobs=1
+)
+
+
+def push(number, mu=0.8):
+    """Return a push whose load, velocity and friction vary from trial to trial."""
+    rng = np.random.default_rng(number)
+    t = np.arange(2000) / 500.0
+    v = 0.05 * np.exp(rng.normal(0.0, 0.1)) * (1.2 + np.sin(7.0 * t))
+    load = 5.0 + rng.normal(0.0, 0.3) + np.sin(3.0 * t + rng.uniform(0.0, 6.0))
+    force = mu * load + rng.normal(0.0, 0.1) + rng.normal(0.0, 0.1, t.size)
+    return TractionSeries("X", f"T{number + 1:02d}", t, v, load, force)
+
+
+def studied(trials):
+    return run_study({"X": trials}, OPTIONS, simulated=True)
+
+
+def test_nothing_stands_out_among_trials_that_are_alike():
+    trials = [push(k) for k in range(10)]
+    study = studied(trials)
+    assert look_first(study) == []
+    assert look_first_tables(study) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda s: replace(s, F_t=s.F_t + 2.0), "F_t of the same load and velocity +2"),
+        (lambda s: replace(s, F_n=s.F_n + 4.0), "F_t/F_n 0."),
+        (lambda s: replace(s, v_t=0.3 * s.v_t), "velocity 0."),
+        (
+            lambda s: replace(
+                s, F_t=s.F_t + np.random.default_rng(1).normal(0.0, 3.0, s.t.size)
+            ),
+            "change from sample to sample",
+        ),
+        (lambda s: replace(s, F_t=-s.F_t), "the ground drives the foot"),
+    ],
+)
+def test_a_trial_with_something_wrong_is_the_first_and_says_what(change, words):
+    trials = [push(k) for k in range(10)]
+    trials[3] = change(trials[3])
+    study = studied(trials)
+    odd = look_first(study)
+    assert (odd[0].terrain, odd[0].number, odd[0].name) == ("X", 4, "T04")
+    assert odd[0].score > 1.0
+    assert any(words in reason for reason in odd[0].reasons), odd[0].reasons
+    (table,) = look_first_tables(study)
+    assert table.rows[0][1] == "4"
+
+
+def test_three_of_ten_trials_with_the_same_fault_do_not_hide_each_other():
+    trials = [push(k) for k in range(10)]
+    for k in (2, 5, 8):
+        trials[k] = replace(trials[k], F_t=trials[k].F_t + 3.0)
+    assert {odd.number for odd in look_first(studied(trials))} == {3, 6, 9}
+
+
+def test_the_scale_is_the_standard_deviation_of_normal_values():
+    rng = np.random.default_rng(1)
+    for count in (4, 9, 10, 31):
+        found = [qn_scale(rng.normal(5.0, 2.0, count)) for _ in range(2000)]
+        assert np.mean(found) == pytest.approx(2.0, rel=0.04), count
+
+
+def test_half_of_the_values_spoil_no_scale():
+    x = np.random.default_rng(1).normal(size=20)
+    x[:9] = 1e6
+    assert qn_scale(x) < 5.0
+
+
+def stood(series):
+    """Return a push before which the foot stands on its weight alone, at 125 Hz.
+
+    Such a rate is too low for the lag of a force.
+    """
+    rng = np.random.default_rng(int(series.name[1:]))
+    t = np.arange(series.t.size + 500) / 125.0
+    load, force = (
+        np.concatenate([weight + rng.normal(0.0, 0.3, 500), values])
+        for weight, values in ((2.9, series.F_n), (0.0, series.F_t))
+    )
+    v_t = np.concatenate([np.zeros(500), series.v_t])
+    return replace(series, t=t, v_t=v_t, F_n=load, F_t=force)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda s: replace(s, F_t=s.F_t + 3.0), "F_t of the foot that stands +3"),
+        pytest.param(
+            lambda s: replace(s, F_n=s.F_n + 3.0),
+            "F_n of the foot that stands +3",
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            lambda s: replace(
+                s, F_n=s.F_n + np.random.default_rng(1).normal(0.0, 3.0, s.t.size)
+            ),
+            "noise of F_n at rest 8",
+            marks=pytest.mark.slow,
+        ),
+    ],
+)
+def test_a_wrong_sensor_is_seen_at_a_foot_that_stands_on_any_ground(change, words):
+    trials = [stood(push(k, mu=0.4 + 0.1 * k)) for k in range(10)]
+    assert look_first(studied(trials)) == []
+    trials[3] = change(trials[3])
+    assert look_first(studied(trials))[0].number == 4
+    assert any(words in reason for reason in look_first(studied(trials))[0].reasons)
+
+
+def test_three_trials_are_too_few_to_compare():
+    trials = [push(k) for k in range(3)]
+    trials[1] = replace(trials[1], F_t=trials[1].F_t + 5.0)
+    assert look_first(studied(trials)) == []

@@ -1,0 +1,119 @@
+"""A folder held against its list of checksums."""
+
+import os
+import shutil
+
+import pytest
+
+from acquisition.errors import TrialFileError
+from experiments.export import checksums
+from experiments.export.checksums import SUMS, changed_files, write_sums
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "deep").mkdir()
+    (tmp_path / "a.txt").write_bytes(bytes(range(256)))
+    (tmp_path / "deep" / "b c.txt").write_text("b")
+    write_sums(tmp_path)
+    return tmp_path
+
+
+def texts(folder):
+    return [change.text() for change in changed_files(folder)]
+
+
+def test_an_untouched_folder_has_no_changes(folder):
+    assert changed_files(folder) == []
+
+
+@pytest.mark.parametrize("index", [0, 100, 255])
+def test_one_changed_byte_is_named(folder, index):
+    content = bytearray((folder / "a.txt").read_bytes())
+    content[index] ^= 1
+    (folder / "a.txt").write_bytes(content)
+    assert texts(folder) == ["a.txt is changed"]
+
+
+def test_a_missing_and_a_new_file_are_named(folder):
+    (folder / "deep" / "b c.txt").rename(folder / "new.txt")
+    assert texts(folder) == ["deep/b c.txt is missing", f"new.txt is not in {SUMS}"]
+
+
+def test_a_link_is_not_followed_even_to_the_same_content(folder, tmp_path_factory):
+    elsewhere = tmp_path_factory.mktemp("elsewhere") / "a.txt"
+    elsewhere.write_bytes((folder / "a.txt").read_bytes())
+    (folder / "a.txt").unlink()
+    (folder / "a.txt").symlink_to(elsewhere)
+    (text,) = texts(folder)
+    assert text.startswith("a.txt cannot be read")
+
+
+def test_a_folder_behind_a_link_is_not_entered(folder, tmp_path_factory):
+    (folder / "more").symlink_to(tmp_path_factory.mktemp("elsewhere"))
+    assert texts(folder) == [f"more is not in {SUMS}"]
+
+
+@pytest.mark.parametrize("content", [b"nonsense\n", b"\xff\xfe\n", b"0" * 64 + b" a\n"])
+def test_a_list_that_is_none_is_refused_with_its_line(folder, content):
+    with (folder / SUMS).open("ab") as file:
+        file.write(content)
+    with pytest.raises(TrialFileError, match="line 3 is not a checksum"):
+        changed_files(folder)
+
+
+def test_a_list_that_is_missing_is_named(folder):
+    (folder / SUMS).unlink()
+    with pytest.raises(TrialFileError, match=SUMS):
+        changed_files(folder)
+
+
+def test_a_changed_digit_in_the_list_is_seen(folder):
+    text = (folder / SUMS).read_text()
+    digit = "0" if text[0] != "0" else "1"
+    (folder / SUMS).write_text(digit + text[1:])
+    assert texts(folder) == ["a.txt is changed"]
+
+
+def test_a_folder_of_too_many_files_is_refused(folder, monkeypatch):
+    monkeypatch.setattr(checksums, "_MOST", 3)
+    assert changed_files(folder) == []
+    (folder / "new.txt").touch()
+    with pytest.raises(TrialFileError, match="holds more than 3 files"):
+        changed_files(folder)
+
+
+@pytest.mark.slow
+def test_more_than_a_hundred_thousand_files_are_refused(folder):
+    """Names of few files: what they hold is not looked at any more."""
+    many = folder / "many"
+    many.mkdir()
+    few = [folder / f"{number}.txt" for number in range(4)]
+    for path in few:
+        path.touch()
+    try:
+        for number in range(100_001):
+            os.link(few[number % 4], f"{many}/{number}")
+        with pytest.raises(TrialFileError, match="holds more than 100000 files"):
+            changed_files(folder)
+    finally:
+        shutil.rmtree(many)
+
+
+@pytest.mark.parametrize(
+    ("size", "problem"),
+    [(16_000_000, "line 3 is not a checksum"), (16_000_001, "is larger than")],
+)
+def test_a_list_is_read_up_to_sixteen_megabytes(folder, size, problem):
+    os.truncate(folder / SUMS, size)
+    with pytest.raises(TrialFileError, match=problem):
+        changed_files(folder)
+
+
+def test_a_list_that_is_too_long_is_refused(folder, monkeypatch):
+    size = (folder / SUMS).stat().st_size
+    monkeypatch.setattr(checksums, "_LARGEST", size)
+    assert changed_files(folder) == []
+    monkeypatch.setattr(checksums, "_LARGEST", size - 1)
+    with pytest.raises(TrialFileError, match="is larger than"):
+        changed_files(folder)
