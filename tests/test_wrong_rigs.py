@@ -2,8 +2,8 @@
 
 import pytest
 
+from experiments.commissioning.evidence.order import StepId
 from experiments.commissioning.judging import LIMITS
-from experiments.commissioning.order import StepId
 from experiments.commissioning.procedure import STEPS
 from fakes.world.wrong_rigs import catalogue
 from tests.wrong_rigs import FOUND, REFUSED, WARNED, found_by

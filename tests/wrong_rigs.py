@@ -21,14 +21,14 @@ from pathlib import Path
 import numpy as np
 
 from experiments.commands.commission import FAKE_FOLDER
-from experiments.commissioning.judging import LIMITS
-from experiments.commissioning.order import StepId
-from experiments.commissioning.procedure import STEPS
-from experiments.commissioning.record import (
+from experiments.commissioning.evidence.order import StepId
+from experiments.commissioning.evidence.record import (
     Commissioning,
     StepRecord,
     read_commissioning,
 )
+from experiments.commissioning.judging import LIMITS
+from experiments.commissioning.procedure import STEPS
 from experiments.commissioning.recording import Values, read_raw
 from experiments.rig.build import build_tool
 from experiments.settings.load import load_settings

@@ -16,8 +16,8 @@ from experiments.rig.truth_options import check_truth, mount_of
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from experiments.commissioning.evidence.order import StepId
     from experiments.commissioning.guide import RecordFolder
-    from experiments.commissioning.order import StepId
     from experiments.commissioning.scene import Scene
     from experiments.commissioning.step import Step
     from experiments.operator.console import Console
@@ -123,9 +123,9 @@ def _terrain(args: argparse.Namespace, settings: Settings) -> str:
 
 def _say_end(files: RecordFolder, terrain: str, console: Console) -> None:
     """Say what is left to do, or that the arm is commissioned."""
-    from experiments.commissioning.gate import lacks
+    from experiments.commissioning.evidence.gate import lacks
+    from experiments.commissioning.evidence.record import NAME
     from experiments.commissioning.procedure import STEPS
-    from experiments.commissioning.record import NAME
 
     last = max(done.ended for done in files.record.steps)
     lacking = {lack.step for lack in lacks(files.record, {}, last, terrain)}
@@ -141,7 +141,7 @@ def _note_changes(args: argparse.Namespace, files: RecordFolder) -> None:
     from datetime import UTC, datetime
 
     from acquisition.clock import SystemClock
-    from experiments.commissioning.order import TOLD
+    from experiments.commissioning.evidence.order import TOLD
 
     if not files.record.steps:
         return

@@ -7,8 +7,8 @@ import numpy as np
 
 from acquisition.errors import TractionError, UnfitDeviceError
 from acquisition.sample import Flag
+from experiments.commissioning.evidence.order import StepId
 from experiments.commissioning.judging import Judgement, found, judged
-from experiments.commissioning.order import StepId
 from experiments.commissioning.recording import Values, number, texts, words
 from experiments.commissioning.scene import Scene
 from experiments.commissioning.step import Step

@@ -10,8 +10,8 @@ import numpy as np
 
 from acquisition.errors import SettingsError
 from experiments.calibrating.terrain import TerrainGuide
+from experiments.commissioning.evidence.order import StepId
 from experiments.commissioning.judging import Judgement, found, judged
-from experiments.commissioning.order import StepId
 from experiments.commissioning.recording import Values, number
 from experiments.commissioning.scene import Scene
 from experiments.commissioning.step import Step

@@ -17,16 +17,16 @@ from numpy.typing import NDArray
 from acquisition.errors import SettingsError
 from experiments.commissioning import rest_pose
 from experiments.commissioning.bus import listen
-from experiments.commissioning.daily_record import (
+from experiments.commissioning.evidence.daily_record import (
     DailyCheck,
     read_history,
     write_history,
 )
+from experiments.commissioning.evidence.gate import lacks, require
+from experiments.commissioning.evidence.order import BASES, StepId
 from experiments.commissioning.fits import angle, fit_foot, orientations
-from experiments.commissioning.gate import lacks, require
 from experiments.commissioning.guide import RecordFolder
 from experiments.commissioning.judging import Found, Judgement, found, judged
-from experiments.commissioning.order import BASES, StepId
 from experiments.commissioning.recording import (
     Values,
     number,

@@ -7,18 +7,18 @@ from pathlib import Path
 
 from experiments import provenance
 from experiments.commissioning import bus, by_hand
-from experiments.commissioning.gate import lacks, require
-from experiments.commissioning.inputs import inputs_of
-from experiments.commissioning.judging import Judgement
-from experiments.commissioning.order import StepId
-from experiments.commissioning.procedure import STEPS
-from experiments.commissioning.record import (
+from experiments.commissioning.evidence.gate import lacks, require
+from experiments.commissioning.evidence.inputs import inputs_of
+from experiments.commissioning.evidence.order import StepId
+from experiments.commissioning.evidence.record import (
     Commissioning,
     Measured,
     StepRecord,
     read_commissioning,
     write_commissioning,
 )
+from experiments.commissioning.judging import Judgement
+from experiments.commissioning.procedure import STEPS
 from experiments.commissioning.recording import read_raw, write_raw
 from experiments.commissioning.scene import Scene
 from experiments.commissioning.step import Step

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 
-from experiments.commissioning.record import Measured
+from experiments.commissioning.evidence.record import Measured
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from acquisition.ipc.shared_sensor import unpack_wrenches
 from experiments.commissioning.by_hand import CARRIED
+from experiments.commissioning.evidence.order import StepId
 from experiments.commissioning.fits import orientations
 from experiments.commissioning.judging import Judgement, found, judged
-from experiments.commissioning.order import StepId
 from experiments.commissioning.recording import Values, number, texts, words
 from experiments.commissioning.scene import Scene
 from experiments.commissioning.step import Step

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from acquisition.errors import SettingsError
 from acquisition.files import read_regular
-from experiments.commissioning.record import Raw
+from experiments.commissioning.evidence.record import Raw
 
 _LARGEST = 64_000_000  # bytes of a file
 Values: TypeAlias = Mapping[str, NDArray[Any]]

@@ -16,8 +16,8 @@ from acquisition.devices import SHORTED, SafetyMode
 from acquisition.errors import PreflightError
 from acquisition.sample import MOTOR_FRESH_SHIFT, SAFETY_MODE_MASK
 from acquisition.simulation import PendantAction
+from experiments.commissioning.evidence.order import StepId
 from experiments.commissioning.judging import Found, Judgement, found, judged
-from experiments.commissioning.order import StepId
 from experiments.commissioning.recording import Values, texts, words
 from experiments.commissioning.scene import Scene
 from experiments.commissioning.step import Step

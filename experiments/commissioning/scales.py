@@ -6,9 +6,9 @@ is the same before and while it presses, so differences are of the scale alone.
 
 import numpy as np
 
+from experiments.commissioning.evidence.order import StepId
 from experiments.commissioning.fits import orientations
 from experiments.commissioning.judging import Found, Judgement, found, judged
-from experiments.commissioning.order import StepId
 from experiments.commissioning.recording import Values, number
 from experiments.commissioning.scene import Scene
 from experiments.commissioning.step import Step

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from acquisition.control_loop.proof import ProofGoal
 from acquisition.ipc.loop_client import LoopClient
 from acquisition.simulation import SimulationControl
-from experiments.commissioning.inputs import present_inputs
+from experiments.commissioning.evidence.inputs import present_inputs
 from experiments.commissioning.recording import Values
 from experiments.messages import FaultContext, fault_text
 from experiments.operator.console import Console

@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from experiments.commissioning.evidence.order import StepId
 from experiments.commissioning.judging import Judgement
-from experiments.commissioning.order import StepId
 from experiments.commissioning.recording import Values
 from experiments.commissioning.scene import Scene
 

@@ -10,8 +10,8 @@ from acquisition.control_loop.faults import Fault
 from acquisition.devices import SafetyMode
 from acquisition.errors import PreflightError
 from acquisition.sample import MOTOR_FRESH_SHIFT, SAFETY_MODE_MASK
+from experiments.commissioning.evidence.order import StepId
 from experiments.commissioning.judging import Judgement, found, judged
-from experiments.commissioning.order import StepId
 from experiments.commissioning.recording import Values
 from experiments.commissioning.scene import Scene
 from experiments.commissioning.step import Step

@@ -10,9 +10,9 @@ import numpy as np
 from acquisition.errors import PreflightError
 from acquisition.ipc.shared_sensor import unpack_wrenches
 from experiments.commissioning.by_hand import CARRIED
+from experiments.commissioning.evidence.order import StepId
 from experiments.commissioning.fits import FITTED, fit_foot, fit_hung
 from experiments.commissioning.judging import Judgement, found, judged
-from experiments.commissioning.order import StepId
 from experiments.commissioning.recording import Values, number
 from experiments.commissioning.scene import Scene
 from experiments.commissioning.step import Step

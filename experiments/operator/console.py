@@ -6,7 +6,7 @@ import os
 import shutil
 import sys
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, TextIO
 
 from acquisition.errors import TractionError
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from rich.live import Live
 
 GOOD, WARNING, BAD = "✔", "▲", "✘"
+AddLine = Callable[[str, str, str], None]  # mark, name and text of a graded line
 _GRADES = {GOOD: "good", WARNING: "warning", BAD: "bad"}
 _ARM, _ARM_WHOLE = "ARM: ", "ARM:\N{NO-BREAK SPACE}"
 _BELOW_TEXT = " " * 18  # where the text of a graded line begins

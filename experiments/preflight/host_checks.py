@@ -11,8 +11,8 @@ import numpy as np
 from acquisition.sample import Record
 from experiments.dates import is_ahead
 from experiments.messages import preflight_error
-from experiments.operator.console import BAD, GOOD, WARNING
-from experiments.preflight.page import Add, CheckResult
+from experiments.operator.console import BAD, GOOD, WARNING, AddLine
+from experiments.preflight.page import CheckResult
 from experiments.rig.rig import Rig
 from experiments.settings.load import SHIPPED
 from experiments.settings.rig import CONTACT_LIMITS, WITHIN_RANGE, RigSettings
@@ -218,7 +218,7 @@ def check_stream(fields: Mapping[str, str]) -> CheckResult | None:
     return CheckResult(GOOD if is_fine else WARNING, name, text)
 
 
-def check_disk(data: Path, limit: float, add: Add, probe: DiskProbe) -> None:
+def check_disk(data: Path, limit: float, add: AddLine, probe: DiskProbe) -> None:
     """Grade the free space where the data folder is going to be.
 
     Args:

@@ -1,8 +1,7 @@
 """Is this the arm that its files were measured on? The pucks' serial numbers tell."""
 
 from acquisition.errors import IDLE_ARM, PreflightError, SettingsError
-from experiments.operator.console import BAD, GOOD
-from experiments.preflight.page import Add
+from experiments.operator.console import BAD, GOOD, AddLine
 from experiments.rig.rig import Rig
 from wam.calibration.arm_identity import check_same_arm
 from wam.calibration.friction_file import friction_from_toml
@@ -36,7 +35,7 @@ def measured_on(rig: Rig) -> dict[str, tuple[int, ...] | None]:
     return noted
 
 
-def check_identity(rig: Rig, add: Add) -> None:
+def check_identity(rig: Rig, add: AddLine) -> None:
     """Compare the serial numbers of this arm with those that its files state.
 
     Raises:

@@ -7,7 +7,6 @@ from typing import TypeVar
 from acquisition.errors import PreflightError
 from experiments.operator.console import Console
 
-Add = Callable[[str, str, str], None]  # mark, name and text of a line
 _T = TypeVar("_T")
 
 

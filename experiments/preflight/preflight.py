@@ -10,9 +10,9 @@ from acquisition.control_loop.timing import SLOW_EXCHANGE_NS, loop_report
 from acquisition.devices import SafetyMode
 from acquisition.errors import IDLE_ARM, TractionError
 from experiments import provenance
-from experiments.commissioning.gate import check_commissioned
+from experiments.commissioning.evidence.gate import check_commissioned
 from experiments.messages import preflight_error
-from experiments.operator.console import BAD, GOOD, WARNING, Console
+from experiments.operator.console import BAD, GOOD, WARNING, AddLine, Console
 from experiments.preflight.connecting import as_preflight, not_reached
 from experiments.preflight.host_checks import (
     DiskProbe,
@@ -29,7 +29,7 @@ from experiments.preflight.host_checks import (
     reach_words,
 )
 from experiments.preflight.identity import check_identity, serial_numbers
-from experiments.preflight.page import Add, CheckResult, ChecksPage
+from experiments.preflight.page import CheckResult, ChecksPage
 from experiments.preflight.zero import zero_errors
 from experiments.rig.arm_operations import EXCHANGE_CYCLES
 from experiments.rig.law_calibrations import forced_calibrations, law_words
@@ -169,7 +169,7 @@ def _check_arm(rig: Rig, page: ChecksPage) -> ArmInfo:
     return info
 
 
-def _check_zero(rig: Rig, info: ArmInfo, add: Add) -> None:
+def _check_zero(rig: Rig, info: ArmInfo, add: AddLine) -> None:
     """Compare the zero with mech_at_home, which is of the real arm.
 
     Raises:
@@ -183,7 +183,7 @@ def _check_zero(rig: Rig, info: ArmInfo, add: Add) -> None:
     check_zero(error)
 
 
-def _check_sensor(rig: Rig, arm_state: str, add: Add) -> dict[str, str]:
+def _check_sensor(rig: Rig, arm_state: str, add: AddLine) -> dict[str, str]:
     try:
         fields = rig.backend.open_sensor()
     except TractionError as error:
@@ -228,7 +228,7 @@ def start_devices(rig: Rig) -> ArmInfo:
     return info
 
 
-def _check_exchange(rig: Rig, add: Add) -> None:
+def _check_exchange(rig: Rig, add: AddLine) -> None:
     """Grade the way from the request to the seventh position over this adapter."""
     measured = rig.backend.arm.measure_exchange()
     times = np.array(measured.replies_ns)
@@ -255,7 +255,7 @@ def _check_exchange(rig: Rig, add: Add) -> None:
         add(WARNING, "answers", slow)
 
 
-def _check_rights(rig: Rig, add: Add) -> dict[str, str]:
+def _check_rights(rig: Rig, add: AddLine) -> dict[str, str]:
     """Say what the kernel refused to each process; return it for the recording."""
     fields: dict[str, str] = {}
     refused: list[str] = []
@@ -278,7 +278,7 @@ def _check_rights(rig: Rig, add: Add) -> dict[str, str]:
     return fields
 
 
-def _check_loop(rig: Rig, seconds: float, add: Add) -> None:
+def _check_loop(rig: Rig, seconds: float, add: AddLine) -> None:
     """Run the loop for a while, the arm idle, and grade its cadence."""
     seconds = STEPPED_TEST if rig.is_stepped else seconds
     timings = rig.backend.loop_client.timings()

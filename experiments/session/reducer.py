@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Any, cast
 
-from experiments.session.states import TABLE, Event, SessionPhase, Step
+from experiments.session.states import TABLE, Event, PhaseChange, SessionPhase
 
 KEEP, REJECT = "keep", "reject"
 _EVENTS = {str(event): event for event in Event}
@@ -122,7 +122,7 @@ def replay(events: Iterable[_Facts]) -> SessionState:
     return state
 
 
-def _next_phase(step: Step, state: SessionState) -> SessionPhase:
+def _next_phase(step: PhaseChange, state: SessionState) -> SessionPhase:
     """Return where the step leads; of two ways the kept trials decide."""
     if len(step.to) == 1:
         return step.to[0]

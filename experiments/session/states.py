@@ -43,7 +43,7 @@ class Event(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class PhaseChange:
     """What an event does in a phase.
 
     Attributes:
@@ -137,18 +137,18 @@ _WHY: Mapping[SessionPhase, str] = {
 _OPENING = frozenset({Event.STARTED, Event.RESUMED, Event.REDO, Event.GIVEN_UP})
 
 
-def _step(phase: SessionPhase, event: Event) -> Step:
+def _step(phase: SessionPhase, event: Event) -> PhaseChange:
     to = _WAYS[event].get(phase, ())
     if to:
-        return Step(to)
+        return PhaseChange(to)
     if event is Event.STARTED and phase is not SessionPhase.PLANNED:
-        return Step(refused="the session was started before")
+        return PhaseChange(refused="the session was started before")
     if phase in OPEN and event in _OPENING | {Event.VERDICT}:
-        return Step(refused="the session is open")
-    return Step(refused=_WHY[phase])
+        return PhaseChange(refused="the session is open")
+    return PhaseChange(refused=_WHY[phase])
 
 
-TABLE: Mapping[tuple[SessionPhase, Event], Step] = {
+TABLE: Mapping[tuple[SessionPhase, Event], PhaseChange] = {
     (phase, event): _step(phase, event) for phase in SessionPhase for event in Event
 }
 

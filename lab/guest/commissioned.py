@@ -4,9 +4,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
-from experiments.commissioning.inputs import inputs_of, present_inputs
-from experiments.commissioning.order import GATED, StepId
-from experiments.commissioning.record import (
+from experiments.commissioning.evidence.inputs import inputs_of, present_inputs
+from experiments.commissioning.evidence.order import GATED, StepId
+from experiments.commissioning.evidence.record import (
     NAME,
     Commissioning,
     StepRecord,

@@ -12,8 +12,8 @@ from acquisition.trial_file import writer
 from acquisition.trial_file.reader import TrialReader
 from analysis.data.tables import load_tables
 from analysis.terrains.database import load
-from experiments.commissioning.daily_record import read_history
-from experiments.commissioning.record import read_commissioning
+from experiments.commissioning.evidence.daily_record import read_history
+from experiments.commissioning.evidence.record import read_commissioning
 from experiments.session.data_files import journal_line, write_json
 from experiments.session.store import list_sessions
 from experiments.settings.load import load_settings

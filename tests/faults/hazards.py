@@ -6,7 +6,7 @@
 from dataclasses import dataclass
 from enum import Enum
 
-from experiments.commissioning.order import StepId
+from experiments.commissioning.evidence.order import StepId
 from tests.faults.bounds import BOUND_PHASES, PrintedBound, read_bounds
 from tests.faults.expected import NOTHING
 from tests.faults.hazard_rows import ROWS

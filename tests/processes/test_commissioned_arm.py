@@ -12,7 +12,7 @@ import pytest
 
 from acquisition.clock import SystemClock
 from acquisition.errors import TractionError
-from experiments.commissioning.record import NAME
+from experiments.commissioning.evidence.record import NAME
 from lab.guest.commissioned import take_as_commissioned
 from tests.experiments.program import changed, served_config, traction
 

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from experiments.commissioning.order import GATED, StepId
-from experiments.commissioning.record import Commissioning, read_commissioning
+from experiments.commissioning.evidence.order import GATED, StepId
+from experiments.commissioning.evidence.record import Commissioning, read_commissioning
 from experiments.commissioning.recording import read_raw
 from experiments.commissioning.rest_pose import rest_pose
 from experiments.rig.build import build_tool

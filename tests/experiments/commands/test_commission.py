@@ -5,7 +5,7 @@ import json
 import pytest
 
 from experiments.commands.commission import FAKE_FOLDER
-from experiments.commissioning.record import NAME, read_commissioning
+from experiments.commissioning.evidence.record import NAME, read_commissioning
 from tests.experiments.program import traction, write_config
 
 FIRST = ("--fake", "--fast", "--operator-script", "auto", "--until", "C1")

@@ -3,11 +3,14 @@
 import pytest
 
 from experiments.commands.commission import FAKE_FOLDER
-from experiments.commissioning.daily_record import read_history
-from experiments.commissioning.gate import lacks
-from experiments.commissioning.order import StepId
+from experiments.commissioning.evidence.daily_record import read_history
+from experiments.commissioning.evidence.gate import lacks
+from experiments.commissioning.evidence.order import StepId
+from experiments.commissioning.evidence.record import (
+    read_commissioning,
+    write_commissioning,
+)
 from experiments.commissioning.procedure import STEPS
-from experiments.commissioning.record import read_commissioning, write_commissioning
 from tests.experiments.program import traction, write_config
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(1800)]

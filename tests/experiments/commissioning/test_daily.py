@@ -7,15 +7,15 @@ import pytest
 
 from acquisition.errors import SettingsError
 from experiments.commissioning import daily
-from experiments.commissioning.daily_record import (
+from experiments.commissioning.evidence.daily_record import (
     DailyCheck,
     DailyHistory,
     read_history,
     write_history,
 )
+from experiments.commissioning.evidence.record import Measured, Raw
 from experiments.commissioning.fits import fit_foot
 from experiments.commissioning.guide import RecordFolder
-from experiments.commissioning.record import Measured, Raw
 from experiments.commissioning.recording import texts
 from experiments.commissioning.weights import POSES
 from experiments.rig.build import build_tool

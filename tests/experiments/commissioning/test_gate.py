@@ -6,15 +6,15 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from acquisition.errors import PreflightError
-from experiments.commissioning.daily_record import (
+from experiments.commissioning.evidence.daily_record import (
     DailyCheck,
     read_history,
     write_history,
 )
-from experiments.commissioning.gate import check_commissioned
-from experiments.commissioning.inputs import inputs_of, present_inputs
-from experiments.commissioning.order import GATED, ORDER, StepId
-from experiments.commissioning.record import NAME, Raw, write_commissioning
+from experiments.commissioning.evidence.gate import check_commissioned
+from experiments.commissioning.evidence.inputs import inputs_of, present_inputs
+from experiments.commissioning.evidence.order import GATED, ORDER, StepId
+from experiments.commissioning.evidence.record import NAME, Raw, write_commissioning
 from experiments.operator.console import BAD, GOOD, WARNING
 from experiments.preflight.connecting import connect_rig
 from experiments.rig.rig import FakeOptions

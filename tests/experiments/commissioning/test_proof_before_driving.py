@@ -5,10 +5,10 @@ from dataclasses import replace
 import pytest
 
 from acquisition.errors import PreflightError
+from experiments.commissioning.evidence.order import StepId
+from experiments.commissioning.evidence.record import write_commissioning
 from experiments.commissioning.guide import RecordFolder, do_step
-from experiments.commissioning.order import StepId
 from experiments.commissioning.procedure import STEPS
-from experiments.commissioning.record import write_commissioning
 from experiments.commissioning.scene import Scene
 from experiments.operator.auto_operator import AutoOperator
 from experiments.operator.console import Console

@@ -6,9 +6,9 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from acquisition.errors import PreflightError, SettingsError
-from experiments.commissioning.gate import bases_of, lacks, require
-from experiments.commissioning.order import BASES, GATED, ORDER, TOLD, StepId
-from experiments.commissioning.record import (
+from experiments.commissioning.evidence.gate import bases_of, lacks, require
+from experiments.commissioning.evidence.order import BASES, GATED, ORDER, TOLD, StepId
+from experiments.commissioning.evidence.record import (
     NAME,
     Commissioning,
     Measured,

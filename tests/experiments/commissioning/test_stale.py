@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import pytest
 
-from experiments.commissioning.gate import lacks
-from experiments.commissioning.inputs import present_inputs
-from experiments.commissioning.order import BASES, ORDER, TOLD
+from experiments.commissioning.evidence.gate import lacks
+from experiments.commissioning.evidence.inputs import present_inputs
+from experiments.commissioning.evidence.order import BASES, ORDER, TOLD
 from experiments.preflight.connecting import connect_rig
 from experiments.rig.rig import FakeOptions
 from experiments.settings.calibrations import PREFIX

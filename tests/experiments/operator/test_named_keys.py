@@ -22,14 +22,14 @@ SHOWN_AT = {
     "commands/commission.py": {Prompt.CONFIRM},
     "operator/keys.py": set(KEYS),
     "operator/screens.py": {Prompt.READY},
-    "proving/by_hand.py": {Prompt.CONFIRM},
-    "proving/daily.py": {Prompt.CONFIRM},
-    "proving/guide.py": {Prompt.CONFIRM},
-    "proving/lock_clock.py": {Prompt.CONFIRM, Prompt.PAUSED},
-    "proving/rest_pose.py": {Prompt.CONFIRM},
-    "proving/scales.py": {Prompt.CONFIRM},
-    "proving/stop_circuit.py": {Prompt.PAUSED},
-    "proving/weights.py": {Prompt.CONFIRM},
+    "commissioning/by_hand.py": {Prompt.CONFIRM},
+    "commissioning/daily.py": {Prompt.CONFIRM},
+    "commissioning/guide.py": {Prompt.CONFIRM},
+    "commissioning/lock_clock.py": {Prompt.CONFIRM, Prompt.PAUSED},
+    "commissioning/rest_pose.py": {Prompt.CONFIRM},
+    "commissioning/scales.py": {Prompt.CONFIRM},
+    "commissioning/stop_circuit.py": {Prompt.PAUSED},
+    "commissioning/weights.py": {Prompt.CONFIRM},
     "run/context.py": {Prompt.LIFT, Prompt.READY, Prompt.UNDO},
     "run/console_loop.py": {Prompt.DAMPED, Prompt.LAY_DOWN},
     "run/pose_walk.py": {Prompt.MOVE, Prompt.MOVING},
@@ -38,7 +38,7 @@ SHOWN_AT = {
     "run/verdicts.py": {Prompt.REVIEW, Prompt.UNDO},
     "run/tare.py": {Prompt.SUPPORT},
 }
-UNITS = ("report/", "commands/fake.py")  # [m] and [s] are no keys there
+UNITS = ("report/", "export/", "commands/fake.py")  # [m] and [s] are no keys there
 
 
 def keys_named(text):

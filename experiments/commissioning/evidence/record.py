@@ -16,7 +16,7 @@ from acquisition.errors import SettingsError
 from acquisition.files import open_directory, read_regular, replace_file
 from acquisition.formats import FORMAT
 from acquisition.validation import Entries, Many, first_problem
-from experiments.commissioning.order import ORDER, StepId
+from experiments.commissioning.evidence.order import ORDER, StepId
 
 NAME = "commissioning.json"
 _LARGEST = 4_000_000  # bytes

@@ -13,7 +13,7 @@ from acquisition.errors import SettingsError
 from acquisition.files import open_directory, read_regular, replace_file
 from acquisition.formats import FORMAT
 from acquisition.validation import Many, first_problem
-from experiments.commissioning.record import Measured, Raw, RecordPart, Word
+from experiments.commissioning.evidence.record import Measured, Raw, RecordPart, Word
 from experiments.dates import is_fresh
 
 NAME = "daily.json"

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 
 from acquisition.errors import IDLE_ARM, PreflightError, TractionError
-from experiments.commissioning.daily_record import COUNTS_FOR, read_history
-from experiments.commissioning.daily_record import FIELD as DAILY_FIELD
-from experiments.commissioning.inputs import present_inputs
-from experiments.commissioning.order import (
+from experiments.commissioning.evidence.daily_record import COUNTS_FOR, read_history
+from experiments.commissioning.evidence.daily_record import FIELD as DAILY_FIELD
+from experiments.commissioning.evidence.inputs import present_inputs
+from experiments.commissioning.evidence.order import (
     BASES,
     GATED,
     LONGEST_DAYS,
@@ -16,11 +16,10 @@ from experiments.commissioning.order import (
     StepId,
     bases_of,
 )
-from experiments.commissioning.record import Commissioning, read_commissioning
+from experiments.commissioning.evidence.record import Commissioning, read_commissioning
 from experiments.dates import is_ahead, is_fresh
 from experiments.messages import preflight_error
-from experiments.operator.console import BAD, GOOD, WARNING
-from experiments.preflight.page import Add
+from experiments.operator.console import BAD, GOOD, WARNING, AddLine
 from experiments.rig.rig import Rig
 from wam.driver.startup import ArmInfo
 
@@ -121,7 +120,7 @@ def require(found: list[Lack]) -> None:
 def check_commissioned(
     rig: Rig,
     info: ArmInfo,
-    add: Add,
+    add: AddLine,
     made_anew: Collection[str] = (),
     sensor: Mapping[str, str] | None = None,
 ) -> dict[str, str]:
@@ -163,7 +162,7 @@ def check_commissioned(
 
 
 def _check_daily(
-    rig: Rig, record: Commissioning | None, now: datetime, add: Add
+    rig: Rig, record: Commissioning | None, now: datetime, add: AddLine
 ) -> str:
     """Refuse an arm whose last daily check failed; return words for recordings.
 

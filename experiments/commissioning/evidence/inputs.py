@@ -6,7 +6,7 @@ import platform
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from experiments.commissioning.order import StepId, bases_of
+from experiments.commissioning.evidence.order import StepId, bases_of
 from experiments.rig.rig import Rig
 from experiments.settings.calibrations import PREFIX
 from wam.driver.startup import ArmInfo
