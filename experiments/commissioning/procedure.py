@@ -11,7 +11,7 @@ from experiments.commissioning.lock_clock import LOCK_AND_CLOCK
 from experiments.commissioning.rest_pose import (
     GRAVITY_RAMP,
     LIFT,
-    RAMPS_UNDER_LITTLE_TORQUE,
+    RAMPS,
     REST_POSE,
 )
 from experiments.commissioning.scales import PLATE
@@ -24,7 +24,7 @@ SITTINGS: tuple[tuple[Step, ...], ...] = (
     (CONFIGURATION, LISTEN, IDENTITY, TIMING),
     (STOP_CIRCUIT,),
     (BY_HAND, OWN_WEIGHT, HUNG_WEIGHT),
-    (REST_POSE, RAMPS_UNDER_LITTLE_TORQUE, LIFT, GRAVITY_RAMP),
+    (REST_POSE, RAMPS, LIFT, GRAVITY_RAMP),
     (LOCK_AND_CLOCK,),
     (CONTAINER,),
     (PLATE,),

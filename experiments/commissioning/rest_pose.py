@@ -26,7 +26,7 @@ from experiments.run.stop import ArmFaultError
 from wam.model.constants import ArmConstants, Array
 
 # Joints as they are pushed, the sign is that of the motion: what bears least first.
-RAMPS = (1, -1, 3, -3, 5, -5, 7, -7, 2, -4, -6)
+PUSHED = (1, -1, 3, -3, 5, -5, 7, -7, 2, -4, -6)
 LIFTED = (2, -4, -6)  # those that bear weight on the rest pose
 _RAMP_SECONDS = 1.0
 _AFTER = 0.3  # s, recorded beyond the end of a ramp
@@ -183,7 +183,7 @@ def rest_rows(values: Values) -> list[Found]:
     return [*rows, *_ended(values), found("active", seconds)]
 
 
-def ramps(scene: Scene, joints: Sequence[int] = RAMPS) -> Values:
+def ramps(scene: Scene, joints: Sequence[int] = PUSHED) -> Values:
     """Push one joint after the other, each until it moves; the sign is the sense."""
     lay_down(scene)
     constants, q = scene.rig.model.constants, scene.position()
@@ -384,7 +384,7 @@ REST_POSE = Step(
     needs_loop=True,
     needs_zero=True,
 )
-RAMPS_UNDER_LITTLE_TORQUE = Step(
+RAMPS = Step(
     StepId.RAMPS,
     ramps,
     judge_ramps,

@@ -33,7 +33,7 @@ _WARM = (
     "experiments.run.session",
     "experiments.trial.quality",
     "analysis.data",
-    "scipy.signal",  # for the libraries below it: no session uses it itself
+    "scipy.signal",  # no session uses it, but without it first replies come late here
     "fakes.serving.puck_server",
 )
 # The files' owner and time of change are others in here: git would read them all.

@@ -367,8 +367,7 @@ class WamArm:
         self._safety.heed_speed_faults()
         if motor := self._traffic.balance.doubled():
             raise PreflightError(
-                f"Puck {motor} answers more often than it is asked: something else "
-                "answers in its name.",
+                f"Puck {motor} answers more often than it is asked.",
                 hint="Look for a second puck of that number, a second program, or an "
                 "adapter that repeats frames.",
             )

@@ -3,15 +3,15 @@
 from wam.driver.transmission import MOTORS
 
 _DOUBLED = 5  # replies more than questions; a frame that the bus repeats is one
-_FORGIVEN_EVERY = 50  # questions after which each balance is a reply nearer to zero
+_FORGIVEN_EVERY = 50  # questions, after which each balance is a reply nearer to zero
 _MOST_OWED = 30  # questions: as many as go unanswered before the arm is idled
 
 
 class ReplyBalance:
     """Counts replies and questions of each motor.
 
-    A reply that is late is owed until it comes; one that is lost, and one that came
-    twice by accident, are forgotten within a tenth of a second.
+    A reply that is late is owed until it comes. Of those that are lost, and of those
+    that come twice by accident, one in 50 questions is forgotten: ten a second.
 
     Attributes:
         replies: of motors 1 to 7; whoever hears one counts it here.

@@ -160,14 +160,20 @@ def test_what_is_lost_in_the_middle_is_said_where_it_was(folder):
     assert "0.10 s of the recording (0.10 s at 0.20 s)" in again.out
 
 
-def test_an_attachment_that_is_gone_is_named(folder):
+def with_damaged_attachment(folder, name):
+    """Return a trial whose attachment `name` no other file holds, and is damaged."""
     path = folder / "trials" / "T09.mcap"
-    header = make_header(attachments={"config.toml": b"[rig]  # no other file has it"})
+    header = make_header(attachments={name: b"# no other file has it"})
     seal(write_trial(path, make_cycles(300), header), "travel")
     data = bytearray(path.read_bytes())
     data[span_of(bytes(data), ATTACHMENT).end - 6] ^= 1
     path.chmod(0o644)
     path.write_bytes(bytes(data))
+    return path
+
+
+def test_an_attachment_that_is_gone_is_named(folder):
+    path = with_damaged_attachment(folder, "config.toml")
     done = traction("recover", path)
     assert "Lost: config.toml, which no file beside it holds." in done.out
     assert json.loads(traction("recover", path, "--json").out)[0][
@@ -176,13 +182,7 @@ def test_an_attachment_that_is_gone_is_named(folder):
 
 
 def test_a_copy_that_cannot_be_analysed_is_not_called_saved(folder):
-    path = folder / "trials" / "T09.mcap"
-    header = make_header(attachments={"ft_calibration.toml": b"# no other file has it"})
-    seal(write_trial(path, make_cycles(300), header), "travel")
-    data = bytearray(path.read_bytes())
-    data[span_of(bytes(data), ATTACHMENT).end - 6] ^= 1
-    path.chmod(0o644)
-    path.write_bytes(bytes(data))
+    path = with_damaged_attachment(folder, "ft_calibration.toml")
     done = traction("recover", path)
     assert done.code == 6
     assert "saved" not in done.out
