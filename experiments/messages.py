@@ -158,7 +158,6 @@ _WEIGHT_WORDS = {
     ),
 }
 _HEARTBEAT = "heartbeat"  # the monitor of the loop's traffic
-_BUTTON = "other"  # the monitor that a pressed E-stop button shows
 _PUCKS = 7
 
 
@@ -268,9 +267,7 @@ def _filled(
     is_of_time = verdict.fault in _OF_TIME
     name, nodes = verdict.reason, list[int]()
     if isinstance(detail, CircuitCauses):
-        causes = ", ".join(
-            f"{cause} fault" for cause in detail.causes if cause != _BUTTON
-        )
+        causes = ", ".join(f"{cause} fault" for cause in detail.tripped)
         is_of_time = is_of_time or _HEARTBEAT in detail.causes
         if causes and verdict.fault is not None:
             name = _BY_MONITOR[verdict.fault]

@@ -10,11 +10,19 @@ class NoDetail:
     """A fault without numbers."""
 
 
+_BUTTON = "other"  # the monitor that a pressed E-stop button shows
+
+
 @dataclass(frozen=True, slots=True)
 class CircuitCauses:
-    """Monitors of the safety circuit that caused its stop; none for the pendant."""
+    """Monitors of the safety circuit that show a fault after it stopped the arm."""
 
     causes: tuple[str, ...] = ()
+
+    @property
+    def tripped(self) -> tuple[str, ...]:
+        """Monitors that stopped the arm; () = a person did, at the pendant."""
+        return tuple(cause for cause in self.causes if cause != _BUTTON)
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,12 +4,15 @@ from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+from acquisition.control_loop.details import CircuitCauses
+from acquisition.control_loop.faults import GuardVerdict
 from acquisition.control_loop.proof import ProofGoal
+from acquisition.devices import SafetyMode
 from acquisition.ipc.loop_client import LoopClient
 from acquisition.simulation import SimulationControl
 from experiments.commissioning.evidence.inputs import present_inputs
 from experiments.commissioning.recording import Values
-from experiments.messages import FaultContext, fault_text
+from experiments.messages import FaultContext, fault_text, preflight_error
 from experiments.operator.console import Console
 from experiments.operator.prompts import Prompt
 from experiments.rig.rig import Rig
@@ -107,10 +110,11 @@ class Scene:
         """Say `text` and wait for [space].
 
         Raises:
+            PreflightError: the arm lost its power.
             ArmFaultError, StopRequestedError: as `ConsoleLoop.tick`.
         """
         self.say(text)
-        while self.console_loop.tick(Prompt.CONFIRM) != " ":
+        while self._tick(Prompt.CONFIRM) != " ":
             pass
 
     def ask_number(self, text: str, simulated: float) -> float:
@@ -146,7 +150,18 @@ class Scene:
     def wait(self, seconds: float) -> None:
         """Let `seconds` pass; raises as `ask`."""
         for _ in range(max(1, round(seconds / TICK))):
-            self.console_loop.tick(Prompt.MOVING)
+            self._tick(Prompt.MOVING)
+
+    def _tick(self, prompt: Prompt) -> str:
+        """Let 20 ms pass and return the key pressed; raises as `ask`.
+
+        The guard has nothing to say of an idle arm in E-stop, and its pucks tell no
+        positions: what a step recorded from now on would be of no arm.
+        """
+        key = self.console_loop.tick(prompt)
+        if self.loop_client.status.safety is SafetyMode.E_STOP:
+            raise preflight_error("no-power")
+        return key
 
     def await_hand(self) -> None:
         """Wait until a simulated hand has done what it was told; raises as `ask`."""
@@ -172,11 +187,18 @@ class Scene:
             return ""  # it is told once; what comes of it is recorded
 
     def until_fault(self, work: Callable[[], None], seconds: float) -> list[str]:
-        """Do `work`, wait; return what the guard stopped it for, [] for nothing."""
+        """Do `work`, wait; return what the guard stopped it for, [] for nothing.
+
+        Raises:
+            ArmFaultError: a person stopped the arm, which says nothing about it.
+            PreflightError, StopRequestedError: as `ask`.
+        """
         try:
             work()
             self.wait(seconds)
         except ArmFaultError as fault:
+            if _is_by_pendant(fault.verdict):
+                raise
             return [self.fault_words(fault)]
         return []
 
@@ -210,3 +232,8 @@ class Scene:
     def position(self) -> Array:
         """Return where the joints are [rad], shape (7,)."""
         return self.loop_client.latest()["position"][0].copy()
+
+
+def _is_by_pendant(verdict: GuardVerdict) -> bool:
+    """Return whether a person pressed the stop or Shift-idle."""
+    return isinstance(verdict.detail, CircuitCauses) and not verdict.detail.tripped
