@@ -6,9 +6,10 @@ import errno
 import importlib
 import os
 import re
+import signal
 import sys
-from collections.abc import Collection, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Collection, Generator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
@@ -159,6 +160,30 @@ def _show_first_steps(_: argparse.Namespace) -> int:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
+    with _ended_as_by_ctrl_c():
+        return _main(arguments)
+
+
+@contextmanager
+def _ended_as_by_ctrl_c() -> Generator[None]:
+    """End a command at SIGTERM or a closed terminal as at Ctrl-C.
+
+    What it opened is closed, and it says so. A session handles all three itself.
+    """
+    replaced: list[signal.Signals] = []
+    for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
+        if signal.getsignal(number) is signal.SIG_DFL:  # not ignored, as by nohup
+            with suppress(ValueError):  # in a thread there are no handlers
+                signal.signal(number, signal.default_int_handler)
+                replaced.append(number)
+    try:
+        yield
+    finally:
+        for number in replaced:
+            signal.signal(number, signal.SIG_DFL)
+
+
+def _main(arguments: Sequence[str] | None) -> int:
     if "_ARGCOMPLETE" in os.environ:  # the shell asks, and reads what is printed
         _complete()
     for name, value in openblas_settings().items():

@@ -1,5 +1,6 @@
 import errno
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +10,7 @@ import pytest
 from experiments import provenance
 from experiments.__main__ import COMMANDS, EXIT_CODES, build_parser
 from experiments.messages import CATALOGUE
+from experiments.settings import load
 from tests.experiments.program import traction
 
 
@@ -158,3 +160,36 @@ def test_a_disk_that_refuses_anything_is_no_bug(monkeypatch, number, code):
     assert done.code == code
     assert os.strerror(number) in done.err
     assert ("/data/sessions: cannot be used" in done.err) is (code == 6)
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_command_that_is_ended_from_outside_says_so(monkeypatch, number):
+    closed = []
+
+    def be_ended(_):
+        try:
+            signal.raise_signal(number)
+        finally:
+            closed.append(number)
+
+    monkeypatch.setattr(load, "load_settings", be_ended)
+    before = signal.getsignal(number)
+    done = traction("status")
+    assert (done.code, done.err.split()[0]) == (130, "Interrupted.")
+    assert closed == [number]
+    assert signal.getsignal(number) is before
+
+
+def test_a_command_started_to_outlive_its_terminal_does(monkeypatch, tmp_path):
+    load_settings = load.load_settings
+
+    def be_hung_up(path):
+        signal.raise_signal(signal.SIGHUP)
+        return load_settings(path)
+
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        monkeypatch.setattr(load, "load_settings", be_hung_up)
+        assert traction("status", "--data", tmp_path).code == 0
+    finally:
+        signal.signal(signal.SIGHUP, before)
