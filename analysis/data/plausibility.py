@@ -16,6 +16,7 @@ from analysis.data.frozen_channels import frozen_channels
 from analysis.data.load import RecordedTrial
 from analysis.data.prepare import PreparedTrial, Smoothed
 from analysis.data.series import Array
+from analysis.data.tare_bracket import LARGEST_CHANGE
 
 SLOWEST = 0.005  # m/s; a slower foot sticks, and its forces may point anywhere
 PRESSED = 1.0  # N; below it the direction of a force is the sensor's noise
@@ -57,6 +58,7 @@ DoubtName = Literal[
     "heading",
     "pressure",
     "frozen",
+    "zero",
 ]
 
 
@@ -112,14 +114,14 @@ def doubts_of_record(recorded: RecordedTrial) -> list[Doubt]:
     moment, and the way of the sole itself.
     """
     v_t, F_t, F_n = recorded.traction.T
-    frozen = list(_frozen(recorded))
+    sensor = [*_frozen(recorded), *_zero(recorded)]
     moving = (np.abs(v_t) > SLOWEST) & (F_n > PRESSED)
     if np.count_nonzero(moving) < FEWEST:
-        return frozen
+        return sensor
     raw = np.ascontiguousarray(recorded.cycles["wrench_raw"][moving])
     wrench = recorded.payload.contact(raw, recorded.rotation[moving])
     return [
-        *frozen,
+        *sensor,
         *_way(recorded, moving),
         *_sideways(recorded.lateral[moving], F_t[moving]),
         *free_moment(wrench[:, :3], wrench[:, 3:]),
@@ -285,6 +287,23 @@ def _frozen(recorded: RecordedTrial) -> Iterator[Doubt]:
             f"{', '.join(channel.text for channel in found)} while the foot slides",
             "a broken gauge or wire, or a channel at its end; no force is vouched for",
             "change the cable or the sensor, and record again",
+        )
+
+
+def _zero(recorded: RecordedTrial) -> Iterator[Doubt]:
+    if recorded.bracket is not None:
+        yield from zero_doubts(recorded.bracket.force_change)
+
+
+def zero_doubts(change: float) -> Iterator[Doubt]:
+    """Judge by how much the sensor's zero moved between the tares about a trial [N]."""
+    if change > LARGEST_CHANGE:
+        yield Doubt(
+            "zero",
+            f"the sensor's zero moved by {change:.1f} N between the tares before and "
+            f"after it (limit {LARGEST_CHANGE:g})",
+            "the foot or the sensor came loose or was knocked, or a tare was touched",
+            "look at the foot's mount, and record again",
         )
 
 

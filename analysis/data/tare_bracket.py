@@ -13,6 +13,9 @@ from acquisition.settings import Number
 from acquisition.trial_file.data_files import read_data
 from analysis.data.series import Array
 
+# Between two tares the zero of a good sensor wanders by 0.3 N on each axis. A foot that
+# came loose, a knock or another gain moves it farther.
+LARGEST_CHANGE = 2.0  # N
 _LARGEST = 1e6  # N, N m: beyond every sensor
 _Axis = Annotated[Number, Field(strict=True, gt=-_LARGEST, lt=_LARGEST)]
 _Time = Annotated[int, Field(ge=0, lt=10**19)]  # ns
@@ -44,6 +47,11 @@ class TareBracket:
     def change(self) -> Array:
         """How far the zero has moved from one to the other [N, N m], shape (6,)."""
         return self.biases[1] - self.biases[0]
+
+    @property
+    def force_change(self) -> float:
+        """How far the zero of the force has moved from one to the other [N]."""
+        return float(np.linalg.norm(self.change[:3]))
 
     def drift(self, t: Array) -> Array:
         """Return the change since the first tare at `t` [s], linear, shape (n, 6)."""

@@ -12,9 +12,10 @@ from acquisition.control_loop.states import ArmState
 from acquisition.devices import WrenchSample
 from acquisition.errors import PreflightError, TractionError
 from acquisition.ipc.shared_sensor import unpack_wrenches
+from analysis.data.plausibility import zero_doubts
 from experiments.fault_injection.plan import FaultTrigger
 from experiments.messages import CATALOGUE, preflight_error, weight_words
-from experiments.operator.console import GOOD
+from experiments.operator.console import GOOD, WARNING
 from experiments.operator.prompts import Prompt
 from experiments.rig.rig import Rig
 from experiments.run.console_loop import TICK
@@ -204,6 +205,7 @@ def _accept(context: RunContext, name: TrialName, result: TareResult) -> None:
     rotation = rig.model.sole_pose(position)[1]
     tared = rig.payload.tared(np.array(result.wrench), rotation)
     _check_residual(rig, tared, rotation)
+    change = float(np.linalg.norm(tared.bias[:3] - rig.tared.bias[:3]))
     rig.tared, rig.tared_ns = tared, result.t_ns
     bias = tared.bias.tolist()
     context.loop_client.set_bias(bias)
@@ -213,15 +215,22 @@ def _accept(context: RunContext, name: TrialName, result: TareResult) -> None:
         bias=[round(v, 4) for v in bias],
         spread=round(float(result.spread), 3),
     )
-    _close_bracket(context)
+    _close_bracket(context, change)
 
 
-def _close_bracket(context: RunContext) -> None:
-    """Write the tare into the sidecar of the trial before it."""
+def _close_bracket(context: RunContext, change: float) -> None:
+    """Write the tare into the sidecar of the trial before it.
+
+    Args:
+        context: the session.
+        change: of the zero since the tare before that trial [N].
+    """
     name, rig = context.state.last_recorded, context.rig
     if name is None:
         return
     context.state.last_recorded = None
+    for doubt in zero_doubts(change):
+        context.say(f"{WARNING} {name.kept}: {doubt.text}.")
     tare = {"t_ns": rig.tared_ns, "bias": rig.tared.bias.tolist()}
     folder = context.metadata.folder
     context.console_loop.run_aside(lambda: write_next_tare(folder, name, tare))

@@ -11,6 +11,7 @@ from analysis.data.load import load_trial
 from analysis.data.plausibility import doubts_of, doubts_of_record, summed_up
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.series import TractionSeries
+from analysis.data.tare_bracket import TareBracket
 
 RECORDED = Path(__file__).parents[2] / "data" / "recorded" / "session-1.0.tar.xz"
 TIME, SPEED, LOAD, ALONG = range(4)
@@ -155,6 +156,14 @@ def test_a_foot_that_is_not_pressed_by_a_frozen_channel_is_doubted(recorded):
     unloaded = recorded.traction * np.array([1.0, 1.0, 0.0])
     found = replace(recorded, cycles=cycles, traction=unloaded)
     assert kinds(found) == {"frozen"}
+
+
+@pytest.mark.parametrize(("moved", "is_doubted"), [(1.9, False), (2.1, True)])
+def test_a_zero_that_moved_about_a_trial_is_doubted(recorded, moved, is_doubted):
+    biases = np.zeros((2, 6))
+    biases[1, :2] = moved / np.sqrt(2.0)
+    about = replace(recorded, bracket=TareBracket((-2.0, 8.0), biases))
+    assert ("zero" in kinds(about)) is is_doubted
 
 
 def test_swapped_axes_of_the_moment_do_not_belong_to_the_force(recorded):

@@ -133,7 +133,8 @@ def lifted(tmp_path, *keys, mass=0.0, residual=0.5, calibrations=None):
     rig.backend.loop_client = LiftedFoot(rig.clock)
     rig.frame = SimpleNamespace(height=lambda position: position[2])
     rig.model = SimpleNamespace(sole_pose=lambda q: (np.zeros(3), np.eye(3)))
-    rig.payload, rig.is_simulated = payload(mass), True
+    rig.payload = rig.tared = payload(mass)
+    rig.is_simulated = True
     rig.row = SimpleNamespace(name="TF", foot="tread", reset=())
     rig.settings = SimpleNamespace(
         calibrations=calibrations or {},
@@ -180,6 +181,17 @@ def test_a_tare_is_written_to_the_trial_before_it_and_the_next_one_is_not(tmp_pa
     take_tare(context, TrialName(2, 1))
     assert context.rig.tared_ns > written["next_tare"]["t_ns"]
     assert json.loads(sidecar.read_text()) == written
+
+
+@pytest.mark.parametrize(("moved", "is_told"), [(1.9, False), (2.1, True)])
+def test_a_zero_that_moved_between_two_tares_is_told(tmp_path, capsys, moved, is_told):
+    context = lifted(tmp_path, residual=5.0)
+    take_tare(context, TrialName(1, 1))
+    context.state.last_recorded = TrialName(1, 1)
+    context.loop_client.force = lambda seconds: 0.1 + moved
+    take_tare(context, TrialName(2, 1))
+    words = f"T01: the sensor's zero moved by {moved} N"
+    assert (words in capsys.readouterr().out) is is_told
 
 
 def test_the_operator_is_asked_to_lift_all_the_time(tmp_path):
