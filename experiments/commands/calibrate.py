@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from experiments.arguments import friction_share
-from experiments.calibrating.opening import add_arm
+from experiments.calibration.opening import add_arm
 
 if TYPE_CHECKING:
     from experiments.run.console_loop import ConsoleLoop
@@ -58,7 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Lead through one calibration and write its file; return the exit code."""
-    from experiments.calibrating.opening import check_arm, check_new, guide_person
+    from experiments.calibration.opening import check_arm, check_new, guide_person
     from experiments.settings.load import load_settings
 
     check_arm(args)
@@ -82,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _gravity(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> None:
-    from experiments.calibrating.gravity import GravityGuide
+    from experiments.calibration.gravity import GravityGuide
     from experiments.session.data_files import write_new_text
     from wam.calibration.gravity_file import gravity_to_toml
 
@@ -93,7 +93,7 @@ def _gravity(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> 
 
 
 def _friction(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> None:
-    from experiments.calibrating.friction import FrictionGuide
+    from experiments.calibration.friction import FrictionGuide
     from experiments.session.data_files import write_new_text
     from wam.calibration.excitation import CENTRES
     from wam.calibration.friction_file import friction_to_toml, truth_to_toml
@@ -125,7 +125,7 @@ def _written(args: argparse.Namespace, out: Path) -> list[Path]:
 
 
 def _sensor(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> None:
-    from experiments.calibrating.sensor import SensorGuide
+    from experiments.calibration.sensor import SensorGuide
     from experiments.session.data_files import write_new_text
     from ft_sensor.calibration.sensor_file import sensor_to_toml
 
@@ -143,7 +143,7 @@ def _sensor(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> N
 
 
 def _terrain(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> None:
-    from experiments.calibrating.terrain import TerrainGuide
+    from experiments.calibration.terrain import TerrainGuide
     from experiments.session.data_files import write_new_text
     from experiments.session.store import iso_utc
     from experiments.settings.calibrations import FORCED

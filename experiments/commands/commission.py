@@ -10,7 +10,7 @@ from experiments.arguments import (
     asked_time,
     friction_share,
 )
-from experiments.calibrating.opening import add_arm
+from experiments.calibration.opening import add_arm
 from experiments.rig.truth_options import check_truth, mount_of
 
 if TYPE_CHECKING:

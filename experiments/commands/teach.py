@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from experiments.arguments import friction_share
-from experiments.calibrating.opening import add_arm
+from experiments.calibration.opening import add_arm
 
 if TYPE_CHECKING:
-    from experiments.calibrating.place import TaughtEnds
+    from experiments.calibration.place import TaughtEnds
     from experiments.run.console_loop import ConsoleLoop
     from experiments.settings.matrix import TerrainRow
 
@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Lead through the touches and write the place; return the exit code."""
     from acquisition.errors import SettingsError
-    from experiments.calibrating.opening import check_arm, check_new, guide_person
+    from experiments.calibration.opening import check_arm, check_new, guide_person
     from experiments.settings.load import load_unplaced
 
     check_arm(args)
@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _teach(console_loop: ConsoleLoop, place: str, out: Path, row: TerrainRow) -> None:
-    from experiments.calibrating.place import PlaceGuide
+    from experiments.calibration.place import PlaceGuide
     from experiments.session.data_files import write_new_text
 
     ends = PlaceGuide(console_loop).run()

@@ -9,7 +9,7 @@ from dataclasses import asdict
 import numpy as np
 
 from acquisition.errors import SettingsError
-from experiments.calibrating.terrain import TerrainGuide
+from experiments.calibration.terrain import TerrainGuide
 from experiments.commissioning.evidence.order import StepId
 from experiments.commissioning.judging import Judgement, found, judged
 from experiments.commissioning.recording import Values, number

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from acquisition.devices import SafetyMode
-from experiments.calibrating import gravity
+from experiments.calibration import gravity
 from experiments.operator.auto_operator import AutoOperator
 from experiments.operator.prompts import Prompt
 from experiments.run import pose_walk as walk

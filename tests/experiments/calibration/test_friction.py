@@ -12,7 +12,7 @@ from experiments.operator.auto_operator import AutoOperator
 from experiments.operator.prompts import Prompt
 from fakes.plant.model import PlantOptions
 from fakes.world import plain_world
-from tests.experiments.calibrating.friction_errors import errors_of, verdicts
+from tests.experiments.calibration.friction_errors import errors_of, verdicts
 from tests.experiments.program import traction
 from wam.calibration import excitation
 from wam.model.friction import friction_of

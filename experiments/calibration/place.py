@@ -8,7 +8,7 @@ from acquisition.control_loop.states import ArmState
 from acquisition.errors import PreflightError
 from acquisition.ipc.shared_sensor import unpack_wrenches
 from acquisition.simulation import ENDS
-from experiments.calibrating.terrain import AVERAGE, STILL
+from experiments.calibration.terrain import AVERAGE, STILL
 from experiments.operator.prompts import Prompt
 from experiments.run.console_loop import TICK, ConsoleLoop
 from experiments.run.ready import activate

@@ -9,7 +9,7 @@ import pytest
 import fakes.world.rig
 from acquisition.errors import SettingsError
 from acquisition.trial_file.reader import TrialReader
-from experiments.calibrating import sensor
+from experiments.calibration import sensor
 from experiments.operator import auto_operator as operator
 from experiments.run import pose_walk as walk
 from experiments.settings.calibrations import with_calibrations
