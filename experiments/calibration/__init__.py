@@ -1,4 +1,5 @@
-"""Guided calibrations: gravity, friction, sensor and foot, terrain.
+"""Guided calibrations: gravity, friction, sensor and foot, terrain, place.
 
-Each module is one; `experiments.run.PoseWalk` moves the arm from pose to pose.
+Each is a module of its own; `guiding` opens the rig and leaves the arm idle. The
+arithmetic is in `wam.calibration` and `ft_sensor.calibration`.
 """

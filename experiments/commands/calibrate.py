@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from experiments.arguments import friction_share
-from experiments.calibration.opening import add_arm
+from experiments.calibration.options import add_arm
 
 if TYPE_CHECKING:
     from experiments.run.console_loop import ConsoleLoop
@@ -58,7 +58,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Lead through one calibration and write its file; return the exit code."""
-    from experiments.calibration.opening import check_arm, check_new, guide_person
+    from experiments.calibration.guiding import check_new, guide_person
+    from experiments.calibration.options import check_arm
     from experiments.settings.load import load_settings
 
     check_arm(args)
@@ -242,7 +243,7 @@ def _chosen_poses(
     """Return the poses of a person, checked before anything is started; [] = none."""
     if args.pose_file is None:
         return []
-    from experiments.run.surroundings import read_poses
+    from experiments.calibration.pose_file import read_poses
 
     fewest = _FEWEST.get(args.what)
     counts = range(0) if fewest is None else range(fewest, _MOST + 1)

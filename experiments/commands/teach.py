@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from experiments.arguments import friction_share
-from experiments.calibration.opening import add_arm
+from experiments.calibration.options import add_arm
 
 if TYPE_CHECKING:
     from experiments.calibration.place import TaughtEnds
@@ -40,7 +40,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Lead through the touches and write the place; return the exit code."""
     from acquisition.errors import SettingsError
-    from experiments.calibration.opening import check_arm, check_new, guide_person
+    from experiments.calibration.guiding import check_new, guide_person
+    from experiments.calibration.options import check_arm
     from experiments.settings.load import load_unplaced
 
     check_arm(args)

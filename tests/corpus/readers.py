@@ -14,11 +14,11 @@ from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.recover import recover_file
 from analysis.data.tables import load_tables
 from analysis.terrains import database as terrain_db
+from experiments.calibration.pose_file import read_poses
 from experiments.export.checksums import SUMS, changed_files
 from experiments.export.rebuilding import compare_tables
 from experiments.operator.scripted import ScriptedOperator
 from experiments.rig.law_calibrations import build_compensation
-from experiments.run.surroundings import read_poses
 from experiments.session.crash_recovery import recover_session
 from experiments.session.data_files import journal_line
 from experiments.session.journal import open_journal
