@@ -1,5 +1,6 @@
-"""Guided calibrations: gravity, friction, sensor and foot, terrain, place.
+"""Guided calibrations: move, let settle, collect, fit, show, keep.
 
-Each is a module of its own; `guiding` opens the rig and leaves the arm idle. The
-arithmetic is in `wam.calibration` and `ft_sensor.calibration`.
+A `GuidedCalibration` is what a module says of these, `calibrate` the way through all of
+them; the arithmetic is in `wam.calibration` and `ft_sensor.calibration`. Begin with
+`calibration`.
 """

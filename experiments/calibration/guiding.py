@@ -56,7 +56,7 @@ def guide_person(
     row: TerrainRow,
     work: Callable[[ConsoleLoop], None],
     command: str,
-    made_anew: Collection[str] | None = None,
+    made_anew: Collection[str],
 ) -> int:
     """Open the rig, check it, do the work; return the exit code.
 
@@ -66,8 +66,7 @@ def guide_person(
         row: the terrain.
         work: what a person is guided through.
         command: to start it again.
-        made_anew: of what a commissioning stands on, what is measured anew; None = no
-            torque follows.
+        made_anew: of what a commissioning stands on, what is measured anew.
 
     Raises:
         TractionError: the rig cannot be opened or is not fit.

@@ -5,7 +5,7 @@ import pytest
 
 import experiments.operator.auto_operator as operator
 from acquisition.errors import PreflightError, SettingsError
-from experiments.calibration.place import _taught
+from experiments.calibration.place import EndTouch, fit_ends
 from experiments.settings.load import load_settings
 from experiments.settings.places import TaughtPlace
 from tests.experiments.program import traction, write_config
@@ -85,10 +85,12 @@ def test_what_cannot_be_taught_is_refused_before_anything_starts(tmp_path):
 
 
 def test_touches_of_one_end_that_lie_apart_are_refused():
-    near = [(np.array([0.2, 0.0, 0.1]), np.zeros(7))] * 3
-    far = [(np.array([0.6 + 0.02 * k, 0.0, 0.1]), np.zeros(7)) for k in range(3)]
+    near = [EndTouch(np.array([0.2, 0.0, 0.1]), np.zeros(7))] * 3
+    far = [
+        EndTouch(np.array([0.6 + 0.02 * k, 0.0, 0.1]), np.zeros(7)) for k in range(3)
+    ]
     with pytest.raises(PreflightError, match="touches of the far end lie 20 mm"):
-        _taught(near, far)
-    ends = _taught(near, far[:1] * 3)
+        fit_ends(near, far)
+    ends = fit_ends(near, far[:1] * 3)
     assert ends.travel == pytest.approx(0.4)
     assert (ends.heading, ends.incline) == pytest.approx((0.0, 0.0))

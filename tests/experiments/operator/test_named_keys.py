@@ -19,6 +19,7 @@ CODE = Path(experiments.__file__).parent
 SHOWN_AT = {
     "calibration/place.py": {Prompt.TOUCH},
     "calibration/terrain.py": {Prompt.TOUCH},
+    "calibration/touching.py": {Prompt.TOUCH},
     "commands/commission.py": {Prompt.CONFIRM},
     "operator/keys.py": set(KEYS),
     "operator/screens.py": {Prompt.READY},
