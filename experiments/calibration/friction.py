@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from experiments.calibration.calibration import CalibrationContext, GuidedCalibration
+from experiments.calibration.joint_table import show_joints
 from experiments.calibration.moving import arrivals
 from experiments.rig.law_calibrations import friction_path
 from experiments.run.pose_walk import PoseWalk
@@ -32,7 +33,6 @@ from wam.model.friction import friction_of, joint_coulomb
 _KNOWN, _DRAWN = 0.02, 0.1
 _SIGMAS = 1.96
 _SPEEDS = np.array([0.01, 0.05, 0.1, 0.4])  # rad/s, of the table
-_HEADER = ["friction [N m]", *(f"joint {joint}" for joint in range(1, 8))]
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +89,8 @@ def fit(context: CalibrationContext, recorded: RecordedWay) -> FrictionFit:
 
 def show(context: CalibrationContext, fitted: FrictionFit) -> None:
     """Print the friction of the joints, and what it leaves of the held-out sweep."""
-    context.console.table(_HEADER, _rows(context.rig.model.constants, fitted))
+    rows = _rows(context.rig.model.constants, fitted)
+    show_joints(context.console, "friction [N m]", rows)
     shares = ", ".join(f"{share:.2f}" for share in fitted.residual)
     context.console.say(
         f"residual on the held-out sweep, share of Coulomb friction: {shares} "
@@ -97,27 +98,20 @@ def show(context: CalibrationContext, fitted: FrictionFit) -> None:
     )
 
 
-def _rows(constants: ArmConstants, fitted: FrictionFit) -> list[list[str]]:
-    """Return the friction of the joints [N m], a row of eight cells for each measure.
-
-    The first cell is the name, the others are joints 1 to 7.
-    """
+def _rows(constants: ArmConstants, fitted: FrictionFit) -> list[tuple[str, Array]]:
+    """Return measures of the friction of the joints [N m], shape (7,) each."""
     friction = fitted.friction
-    deviation = _SIGMAS * joint_deviation(constants, fitted.deviation)
-    rows = [
-        _row("Coulomb", joint_coulomb(constants, friction.coulomb)),
-        _row("  ± (95 %)", deviation),
-        _row("asymmetry", joint_asymmetry(constants, friction.asymmetry)),
-        _row("break-away", joint_breakaway(constants, friction)),
-    ]
     curves = [speed_curve(constants, friction, j, _SPEEDS) for j in range(7)]
-    for speed, torques in zip(_SPEEDS, np.array(curves).T, strict=True):
-        rows.append(_row(f"at {speed:g} rad/s", torques))
-    return rows
-
-
-def _row(name: str, values: Array) -> list[str]:
-    return [name, *(f"{value:.3f}" for value in values)]
+    return [
+        ("Coulomb", joint_coulomb(constants, friction.coulomb)),
+        ("  ± (95 %)", _SIGMAS * joint_deviation(constants, fitted.deviation)),
+        ("asymmetry", joint_asymmetry(constants, friction.asymmetry)),
+        ("break-away", joint_breakaway(constants, friction)),
+        *(
+            (f"at {speed:g} rad/s", torques)
+            for speed, torques in zip(_SPEEDS, np.array(curves).T, strict=True)
+        ),
+    ]
 
 
 def check(context: CalibrationContext, fitted: FrictionFit) -> None:

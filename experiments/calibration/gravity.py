@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from experiments.calibration.calibration import CalibrationContext, GuidedCalibration
+from experiments.calibration.joint_table import show_joints
 from experiments.calibration.moving import arrivals
 from experiments.operator.console import Console
 from experiments.rig.law_calibrations import gravity_path
@@ -112,11 +113,9 @@ def show(context: CalibrationContext, weighed: WeighedArm) -> None:
 def _show_residuals(
     console: Console, moments: MomentFit, measured: MeasuredMoments
 ) -> None:
-    friction = np.abs(measured.friction).mean(axis=0)
-    rows = [_row(str(i), rest) for i, rest in enumerate(moments.residuals, 1)]
-    rows.append(_row("dry friction", friction))
-    header = ["residual [N m]", *(f"joint {joint}" for joint in range(1, 8))]
-    console.table(header, rows)
+    rows = [(str(i), rest) for i, rest in enumerate(moments.residuals, 1)]
+    rows.append(("dry friction", np.abs(measured.friction).mean(axis=0)))
+    show_joints(console, "residual [N m]", rows)
     console.say(
         f"rms {moments.residual:.3f} N m, rank {moments.rank} of 12, condition "
         f"{moments.condition:.1f}"
@@ -137,10 +136,6 @@ def _show_zeros(console: Console, zeros: ZeroErrors) -> None:
         f"zero errors estimated from torques [degrees]: {', '.join(joints)}; "
         "joints 1, 6 and 7 are not observable"
     )
-
-
-def _row(name: str, values: Array) -> list[str]:
-    return [name, *(f"{value:.3f}" for value in values)]
 
 
 def check(context: CalibrationContext, weighed: WeighedArm) -> None:
