@@ -25,12 +25,12 @@ from experiments.operator.screens import (
 from experiments.rig.rig import Rig
 from experiments.run.console_loop import TICK
 from experiments.run.context import RunContext, RunServices
+from experiments.run.kept_trials import kept_traces
+from experiments.run.quality import review_trial
 from experiments.run.stop import ArmFaultError, StopRequestedError
+from experiments.run.trial import EndDetector, PaceMonitor, trial_header
 from experiments.session.sidecar import TrialName, TrialOutcome
 from experiments.session.states import Event
-from experiments.trial.files import EndDetector, PaceMonitor, trial_header
-from experiments.trial.quality import review_trial
-from experiments.trial.running import kept_traces
 from wam.control.friction_compensation import SWUNG_MOTOR
 
 HISTORY = 5.0  # s of traction in the sparklines

@@ -28,6 +28,7 @@ from experiments.run.console_loop import ConsoleLoop
 from experiments.run.context import busy_load
 from experiments.run.runner import SessionRunner
 from experiments.run.stop import StopFlag, handle_signals
+from experiments.run.trial import SessionMetadata, collect_metadata
 from experiments.session.data_files import write_json, write_text
 from experiments.session.journal import Journal
 from experiments.session.lock import session_lock
@@ -40,7 +41,6 @@ from experiments.settings.matrix import TerrainRow
 from experiments.status_table.session_summaries import glance_sessions
 from experiments.status_table.upcoming import next_steps
 from experiments.status_table.where import Where
-from experiments.trial.files import SessionMetadata, collect_metadata
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ from acquisition.sample import Record
 from acquisition.trial_file.header import TrialHeader
 from acquisition.trial_file.reader import TrialReader
 from experiments.messages import FaultContext, fault_text
-from experiments.trial.files import TIME_LIMIT
+from experiments.session.sidecar import TIME_LIMIT
 
 if TYPE_CHECKING:
     from experiments.rig.rig import Rig

@@ -271,7 +271,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             (
                 _MATRIX,
                 "tests/ft_sensor/vendors/test_sensor_contract.py::test_one_number_that_stands_still_is_invalid_until_it_moves",
-                "tests/experiments/trial/test_quality.py::test_a_frozen_channel_is_named_and_nothing_of_the_sensor_is_ticked",
+                "tests/experiments/run/test_quality.py::test_a_frozen_channel_is_named_and_nothing_of_the_sensor_is_ticked",
             ),
         ),
         "drifting": (

@@ -16,15 +16,19 @@ from acquisition.trial_file.writer import FLIGHT_TOPICS, TRUTH_TOPICS, TrialWrit
 from analysis.data.recorded_factors import tread_of
 from experiments import provenance
 from experiments.rig.rig import Rig
+from experiments.run.quality import Review
 from experiments.session.data_files import write_json
-from experiments.session.sidecar import TrialName, TrialOutcome, sidecar_of
+from experiments.session.sidecar import (
+    TIME_LIMIT,
+    TrialName,
+    TrialOutcome,
+    sidecar_of,
+)
 from experiments.session.store import SessionFolder, iso_utc
 from experiments.session.trial_files import kept_sidecars
-from experiments.trial.quality import Review
 from ft_sensor.calibration.files import payload_to_toml, terrain_to_toml
 from wam.model.arm_model import urdf
 
-TIME_LIMIT = 30.0  # s
 AFTER_TRAVEL = 0.4  # a trial goes on this long after the foot has crossed [s]
 FLIGHT_SECONDS = 2.0
 PACE_SECONDS, PACE_LIMIT = 1.0, 0.2  # s, m/s

@@ -36,9 +36,9 @@ from analysis.data.quality import (
 )
 from experiments.operator.console import BAD, GOOD, WARNING
 from experiments.operator.graphs import WayTrace, trace_lines
+from experiments.run.kept_trials import plain_trace, traces_of
 from experiments.session.store import SessionFolder
 from experiments.session.trial_files import kept_sidecars
-from experiments.trial.running import plain_trace, traces_of
 
 STALE_SHARE = 0.01  # of the cycles
 ENOUGH_EARLIER = 3  # trials before which nothing is odd

@@ -9,8 +9,8 @@ from acquisition.trial_file.reader import TrialReader
 from analysis.data.lag import ForceLag
 from analysis.data.plausibility import Doubt
 from experiments.operator.console import BAD, GOOD, WARNING
+from experiments.run.quality import review_trial, thin_so_far
 from experiments.session.store import SessionFolder
-from experiments.trial.quality import review_trial, thin_so_far
 from tests.disturbances.rewriting import rewrite
 
 
