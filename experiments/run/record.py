@@ -11,7 +11,6 @@ from acquisition.errors import TractionError, TrialFileError
 from acquisition.ipc.child import ProcessLostError
 from acquisition.sample import MOTOR_FRESH_SHIFT, Flag
 from acquisition.trial_file.header import TrialHeader
-from experiments.fault_injection.plan import FaultTrigger
 from experiments.messages import CATALOGUE, FaultContext
 from experiments.operator.console import WARNING
 from experiments.operator.feedback import FeedbackSignal
@@ -25,6 +24,7 @@ from experiments.operator.screens import (
 from experiments.rig.rig import Rig
 from experiments.run.console_loop import TICK
 from experiments.run.context import RunContext, RunServices
+from experiments.run.fault_plan import FaultTrigger
 from experiments.run.kept_trials import kept_traces
 from experiments.run.quality import review_trial
 from experiments.run.stop import ArmFaultError, StopRequestedError

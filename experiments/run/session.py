@@ -7,8 +7,6 @@ from pathlib import Path
 
 from acquisition.errors import TractionError, UnfitDeviceError
 from experiments.arguments import data_option
-from experiments.fault_injection.host_faults import HostFaults
-from experiments.fault_injection.plan import plan_faults
 from experiments.operator.console import Console
 from experiments.operator.prompts import OperatorInput
 from experiments.operator.terminal import keyboard
@@ -26,6 +24,8 @@ from experiments.rig.rig import FakeOptions, Rig
 from experiments.rig.simulation import SimulatedHand
 from experiments.run.console_loop import ConsoleLoop
 from experiments.run.context import busy_load
+from experiments.run.fault_plan import plan_faults
+from experiments.run.host_faults import HostFaults
 from experiments.run.runner import SessionRunner
 from experiments.run.stop import StopFlag, handle_signals
 from experiments.run.trial import SessionMetadata, collect_metadata

@@ -8,7 +8,7 @@ from enum import Enum
 from acquisition.errors import SettingsError
 from acquisition.simulation import SimulationControl
 from experiments.arguments import did_you_mean
-from experiments.fault_injection.host_faults import COMPUTER_FAULTS, HostFaults
+from experiments.run.host_faults import COMPUTER_FAULTS, HostFaults
 
 _PATTERN = re.compile(
     r"^(?P<name>[a-z0-9-]+)(@T(?P<trial>\d+)\+(?P<seconds>\d+(\.\d+)?)s?)?$"
