@@ -35,12 +35,12 @@ from experiments.session.lock import session_lock
 from experiments.session.recorded_conditions import write_conditions
 from experiments.session.states import Event
 from experiments.session.store import create_session, session_utc_ns
+from experiments.session.summaries import glance_sessions
 from experiments.session.unbegun import clear_unbegun
+from experiments.session.upcoming import next_steps
+from experiments.session.where import Where
 from experiments.settings.load import Settings
 from experiments.settings.matrix import TerrainRow
-from experiments.status_table.session_summaries import glance_sessions
-from experiments.status_table.upcoming import next_steps
-from experiments.status_table.where import Where
 
 
 @dataclass(frozen=True, slots=True)

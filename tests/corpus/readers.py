@@ -23,13 +23,13 @@ from experiments.session.crash_recovery import recover_session
 from experiments.session.data_files import journal_line
 from experiments.session.journal import open_journal
 from experiments.session.lock import session_lock
+from experiments.session.status_table import count_rows, see_sessions
 from experiments.session.store import list_sessions
+from experiments.session.summaries import Checksums
 from experiments.session.unfinished import find_unfinished
+from experiments.session.where import Where
 from experiments.settings.load import load_settings
 from experiments.settings.rig import FrictionSettings
-from experiments.status_table.session_summaries import Checksums
-from experiments.status_table.table import count_rows, see_sessions
-from experiments.status_table.where import Where
 from experiments.tools.pendant import read_script
 from ft_sensor.calibration.files import payload_from_toml, terrain_from_toml
 from ft_sensor.calibration.sensor_file import sensor_from_toml

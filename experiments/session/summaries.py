@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from analysis.data.terrain_kinds import Value
     from experiments.session.kept_files import Deviation
     from experiments.session.store import SessionFolder
-    from experiments.status_table.where import Where
+    from experiments.session.where import Where
 
 _FACTORS = "terrain.factors."  # before the name of a condition
 

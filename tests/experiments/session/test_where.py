@@ -5,10 +5,10 @@ import itertools
 import pytest
 
 from acquisition.errors import SettingsError
+from experiments.session.upcoming import next_steps, suggest_order
+from experiments.session.where import parse_where
 from experiments.settings.load import load_settings
 from experiments.settings.matrix import Design
-from experiments.status_table.upcoming import next_steps, suggest_order
-from experiments.status_table.where import parse_where
 
 FACTS = {"d50": 19.0, "moisture": "wet", "load": None, "incline_deg": -10.0}
 

@@ -7,14 +7,14 @@ from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING
 
 from experiments.session.store import list_sessions
-from experiments.status_table.session_summaries import (
+from experiments.session.summaries import (
     SeenSession,
     facts_of,
     glance,
     recorded_facts,
     summarise,
 )
-from experiments.status_table.where import Where
+from experiments.session.where import Where
 
 if TYPE_CHECKING:
     from pathlib import Path

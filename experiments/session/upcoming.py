@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING
 from acquisition.errors import TrialFileError
 from experiments.arguments import data_option
 from experiments.session.lock import owner_of
-from experiments.status_table.table import facts_of_row
+from experiments.session.status_table import facts_of_row
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from analysis.data.terrain_kinds import Value
+    from experiments.session.summaries import SeenSession
+    from experiments.session.where import Where
     from experiments.settings.matrix import MatrixSettings, TerrainRow
-    from experiments.status_table.session_summaries import SeenSession
-    from experiments.status_table.where import Where
 
 
 def next_steps(

@@ -5,11 +5,11 @@ import os
 import pytest
 
 from benchmarks.made_sessions import make_sessions
+from experiments.session import summaries
+from experiments.session.status_table import find_deviations, see_sessions
 from experiments.session.store import list_sessions
-from experiments.status_table import session_summaries
-from experiments.status_table.session_summaries import Checksums
-from experiments.status_table.table import find_deviations, see_sessions
-from experiments.status_table.where import Where, parse_where
+from experiments.session.summaries import Checksums
+from experiments.session.where import Where, parse_where
 
 
 @pytest.fixture
@@ -86,12 +86,12 @@ def test_a_file_that_stays_as_it_is_is_read_once(data, monkeypatch):
 
 def test_conditions_hash_no_other_session(data, monkeypatch):
     summarised = []
-    usual = session_summaries.summarise
+    usual = summaries.summarise
 
     def seen(folder, digest):
         summarised.append((folder.id, digest is not None))
         return usual(folder, digest)
 
-    monkeypatch.setattr("experiments.status_table.table.summarise", seen)
+    monkeypatch.setattr("experiments.session.status_table.summarise", seen)
     see_sessions(data, parse_where("session=S002", ()), Checksums())
     assert summarised == [("S002", True)]
