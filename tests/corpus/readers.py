@@ -17,6 +17,7 @@ from analysis.terrains import database as terrain_db
 from experiments.calibration.pose_file import read_poses
 from experiments.export.checksums import SUMS, changed_files
 from experiments.export.rebuilding import compare_tables
+from experiments.operator.pendant import read_script
 from experiments.operator.scripted import ScriptedOperator
 from experiments.rig.law_calibrations import build_compensation
 from experiments.session.crash_recovery import recover_session
@@ -30,7 +31,6 @@ from experiments.session.unfinished import find_unfinished
 from experiments.session.where import Where
 from experiments.settings.load import load_settings
 from experiments.settings.rig import FrictionSettings
-from experiments.tools.pendant import read_script
 from ft_sensor.calibration.files import payload_from_toml, terrain_from_toml
 from ft_sensor.calibration.sensor_file import sensor_from_toml
 from ft_sensor.reading import StreamTiming

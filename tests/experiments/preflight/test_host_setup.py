@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from experiments.tools.host_setup import run_all
+from experiments.preflight.host_setup import run_all
 from tests.experiments.program import traction, write_config
 
 NAMES = {

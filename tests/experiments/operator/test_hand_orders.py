@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.tools.hand_orders import (
+from experiments.operator.hand_orders import (
     HAND_WORDS,
     HandOrderError,
     HangOrder,
@@ -17,7 +17,7 @@ from experiments.tools.hand_orders import (
     TwistOrder,
     parse_hand_order,
 )
-from experiments.tools.pendant import Lines, Pendant, TimedPress, parse_script
+from experiments.operator.pendant import Lines, Pendant, TimedPress, parse_script
 
 S = 1_000_000_000
 ZEROS = (0.0,) * 6

@@ -13,7 +13,7 @@ from acquisition.clock import NS_PER_S
 from acquisition.errors import SettingsError
 from acquisition.settings import read_text
 from acquisition.simulation import Hands, PendantAction
-from experiments.tools.hand_orders import (
+from experiments.operator.hand_orders import (
     HAND_WORDS,
     HandOrder,
     HandOrderError,

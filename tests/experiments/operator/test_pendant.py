@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.errors import SettingsError
-from experiments.tools.pendant import (
+from experiments.operator.pendant import (
     Lines,
     Pendant,
     TimedPress,
