@@ -16,13 +16,13 @@ from acquisition.control_loop.realtime import RealtimeRequest, choose_cores, req
 from acquisition.errors import SessionError
 from acquisition.ipc.layout import SharedLayout
 from acquisition.settings import read_text
-from experiments.live.channels import (
+from experiments.commands.live.channels import (
     DESCRIPTION_TOPIC,
     EVENTS_TOPIC,
     LIVE_TOPICS,
     LiveEncoder,
 )
-from experiments.live.server import HOST, LiveServer, layout_path
+from experiments.commands.live.server import HOST, LiveServer, layout_path
 from experiments.operator.console import Console
 from experiments.session.lock import owner_of
 from experiments.session.store import SessionFolder, list_sessions

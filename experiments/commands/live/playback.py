@@ -14,12 +14,12 @@ from acquisition.sample import MOTOR_FRESH_SHIFT, Flag
 from acquisition.settings import parse_toml
 from acquisition.trial_file.reader import TopicRows, TrialReader
 from analysis.data.load import RecordedTrial, load_trial
-from experiments.live.channels import (
+from experiments.commands.live.channels import (
     DESCRIPTION_TOPIC,
     LIVE_TOPICS,
     LiveEncoder,
 )
-from experiments.live.server import HOST, LiveServer, PlaybackWish, layout_path
+from experiments.commands.live.server import HOST, LiveServer, PlaybackWish, layout_path
 from experiments.operator.console import Console
 from experiments.operator.graphs import LiveScales
 from experiments.operator.screens import RecordingView, recording_lines

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from acquisition.schema import CYCLE, schema_text
-from experiments.live.channels import (
+from experiments.commands.live.channels import (
     LIVE_TOPICS,
     ArmFrames,
     LiveEncoder,
 )
-from experiments.live.server import layout_path
+from experiments.commands.live.server import layout_path
 from tests.acquisition.ros import decode
 from tests.acquisition.test_schema import filled, numbers_of
 from wam.model.arm_model import ArmModel, urdf

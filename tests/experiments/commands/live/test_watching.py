@@ -12,16 +12,21 @@ from acquisition.errors import LinkError, SettingsError
 from acquisition.ipc.layout import SharedLayout
 from acquisition.ipc.shared_memory import SharedMemory
 from acquisition.schema import CYCLE
-from experiments.live.channels import LIVE_TOPICS
-from experiments.live.playback import serve
-from experiments.live.server import LiveServer
-from experiments.live.watching import WatchedSession, event_text, find_open, watch
+from experiments.commands.live.channels import LIVE_TOPICS
+from experiments.commands.live.playback import serve
+from experiments.commands.live.server import LiveServer
+from experiments.commands.live.watching import (
+    WatchedSession,
+    event_text,
+    find_open,
+    watch,
+)
 from experiments.operator.console import Console
 from experiments.session.lock import session_lock
 from experiments.session.store import create_session
 from tests.acquisition.ros import decode
 from tests.acquisition.test_schema import filled
-from tests.experiments.live.viewer import Viewer
+from tests.experiments.commands.live.viewer import Viewer
 from tests.experiments.program import traction
 
 pytest.importorskip("foxglove")
