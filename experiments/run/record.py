@@ -11,6 +11,7 @@ from acquisition.errors import TractionError, TrialFileError
 from acquisition.ipc.child import ProcessLostError
 from acquisition.sample import MOTOR_FRESH_SHIFT, Flag
 from acquisition.trial_file.header import TrialHeader
+from analysis.data.prepare import PrepareOptions
 from experiments.messages import CATALOGUE, FaultContext
 from experiments.operator.console import WARNING
 from experiments.operator.feedback import FeedbackSignal
@@ -42,7 +43,10 @@ def recording_screen(
 ) -> Callable[[int], list[str]]:
     """Return what draws trial `trial`, whose `outcome` is kept up to date."""
     loop_client, limits = rig.backend.loop_client, rig.settings.rig.guard_limits()
-    scales = LiveScales(limits["foot_speed"], limits["contact_force"])
+    window = PrepareOptions()
+    scales = LiveScales(
+        (window.slowest, window.fastest), limits["foot_speed"], limits["contact_force"]
+    )
     skipped_before = loop_client.loop.skipped
 
     def lines(width: int) -> list[str]:

@@ -14,6 +14,7 @@ from acquisition.sample import MOTOR_FRESH_SHIFT, Flag
 from acquisition.settings import parse_toml
 from acquisition.trial_file.reader import TopicRows, TrialReader
 from analysis.data.load import RecordedTrial, load_trial
+from analysis.data.prepare import PrepareOptions
 from experiments.commands.live.channels import (
     DESCRIPTION_TOPIC,
     LIVE_TOPICS,
@@ -47,7 +48,7 @@ def play(path: Path, speed: float, clock: Clock, console: Console) -> None:
         clock.sleep_until(due_ns)
         if console.is_lost:
             return
-        view = replace(_view(trial, row), scales=scales)
+        view = _view(trial, row, scales)
         lines = recording_lines(view, console.width)[:-2]
         if console.is_live:
             console.panel(lines)
@@ -60,17 +61,19 @@ def play(path: Path, speed: float, clock: Clock, console: Console) -> None:
 
 def _scales_of(path: Path) -> LiveScales:
     """Return the scales of the limits that were set when it was recorded."""
+    window = PrepareOptions()
+    used_speeds = (window.slowest, window.fastest)
     config = TrialReader(path).attachments.get("config.toml", b"")
     try:
         limits: Any = parse_toml(config.decode()).get("limits", {})
     except ValueError:
-        return LiveScales()
+        return LiveScales(used_speeds)
     known = {
         field.name: float(limits[field.name])
         for field in fields(LiveScales)
         if isinstance(limits.get(field.name), float | int) and limits[field.name] > 0
     }
-    return LiveScales(**known)
+    return LiveScales(used_speeds, **known)
 
 
 def _rows(trial: RecordedTrial, step: float) -> Iterator[int]:
@@ -83,7 +86,7 @@ def _rows(trial: RecordedTrial, step: float) -> Iterator[int]:
     yield last
 
 
-def _view(trial: RecordedTrial, row: int) -> RecordingView:
+def _view(trial: RecordedTrial, row: int, scales: LiveScales) -> RecordingView:
     first = int(np.searchsorted(trial.t, float(trial.t[row]) - _HISTORY))
     before = max(0, row - RATE_HZ)
     span = float(trial.t[row] - trial.t[before])
@@ -99,6 +102,7 @@ def _view(trial: RecordedTrial, row: int) -> RecordingView:
         is_arm_fine=flags & _ALL_MOTORS == _ALL_MOTORS,
         is_sensor_fine=bool(flags & Flag.FT_FRESH) and not flags & Flag.FT_SATURATED,
         traction=trial.traction[first : row + 1],
+        scales=scales,
     )
 
 
