@@ -8,6 +8,7 @@ _RUN, _RUN_TESTS = "experiments/run", "tests/experiments/run"
 _POSES = (
     "tests/wam/calibration/test_gravity_poses.py",
     "tests/experiments/run/test_surroundings.py",
+    "tests/experiments/calibration/test_pose_file.py",
 )
 _SALVAGED = (
     f"{_FILE_TESTS}/test_recover.py",

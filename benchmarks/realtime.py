@@ -24,11 +24,11 @@ import numpy as np
 from acquisition.control_loop.realtime import choose_cores
 from acquisition.sample import Record
 from benchmarks.realtime_table import RawRecord, Times, Window, table
+from experiments.preflight.loop_benchmark import run_bench
 from experiments.preflight.preflight import start_devices
 from experiments.rig.processes import MultiProcessBackend
 from experiments.rig.rig import FakeOptions, Rig, build_rig
 from experiments.settings.load import Settings, load_settings
-from experiments.tools.bench import run_bench
 
 C_FILES = Path(__file__).parent / "c"
 

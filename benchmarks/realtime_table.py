@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from acquisition.clock import PERIOD_NS
 from acquisition.control_loop.loop import LATE_NS
-from experiments.tools.bench import BenchReport, ProcessUse
+from experiments.preflight.loop_benchmark import BenchReport, ProcessUse
 
 NEAR_NS = 4_000_000
 QUANTILES = (50.0, 99.0, 99.9)

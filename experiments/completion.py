@@ -78,8 +78,8 @@ def _trials(args: argparse.Namespace) -> list[str]:
 
 def _faults(args: argparse.Namespace) -> list[str]:
     """Return what a simulated rig of these settings can be made to do."""
-    from experiments.fault_injection.host_faults import COMPUTER_FAULTS
     from experiments.rig.rig import FakeOptions, build_rig
+    from experiments.run.host_faults import COMPUTER_FAULTS
     from experiments.settings.load import load_settings
 
     settings = load_settings(getattr(args, "config", None))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from experiments.operator.console import Console
-    from experiments.tools.bench import BenchReport
+    from experiments.preflight.loop_benchmark import BenchReport
 
 EXAMPLES = """\
   traction bench --fake --seconds 60        the loop with simulated devices
@@ -34,11 +34,11 @@ def run(args: argparse.Namespace) -> int:
     from acquisition.errors import PreflightError, SettingsError
     from experiments.operator.console import WARNING, Console
     from experiments.preflight.connecting import connect_rig
+    from experiments.preflight.loop_benchmark import run_bench
     from experiments.preflight.preflight import start_devices
     from experiments.rig.processes import MultiProcessBackend
     from experiments.rig.rig import FakeOptions
     from experiments.settings.load import load_settings
-    from experiments.tools.bench import run_bench
 
     if not 1.0 <= args.seconds <= _LONGEST:
         raise SettingsError(

@@ -6,12 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from experiments.arguments import (
-    asked_time,
-    friction_share,
-)
-from experiments.calibrating.opening import add_arm
-from experiments.rig.truth_options import check_truth, mount_of
+from experiments.arguments import friction_share
+from experiments.calibration.options import add_arm, check_arm, fake_options
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -78,12 +74,11 @@ def run(args: argparse.Namespace) -> int:
     from experiments.commissioning.guide import RecordFolder, recheck
     from experiments.operator.console import Console
     from experiments.operator.scripted import choose_operator
-    from experiments.rig.rig import FakeOptions
     from experiments.settings.load import load_settings
 
-    check_truth(args)
+    check_arm(args)
     steps = _steps(args)
-    friction = friction_share(args)
+    friction_share(args)
     settings = load_settings(args.config)
     console = Console(color=not args.no_color)
     folder = _folder(settings, is_fake=args.fake)
@@ -91,17 +86,7 @@ def run(args: argparse.Namespace) -> int:
     if args.recheck:
         return 0 if recheck(files, console) else 6
     operator = choose_operator(args.operator_script, is_fake=args.fake)
-    fake: FakeOptions | None = None
-    if args.fake:
-        fake = FakeOptions(
-            asked_time(args) or "paced",
-            args.seed,
-            friction,
-            cables=args.cables,
-            spread=True,
-            mount=mount_of(args),
-            wrong=args.wrong,
-        )
+    fake = fake_options(args, spread=True)
     who = args.operator or operator.who
     kind = "SIMULATED" if args.fake else "LIVE RIG"
     console.say(f"traction commission        {kind} · {files.folder}")
@@ -220,8 +205,8 @@ def _on_rig(
     from experiments.preflight.connecting import connect_rig
     from experiments.rig.bus_log import logging_bus
     from experiments.run.console_loop import ConsoleLoop
-    from experiments.run.pose_walk import INTERRUPTED
     from experiments.run.stop import (
+        INTERRUPTED,
         ArmFaultError,
         StopFlag,
         StopRequestedError,
@@ -251,11 +236,6 @@ def _steps(args: argparse.Namespace) -> list[StepId]:
     from acquisition.errors import SettingsError
     from experiments.commissioning.procedure import STEPS
 
-    if not args.fake and (asked_time(args) or args.operator_script):
-        raise SettingsError(
-            "--fast, --processes and --operator-script work only with --fake.",
-            hint="Nothing was started.",
-        )
     known = list(STEPS)
     ends = [args.first or known[0], args.last or known[-1]]
     for name in ends:

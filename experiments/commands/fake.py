@@ -12,9 +12,9 @@ from experiments.rig.truth_options import add_truth, truth_of
 
 if TYPE_CHECKING:
     from experiments.operator.console import Console
+    from experiments.operator.pendant import Order, Pressable
     from experiments.rig.fake import ServedArm
     from experiments.settings.load import Settings
-    from experiments.tools.pendant import Order, Pressable
 
 EXAMPLES = """\
   traction fake --can traction-fake:/tmp/wam.sock --idle-first
@@ -123,11 +123,11 @@ def run(args: argparse.Namespace) -> int:
     """Serve until a signal ends it and return the exit code."""
     from acquisition.clock import SystemClock
     from experiments.operator.console import Console
+    from experiments.operator.pendant import Lines, Pendant, read_script
     from experiments.rig.bus_log import open_bus_log
     from experiments.rig.fake import build_server
     from experiments.run.stop import StopFlag, handle_signals
     from experiments.settings.load import load_settings
-    from experiments.tools.pendant import Lines, Pendant, read_script
 
     served = _served(args)
     script = None if args.script is None else read_script(args.script)

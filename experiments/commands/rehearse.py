@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from analysis.validation.bands import BandResult
     from experiments.operator.console import Console
-    from experiments.tools.acceptance import AcceptancePlan
+    from experiments.rehearsal.plan import AcceptancePlan
 
 EXAMPLES = """\
   traction rehearse --seed 2                all terrains, ten trials each, 43 bands
@@ -40,15 +40,11 @@ def run(args: argparse.Namespace) -> int:
     import json
 
     from experiments.operator.console import Console
+    from experiments.rehearsal.judging import analyse, as_plain
+    from experiments.rehearsal.plan import AcceptancePlan
+    from experiments.rehearsal.recording import calibrate_arm, record_study
     from experiments.session.data_files import write_text
     from experiments.settings.load import load_settings
-    from experiments.tools.acceptance import (
-        AcceptancePlan,
-        analyse,
-        as_plain,
-        calibrate_arm,
-        record_study,
-    )
 
     _check_arguments(args)
     settings = load_settings(args.config)
@@ -85,7 +81,7 @@ def _print(
     plan: AcceptancePlan, results: Sequence[BandResult], folder: Path, console: Console
 ) -> int:
     from experiments.operator.console import BAD, GOOD
-    from experiments.tools.acceptance import gated
+    from experiments.rehearsal.judging import gated
 
     rows = [
         [

@@ -71,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _show_trial(args: argparse.Namespace) -> int:
     from acquisition.clock import SystemClock
-    from experiments.live.playback import play
+    from experiments.commands.live.playback import play
     from experiments.operator.console import Console
     from experiments.session.annotations import trial_path
     from experiments.session.kept_files import compare_trial, kept_data_error
@@ -91,7 +91,7 @@ def _show_trial(args: argparse.Namespace) -> int:
 
 def _serve_trial(args: argparse.Namespace, path: Path, console: Console) -> int:
     from acquisition.clock import SystemClock
-    from experiments.live.playback import serve
+    from experiments.commands.live.playback import serve
     from experiments.run.stop import StopFlag, handle_signals
 
     stop = StopFlag()

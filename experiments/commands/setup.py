@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from experiments.preflight.host_setup import HostSetup
     from experiments.settings.load import Settings
-    from experiments.tools.host_setup import HostSetup
 
 EXAMPLES = """\
   traction setup --config lab/rig.toml             what would be written and run
@@ -47,8 +47,8 @@ def run(args: argparse.Namespace) -> int:
     """Print or install what the computer needs; return the exit code."""
     from acquisition.errors import SettingsError
     from experiments.operator.console import GOOD, WARNING, Console
+    from experiments.preflight.host_setup import SENSOR_LINK, install, run_all
     from experiments.settings.load import load_settings
-    from experiments.tools.host_setup import SENSOR_LINK, install, run_all
 
     if args.root is not None and not args.install:
         raise SettingsError("--root goes with --install.", hint="Add it.")
@@ -101,7 +101,7 @@ def _setup_of(args: argparse.Namespace, settings: Settings) -> HostSetup:
     import getpass
     import os
 
-    from experiments.tools.host_setup import HostSetup
+    from experiments.preflight.host_setup import HostSetup
     from ft_sensor.serial_line.link import adapter_serial
 
     can, port = settings.rig.can, _port_of(settings)

@@ -13,10 +13,10 @@ if TYPE_CHECKING:
 
     from experiments.operator.console import Console
     from experiments.session.kept_files import Deviation
+    from experiments.session.status_table import MatrixRow
     from experiments.session.store import SessionFolder
+    from experiments.session.where import Where
     from experiments.settings.matrix import MatrixSettings
-    from experiments.status_table.table import MatrixRow
-    from experiments.status_table.where import Where
 
 EXAMPLES = """\
   traction status                           the table, and what comes next
@@ -47,15 +47,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the table, counted from files whose checksum is right."""
     from experiments.operator.console import Console
-    from experiments.settings.load import load_settings
-    from experiments.status_table.session_summaries import Checksums
-    from experiments.status_table.table import (
+    from experiments.session.status_table import (
         count_rows,
         find_deviations,
         see_sessions,
     )
-    from experiments.status_table.upcoming import next_steps
-    from experiments.status_table.where import parse_where
+    from experiments.session.summaries import Checksums
+    from experiments.session.upcoming import next_steps
+    from experiments.session.where import parse_where
+    from experiments.settings.load import load_settings
 
     matrix = load_settings(args.config).matrix
     digest = Checksums()
@@ -166,7 +166,7 @@ def _show(table: StatusTable, console: Console, *, is_json: bool) -> int:
 def _factors(args: argparse.Namespace, matrix: MatrixSettings) -> list[str]:
     """Return the factors of the matrix, and of recorded sessions where one is asked."""
     from experiments.session.store import list_sessions
-    from experiments.status_table.session_summaries import recorded_factors
+    from experiments.session.summaries import recorded_factors
 
     names = dict.fromkeys(name for row in matrix.terrains for name in row.factors)
     if args.where:

@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Serve what is recorded until Ctrl-C and return the exit code."""
     from acquisition.clock import SystemClock
-    from experiments.live.watching import watch
+    from experiments.commands.live.watching import watch
     from experiments.operator.console import Console
     from experiments.run.stop import StopFlag, handle_signals
 

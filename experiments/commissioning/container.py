@@ -9,7 +9,8 @@ from dataclasses import asdict
 import numpy as np
 
 from acquisition.errors import SettingsError
-from experiments.calibrating.terrain import TerrainGuide
+from experiments.calibration.calibration import CalibrationContext
+from experiments.calibration.terrain import TERRAIN
 from experiments.commissioning.evidence.order import StepId
 from experiments.commissioning.judging import Judgement, found, judged
 from experiments.commissioning.recording import Values, number
@@ -31,7 +32,7 @@ def collect(scene: Scene) -> Values:
         f"{row.incline_deg:g} degrees, heading {row.heading_deg:g}."
     )
     with scene.followed():
-        points = TerrainGuide(scene.console_loop).touch()
+        points = TERRAIN.collect(CalibrationContext(scene.console_loop))
     expected = {name: np.array(value) for name, value in asdict(frame).items()}
     return {"points": np.array(points), **expected}
 

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.data.prepare import PrepareOptions
-
 _BARS = "▁▂▃▄▅▆▇█"
 _ABSURD = 1e9  # nothing a sensor or an encoder can mean
 # What a push needs at most; what it may, stands in LimitSection of rig.toml [N].
@@ -59,19 +57,19 @@ class LiveScales:
     """The scales of a running trial's bars, from the limits of rig.toml.
 
     Attributes:
+        used_speeds: velocities of the samples which models use, from and to [m/s].
         foot_speed: beyond it the arm damps [m/s].
         contact_force: beyond it the trial ends [N].
     """
 
+    used_speeds: tuple[float, float]
     foot_speed: float = 0.8
     contact_force: float = 100.0
 
     @property
     def v_t(self) -> BarScale:
         """Of velocity; the band is that of the samples which models use."""
-        window = PrepareOptions()
-        band = (window.slowest, window.fastest)
-        return BarScale(self.foot_speed, *band, "m/s", ".3f")
+        return BarScale(self.foot_speed, *self.used_speeds, "m/s", ".3f")
 
     @property
     def F_t(self) -> BarScale:

@@ -1,6 +1,6 @@
 """What the live part of the screen shows, as lines of text; pure."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import ceil
 
 import numpy as np
@@ -46,7 +46,7 @@ class RecordingView:
     is_arm_fine: bool
     is_sensor_fine: bool
     traction: NDArray[np.float64]
-    scales: LiveScales = field(default_factory=LiveScales)
+    scales: LiveScales
 
 
 def recording_lines(view: RecordingView, width: int) -> list[str]:

@@ -13,7 +13,6 @@ from acquisition.control_loop.states import ArmState, ControlStatus
 from acquisition.devices import SHORTED
 from acquisition.errors import TractionError
 from acquisition.ipc.loop_client import LoopClient
-from experiments.fault_injection.plan import FaultTrigger, PlannedFaults
 from experiments.messages import fault_words
 from experiments.operator.console import WARNING, Console
 from experiments.operator.keys import KeyAction, key_action
@@ -21,6 +20,7 @@ from experiments.operator.prompts import OperatorInput, Prompt, PromptState
 from experiments.operator.terminal import is_person
 from experiments.rig.rig import Rig
 from experiments.rig.simulation import SimulatedHand
+from experiments.run.fault_plan import FaultTrigger, PlannedFaults
 from experiments.run.stop import (
     ArmFaultError,
     StopFlag,

@@ -17,11 +17,11 @@ from experiments.operator.prompts import OperatorInput, Prompt
 from experiments.rig.rig import Rig
 from experiments.run.console_loop import ConsoleLoop
 from experiments.run.stop import ArmFaultError, StopFlag
+from experiments.run.trial import SessionMetadata, TrialArchive
 from experiments.session.journal import Journal
 from experiments.session.reducer import KEEP, REJECT
 from experiments.session.sidecar import TrialName
 from experiments.session.states import Event
-from experiments.trial.files import SessionMetadata, TrialArchive
 
 UNDO_NS = 10_000_000_000  # a verdict can be taken back for so long [ns]
 

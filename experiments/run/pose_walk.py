@@ -4,72 +4,17 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from acquisition.control_loop.faults import Action
-from acquisition.errors import IDLE_ARM, PreflightError, TractionError
+from acquisition.errors import IDLE_ARM, PreflightError
 from acquisition.ipc.shared_sensor import unpack_wrenches
-from experiments.messages import FaultContext, fault_text, rest_text
 from experiments.operator.keys import KeyAction, key_action
 from experiments.operator.prompts import Prompt
 from experiments.run.console_loop import TICK, ConsoleLoop
-from experiments.run.stop import ArmFaultError, StopRequestedError
+from experiments.run.stop import ArmFaultError
 from experiments.run.surroundings import free_space
 from wam.calibration.free_space import FreeSpace
 from wam.calibration.poses import APPROACH_SPEED, MeasurementPose, way_seconds
 from wam.control.position_control import JointMove, move_reference
 from wam.model.constants import Array
-
-INTERRUPTED = 130
-_NOTHING = "Nothing was written."
-_STOPPED = "The move was stopped; it goes on when it is asked for anew only."
-_HOLD = 0.2  # s between a stop and idle
-
-
-class MoveStoppedError(ArmFaultError):
-    """The guard stopped the arm in a move that it made by itself."""
-
-
-def guided(console_loop: ConsoleLoop, work: Callable[[], None], command: str) -> int:
-    """Do `work` and return the exit code; an error is shown on the console.
-
-    Every way out leaves the arm idle: after a stop it holds first, or damps when the
-    stop was asked for twice; an arm that is driven is supported first. The message of a
-    fault names `command` to start again.
-    """
-    console = console_loop.console
-    try:
-        work()
-    except StopRequestedError:
-        console_loop.stop_arm()
-        console_loop.loop_client.advance(_HOLD)
-        console.say(f"Stopped as asked. {_NOTHING}")
-        return INTERRUPTED
-    except ArmFaultError as fault:
-        was_moving = isinstance(fault, MoveStoppedError)
-        if was_moving and fault.verdict.action is Action.DAMP:
-            # No hand is on it: what it is too fast by may be its own encoder.
-            console_loop.make_safe()
-        loop_client = console_loop.loop_client
-        loop_client.advance(TICK)
-        context = FaultContext(
-            "The calibration",
-            bus=loop_client.loop.bus_condition,
-            prompt=None,
-            command=command,
-            state=loop_client.status.state,
-        )
-        result = f"{_STOPPED} {_NOTHING}" if was_moving else _NOTHING
-        console.problem(fault_text(fault.verdict, context, result))
-        return 4
-    except TractionError as error:
-        console.problem(f"{error} {_NOTHING}")
-        return error.exit_code
-    finally:
-        console_loop.lay_down()
-        confirmed = console_loop.make_safe()
-        mode = console_loop.rig.backend.safety_mode()
-        console.say(rest_text(mode, is_confirmed=confirmed))
-    return 0
-
 
 WEIGHED = 0.3  # s of readings of the free foot
 SETTLE = 0.5  # s after a move
@@ -83,6 +28,10 @@ TOUCH = 3.0
 ATTEMPTS = 4  # at an arm that does not come to rest
 
 HaltPlan = Callable[[Array, FreeSpace], Sequence[MeasurementPose]]
+
+
+class MoveStoppedError(ArmFaultError):
+    """The guard stopped the arm in a move that it made by itself."""
 
 
 class PoseWalk:

@@ -13,12 +13,12 @@ from experiments.operator.prompts import Prompt
 from experiments.operator.screens import ReadyView, ready_lines
 from experiments.run.console_loop import ConsoleLoop
 from experiments.run.context import RunContext, RunServices
+from experiments.run.kept_trials import kept_rows
+from experiments.run.quality import review_trial, thin_so_far
 from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.run.verdicts import take_note
 from experiments.session.sidecar import TrialName
 from experiments.session.states import Event
-from experiments.trial.quality import review_trial, thin_so_far
-from experiments.trial.running import kept_rows
 
 PATIENCE = 120.0  # how long a person may take to activate the arm [s]
 _READY_SECONDS = 0.1  # from the request for hold to its first torques

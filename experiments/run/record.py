@@ -11,7 +11,7 @@ from acquisition.errors import TractionError, TrialFileError
 from acquisition.ipc.child import ProcessLostError
 from acquisition.sample import MOTOR_FRESH_SHIFT, Flag
 from acquisition.trial_file.header import TrialHeader
-from experiments.fault_injection.plan import FaultTrigger
+from analysis.data.prepare import PrepareOptions
 from experiments.messages import CATALOGUE, FaultContext
 from experiments.operator.console import WARNING
 from experiments.operator.feedback import FeedbackSignal
@@ -25,12 +25,13 @@ from experiments.operator.screens import (
 from experiments.rig.rig import Rig
 from experiments.run.console_loop import TICK
 from experiments.run.context import RunContext, RunServices
+from experiments.run.fault_plan import FaultTrigger
+from experiments.run.kept_trials import kept_traces
+from experiments.run.quality import review_trial
 from experiments.run.stop import ArmFaultError, StopRequestedError
+from experiments.run.trial import EndDetector, PaceMonitor, trial_header
 from experiments.session.sidecar import TrialName, TrialOutcome
 from experiments.session.states import Event
-from experiments.trial.files import EndDetector, PaceMonitor, trial_header
-from experiments.trial.quality import review_trial
-from experiments.trial.running import kept_traces
 from wam.control.friction_compensation import SWUNG_MOTOR
 
 HISTORY = 5.0  # s of traction in the sparklines
@@ -42,7 +43,10 @@ def recording_screen(
 ) -> Callable[[int], list[str]]:
     """Return what draws trial `trial`, whose `outcome` is kept up to date."""
     loop_client, limits = rig.backend.loop_client, rig.settings.rig.guard_limits()
-    scales = LiveScales(limits["foot_speed"], limits["contact_force"])
+    window = PrepareOptions()
+    scales = LiveScales(
+        (window.slowest, window.fastest), limits["foot_speed"], limits["contact_force"]
+    )
     skipped_before = loop_client.loop.skipped
 
     def lines(width: int) -> list[str]:

@@ -13,12 +13,12 @@ from experiments.run.ready import activate, wait_ready
 from experiments.run.record import record_trial
 from experiments.run.stop import ArmFaultError, StopRequestedError, UndoRequestedError
 from experiments.run.tare import prove_mounting, take_end_tare, take_tare
+from experiments.run.trial import SessionMetadata
 from experiments.run.verdicts import ask_verdict, await_undo, judge_again
 from experiments.session.data_files import write_text
 from experiments.session.journal import Journal
 from experiments.session.sidecar import TrialName
 from experiments.session.states import Event
-from experiments.trial.files import SessionMetadata
 
 FAULTS_IN_A_ROW = 5  # end the session: recording again does not help
 

@@ -7,8 +7,6 @@ from pathlib import Path
 
 from acquisition.errors import TractionError, UnfitDeviceError
 from experiments.arguments import data_option
-from experiments.fault_injection.host_faults import HostFaults
-from experiments.fault_injection.plan import plan_faults
 from experiments.operator.console import Console
 from experiments.operator.prompts import OperatorInput
 from experiments.operator.terminal import keyboard
@@ -26,21 +24,23 @@ from experiments.rig.rig import FakeOptions, Rig
 from experiments.rig.simulation import SimulatedHand
 from experiments.run.console_loop import ConsoleLoop
 from experiments.run.context import busy_load
+from experiments.run.fault_plan import plan_faults
+from experiments.run.host_faults import HostFaults
 from experiments.run.runner import SessionRunner
 from experiments.run.stop import StopFlag, handle_signals
+from experiments.run.trial import SessionMetadata, collect_metadata
 from experiments.session.data_files import write_json, write_text
 from experiments.session.journal import Journal
 from experiments.session.lock import session_lock
 from experiments.session.recorded_conditions import write_conditions
 from experiments.session.states import Event
 from experiments.session.store import create_session, session_utc_ns
+from experiments.session.summaries import glance_sessions
 from experiments.session.unbegun import clear_unbegun
+from experiments.session.upcoming import next_steps
+from experiments.session.where import Where
 from experiments.settings.load import Settings
 from experiments.settings.matrix import TerrainRow
-from experiments.status_table.session_summaries import glance_sessions
-from experiments.status_table.upcoming import next_steps
-from experiments.status_table.where import Where
-from experiments.trial.files import SessionMetadata, collect_metadata
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,6 +9,7 @@ from acquisition.clock import NS_PER_S, Clock, SystemClock
 from acquisition.control_loop.faults import GuardVerdict
 
 URGENT_NS = 3 * NS_PER_S  # two requests closer than this: stop now
+INTERRUPTED = 130  # exit code of a stop that was requested outside a session
 
 
 class StopRequestedError(Exception):

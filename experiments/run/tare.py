@@ -13,13 +13,13 @@ from acquisition.devices import WrenchSample
 from acquisition.errors import PreflightError, TractionError
 from acquisition.ipc.shared_sensor import unpack_wrenches
 from analysis.data.plausibility import zero_doubts
-from experiments.fault_injection.plan import FaultTrigger
 from experiments.messages import CATALOGUE, preflight_error, weight_words
 from experiments.operator.console import GOOD, WARNING
 from experiments.operator.prompts import Prompt
 from experiments.rig.rig import Rig
 from experiments.run.console_loop import TICK
 from experiments.run.context import RunContext, RunServices
+from experiments.run.fault_plan import FaultTrigger
 from experiments.run.pose_walk import PoseWalk
 from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.session.sidecar import TrialName

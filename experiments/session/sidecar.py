@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from acquisition.trial_file.verify import VerifiedFile
 
+TIME_LIMIT = 30.0  # s, a trial is over then
 COMPLETE = frozenset({"travel", "key", "time-limit"})
 
 

@@ -8,9 +8,9 @@ them, e.g. pose, release.
 from collections.abc import Callable
 
 from acquisition.clock import Clock
+from experiments.operator.hand_orders import parse_hand_order
 from experiments.rig.fake import RigTruth, SimulatedRig
 from experiments.settings.load import Settings
-from experiments.tools.hand_orders import parse_hand_order
 from fakes.pucks.wire import WiredNetwork
 from fakes.world.plain_world import simulated_rig
 from fakes.world_clock import TICK_NS, WorldClock

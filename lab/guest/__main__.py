@@ -31,7 +31,7 @@ _WARM = (
     "experiments.commands.run",
     "experiments.rig.processes",
     "experiments.run.session",
-    "experiments.trial.quality",
+    "experiments.run.quality",
     "analysis.data",
     "scipy.signal",  # no session uses it, but without it first replies come late here
     "fakes.serving.puck_server",

@@ -15,7 +15,7 @@ import sys
 from pathlib import Path
 
 from acquisition.clock import NS_PER_S, SystemClock
-from experiments.tools.pendant import Lines
+from experiments.operator.pendant import Lines
 from lab.calls import (
     DONE,
     MEMORY_SIZE,

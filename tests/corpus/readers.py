@@ -14,23 +14,23 @@ from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.recover import recover_file
 from analysis.data.tables import load_tables
 from analysis.terrains import database as terrain_db
+from experiments.calibration.pose_file import read_poses
 from experiments.export.checksums import SUMS, changed_files
 from experiments.export.rebuilding import compare_tables
+from experiments.operator.pendant import read_script
 from experiments.operator.scripted import ScriptedOperator
 from experiments.rig.law_calibrations import build_compensation
-from experiments.run.surroundings import read_poses
 from experiments.session.crash_recovery import recover_session
 from experiments.session.data_files import journal_line
 from experiments.session.journal import open_journal
 from experiments.session.lock import session_lock
+from experiments.session.status_table import count_rows, see_sessions
 from experiments.session.store import list_sessions
+from experiments.session.summaries import Checksums
 from experiments.session.unfinished import find_unfinished
+from experiments.session.where import Where
 from experiments.settings.load import load_settings
 from experiments.settings.rig import FrictionSettings
-from experiments.status_table.session_summaries import Checksums
-from experiments.status_table.table import count_rows, see_sessions
-from experiments.status_table.where import Where
-from experiments.tools.pendant import read_script
 from ft_sensor.calibration.files import payload_from_toml, terrain_from_toml
 from ft_sensor.calibration.sensor_file import sensor_from_toml
 from ft_sensor.reading import StreamTiming

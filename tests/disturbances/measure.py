@@ -20,7 +20,7 @@ from analysis.study.models import FitOptions
 from analysis.study.study import StudyOptions, run_study
 from experiments.operator.console import GOOD
 from experiments.report.external_tables import require_samples
-from experiments.trial.quality import review_trial
+from experiments.run.quality import review_trial
 from ft_sensor.calibration.files import payload_to_toml, terrain_to_toml
 from tests.disturbances.rewriting import rewrite
 from tests.disturbances.rows import Outcome, Recording, RecordingRow, TableRow

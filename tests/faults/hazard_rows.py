@@ -271,7 +271,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             (
                 _MATRIX,
                 "tests/ft_sensor/vendors/test_sensor_contract.py::test_one_number_that_stands_still_is_invalid_until_it_moves",
-                "tests/experiments/trial/test_quality.py::test_a_frozen_channel_is_named_and_nothing_of_the_sensor_is_ticked",
+                "tests/experiments/run/test_quality.py::test_a_frozen_channel_is_named_and_nothing_of_the_sensor_is_ticked",
             ),
         ),
         "drifting": (
@@ -894,8 +894,8 @@ ROWS: dict[str, dict[str, Fields]] = {
             (),
             "before the first torque; 1 N between the poses, 20 degrees about z",
             (
-                "tests/experiments/calibrating/test_sensor.py::test_a_sensor_that_was_turned_since_its_calibration_is_refused",
-                "tests/experiments/calibrating/test_sensor.py::test_a_foot_calibrated_with_another_foot_is_refused",
+                "tests/experiments/calibration/test_sensor.py::test_a_sensor_that_was_turned_since_its_calibration_is_refused",
+                "tests/experiments/calibration/test_sensor.py::test_a_foot_calibrated_with_another_foot_is_refused",
             ),
         ),
         "late": (

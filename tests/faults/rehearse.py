@@ -15,7 +15,7 @@ from acquisition.control_loop.guard import GuardLimits
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import SafetyMode
 from acquisition.trial_file.verify import verify_file
-from experiments.calibrating import gravity
+from experiments.calibration import gravity
 from experiments.operator.auto_operator import AutoOperator
 from experiments.operator.prompts import Prompt
 from experiments.run import pose_walk

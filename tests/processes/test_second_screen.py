@@ -13,8 +13,8 @@ from acquisition.schema import CYCLE
 from experiments.session.lock import session_lock
 from experiments.session.store import create_session
 from tests.acquisition.ros import decode
-from tests.experiments.live.test_watching import written
-from tests.experiments.live.viewer import Viewer
+from tests.experiments.commands.live.test_watching import written
+from tests.experiments.commands.live.viewer import Viewer
 from tests.processes.watching import CLOCK, START, running_trial, until
 
 pytest.importorskip("foxglove")

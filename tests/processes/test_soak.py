@@ -10,10 +10,10 @@ from contextlib import closing
 import can
 import pytest
 
+from experiments.preflight.loop_benchmark import run_bench
 from experiments.preflight.preflight import start_devices
 from experiments.rig.rig import FakeOptions, build_rig
 from experiments.settings.load import load_settings
-from experiments.tools.bench import run_bench
 from fakes.bus.client import SocketBus
 from tests.processes.watching import ROOT, START, children_of
 

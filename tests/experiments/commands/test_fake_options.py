@@ -2,7 +2,8 @@
 
 import pytest
 
-from experiments.commands.calibrate import _MADE_ANEW, _WORK
+from experiments.calibration.kinds import CALIBRATIONS
+from experiments.commands.calibrate import KINDS
 from fakes.serving import home_arm
 from tests.experiments.program import traction
 
@@ -185,6 +186,5 @@ def test_a_script_that_orders_nonsense_starts_nothing(tmp_path):
     assert not (tmp_path / "bus").exists()
 
 
-def test_every_calibration_asks_a_real_arm_for_its_commissioning():
-    # without an entry none would be asked for, and all of them let the arm float
-    assert set(_MADE_ANEW) == set(_WORK)
+def test_every_calibration_of_the_command_line_is_there():
+    assert set(CALIBRATIONS) == set(KINDS)

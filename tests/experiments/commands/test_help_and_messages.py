@@ -17,8 +17,6 @@ from acquisition.control_loop.proof import ProofGoal, ProofKind
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import SafetyMode
 from acquisition.ipc.child import ProcessLostError
-from experiments.fault_injection.host_faults import COMPUTER_FAULTS
-from experiments.fault_injection.plan import FaultPlan
 from experiments.messages import CATALOGUE
 from experiments.operator.auto_operator import AutoOperator
 from experiments.operator.prompts import Prompt
@@ -28,6 +26,8 @@ from experiments.rig.backend import InProcessBackend
 from experiments.rig.build import build_tool
 from experiments.run import ready, runner
 from experiments.run import tare as taring
+from experiments.run.fault_plan import FaultPlan
+from experiments.run.host_faults import COMPUTER_FAULTS
 from experiments.session.data_files import journal_line, parse_line
 from experiments.session.lock import session_lock
 from experiments.session.reducer import replay

@@ -10,8 +10,8 @@ import pytest
 from acquisition.trial_file.reader import TrialReader
 from experiments.export.checksums import ChangedFile, write_sums
 from experiments.export.crate import METADATA
+from experiments.preflight.loop_benchmark import BenchReport
 from experiments.session.kept_files import Deviation
-from experiments.tools.bench import BenchReport
 from tests.acquisition.trials import make_cycles, write_trial
 from tests.experiments.program import traction
 

@@ -12,9 +12,11 @@ from acquisition.errors import SessionError
 from acquisition.trial_file.reader import TrialReader
 from analysis.validation.bands import Band, BandResult
 from experiments.arguments import FRICTION
+from experiments.rehearsal import recording
+from experiments.rehearsal.judging import gated
+from experiments.rehearsal.plan import AcceptancePlan
 from experiments.session.store import list_sessions
 from experiments.settings.load import load_settings
-from experiments.tools import acceptance as simulation
 from tests.experiments.program import traction, write_config
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
@@ -70,8 +72,8 @@ def rehearsed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("rehearsed")
     config = two_terrains(folder)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(simulation, "_record", in_this_process)
-        patch.setattr(simulation, "_pool", lambda _: InThisThread())
+        patch.setattr(recording, "_record", in_this_process)
+        patch.setattr(recording, "_pool", lambda _: InThisThread())
         done = traction(
             *("rehearse", "--trials", 1, "--seed", 3, "--jobs", 1),
             *("--config", config, "--data", folder),
@@ -115,8 +117,8 @@ def test_what_every_session_said_is_kept(rehearsed):
 def test_the_joints_of_another_arm_are_told_and_not_gated(tmp_path):
     config = two_terrains(tmp_path)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(simulation, "_record", in_this_process)
-        patch.setattr(simulation, "_pool", lambda _: InThisThread())
+        patch.setattr(recording, "_record", in_this_process)
+        patch.setattr(recording, "_pool", lambda _: InThisThread())
         done = traction(
             *("rehearse", "--trials", 1, "--friction", 1, "--jobs", 1),
             *("--config", config, "--data", tmp_path),
@@ -125,12 +127,12 @@ def test_the_joints_of_another_arm_are_told_and_not_gated(tmp_path):
     assert "not gated at friction 1" in done.out
 
 
-PLAN = simulation.AcceptancePlan(None, ("TF",), ("TF",), 0.4, 1, 3, FRICTION, 1)
+PLAN = AcceptancePlan(None, ("TF",), ("TF",), 0.4, 1, 3, FRICTION, 1)
 
 
 def test_an_arm_that_rubs_is_calibrated_first_and_compensated(tmp_path, monkeypatch):
-    monkeypatch.setattr(simulation, "_record", calibrated_at_once)
-    plan = simulation.calibrate_arm(PLAN, tmp_path)
+    monkeypatch.setattr(recording, "_record", calibrated_at_once)
+    plan = recording.calibrate_arm(PLAN, tmp_path)
     section = load_settings(plan.config).rig.friction
     assert section.model == "calibrated"
     assert (plan.config.parent / section.file).read_text() == "--friction 0.4 --seed 3"
@@ -153,14 +155,14 @@ def calibrated_at_once(arguments, folder):
 )
 def test_no_other_arm_is_calibrated(change, tmp_path):
     plan = dataclasses.replace(PLAN, **change)
-    assert simulation.calibrate_arm(plan, tmp_path) is plan
+    assert recording.calibrate_arm(plan, tmp_path) is plan
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_calibration_that_fails_ends_the_rehearsal(tmp_path, monkeypatch):
-    monkeypatch.setattr(simulation, "_record", lambda arguments, _: len(arguments) > 2)
+    monkeypatch.setattr(recording, "_record", lambda arguments, _: len(arguments) > 2)
     with pytest.raises(SessionError, match="traction calibrate"):
-        simulation.calibrate_arm(PLAN, tmp_path)
+        recording.calibrate_arm(PLAN, tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -175,7 +177,7 @@ def test_bands_on_slips_that_go_back_decide_where_nothing_rubs(change, deciding)
     results = [
         BandResult(Band(name, "what", 0, 1), (2.0,)) for name in ("D4", "D5", "E3")
     ]
-    shown = simulation.gated(dataclasses.replace(PLAN, **change), results)
+    shown = gated(dataclasses.replace(PLAN, **change), results)
     assert {result.band.id for result in shown} == deciding
 
 

@@ -15,8 +15,8 @@ from experiments.operator.feedback import (
     build_feedback,
     find_speech,
 )
+from experiments.run.trial import PaceMonitor
 from experiments.settings.rig import OperatorSection
-from experiments.trial.files import PaceMonitor
 
 
 class Terminal(io.StringIO):

@@ -17,8 +17,9 @@ NAMED = re.compile(r"\[(space|[a-z]|r?[1-9])\](?![\w.]*\()")
 CODE = Path(experiments.__file__).parent
 # Where texts of a module appear; several for a screen with a key for each.
 SHOWN_AT = {
-    "calibrating/place.py": {Prompt.TOUCH},
-    "calibrating/terrain.py": {Prompt.TOUCH},
+    "calibration/place.py": {Prompt.TOUCH},
+    "calibration/terrain.py": {Prompt.TOUCH},
+    "calibration/touching.py": {Prompt.TOUCH},
     "commands/commission.py": {Prompt.CONFIRM},
     "operator/keys.py": set(KEYS),
     "operator/screens.py": {Prompt.READY},

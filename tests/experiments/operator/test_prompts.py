@@ -4,7 +4,6 @@ import sys
 import pytest
 
 from acquisition.errors import SettingsError
-from experiments.fault_injection.plan import FaultPlan, parse_fault
 from experiments.operator.auto_operator import (
     AUTO_ATTEMPTS,
     AUTO_PATIENCE,
@@ -14,6 +13,7 @@ from experiments.operator.prompts import Prompt, PromptState
 from experiments.operator.scripted import choose_operator
 from experiments.operator.terminal import TerminalInput
 from experiments.rig.simulation import SimulatedHand
+from experiments.run.fault_plan import FaultPlan, parse_fault
 
 KNOWN = ("ft-stale", "ft-silent", "estop")
 

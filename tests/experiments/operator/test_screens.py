@@ -7,6 +7,7 @@ from hypothesis.extra.numpy import arrays
 from experiments.operator.graphs import (
     BarScale,
     KeptRow,
+    LiveScales,
     WayTrace,
     fitted,
     kept_table,
@@ -35,6 +36,7 @@ def recording(**changed):
         "is_arm_fine": True,
         "is_sensor_fine": True,
         "traction": np.array([[0.0, 1.0, 4.0], [0.018, 9.8, 4.2]]),
+        "scales": LiveScales((0.005, 0.2)),
     }
     return RecordingView(**(values | changed))
 

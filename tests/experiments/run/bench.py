@@ -14,10 +14,10 @@ from experiments.rig.pace import WallPace
 from experiments.run.console_loop import ConsoleLoop
 from experiments.run.context import RunContext
 from experiments.run.stop import StopFlag
+from experiments.run.trial import SessionMetadata
 from experiments.session.journal import Journal
 from experiments.session.states import Event
 from experiments.session.store import create_session
-from experiments.trial.files import SessionMetadata
 from fakes.clock import SteppedClock
 
 

@@ -10,8 +10,8 @@ from analysis.data.load import load_trial
 from analysis.data.quality import CoverageGrid, thinnest
 from experiments.operator.prompts import Prompt, PromptState
 from experiments.operator.scripted import ScriptedOperator
+from experiments.run.quality import cells_of
 from experiments.session.reducer import replay
-from experiments.trial.quality import cells_of
 from tests.experiments.program import (
     journal,
     only_session,

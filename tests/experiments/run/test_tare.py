@@ -13,10 +13,10 @@ from acquisition.errors import PreflightError
 from acquisition.ipc.ring_buffer import RingBuffer
 from acquisition.ipc.shared_sensor import WRENCH_DTYPE, pack_wrench
 from acquisition.sample import Sample
-from experiments.fault_injection.plan import FaultTrigger
 from experiments.operator.console import GOOD
 from experiments.operator.prompts import Prompt
 from experiments.rig.build import build_tool
+from experiments.run.fault_plan import FaultTrigger
 from experiments.run.stop import StopRequestedError
 from experiments.run.tare import (
     known_bias,

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from acquisition.errors import SessionError, SettingsError, TrialFileError
 from experiments.operator.console import Console
+from experiments.run.trial import EndDetector
 from experiments.session import store
 from experiments.session.data_files import (
     move_file,
@@ -22,7 +23,6 @@ from experiments.session.store import (
     iso_utc,
     list_sessions,
 )
-from experiments.trial.files import EndDetector
 
 DAY_NS = 1_800_000_000_000_000_000  # 2027-01-15T08:00:00Z
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.tools.pendant import parse_order
+from experiments.operator.pendant import parse_order
 from fakes.plant.model import PlantOptions
 from fakes.world.departure import Departure, draw_sound
 from fakes.world.true_rig import true_options

@@ -1,0 +1,22 @@
+"""A table of what was fitted for each joint."""
+
+from collections.abc import Sequence
+
+from experiments.operator.console import Console
+from wam.model.constants import Array
+
+
+def show_joints(
+    console: Console, quantity: str, rows: Sequence[tuple[str, Array]]
+) -> None:
+    """Print a row for each measure, a column for each joint.
+
+    Args:
+        console: where it is printed.
+        quantity: what the numbers are, with their unit.
+        rows: name of the measure, and its values of joints 1 to 7, shape (7,).
+    """
+    header = [quantity, *(f"joint {joint}" for joint in range(1, 8))]
+    console.table(
+        header, [[name, *(f"{value:.3f}" for value in row)] for name, row in rows]
+    )

@@ -1,0 +1,72 @@
+"""Options of a command that guides a person at an arm; imports nothing slow."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from experiments.arguments import (
+    add_simulated_arm,
+    add_time,
+    asked_time,
+    friction_share,
+)
+from experiments.rig.truth_options import add_truth, check_truth, mount_of
+
+if TYPE_CHECKING:
+    import argparse
+
+    from experiments.rig.rig import FakeOptions
+
+
+def add_arm(parser: argparse.ArgumentParser) -> None:
+    """Declare which arm is guided, and by whom."""
+    parser.add_argument("--fake", action="store_true", help="simulated devices")
+    add_time(parser)
+    add_simulated_arm(parser)
+    add_truth(parser)
+    parser.add_argument(
+        "--operator-script", metavar="auto", help="simulated operator, only with --fake"
+    )
+
+
+def check_arm(args: argparse.Namespace) -> None:
+    """Refuse options of a simulated arm on a real one.
+
+    Raises:
+        SettingsError: one of them was given.
+    """
+    from acquisition.errors import SettingsError
+
+    if not args.fake and (asked_time(args) or args.operator_script):
+        raise SettingsError(
+            "--fast, --processes and --operator-script work only with --fake.",
+            hint="Nothing was started.",
+        )
+    check_truth(args)
+
+
+def fake_options(
+    args: argparse.Namespace, *, spread: bool = False
+) -> FakeOptions | None:
+    """Return how the simulation runs; None = the rig is real.
+
+    Args:
+        args: as `add_arm` declares them.
+        spread: the rig is one of many sound ones, drawn by the seed.
+
+    Raises:
+        SettingsError: joints rub in a way that is not simulated.
+    """
+    from experiments.rig.rig import FakeOptions
+
+    if not args.fake:
+        return None
+    return FakeOptions(
+        asked_time(args) or "paced",
+        args.seed,
+        friction_share(args),
+        cables=args.cables,
+        spread=spread,
+        mount=mount_of(args),
+        wrong=args.wrong,
+    )

@@ -1,0 +1,235 @@
+"""traction calibrate sensor, foot: turn the foot to all sides, fit what it weighs.
+
+Of the sensor the mounting is fitted too; another foot hangs on a sensor whose mounting
+is known.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from acquisition.errors import PreflightError
+from acquisition.ipc.layout import WRENCH_SLOTS
+from acquisition.sample import Record
+from experiments.calibration.calibration import CalibrationContext, GuidedCalibration
+from experiments.calibration.moving import arrivals
+from experiments.rig.rig import Rig
+from experiments.run.pose_walk import PoseWalk
+from experiments.session.store import iso_utc
+from ft_sensor.calibration.fit import SensorFit, check_residual, fit_sensor, turn_words
+from ft_sensor.calibration.sensor_file import SensorCalibration, sensor_to_toml
+from wam.calibration.free_space import FreeSpace
+from wam.calibration.poses import MeasurementPose, choose_orientations, plan_halts
+from wam.model.constants import Array
+from wam.model.tool import Tool
+
+AVERAGE = 2.0  # s of readings that are averaged in each orientation
+_FEWEST = 100  # readings in an average
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredOrientations:
+    """The foot turned to n sides; the last is the first again.
+
+    Attributes:
+        rotations: of frame 7 in the base frame, shape (n, 3, 3).
+        readings: mean raw readings there [N, N m], shape (n, 6).
+    """
+
+    rotations: Array
+    readings: Array
+
+    @property
+    def drift(self) -> float:
+        """How far the forces of the first have changed at the end [N]."""
+        forces = self.readings[:, :3]
+        return float(np.linalg.norm(forces[-1] - forces[0]))
+
+    def fit(self, mounting: tuple[float, float] | None = None) -> SensorFit:
+        """Fit what the sensor carries, and its mounting where it is not known."""
+        return fit_sensor(self.rotations[:-1], self.readings[:-1], mounting)
+
+
+@dataclass(frozen=True, slots=True)
+class WeighedFoot:
+    """What the orientations say.
+
+    Attributes:
+        measured: the orientations.
+        fit: foot and mounting.
+        free: with the mounting fitted too, where that of `fit` was known.
+    """
+
+    measured: MeasuredOrientations
+    fit: SensorFit
+    free: SensorFit | None = None
+
+
+def collect(context: CalibrationContext) -> MeasuredOrientations:
+    """Have the foot turned to all sides; return what the sensor reads there.
+
+    The first orientation is measured again at the end: what has changed is drift.
+
+    Raises:
+        SettingsError: no safe way.
+        PreflightError: not activated, touched meanwhile, or too few readings.
+        StopRequestedError, ArmFaultError: as `ConsoleLoop.tick`.
+    """
+    rig, model = context.rig, context.rig.model
+
+    def plan(start: Array, space: FreeSpace) -> list[MeasurementPose]:
+        count = context.pose_count
+        chosen = list(context.poses) or choose_orientations(model, count, space)
+        chosen.append(chosen[0])
+        return plan_halts(model, start, chosen, space, is_two_sided=False)
+
+    walk = PoseWalk(context.console_loop)
+    rotations: list[Array] = []
+    readings: list[Array] = []
+    for arrival in arrivals(walk, plan, AVERAGE):
+        if arrival.halt.pose is None:
+            continue
+        q, _ = walk.rest(AVERAGE)
+        rotations.append(model.plate_pose(q)[1])
+        readings.append(_mean_reading(rig))
+        context.console.say(f"orientation {len(readings)} measured")
+    return MeasuredOrientations(np.array(rotations), np.array(readings))
+
+
+def _mean_reading(rig: Rig) -> Array:
+    """Return the mean of the last two seconds [N, N m], shape (6,).
+
+    Raises:
+        PreflightError: too few readings, or one that is not valid.
+    """
+    records: Record = rig.shared.wrenches.last(WRENCH_SLOTS)
+    since = rig.clock.now_ns() - int(AVERAGE * 1e9)
+    records = records[records["t_ns"].astype(np.int64) >= since]
+    bad = int(np.count_nonzero(~records["is_valid"] | records["saturated"]))
+    if len(records) < _FEWEST or bad:
+        raise PreflightError(
+            f"{len(records)} readings in {AVERAGE:g} s (at least {_FEWEST}), "
+            f"{bad} of them flagged.",
+            hint="Check the sensor's cable and load, then start again.",
+        )
+    return records["wrench"].mean(axis=0)
+
+
+def _tool(context: CalibrationContext) -> Tool:
+    tool = context.rig.model.tool
+    assert tool is not None
+    return tool
+
+
+def fit(context: CalibrationContext, measured: MeasuredOrientations) -> WeighedFoot:
+    """Fit foot and mounting.
+
+    Raises:
+        SettingsError: orientations too few or too much alike, or readings that do not
+            change.
+    """
+    del context
+    return WeighedFoot(measured, measured.fit())
+
+
+def fit_foot(
+    context: CalibrationContext, measured: MeasuredOrientations
+) -> WeighedFoot:
+    """Fit a foot on a sensor that is mounted as rig.toml says; raises as `fit`."""
+    tool = _tool(context)
+    mounted = measured.fit((tool.sensor_angle, tool.sensor_sign))
+    return WeighedFoot(measured, mounted, measured.fit())
+
+
+def show_foot(context: CalibrationContext, weighed: WeighedFoot) -> None:
+    """Print what hangs on the sensor, its mounting, and what they leave."""
+    fitted, say = weighed.fit, context.console.say
+    com = ", ".join(f"{1e3 * value:.1f}" for value in fitted.com)
+    bias = ", ".join(f"{value:.2f}" for value in fitted.bias[:3])
+    say(f"mass {fitted.mass:.3f} kg, centre {com} mm in the sensor frame")
+    say(
+        f"mounted at {np.degrees(fitted.angle):.1f} degrees about z7, sign "
+        f"{fitted.sign:+z.0f}, bias {bias} N"
+    )
+    say(
+        f"residual {fitted.residual:.3f} N, {fitted.torque_residual:.4f} N m rms; the "
+        f"first orientation had changed by {weighed.measured.drift:.2f} N at the end"
+    )
+
+
+def show(context: CalibrationContext, weighed: WeighedFoot) -> None:
+    """Print the same, and where the sensor is not mounted as rig.toml has it."""
+    show_foot(context, weighed)
+    tool, fitted = _tool(context), weighed.fit
+    if fitted.sign != tool.sensor_sign:
+        context.console.say(
+            f"▲ rig.toml says sign {tool.sensor_sign:+z.0f}: the sensor has the "
+            "other one. Its calibration goes before rig.toml."
+        )
+    elif turned := turn_words(tool.sensor_angle, fitted.angle):
+        context.console.say(
+            f"▲ {turned} from angle_deg of rig.toml. Its calibration goes before "
+            "rig.toml."
+        )
+
+
+def check(context: CalibrationContext, weighed: WeighedFoot) -> None:
+    """Refuse a fit that leaves too much of the forces.
+
+    Raises:
+        SettingsError: it does, and it is not forced.
+    """
+    check_residual(weighed.fit, is_forced=context.is_forced, free=weighed.free)
+
+
+def text(context: CalibrationContext, weighed: WeighedFoot) -> str:
+    """Return the calibration of the sensor, or of a foot, as TOML."""
+    rig, measured = context.rig, weighed.measured
+    return sensor_to_toml(
+        SensorCalibration(
+            fit=weighed.fit,
+            foot=rig.row.foot,
+            drift=measured.drift,
+            measured_utc=iso_utc(rig.clock.utc_ns()),
+            is_simulated=rig.is_simulated,
+            rotations=measured.rotations,
+            readings=measured.readings,
+            is_forced=context.is_forced,
+        )
+    )
+
+
+SENSOR = GuidedCalibration(
+    "sensor",
+    collect,
+    fit,
+    show,
+    text,
+    use=lambda _, name: f'calibration = "{name}" in [ft_sensor] of rig.toml',
+    path=lambda settings, _: settings.folder / "ft_sensor.toml",
+    made_anew=("[ft_sensor]", "[feet]"),
+    check=check,
+    bare=lambda settings, row: (
+        settings.without_sensor(row.foot, is_mounted=False),
+        row,
+    ),
+    fewest_poses=6,
+)
+FOOT = GuidedCalibration(
+    "foot",
+    collect,
+    fit_foot,
+    show_foot,
+    text,
+    use=lambda context, name: (
+        f'calibration = "{name}" in [feet.{context.rig.row.foot}] of rig.toml'
+    ),
+    path=lambda settings, row: settings.folder / f"foot_{row.foot}.toml",
+    made_anew=("[feet]",),
+    check=check,
+    bare=lambda settings, row: (
+        settings.without_sensor(row.foot, is_mounted=True),
+        row,
+    ),
+    fewest_poses=6,
+)

@@ -1,0 +1,135 @@
+"""Which faults a rehearsal injects, and when."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+
+from acquisition.errors import SettingsError
+from acquisition.simulation import SimulationControl
+from experiments.arguments import did_you_mean
+from experiments.run.host_faults import COMPUTER_FAULTS, HostFaults
+
+_PATTERN = re.compile(
+    r"^(?P<name>[a-z0-9-]+)(@T(?P<trial>\d+)\+(?P<seconds>\d+(\.\d+)?)s?)?$"
+)
+# What the preflight is there to find.
+AT_PREFLIGHT = frozenset(
+    {"can-down", "ft-silent", "locked", "not-zeroed"}
+    | {"puck-missing", "puck-hot", "puck-error"}
+)
+
+
+class FaultTrigger(Enum):
+    """What a fault comes into, and from which its seconds are counted."""
+
+    TARE = "tare"
+    RECORDING = "recording"
+
+
+_AT_TARE = frozenset({"tare-moved", "residual"})
+_USUALLY_AFTER = {FaultTrigger.TARE: 0.0, FaultTrigger.RECORDING: 2.0}  # s
+
+
+@dataclass(frozen=True, slots=True)
+class FaultPlan:
+    """A fault and its moment.
+
+    Attributes:
+        name: as in the message catalogue.
+        trial: number of the trial it comes in; 0 = before the preflight.
+        seconds: after the start of the recording, or of the tare before it.
+    """
+
+    name: str
+    trial: int
+    seconds: float
+
+    @property
+    def moment(self) -> FaultTrigger:
+        """What it comes into."""
+        return FaultTrigger.TARE if self.name in _AT_TARE else FaultTrigger.RECORDING
+
+    def to_text(self) -> str:
+        """Return it as it is written on the command line."""
+        return f"{self.name}@T{self.trial}+{self.seconds:g}s"
+
+
+@dataclass(slots=True)
+class PlannedFaults:
+    """The faults of a rehearsal, injected one by one when they are due.
+
+    Attributes:
+        plans: those that have not come yet.
+        devices: what fails in the simulated rig.
+        host_faults: what fails in the computer.
+        are_any: whether any was asked for, come or not.
+    """
+
+    plans: list[FaultPlan]
+    devices: SimulationControl
+    host_faults: HostFaults
+    are_any: bool = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.are_any = bool(self.plans)
+
+    def inject_due(self, moment: FaultTrigger, trial: int, seconds: float) -> None:
+        """Inject what is due `seconds` after the beginning of a moment in `trial`."""
+        for plan in [p for p in self.plans if (p.trial, p.moment) == (trial, moment)]:
+            if seconds >= plan.seconds:
+                self.plans.remove(plan)
+                self._inject(plan)
+
+    def inject_first(self) -> None:
+        """Inject those that come before the preflight."""
+        for plan in [plan for plan in self.plans if plan.trial == 0]:
+            self.plans.remove(plan)
+            self._inject(plan)
+
+    def _inject(self, plan: FaultPlan) -> None:
+        if plan.name in COMPUTER_FAULTS:
+            self.host_faults.inject(plan.name, plan.trial)
+        else:
+            self.devices.inject(plan.name)
+
+
+def parse_fault(text: str, known: Sequence[str]) -> FaultPlan:
+    """Return the plan of `NAME[@Tn+SECONDSs]`.
+
+    Raises:
+        SettingsError: the text is not of that form, or the name is unknown.
+    """
+    match = _PATTERN.match(text)
+    if match is None or match["name"] not in known:
+        asked = did_you_mean(text.partition("@")[0], known)
+        raise SettingsError(
+            f"--fault {text!r} is not a fault that can be raised. {asked}".rstrip(),
+            hint="Use NAME or NAME@T2+3.5s with NAME one of: "
+            f"{', '.join(sorted(known))}. Nothing was started.",
+        )
+    name = match["name"]
+    if match["trial"]:
+        return FaultPlan(name, int(match["trial"]), float(match["seconds"]))
+    if name in AT_PREFLIGHT:
+        return FaultPlan(name, 0, 0.0)
+    plan = FaultPlan(name, 1, 0.0)
+    return FaultPlan(name, 1, _USUALLY_AFTER[plan.moment])
+
+
+def plan_faults(
+    texts: Sequence[str], simulation: SimulationControl | None, host_faults: HostFaults
+) -> PlannedFaults | None:
+    """Return the faults of a rehearsal; those of the preflight are injected at once.
+
+    Raises:
+        SettingsError: as `parse_fault`.
+    """
+    if simulation is None:
+        return None
+    known = (*simulation.fault_names, *COMPUTER_FAULTS)
+    faults = PlannedFaults(
+        [parse_fault(t, known) for t in texts], simulation, host_faults
+    )
+    faults.inject_first()
+    return faults

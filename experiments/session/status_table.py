@@ -1,0 +1,186 @@
+"""The status table: kept trials per terrain, counted from verified files only."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING
+
+from experiments.session.store import list_sessions
+from experiments.session.summaries import (
+    SeenSession,
+    facts_of,
+    glance,
+    recorded_facts,
+    summarise,
+)
+from experiments.session.where import Where
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from analysis.data.terrain_kinds import Value
+    from experiments.session.kept_files import Deviation
+    from experiments.settings.matrix import MatrixSettings, TerrainRow
+
+EVERYTHING = Where()
+
+
+def see_sessions(
+    data: Path, where: Where, digest: Callable[[Path], str]
+) -> list[SeenSession]:
+    """Return all sessions below `data`, oldest number first.
+
+    Args:
+        data: the data folder.
+        where: checksums are computed only of sessions with these values.
+        digest: computes the checksum of a file.
+    """
+    seen: list[SeenSession] = []
+    for folder in list_sessions(data):
+        is_asked = where.matches(facts_of(folder))
+        summary = summarise(folder, digest) if is_asked else glance(folder)
+        seen.append(SeenSession(folder, summary))
+    return _counted_once(seen)
+
+
+def _counted_once(seen: list[SeenSession]) -> list[SeenSession]:
+    """Return the sessions without those trials of a copy that its original has.
+
+    A session that has the number of another one does not count.
+    """
+    from experiments.session.kept_files import (
+        repeated_numbers,
+        repeated_trials,
+        stated_id,
+    )
+
+    again_numbered = repeated_numbers([session.folder for session in seen])
+    folders = {session.folder.id: session.folder for session in seen}
+    result: list[SeenSession] = []
+    for folder, summary in ((s.folder, s.summary) for s in seen):
+        # what was copied is not sound: it states another id
+        is_asked = summary.problem is None and not summary.is_sound
+        original = folders.get(stated_id(folder)) if is_asked else None
+        again = set[str]() if original is None else repeated_trials(folder, original)
+        kept = tuple(name for name in summary.kept if name not in again)
+        problem = summary.problem or again_numbered.get(folder.path)
+        counted = replace(summary, kept=kept, problem=problem)
+        result.append(SeenSession(folder, counted))
+    return result
+
+
+@dataclass(frozen=True, slots=True)
+class MatrixRow:
+    """One terrain, live or simulated: what is kept of what is wanted.
+
+    Attributes:
+        terrain: its name.
+        is_simulated: trials of simulated devices.
+        kept: how many verified trials are kept.
+        wanted: how many there are to be.
+        rejected: how many attempts were rejected or interrupted.
+        sessions: ids of the sessions.
+        trials: in how many sessions T01, T02 ... are kept, in this order.
+    """
+
+    terrain: str
+    is_simulated: bool
+    kept: int
+    wanted: int
+    rejected: int
+    sessions: tuple[str, ...]
+    trials: tuple[int, ...]
+
+    def as_dict(self) -> dict[str, object]:
+        """Return the line for JSON."""
+        return asdict(self)
+
+    def cells(self) -> str:
+        """Return one sign per trial: kept, kept in several sessions, missing."""
+        signs = {0: "·", 1: "█"}
+        return "".join(signs.get(n, str(min(n, 9))) for n in self.trials)
+
+
+def count_rows(
+    seen: Sequence[SeenSession],
+    matrix: MatrixSettings,
+    where: Where = EVERYTHING,
+) -> list[MatrixRow]:
+    """Return a line per terrain of the matrix, live first, simulated where there is.
+
+    Args:
+        seen: the sessions.
+        matrix: the terrains, and how often each is recorded.
+        where: only terrains and sessions of which these hold.
+    """
+    sessions = counted_of(seen, where)
+    lines: list[MatrixRow] = []
+    blocks = 1 + matrix.design.repeat_blocks
+    for row in matrix.terrains:
+        if not where.matches(facts_of_row(row)):
+            continue
+        for is_simulated in (False, True):
+            own = [s for s in sessions if is_of(s, row, is_simulated=is_simulated)]
+            is_wanted = not is_simulated and where.matches({"kind": "live"})
+            if own or (is_wanted and not {"session", "operator"} & where.keys):
+                wanted = row.trials * blocks
+                lines.append(_line(row, own, wanted, is_simulated=is_simulated))
+    return lines
+
+
+def counted_of(seen: Sequence[SeenSession], where: Where) -> list[SeenSession]:
+    """Return the sessions with these values that can be read."""
+    return [
+        s
+        for s in seen
+        if s.summary.problem is None
+        if where.matches(s.facts) and where.matches(recorded_facts(s.folder, where))
+    ]
+
+
+def is_of(session: SeenSession, row: TerrainRow, *, is_simulated: bool) -> bool:
+    """Return whether a session is of this terrain, and live or simulated as asked."""
+    folder = session.folder
+    return folder.terrain == row.name and folder.is_simulated is is_simulated
+
+
+def find_deviations(seen: Sequence[SeenSession], where: Where) -> list[Deviation]:
+    """Return what is missing or changed of the kept trials in the table.
+
+    Args:
+        seen: the sessions.
+        where: only sessions with these values, as in `count_rows`; what cannot be
+            read is named of every session.
+    """
+    asked = [s for s in seen if s.summary.problem or where.matches(s.facts)]
+    found = [d for s in asked for d in s.summary.deviations]
+    found += [s.summary.problem for s in seen if s.summary.problem is not None]
+    return list(dict.fromkeys(found))
+
+
+def facts_of_row(row: TerrainRow) -> dict[str, Value]:
+    """Return what conditions can ask of a row of the matrix."""
+    fixed = {"terrain": row.name, "stones": row.stones, "incline_deg": row.incline_deg}
+    more = {"foot": row.foot, "push_deg": float(row.push_deg), "place": row.place}
+    return {**row.factors, **fixed, **more}
+
+
+def _line(
+    row: TerrainRow,
+    sessions: Sequence[SeenSession],
+    wanted: int,
+    *,
+    is_simulated: bool,
+) -> MatrixRow:
+    kept = [name for s in sessions for name in s.summary.kept]
+    names = [f"T{number:02d}" for number in range(1, row.trials + 1)]
+    return MatrixRow(
+        terrain=row.name,
+        is_simulated=is_simulated,
+        kept=len(kept),
+        wanted=wanted,
+        rejected=sum(s.summary.rejected for s in sessions),
+        sessions=tuple(s.folder.id for s in sessions),
+        trials=tuple(kept.count(name) for name in names),
+    )

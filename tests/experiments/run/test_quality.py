@@ -1,0 +1,188 @@
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from acquisition.sample import Flag
+from acquisition.trial_file.reader import TrialReader
+from analysis.data.lag import ForceLag
+from analysis.data.plausibility import Doubt
+from experiments.operator.console import BAD, GOOD, WARNING
+from experiments.run.quality import review_trial, thin_so_far
+from experiments.session.store import SessionFolder
+from tests.disturbances.rewriting import rewrite
+
+
+@pytest.fixture
+def cycles(first_trial):
+    return TrialReader(first_trial).cycles().data.copy()
+
+
+def test_a_good_trial_is_reviewed_with_its_numbers(first_trial):
+    review = review_trial(first_trial)
+    assert review.worst_gap == pytest.approx(0.002, abs=1e-6)
+    assert review.missed == 0
+    assert review.joint7 < 0.020
+    assert review.ratio == pytest.approx(0.8, abs=0.25)  # rubber on a plate
+    assert [mark for mark, _ in review.lines()][:5] == [GOOD] * 5
+
+
+def test_missing_cycles_are_counted_and_marked(first_trial, cycles, tmp_path):
+    holes = np.delete(cycles, [700, 701, 1200])
+    review = review_trial(rewrite(first_trial, tmp_path / "T.mcap", holes))
+    assert review.missed == 3
+    assert review.worst_gap == pytest.approx(0.006, abs=1e-6)
+    assert review.lines()[0][0] == WARNING
+
+
+def test_a_foot_that_turned_is_marked(first_trial, cycles, tmp_path):
+    cycles["position"][1000:, 6] += 0.03
+    review = review_trial(rewrite(first_trial, tmp_path / "T.mcap", cycles))
+    assert review.joint7 == pytest.approx(0.03, abs=0.005)
+    assert review.lines()[2][0] == WARNING
+
+
+def test_a_trial_of_a_foot_at_rest_can_be_reviewed(first_trial, cycles, tmp_path):
+    """A person may press [space] at once."""
+    path = rewrite(first_trial, tmp_path / "T.mcap", cycles[:300])
+    review = review_trial(path)
+    assert review.kept < 250
+    assert review.lines()[3][0] == WARNING
+
+
+def test_a_trial_in_the_air_has_no_friction(first_trial, cycles, tmp_path):
+    cycles["wrench_raw"][:] = cycles["wrench_raw"][:1]
+    review = review_trial(rewrite(first_trial, tmp_path / "T.mcap", cycles[:1000]))
+    assert np.isnan(review.ratio)
+    assert review.lines()[4] == (WARNING, "quick fit impossible: no load")
+
+
+@pytest.mark.parametrize(
+    ("flag", "is_set", "words"),
+    [
+        (Flag.FT_SATURATED, True, "sensor saturated in 5.0% of the cycles"),
+        (Flag.FT_FRESH, False, "sensor stale in 5.0% of the cycles"),
+    ],
+)
+def test_a_sensor_in_trouble_is_marked(
+    first_trial, cycles, tmp_path, flag, is_set, words
+):
+    few = cycles[:1000]
+    flags = few["flags"][:50]
+    few["flags"][:50] = flags | flag if is_set else flags & ~np.uint32(flag)
+    review = review_trial(rewrite(first_trial, tmp_path / "T.mcap", few))
+    assert review.lines()[1] == (WARNING, words)
+
+
+AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
+
+
+@pytest.mark.parametrize("axis", range(6))
+def test_a_frozen_channel_is_named_and_nothing_of_the_sensor_is_ticked(
+    first_trial, cycles, tmp_path, axis
+):
+    """Whatever the other five show."""
+    raw = cycles["wrench_raw"]
+    raw[len(raw) // 3 :, axis] = raw[len(raw) // 3, axis]
+    review = review_trial(rewrite(first_trial, tmp_path / "T.mcap", cycles))
+    lines = review.lines()
+    assert lines[1][0] == WARNING
+    assert lines[1][1].startswith(f"sensor not vouched for: {AXES[axis]} stands at ")
+    assert lines[4][0] in {WARNING, BAD}
+    assert any(mark == BAD and AXES[axis] in text for mark, text in lines[6:])
+
+
+@pytest.mark.parametrize("ratio", [-3.59, -0.01, 0.0, 5.1, np.inf, -np.inf])
+def test_a_quick_fit_that_cannot_be_is_never_ticked(first_trial, ratio):
+    review = replace(review_trial(first_trial), ratio=ratio)
+    for earlier in ([], [ratio] * 4, [0.7, 0.8, 0.9]):
+        mark, text = review.lines(earlier)[4]
+        assert mark == BAD
+        assert "cannot be" in text
+    assert (review.known_ratio is None) == np.isinf(ratio)
+
+
+def test_quick_fits_that_cannot_be_are_no_measure_for_others(first_trial):
+    review = review_trial(first_trial)
+    odd = [-3.59, np.inf, np.nan]
+    assert "before" not in review.lines([*odd, 0.8, 0.8])[4][1]
+    assert "(3 before: 0.80" in review.lines([*odd, 0.8, 0.8, 0.8])[4][1]
+
+
+def test_a_quick_fit_of_forces_that_are_doubted_is_not_ticked(first_trial):
+    doubt = Doubt("lag", "the force is 500 ms late", "a queue")
+    mark, text = replace(review_trial(first_trial), doubts=(doubt,)).lines()[4]
+    assert mark == WARNING
+    assert text.endswith("not vouched for")
+
+
+def test_less_than_three_trials_before_say_nothing(first_trial):
+    review = review_trial(first_trial)
+    for earlier in ([], [0.1, 0.1]):
+        found, text = review.lines(earlier)[4]
+        assert found == GOOD
+        assert "before" not in text
+
+
+@pytest.mark.parametrize(
+    ("off", "mark"),
+    [(0.0, GOOD), (0.29, GOOD), (0.31, WARNING), (-0.29, GOOD), (-0.31, WARNING)],
+)
+def test_the_quick_fit_is_held_against_the_trials_before(first_trial, off, mark):
+    """Three standard deviations, 0.1 each, are the limit."""
+    review = review_trial(first_trial)
+    middle = review.ratio + off
+    found, text = review.lines([middle - 0.1, middle, middle + 0.1])[4]
+    assert found == mark
+    assert text.endswith(f"(3 before: {middle:.2f} ± 0.10)")
+
+
+def test_a_force_that_comes_late_is_shown_with_its_offset(first_trial):
+    review = replace(review_trial(first_trial), lag=ForceLag(0.0213, 0.8))
+    assert review.lines()[5] == (GOOD, "lag force 21.3 ms late")
+    early = replace(review, lag=ForceLag(-0.004, 0.8))
+    assert "4.0 ms early" in early.lines()[5][1]
+
+
+def test_a_late_force_is_no_tick(first_trial):
+    doubt = Doubt("lag", "the force is 500 ms late", "a queue")
+    late = replace(
+        review_trial(first_trial), lag=ForceLag(0.5, 0.8), doubts=(doubt,)
+    ).lines()
+    assert late[5] == (WARNING, "lag force 500.0 ms late")
+    assert late[6] == (BAD, doubt.text)
+
+
+def test_a_plate_does_not_show_when_the_force_came_which_is_no_tick(first_trial):
+    mark, words = review_trial(first_trial).lines()[5]
+    assert mark == WARNING
+    assert words.startswith("lag of the force not vouched for")
+
+
+# --- what is thin -------------------------------------------------------------------
+
+SPARSE = [[0, 0, 0, 0], [0, 900, 3, 0], [0, 900, 900, 0], [0, 0, 0, 0]]
+FULL = [[0, 900, 900, 0], [0, 0, 900, 0], [0, 0, 0, 0], [0, 0, 0, 0]]
+
+
+def session(folder, *coverages, verdict="keep"):
+    """Return a session whose sidecars have these coverages."""
+    (folder / "trials").mkdir()
+    for k, coverage in enumerate(coverages, 1):
+        details = {"verdict": verdict, "coverage": coverage}
+        (folder / "trials" / f"T{k:02d}.json").write_text(json.dumps(details))
+    return SessionFolder(folder, "S001", "S0", is_simulated=False)
+
+
+def test_the_samples_of_all_kept_trials_are_counted(tmp_path):
+    (tmp_path / "one").mkdir()
+    one = session(tmp_path / "one", [[0, 9, 9, 0], *SPARSE[1:]])
+    assert thin_so_far(one) == "slower than 0.05 m/s, above 5 N"
+    assert thin_so_far(session(tmp_path, SPARSE, FULL)) == ""
+
+
+def test_rejected_and_damaged_trials_count_nothing(tmp_path):
+    (tmp_path / "rejected").mkdir()
+    assert thin_so_far(session(tmp_path / "rejected", SPARSE, verdict="reject")) == ""
+    assert thin_so_far(session(tmp_path, [[1, 2]], "none", None)) == ""

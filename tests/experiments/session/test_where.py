@@ -1,0 +1,113 @@
+"""Conditions of --where, and the order of a matrix with factors."""
+
+import itertools
+
+import pytest
+
+from acquisition.errors import SettingsError
+from experiments.session.upcoming import next_steps, suggest_order
+from experiments.session.where import parse_where
+from experiments.settings.load import load_settings
+from experiments.settings.matrix import Design
+
+FACTS = {"d50": 19.0, "moisture": "wet", "load": None, "incline_deg": -10.0}
+
+
+@pytest.mark.parametrize(
+    ("text", "holds"),
+    [
+        ("d50>=19", True),
+        ("d50>19", False),
+        ("d50=19", True),
+        ("d50=19.0", True),
+        ("d50!=19", False),
+        ("d50<20,d50>10", True),
+        ("moisture=wet", True),
+        ("moisture!=wet", False),
+        ("incline_deg<0", True),
+        ("incline_deg<=-10", True),
+        ("load=-", True),
+        ("load!=-", False),
+        ("load<5", False),
+        ("moisture=wet,d50<19", False),
+        ("terrain=S0", True),  # not known of it
+    ],
+)
+def test_numbers_are_compared_and_words_are_equal_or_not(text, holds):
+    where = parse_where(text, ("d50", "moisture", "load"))
+    assert where.matches(FACTS) is holds
+    assert str(where) == text
+
+
+@pytest.mark.parametrize(
+    "text", ["d50~3", "hope=1", "d50", "=3", "d50>", "moisture<wet"]
+)
+def test_what_is_no_condition_is_refused(text):
+    with pytest.raises(SettingsError):
+        parse_where(text, ("d50", "moisture"))
+
+
+def matrix(order="randomised", **details):
+    """Return a matrix of three feet on stones of three sizes, dry and wet."""
+    shipped = load_settings(None).matrix
+    rows = tuple(
+        shipped.terrains[0].model_copy(
+            update={
+                "name": f"{foot[0]}{d:g}{wet[0]}",
+                "foot": foot,
+                "factors": {"d50": float(d), "moisture": wet},
+            }
+        )
+        for foot in ("tread", "bare", "round")
+        for d in (10, 19, 37)
+        for wet in ("dry", "wet")
+    )
+    design = Design(order=order, **details)
+    return shipped.model_copy(update={"terrains": rows, "design": design})
+
+
+NAMES = [row.name for row in matrix().terrains]
+
+
+def test_only_what_was_asked_for_is_suggested(tmp_path):
+    where = parse_where("moisture=wet,d50<19", ("d50", "moisture"))
+    (line,) = next_steps(tmp_path, [], matrix("rows"), where, is_simulated=False)
+    assert line == "Next, as the rows stand: t10w b10w r10w"
+    none = parse_where("d50>99", ("d50", "moisture"))
+    assert next_steps(tmp_path, [], matrix("rows"), none, is_simulated=False) == []
+
+
+def test_rows_come_as_they_stand():
+    assert suggest_order(matrix("rows"), []) == NAMES
+    assert suggest_order(matrix("rows"), ["t10d"]) == NAMES[1:]
+
+
+def test_the_seed_decides_the_order_and_what_is_recorded_leaves_it():
+    order = suggest_order(matrix(seed=1), [])
+    assert sorted(order) == sorted(NAMES)
+    assert order != NAMES
+    assert suggest_order(matrix(seed=1), []) == order
+    assert suggest_order(matrix(seed=2), []) != order
+    done = [order[3], order[0], "not of this matrix"]
+    rest = [name for name in order if name not in done]
+    assert suggest_order(matrix(seed=1), done) == rest
+
+
+def test_blocks_are_done_in_one_go():
+    blocked = matrix("blocked", block_by=("foot",))
+    order = suggest_order(blocked, [])
+    feet = [name[0] for name in order]
+    assert sorted(order) == sorted(NAMES)
+    assert sum(a != b for a, b in itertools.pairwise(feet)) == 2
+    begun = suggest_order(blocked, ["r19w"])
+    assert [name[0] for name in begun[:5]] == ["r"] * 5
+    assert order != sorted(order)
+
+
+def test_cells_come_again_when_all_were_recorded():
+    twice = matrix(repeat_blocks=1)
+    assert len(suggest_order(twice, NAMES[:-1])) == 1
+    again = suggest_order(twice, NAMES)
+    assert sorted(again) == sorted(NAMES)
+    assert again != suggest_order(twice, [])
+    assert suggest_order(twice, [*NAMES, *NAMES]) == []
