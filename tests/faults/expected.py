@@ -63,6 +63,7 @@ class Cell:
         arm: what the arm does at once; None = what it did before.
         at_rest: what it does in the end.
         why: why the cell cannot exist, or what is particular about it.
+        then: words of a second message, where one fault brings another.
     """
 
     end: End
@@ -71,6 +72,7 @@ class Cell:
     arm: Arm | None = None
     at_rest: str = "idle"
     why: str = ""
+    then: str = ""
 
 
 Row = tuple[Cell, ...]
@@ -604,7 +606,12 @@ TABLE: dict[str, Row] = {
         preflight=_BRAKED,
         idle=_BRAKED,
         tare=replace(_SLIP, arm=None, why="watched in trials: stops the next one"),
-        ready=replace(_SLIP, arm=None, why="watched in trials: stops the next one"),
+        ready=replace(
+            _SLIP,
+            arm=None,
+            why="watched in trials: stops the next one; let go, the foot swings back",
+            then=" rad/s > 4.00",
+        ),
         recording=_SLIP,
         review=replace(OK, why="watched in trials only"),
     ),

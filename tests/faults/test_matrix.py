@@ -111,6 +111,9 @@ def check_words(seen, cell: Cell) -> None:
         assert cell.text in done.out
         return
     (*lines, last) = done.err.splitlines()
+    if cell.then:
+        assert cell.then in last
+        (*lines, last) = lines
     assert lines == [] or cell.end in SEVERAL_LINES
     assert cell.text in last
     if cell.end is End.UNBRACKETED:
