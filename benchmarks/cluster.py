@@ -26,10 +26,10 @@ from typing import Any
 import numpy as np
 
 from analysis.data.prepare import PrepareOptions, prepare_trial
-from analysis.data.tables import load_tables
 from analysis.study.crossval import FoldPlan, plan_folds, run_fold
 from analysis.study.jobs import Workers, guided_sizes, run_tasks
 from analysis.study.models import REPORTED, FitOptions
+from analysis.tables.loading import load_tables
 from benchmarks.rows import BenchRow
 from benchmarks.study_race import SLICE
 

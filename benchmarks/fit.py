@@ -20,11 +20,11 @@ from threadpoolctl import threadpool_limits
 from acquisition.linear_algebra import keep_memory
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.samples import SampleTable
-from analysis.data.tables import load_tables
 from analysis.gp.arcsine import Arcsine
 from analysis.gp.likelihood import Likelihood
 from analysis.gp.noise import ConstantNoise
 from analysis.gp.regression import fit_gp
+from analysis.tables.loading import load_tables
 from analysis.tustin.model import TustinBounds, TustinParameters, fit_tustin, predict
 from benchmarks import beside_gpy, beside_tinygp
 from benchmarks.beside_sklearn import KERNELS, fit_theirs, theirs, three_starts

@@ -18,7 +18,6 @@ import numpy as np
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.samples import SampleTable, TrainingSet
 from analysis.data.series import Array
-from analysis.data.tables import load_tables
 from analysis.study.crossval import FoldTask, choose_rows, plan_folds, run_fold
 from analysis.study.models import (
     GP_NN,
@@ -29,6 +28,7 @@ from analysis.study.models import (
     FitOptions,
     ModelFitter,
 )
+from analysis.tables.loading import load_tables
 from analysis.tustin.model import TustinFit
 from benchmarks.beside_sklearn import fit_theirs, three_starts
 

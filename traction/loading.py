@@ -5,7 +5,7 @@ from pathlib import Path
 
 from acquisition.errors import SessionError, SettingsError
 from analysis.data.load import load_trial as recorded_trial
-from analysis.data.tables import load_tables as tables_by_terrain
+from analysis.tables.loading import load_tables as tables_by_terrain
 from experiments.session.kept_files import check_kept
 from experiments.session.store import find_session
 from traction.trial_sets import TrialSet

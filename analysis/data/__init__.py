@@ -1,6 +1,5 @@
-"""Recorded trials and foreign tables as samples ready for a model.
+"""Recorded trials as samples ready for a model.
 
-`load` reads a trial file, `tables` a foreign table; both give a `TractionSeries`.
-`prepare` smooths, thins and windows it, `events` finds slips, `quality` grades
-coverage.
+`load` reads a trial file as a `TractionSeries`, `prepare` smooths, thins and windows
+it, `events` finds slips, `quality` grades coverage. Begin with `series`.
 """

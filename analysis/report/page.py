@@ -119,7 +119,7 @@ def html_page(
         notes: what could not be done.
     """
     environment = Environment(
-        loader=PackageLoader("analysis"),
+        loader=PackageLoader("analysis.report"),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,

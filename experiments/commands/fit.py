@@ -71,8 +71,8 @@ def run(args: argparse.Namespace) -> int:
     from experiments.report.workers import start_workers
 
     start_workers(args.scheduler)
-    from analysis.dialects.columns import parse_covariates, parse_inputs
     from analysis.study.covariates import WAY
+    from analysis.tables.columns import parse_covariates, parse_inputs
     from experiments.operator.console import Console
     from experiments.report.choices import ReportRequest, analysis_choices
     from experiments.report.external_tables import report_tables_of_trials
@@ -104,13 +104,13 @@ def _load(
     args: argparse.Namespace, inputs: Sequence[str]
 ) -> dict[str, list[TractionSeries]]:
     """Return the trials by terrain, with further columns; raises SettingsError."""
-    from analysis.data.tables import load_tables
     from analysis.data.terrain_kinds import parse_stones
-    from analysis.dialects.columns import (
+    from analysis.tables.columns import (
         parse_columns,
         parse_names,
         parse_units,
     )
+    from analysis.tables.loading import load_tables
 
     columns = parse_columns(args.columns) if args.columns else None
     stones = parse_stones(args.stones) if args.stones else None

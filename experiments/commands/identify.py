@@ -74,8 +74,8 @@ def run(args: argparse.Namespace) -> int:
 def _series(args: argparse.Namespace) -> list[TractionSeries]:
     """Return the trials of all files, recorded ones and tables."""
     from analysis.data.load import load_trial
-    from analysis.data.tables import load_tables
-    from analysis.dialects.columns import parse_columns, parse_names, parse_units
+    from analysis.tables.columns import parse_columns, parse_names, parse_units
+    from analysis.tables.loading import load_tables
 
     recorded = [path for path in args.files if path.suffix == ".mcap"]
     tables = [path for path in args.files if path.suffix != ".mcap"]

@@ -12,8 +12,8 @@ from experiments.rig.truth_options import add_truth, mount_of
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from analysis.validation.bands import BandResult
     from experiments.operator.console import Console
+    from experiments.rehearsal.bands import BandResult
     from experiments.rehearsal.plan import AcceptancePlan
 
 EXAMPLES = """\

@@ -49,8 +49,8 @@ def run(args: argparse.Namespace) -> int:
 
     if not _is_kept(Path(args.data)):
         start_workers(args.scheduler)
-    from analysis.dialects.columns import parse_covariates
     from analysis.study.jobs import Shard
+    from analysis.tables.columns import parse_covariates
     from experiments.operator.console import Console, PageRecorder
     from experiments.report.choices import (
         ReportRequest,

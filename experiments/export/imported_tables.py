@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from acquisition.files import open_regular
-from analysis.data.data_package import TableOrigin
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.recorded_factors import value_text
 from analysis.imported.channels import Clocked, JointChannel, WrenchChannel
@@ -21,6 +20,7 @@ from analysis.imported.record import (
 )
 from analysis.logs.log_file import LogTopic
 from analysis.logs.opening import log_files
+from analysis.tables.data_package import TableOrigin
 from experiments import provenance
 from experiments.export.quantities import KEPT, QUANTITIES, kept_rule
 from experiments.export.table_columns import Quantity, Values, columns_of

@@ -8,7 +8,10 @@ from typing import Any
 from acquisition.clock import SystemClock
 from acquisition.errors import SessionError, TrialFileError
 from acquisition.formats import FORMAT
-from analysis.data.data_package import (
+from analysis.data.load import RecordedTrial, load_trial
+from analysis.data.prepare import PrepareOptions, prepare_trial
+from analysis.data.recorded_factors import FOOT, StatedFactors, value_text
+from analysis.tables.data_package import (
     DESCRIPTOR,
     DataPackage,
     PackageField,
@@ -16,10 +19,7 @@ from analysis.data.data_package import (
     TableOrigin,
     TableSchema,
 )
-from analysis.data.load import RecordedTrial, load_trial
-from analysis.data.parquet_tables import to_parquet
-from analysis.data.prepare import PrepareOptions, prepare_trial
-from analysis.data.recorded_factors import FOOT, StatedFactors, value_text
+from analysis.tables.parquet import to_parquet
 from experiments.export.checksums import SUMS, digest_of, write_sums
 from experiments.export.quantities import KEPT, QUANTITIES, kept_rule
 from experiments.export.table_columns import (

@@ -12,11 +12,11 @@ from analysis.data.prepare import PrepareOptions
 from analysis.data.terrain_kinds import FLAT
 from analysis.study.models import GP_SE, TUSTIN, FitOptions
 from analysis.study.study import Study, StudyOptions, run_study
-from analysis.validation.bands import Band, BandResult, hold_against_bands
-from analysis.validation.model_measures import measure_models
-from analysis.validation.slip_measures import GroundTrials, measure_slips
 from experiments.arguments import FRICTION
+from experiments.rehearsal.bands import Band, BandResult, hold_against_bands
+from experiments.rehearsal.model_measures import measure_models
 from experiments.rehearsal.plan import AcceptancePlan
+from experiments.rehearsal.slip_measures import GroundTrials, measure_slips
 from experiments.report.truth_errors import compare_with_truth, z_scores
 from experiments.session.store import list_sessions
 

@@ -7,7 +7,7 @@ from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from acquisition.errors import SettingsError
 from acquisition.validation import Entries, Many, first_problem
-from analysis.data.data_package import DataPackage
+from analysis.tables.data_package import DataPackage
 from analysis.terrains.database import load
 from tests.corpus.samples import samples
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from analysis.data.series import TractionSeries
-from analysis.data.tables import load_tables
 from analysis.study.models import FitOptions
 from analysis.study.study import StudyOptions, run_study
+from analysis.tables.loading import load_tables
 
 DATA = Path(__file__).parent.parent / "data"
 SMALL_FIT = FitOptions(gp_points=60, draws=20)

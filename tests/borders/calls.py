@@ -9,9 +9,9 @@ import numpy as np
 
 import traction as tr
 from acquisition.errors import SettingsError
-from analysis.data.tables import load_tables
 from analysis.study.distribution import NewTrialPrediction
 from analysis.study.metrics import Prediction
+from analysis.tables.loading import load_tables
 from analysis.terrains.known import KnownTerrain
 from analysis.terrains.points import points_of
 from tests.analysis.terrains.tables import normal_table

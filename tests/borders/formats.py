@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from analysis.data.tables import load_tables
+from analysis.tables.loading import load_tables
 from tests.borders.row import Answer, Border, Outcome
 from tests.borders.tables import NAMES, VALUES, flagged, judged, refused, table, values
 

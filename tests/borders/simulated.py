@@ -8,7 +8,7 @@ import numpy as np
 
 import traction as tr
 from acquisition.errors import SettingsError
-from analysis.data.tables import load_tables
+from analysis.tables.loading import load_tables
 from experiments.__main__ import main
 from tests.borders.row import Answer, Border, Outcome
 from tests.borders.tables import COUNT, NAMES, ROWS, VALUES, refused, text

@@ -10,7 +10,7 @@ from acquisition.errors import SettingsError
 from analysis.data.plausibility import doubts_of
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.series import TractionSeries
-from analysis.data.tables import load_tables
+from analysis.tables.loading import load_tables
 from tests.borders.row import Answer, Border, Outcome
 
 NAMES = ("t", "v_t", "F_n", "F_t")

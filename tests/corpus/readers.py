@@ -12,7 +12,7 @@ from acquisition.clock import SystemClock
 from acquisition.errors import TractionError, TrialFileError
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.recover import recover_file
-from analysis.data.tables import load_tables
+from analysis.tables.loading import load_tables
 from analysis.terrains import database as terrain_db
 from experiments.calibration.pose_file import read_poses
 from experiments.export.checksums import SUMS, changed_files

@@ -11,8 +11,8 @@ import numpy as np
 from acquisition import formats
 from analysis.breakaway.censored import Family
 from analysis.breakaway.model import BREAK_AWAY, BreakAwayModel, PushLaw
-from analysis.data.data_package import TableOrigin
-from analysis.data.parquet_tables import to_parquet
+from analysis.tables.data_package import TableOrigin
+from analysis.tables.parquet import to_parquet
 from analysis.terrains.database import FORMAT, VERSION
 from fakes.plant.friction import draw_friction
 from fakes.sensor.kinds import SERIAL_KINDS, SensorChoice, make_stream

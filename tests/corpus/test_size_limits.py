@@ -31,7 +31,7 @@ START = PEAK + "from experiments.__main__ import main; sys.exit(main())"
 READ = (
     PEAK
     + """from pathlib import Path
-from analysis.data.tables import load_tables
+from analysis.tables.loading import load_tables
 (trials,) = load_tables([Path(sys.argv[1])]).values()
 print(len(trials[0].t))
 """

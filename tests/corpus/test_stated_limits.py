@@ -17,11 +17,11 @@ from acquisition.trial_file.chunks import RECORD_LIMIT, unpacked_limit
 from acquisition.trial_file.data_files import open_data
 from acquisition.trial_file.reader import MAX_ROWS, TrialReader
 from acquisition.trial_file.salvage import SoundRecords
-from analysis.data import tables
 from analysis.data.memory import share_of_memory
-from analysis.data.tables import LARGEST_FILE, PARTS, load_tables, most_trials
-from analysis.dialects.encoding import LONGEST_LINE
 from analysis.study.store import LARGEST, MOST_BYTES
+from analysis.tables import loading as tables
+from analysis.tables.encoding import LONGEST_LINE
+from analysis.tables.loading import LARGEST_FILE, PARTS, load_tables, most_trials
 from analysis.terrains import database
 from experiments.operator.scripted import ScriptedOperator
 from experiments.session.data_files import journal_line, parse_object

@@ -15,9 +15,9 @@ from analysis.data.load import load_trial
 from analysis.data.prepare import prepare_trial
 from analysis.data.quality import quick_ratio
 from analysis.data.series import Array
-from analysis.data.tables import load_tables
 from analysis.study.models import FitOptions
 from analysis.study.study import StudyOptions, run_study
+from analysis.tables.loading import load_tables
 from experiments.operator.console import GOOD
 from experiments.report.external_tables import require_samples
 from experiments.run.quality import review_trial

@@ -10,7 +10,7 @@ from acquisition.formats import FORMAT
 from acquisition.recording.recorder import seal
 from acquisition.trial_file import writer
 from acquisition.trial_file.reader import TrialReader
-from analysis.data.tables import load_tables
+from analysis.tables.loading import load_tables
 from analysis.terrains.database import load
 from experiments.commissioning.evidence.daily_record import read_history
 from experiments.commissioning.evidence.record import read_commissioning

@@ -11,9 +11,9 @@ import numpy as np
 
 from acquisition.errors import SettingsError
 from analysis.data.prepare import PrepareOptions, moving_average, prepare_trial
-from analysis.data.tables import load_tables
-from analysis.dialects.columns import parse_columns, parse_names
 from analysis.imported.importing import ImportRequest, import_log
+from analysis.tables.columns import parse_columns, parse_names
+from analysis.tables.loading import load_tables
 from ft_sensor.payload import Payload
 from tests.experiments.program import traction
 from tests.judges.judgement import Judgement, at_most, near, said

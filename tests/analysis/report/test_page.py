@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from analysis.data.tables import load_tables
 from analysis.report.page import html_page, write_report
 from analysis.report.page_model import PageSection, ReportContext, ReportFigure
 from analysis.report.section import ReportSection, ReportTable
 from analysis.report.style import new_figure, render, styled
 from analysis.study.models import GP_SE_NOISE, PAPER_MODELS, FitOptions
 from analysis.study.study import StudyOptions, run_study
+from analysis.tables.loading import load_tables
 
 CHROMIUM = next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))),

@@ -8,7 +8,6 @@ import pytest
 from acquisition.errors import SettingsError
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.series import TractionSeries
-from analysis.dialects.columns import parse_covariates
 from analysis.report.sections.beyond_paper.further_columns import covariate_tables
 from analysis.study.covariates import (
     COVARIATE_TYPES,
@@ -20,6 +19,7 @@ from analysis.study.covariates import (
 )
 from analysis.study.models import FitOptions
 from analysis.study.store import ResultStore
+from analysis.tables.columns import parse_covariates
 
 AS_THEY_ARE = PrepareOptions(smoothing=1, downsample=5, slowest=1e-4, fastest=1.0)
 

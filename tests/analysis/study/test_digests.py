@@ -73,7 +73,7 @@ import sys
 from pathlib import Path
 
 from analysis.data.prepare import PrepareOptions, prepare_trial
-from analysis.data.tables import load_tables
+from analysis.tables.loading import load_tables
 from analysis.study.crossval import plan_folds, run_fold
 from analysis.study.jobs import run_tasks
 from analysis.study.models import FitOptions

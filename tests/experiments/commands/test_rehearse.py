@@ -10,9 +10,9 @@ import pytest
 
 from acquisition.errors import SessionError
 from acquisition.trial_file.reader import TrialReader
-from analysis.validation.bands import Band, BandResult
 from experiments.arguments import FRICTION
 from experiments.rehearsal import recording
+from experiments.rehearsal.bands import Band, BandResult
 from experiments.rehearsal.judging import gated
 from experiments.rehearsal.plan import AcceptancePlan
 from experiments.session.store import list_sessions

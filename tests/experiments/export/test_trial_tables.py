@@ -12,7 +12,7 @@ from frictionless import Package, system
 from acquisition.trial_file.reader import TrialReader
 from analysis.data.load import load_trial
 from analysis.data.prepare import PrepareOptions, prepare_trial
-from analysis.data.tables import load_tables
+from analysis.tables.loading import load_tables
 from experiments.export.quantities import KEPT, QUANTITIES, kept_rule
 from experiments.export.table_columns import columns_of, decimals_of
 from tests.experiments.program import digest, traction

@@ -7,7 +7,7 @@ from itertools import islice
 from pathlib import Path
 
 from acquisition.errors import SettingsError
-from analysis.dialects.columns import (
+from analysis.tables.columns import (
     COLUMNS,
     columns_hint,
     find_column,
@@ -15,9 +15,9 @@ from analysis.dialects.columns import (
     split_header,
     unit_of_cell,
 )
-from analysis.dialects.numbers import MARKS, NumberForm
-from analysis.dialects.refusals import refusal, refused_line
-from analysis.dialects.times import is_iso
+from analysis.tables.numbers import MARKS, NumberForm
+from analysis.tables.refusals import refusal, refused_line
+from analysis.tables.times import is_iso
 
 BLANKS = " "  # the delimiter of columns that runs of blanks part
 _DELIMITERS = ("\t", ";", ",", BLANKS)  # the first one that fits is taken

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from acquisition.errors import MissingLibraryError, SettingsError
-from analysis.data.data_package import TableOrigin
 from analysis.data.series import Array
-from analysis.dialects.columns import (
+from analysis.tables.columns import (
     PREPARED,
     SIMULATED,
     columns_hint,
@@ -23,7 +22,8 @@ from analysis.dialects.columns import (
     plain,
     split_header,
 )
-from analysis.dialects.refusals import refusal
+from analysis.tables.data_package import TableOrigin
+from analysis.tables.refusals import refusal
 
 MAGIC = b"PAR1"
 MOST_ROWS = 500_000  # of a table; 17 minutes at 500 Hz

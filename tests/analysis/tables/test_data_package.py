@@ -9,15 +9,15 @@ import pytest
 
 from acquisition.errors import SettingsError
 from acquisition.formats import FORMAT
-from analysis.data.data_package import (
+from analysis.tables.data_package import (
     DESCRIPTOR,
     DataPackage,
     PackageFile,
     TableOrigin,
     TableSchema,
 )
-from analysis.data.parquet_tables import MOST_ROWS, to_parquet
-from analysis.data.tables import load_tables
+from analysis.tables.loading import load_tables
+from analysis.tables.parquet import MOST_ROWS, to_parquet
 
 ROWS = "t [s],v_t [mm/s],F_n [N],F_t [N]\n" + "".join(
     f"{0.002 * k:.3f},{10 + k},4.0,{2 + 0.1 * k:.1f}\n" for k in range(6)

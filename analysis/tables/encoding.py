@@ -5,7 +5,7 @@ import gzip
 import zlib
 from pathlib import Path
 
-from analysis.dialects.refusals import refusal, refused_line
+from analysis.tables.refusals import refusal, refused_line
 
 GZIP = b"\x1f\x8b"
 LONGEST_LINE = 65_536  # characters

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from acquisition.errors import SettingsError
-from analysis.dialects.refusals import refusal
+from analysis.tables.refusals import refusal
 
 ENOUGH = 20  # bytes that tell
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from acquisition.errors import SettingsError
-from analysis.data.tables import load_tables
-from analysis.dialects.columns import parse_names
+from analysis.tables.columns import parse_names
+from analysis.tables.loading import load_tables
 
 pytestmark = pytest.mark.shared_data
 DIALECTS = (

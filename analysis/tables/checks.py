@@ -12,9 +12,9 @@ import numpy as np
 from acquisition.clock import RATE_HZ
 from acquisition.errors import SettingsError
 from analysis.data.series import Array
-from analysis.dialects.columns import COLUMNS
-from analysis.dialects.reading import TrialTable
-from analysis.dialects.refusals import refusal
+from analysis.tables.columns import COLUMNS
+from analysis.tables.reading import TrialTable
+from analysis.tables.refusals import refusal
 
 MOST_MISSING = 0.2  # share of the rows without a value
 GAP = 1.0  # s between two rows

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from acquisition.errors import SettingsError
-from analysis.data import tables
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.samples import PooledSamples, SampleTable
 from analysis.data.series import TractionSeries
-from analysis.data.tables import load_tables
-from analysis.dialects.columns import parse_columns, parse_inputs
 from analysis.study.models import GP_SE, TUSTIN, FitOptions
 from analysis.study.study import StudyOptions, run_study
+from analysis.tables import loading as tables
+from analysis.tables.columns import parse_columns, parse_inputs
+from analysis.tables.loading import load_tables
 
 COLUMNS = parse_columns("v_t=v,F_n=N,F_t=T,trial=repeat,terrain=wheel")
 AS_THEY_ARE = PrepareOptions(smoothing=1, downsample=1, slowest=1e-4, fastest=1.0)

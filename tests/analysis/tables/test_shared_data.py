@@ -7,13 +7,13 @@ import pytest
 
 from analysis.data.prepare import PrepareOptions
 from analysis.data.series import TractionSeries
-from analysis.data.tables import load_tables
-from analysis.dialects.columns import parse_columns
 from analysis.report.sections.paper.table_one import table_one
 from analysis.report.sections.summary.section import verdicts
 from analysis.study.fits import to_fits
 from analysis.study.models import GP_SE, GP_SE_NOISE, PAPER_MODELS, TUSTIN, FitOptions
 from analysis.study.study import StudyOptions, run_study
+from analysis.tables.columns import parse_columns
+from analysis.tables.loading import load_tables
 
 pytestmark = [pytest.mark.shared_data, pytest.mark.timeout(900)]
 STONES = ("S0", "S10", "S15", "B0", "B10", "B15")

@@ -2,7 +2,7 @@
 
 Every byte is taken as hostile: sizes are checked before anything is unpacked, nothing
 is unpickled, and whatever does not fit becomes one SettingsError that names the file.
-How text is read stands in `analysis.dialects`.
+How text is read stands in `reading`.
 """
 
 import glob
@@ -20,22 +20,22 @@ import numpy as np
 
 from acquisition.errors import SettingsError
 from acquisition.files import UnfitFileError, open_regular
-from analysis.data.data_package import (
+from analysis.data.memory import share_of_memory
+from analysis.data.series import Array, TractionSeries
+from analysis.tables.checks import check_clock, check_order, notes_of
+from analysis.tables.columns import COLUMNS, GROUPS, factor
+from analysis.tables.data_package import (
     PackagedTable,
     TableOrigin,
     is_package,
     packaged_table,
     packaged_tables,
 )
-from analysis.data.memory import share_of_memory
-from analysis.data.parquet_tables import MAGIC, read_parquet
-from analysis.data.series import Array, TractionSeries
-from analysis.data.table_checks import check_clock, check_order, notes_of
-from analysis.dialects.columns import COLUMNS, GROUPS, factor
-from analysis.dialects.other_formats import ENOUGH, check_kind, not_an_npz
-from analysis.dialects.reading import TextRequest, TrialTable, read_text_table
-from analysis.dialects.refusals import refusal
-from analysis.dialects.times import since_first
+from analysis.tables.other_formats import ENOUGH, check_kind, not_an_npz
+from analysis.tables.parquet import MAGIC, read_parquet
+from analysis.tables.reading import TextRequest, TrialTable, read_text_table
+from analysis.tables.refusals import refusal
+from analysis.tables.times import since_first
 
 DEFAULT_TERRAIN = "table"
 LARGEST_FILE = 24_000_000  # bytes of a table; six times in memory

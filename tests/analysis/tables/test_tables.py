@@ -7,10 +7,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from acquisition.errors import SettingsError
-from analysis.data import tables
-from analysis.data.tables import load_tables
 from analysis.data.terrain_kinds import parse_stones
-from analysis.dialects.columns import parse_columns, parse_units
+from analysis.tables import loading as tables
+from analysis.tables.columns import parse_columns, parse_units
+from analysis.tables.loading import load_tables
 
 GOOD = "t,v_t,F_n,F_t\n0,0.1,2,1\n0.1,0.1,2,1\n0.2,0.1,2,1\n"
 

@@ -9,9 +9,9 @@ from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.series import TractionSeries
 from analysis.study.models import GP_SE, TUSTIN, FitOptions
 from analysis.study.study import StudyOptions, run_study
-from analysis.validation.bands import BANDS, Band, BandResult, hold_against_bands
-from analysis.validation.model_measures import measure_models
-from analysis.validation.slip_measures import GroundTrials, measure_slips
+from experiments.rehearsal.bands import BANDS, Band, BandResult, hold_against_bands
+from experiments.rehearsal.model_measures import measure_models
+from experiments.rehearsal.slip_measures import GroundTrials, measure_slips
 from tests.fakes.point_foot import PointFoot
 
 BAND = Band("X1", "something", 0.2, 0.4)

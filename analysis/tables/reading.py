@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.dialects.columns import COLUMNS, GROUPS, PREPARED, SIMULATED, plain
-from analysis.dialects.dialect import (
+from analysis.tables.columns import COLUMNS, GROUPS, PREPARED, SIMULATED, plain
+from analysis.tables.dialect import (
     BLANKS,
     Dialect,
     UnfitQuotesError,
@@ -19,10 +19,10 @@ from analysis.dialects.dialect import (
     is_as_wide,
     numbered_rows,
 )
-from analysis.dialects.encoding import lines_of
-from analysis.dialects.numbers import MISSING, NumberForm, marks_in
-from analysis.dialects.refusals import refusal, refused_cell, refused_line
-from analysis.dialects.times import is_iso, iso_times
+from analysis.tables.encoding import lines_of
+from analysis.tables.numbers import MISSING, NumberForm, marks_in
+from analysis.tables.refusals import refusal, refused_cell, refused_line
+from analysis.tables.times import is_iso, iso_times
 
 Array = NDArray[np.float64]
 # Beside these delimiters a comma is a usual decimal mark, and points group thousands.

@@ -1,4 +1,0 @@
-"""Templates of the report page.
-
-`analysis.report.page` fills them.
-"""
