@@ -20,8 +20,11 @@ from acquisition.files import publish_file
 from acquisition.sample import Flag
 from acquisition.schema import CYCLE
 from acquisition.temporary_folders import temporary_folder
-from acquisition.trial_file.chunks import as_trial_file_error, read_file
-from acquisition.trial_file.contents import read_contents
+from acquisition.trial_file.contents import (
+    as_trial_file_error,
+    read_contents,
+    read_file,
+)
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.salvage import Gap, Salvaged, SoundRecords
 from acquisition.trial_file.verify import VerifiedFile, verify_file

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from acquisition.clock import PERIOD_NS
 from acquisition.errors import TrialFileError
-from acquisition.trial_file.chunks import as_trial_file_error
+from acquisition.trial_file.contents import as_trial_file_error
 from acquisition.trial_file.data_files import open_data
 from acquisition.trial_file.header import WriterCounts
 from acquisition.trial_file.reader import TopicRows, TrialReader
