@@ -30,6 +30,7 @@ def run(args: argparse.Namespace) -> int:
     """Define the home position after confirmation and return the exit code."""
     from experiments.operator.console import GOOD, WARNING, Console
     from experiments.preflight.connecting import connect_rig
+    from experiments.rig.requests import DefinePosition
     from experiments.rig.rig import FakeOptions
     from experiments.settings.load import load_settings
 
@@ -50,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
             console.say("Nothing was changed. ARM: idle; it sinks slowly, support it.")
             return 5
         _check_encoders(rig, _start(rig), console)  # it was moved until now
-        rig.backend.arm.define_position(home.tolist())
+        rig.backend.ask(DefinePosition(home.tolist()))
         console.check(GOOD, "zero", "positions defined at home")
     finally:
         rig.backend.close()
@@ -60,9 +61,10 @@ def run(args: argparse.Namespace) -> int:
 def _start(rig: Rig) -> ArmInfo:
     """Ask the arm who it is; raise PreflightError when it is not fit."""
     from acquisition.errors import PreflightError, TractionError
+    from experiments.rig.requests import StartArm
 
     try:
-        return rig.backend.start_arm()
+        return rig.backend.ask(StartArm())
     except TractionError as error:
         state = error.arm_state or "not touched"
         raise PreflightError(error.message, hint=error.hint, arm_state=state) from error
