@@ -86,7 +86,6 @@ class Contents:
     """A whole MCAP file whose sections have the right checksums.
 
     Attributes:
-        path: the file.
         data: its data section, a view of all that was read.
         size: bytes of the file.
         summary: channels, schemas, statistics and where the chunks lie.
@@ -94,7 +93,6 @@ class Contents:
         attachments: content by name; the names are no paths.
     """
 
-    path: Path
     data: memoryview
     size: int
     summary: Summary
@@ -124,7 +122,6 @@ def read_contents(path: Path) -> Contents:
         metadata = [_metadata(body, i) for i in summary.metadata_indexes]
         attachments = [_attachment(body, i) for i in summary.attachment_indexes]
     return Contents(
-        path=path,
         data=body,
         size=len(data),
         summary=summary,

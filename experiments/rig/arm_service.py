@@ -19,7 +19,6 @@ from experiments.rig.claim import release
 from experiments.rig.requests import (
     EXCHANGE_CYCLES,
     AskSafetyMode,
-    AskStream,
     BeginLoop,
     ClaimArm,
     CountAnswers,
@@ -95,7 +94,6 @@ class ArmService:
             MeasureExchange: self.measure_exchange,
             DefinePosition: self.define_position,
             OpenSensor: self.open_sensor,
-            AskStream: self.stream_metadata,
             BeginLoop: self.begin,
             IdleArm: self.idle,
             AskSafetyMode: self.safety_mode,
@@ -186,7 +184,7 @@ class ArmService:
         return self._sensor.describe()
 
     def stream_metadata(self) -> dict[str, str]:
-        """See `AskStream`."""
+        """Return what became of the sensor's samples since it was opened, as text."""
         return {} if self._sensor is None else self._sensor.stream_metadata()
 
     def begin(self) -> None:

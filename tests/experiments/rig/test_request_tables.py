@@ -10,7 +10,7 @@ from acquisition.recording.recorder import Recorder
 from acquisition.recording.recorder_process import recorder_handlers
 from experiments.rig import requests
 from experiments.rig.arm_service import ArmAccess, ArmService
-from experiments.rig.requests import AskGrants
+from experiments.rig.requests import AskGrants, AskStream
 from fakes.clock import SteppedClock
 
 
@@ -40,4 +40,5 @@ def test_whatever_can_be_asked_of_the_arm_is_answered(tables):
         for _, kind in inspect.getmembers(requests, inspect.isclass)
         if issubclass(kind, requests.Request) and kind is not requests.Request
     }
-    assert {*tables[0], AskGrants} == asked
+    # of a process, and of the one that reads a sensor
+    assert {*tables[0], AskGrants, AskStream} == asked
