@@ -116,17 +116,6 @@ class SimulationControl(Hands, Protocol):
         ...
 
 
-class TruthSource(Protocol):
-    """The truth of a simulation in another process, a little at a time."""
-
-    def truth_part(self) -> Record:
-        """Return the oldest records that were not taken yet, none at the end.
-
-        Few at a time, or the bus of the simulation would wait meanwhile.
-        """
-        ...
-
-
 @dataclass(frozen=True, slots=True)
 class ServedDevices:
     """Where the devices of a simulated rig can be reached.
@@ -142,11 +131,3 @@ class ServedDevices:
     channel: str
     bitrate: int
     port: str
-
-
-class DeviceServer(Protocol):
-    """The process that serves the devices of a simulated rig."""
-
-    def devices(self) -> ServedDevices:
-        """Return where the devices can be reached."""
-        ...

@@ -24,6 +24,7 @@ from acquisition.control_loop.states import ArmState
 from acquisition.recording.recorder import Recorder
 from acquisition.trial_file.writer import TrialHeader
 from benchmarks.rows import BenchRow
+from experiments.rig.requests import OpenSensor, StartArm
 from experiments.rig.rig import FakeOptions, Rig, build_rig
 from experiments.settings.load import load_settings
 from fakes.bus.in_process import FakeCanBus, InProcessTransport
@@ -68,8 +69,8 @@ def float_rig() -> Rig:
     rig = build_rig(settings, settings.row(TERRAIN), FakeOptions("fast", seed=1))
     backend, hand = rig.backend, rig.simulation
     assert hand is not None
-    backend.start_arm()
-    backend.open_sensor()
+    backend.ask(StartArm())
+    backend.ask(OpenSensor())
     backend.begin()
     backend.loop_client.start()
     backend.loop_client.advance(0.1)

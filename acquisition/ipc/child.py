@@ -20,7 +20,7 @@ from acquisition.control_loop.realtime import die_with_parent
 from acquisition.errors import TractionError
 from acquisition.ipc.channel import Channel, ChannelClosedError
 from acquisition.ipc.layout import SharedLayout
-from acquisition.ipc.rpc import send_call
+from acquisition.ipc.requests import Answer, Request, ask
 from acquisition.ipc.shared_memory import SharedMemory
 from acquisition.linear_algebra import ONE_THREAD
 
@@ -110,15 +110,15 @@ class Child:
         """Whether it runs."""
         return self._process.poll() is None
 
-    def call(self, method: str, arguments: dict[str, Any]) -> Any:  # noqa: ANN401
-        """Call a method of its `RpcServer`; what `make_proxy` sends with.
+    def ask(self, request: Request[Answer]) -> Answer:
+        """Return the answer of its `Dispatcher` to a request.
 
         Raises:
             TractionError: what it raised.
             ProcessLostError: it has ended.
         """
         try:
-            return send_call(self.channel, method, arguments)
+            return ask(self.channel, request)
         except ChannelClosedError:
             self._wait(_PATIENCE)
             raise ProcessLostError(self.name, self.how_it_ended()) from None

@@ -3,12 +3,12 @@
 import json
 import struct
 from dataclasses import dataclass, field
-from enum import IntEnum
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from acquisition.control_loop.faults import GuardVerdict, from_plain, to_plain
+from acquisition.control_loop.proof import ProofGoal
 from acquisition.control_loop.states import ArmState, ControlStatus
 from acquisition.devices import BusCondition, SafetyMode
 from acquisition.ipc.latest_value import Slot
@@ -17,45 +17,93 @@ from acquisition.record_layout import struct_of
 
 _VALUES = 12  # numbers that a command has at most
 COMMAND_DTYPE = np.dtype(
-    [
-        ("number", "<u8"),
-        ("kind", "<u4"),
-        ("argument", "<i4"),
-        ("values", "<f8", (_VALUES,)),
-    ]
+    [("number", "<u8"), ("form", "<u8"), ("values", "<f8", (_VALUES,))]
 )
 _COMMAND: Final = struct_of(COMMAND_DTYPE)
 _STATUS: Final = struct.Struct("<QBB?B4xqQQQQQ")
 _NOTHING = (0.0,) * _VALUES
 
 
-class CommandKind(IntEnum):
-    """What a command asks for."""
+@dataclass(frozen=True, slots=True)
+class EnterState:
+    """Go into a state of the arm; see `Cycle.request`.
 
-    ENTER = 1  # argument: an ArmState; value: number of the newest verdict known
-    WATCH_TRIAL = 2  # argument: 1 while a trial is recorded
-    SET_BIAS = 3  # values: the sensor's reading without load, six of them
-    MOVE = 4  # values: joint positions to go to, seven of them, and the speed
-    LEAVE = 5  # end the loop; the arm is idle by then, or is made so
-    PROVE = 6  # values: what the arm is given, four numbers as of `ProofGoal`
-    START = 7  # hold, until a person activates the arm; value: as of ENTER
+    Attributes:
+        state: wanted.
+        known: number of the newest verdict that the console knows.
+    """
+
+    state: ArmState
+    known: int
 
 
 @dataclass(frozen=True, slots=True)
-class Command:
-    """One command.
+class AwaitActivation:
+    """Hold, until a person activates the arm; `known` as of `EnterState`."""
+
+    known: int
+
+
+@dataclass(frozen=True, slots=True)
+class WatchTrial:
+    """Switch the guard's limits for a trial on or off."""
+
+    is_recording: bool
+
+
+@dataclass(frozen=True, slots=True)
+class SetBias:
+    """Take `bias` for what the sensor reads without load [N, N m], six numbers."""
+
+    bias: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class MoveJoints:
+    """Go to joint positions.
+
+    Attributes:
+        goal: joint positions [rad], seven.
+        speed: that no joint exceeds [rad/s].
+    """
+
+    goal: tuple[float, ...]
+    speed: float
+
+
+@dataclass(frozen=True, slots=True)
+class GiveProof:
+    """Give the arm what `goal` says, in hold."""
+
+    goal: ProofGoal
+
+
+@dataclass(frozen=True, slots=True)
+class LeaveLoop:
+    """End the loop; the arm is idle by then, or is made so."""
+
+
+Command = (
+    EnterState
+    | AwaitActivation
+    | WatchTrial
+    | SetBias
+    | MoveJoints
+    | GiveProof
+    | LeaveLoop
+)
+
+
+class PostedCommand(NamedTuple):
+    """A command as it was posted.
 
     Attributes:
         number: counts the commands from 1; the status says which was obeyed last.
-        kind: what is asked for.
-        argument: a small number, see `CommandKind`.
-        values: numbers, see `CommandKind`.
+        command: what is asked for.
     """
 
     number: int
-    kind: CommandKind
-    argument: int
-    values: tuple[float, ...]
+    command: Command
 
 
 class CommandQueue:
@@ -66,22 +114,21 @@ class CommandQueue:
         self._reader = buffer.reader()
         self.posted = buffer.written
 
-    def post(
-        self, kind: CommandKind, argument: int = 0, values: tuple[float, ...] = ()
-    ) -> int:
+    def post(self, command: Command) -> int:
         """Leave a command and return its number."""
         self.posted += 1
+        form, values = _encode(command)
         padded = (*values, *_NOTHING[len(values) :])
-        self._buffer.write(_COMMAND.pack(self.posted, kind, argument, *padded))
+        self._buffer.write(_COMMAND.pack(self.posted, form, *padded))
         return self.posted
 
-    def take(self) -> list[Command]:
+    def take(self) -> list[PostedCommand]:
         """Return the commands that have come since the last call, oldest first."""
         if not self._reader.backlog:
             return []
         return [
-            Command(number, CommandKind(kind), argument, tuple(values))
-            for number, kind, argument, *values in _COMMAND.iter_unpack(
+            PostedCommand(number, _decode(form, tuple(values)))
+            for number, form, *values in _COMMAND.iter_unpack(
                 self._reader.read().tobytes()
             )
         ]
@@ -179,6 +226,46 @@ class StatusSlot:
             worst_late_ns=worst,
             control=control,
         )
+
+
+def _encode(command: Command) -> tuple[int, tuple[float, ...]]:
+    """Return the form of a command and its numbers."""
+    match command:
+        case EnterState(state, known):
+            return 1, (state, known)
+        case AwaitActivation(known):
+            return 2, (known,)
+        case WatchTrial(is_recording):
+            return 3, (is_recording,)
+        case SetBias(bias):
+            return 4, bias
+        case MoveJoints(goal, speed):
+            return 5, (*goal, speed)
+        case GiveProof(goal):
+            return 6, goal.values
+        case LeaveLoop():
+            return 7, ()
+
+
+def _decode(form: int, values: tuple[float, ...]) -> Command:
+    """Return the command that `_encode` has written."""
+    match form:
+        case 1:
+            return EnterState(ArmState(int(values[0])), int(values[1]))
+        case 2:
+            return AwaitActivation(int(values[0]))
+        case 3:
+            return WatchTrial(bool(values[0]))
+        case 4:
+            return SetBias(values[:6])
+        case 5:
+            return MoveJoints(values[:7], values[7])
+        case 6:
+            return GiveProof(ProofGoal.of(values))
+        case 7:
+            return LeaveLoop()
+        case _:
+            raise ValueError(f"there is no command of form {form}")
 
 
 def _text_of(verdicts: tuple[GuardVerdict, ...]) -> bytes:

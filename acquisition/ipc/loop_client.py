@@ -7,7 +7,18 @@ from typing import Protocol
 from acquisition.clock import NS_PER_S, PERIOD_NS, Clock
 from acquisition.control_loop.proof import ProofGoal
 from acquisition.control_loop.states import ArmState, ControlStatus
-from acquisition.ipc.commands import CommandKind, CommandQueue, LoopStatus, StatusSlot
+from acquisition.ipc.commands import (
+    AwaitActivation,
+    CommandQueue,
+    EnterState,
+    GiveProof,
+    LeaveLoop,
+    LoopStatus,
+    MoveJoints,
+    SetBias,
+    StatusSlot,
+    WatchTrial,
+)
 from acquisition.ipc.layout import ProcessRole, SharedLayout
 from acquisition.ipc.ring_buffer import RingBufferReader
 from acquisition.sample import Record
@@ -93,13 +104,11 @@ class LoopClient:
 
     def request(self, state: ArmState) -> None:
         """Ask the loop for a state of the arm; see `Cycle.request`."""
-        self._asked = self._commands.post(
-            CommandKind.ENTER, state, values=(self._known,)
-        )
+        self._asked = self._commands.post(EnterState(state, self._known))
 
     def start(self) -> None:
         """Ask the loop to hold, until a person activates the arm; see `Cycle.start`."""
-        self._asked = self._commands.post(CommandKind.START, values=(self._known,))
+        self._asked = self._commands.post(AwaitActivation(self._known))
 
     def idle(self, seconds: float = 1.0) -> bool:
         """Ask for idle and wait; return whether the arm is confirmed idle."""
@@ -117,23 +126,23 @@ class LoopClient:
 
         No joint is faster than `speed` [rad/s] on the way.
         """
-        self._asked = self._commands.post(CommandKind.MOVE, values=(*goal, speed))
+        self._asked = self._commands.post(MoveJoints(tuple(goal), speed))
 
     def prove(self, goal: ProofGoal) -> None:
         """Ask for a proof, in hold."""
-        self._asked = self._commands.post(CommandKind.PROVE, values=goal.values)
+        self._asked = self._commands.post(GiveProof(goal))
 
     def set_bias(self, bias: Sequence[float]) -> None:
         """Tell the loop what the sensor reads without load [N, N m], six numbers."""
-        self._commands.post(CommandKind.SET_BIAS, values=tuple(bias))
+        self._commands.post(SetBias(tuple(bias)))
 
     def watch_trial(self, *, is_recording: bool) -> None:
         """Switch the guard's limits for a running trial on or off."""
-        self._commands.post(CommandKind.WATCH_TRIAL, int(is_recording))
+        self._commands.post(WatchTrial(is_recording))
 
     def leave(self) -> None:
         """Ask the loop to end."""
-        self._commands.post(CommandKind.LEAVE)
+        self._commands.post(LeaveLoop())
 
     def last(self, seconds: float) -> Record:
         """Return the records of the last `seconds`, oldest first."""

@@ -8,16 +8,21 @@ from acquisition.clock import RATE_HZ
 from acquisition.control_loop.cycle import Cycle
 from acquisition.control_loop.faults import Fault, verdict_for
 from acquisition.control_loop.loop import LoopStats, Tick
-from acquisition.control_loop.proof import ProofGoal
 from acquisition.control_loop.states import ArmState
 from acquisition.control_loop.timing import pack_timing
 from acquisition.devices import Arm
 from acquisition.ipc.commands import (
-    Command,
-    CommandKind,
+    AwaitActivation,
     CommandQueue,
+    EnterState,
+    GiveProof,
+    LeaveLoop,
     LoopStatus,
+    MoveJoints,
+    PostedCommand,
+    SetBias,
     StatusSlot,
+    WatchTrial,
 )
 from acquisition.ipc.layout import ProcessRole, SharedLayout
 
@@ -81,8 +86,8 @@ class LoopServer:
 
     def __call__(self, tick: Tick) -> None:
         """Run one cycle with everything around it."""
-        for command in self._commands.take():
-            self._obey(command)
+        for posted in self._commands.take():
+            self._obey(posted)
         self._watch(tick.now_ns)
         self._cycle(tick)
         self._cycles += 1
@@ -95,25 +100,25 @@ class LoopServer:
         self._status.is_running = False
         self._status_slot.write(self._status)
 
-    def _obey(self, command: Command) -> None:
-        kind, cycle = command.kind, self._cycle
-        if kind is CommandKind.ENTER:
-            cycle.request(ArmState(command.argument), int(command.values[0]))
-        elif kind is CommandKind.START:
-            cycle.start(int(command.values[0]))
-        elif kind is CommandKind.WATCH_TRIAL:
-            cycle.is_recording = bool(command.argument)
-            self._publish_metadata()
-        elif kind is CommandKind.SET_BIAS:
-            cycle.set_bias(command.values[:6])
-        elif kind is CommandKind.MOVE:
-            *goal, speed = command.values[:8]
-            cycle.move_to(tuple(goal), speed)
-        elif kind is CommandKind.PROVE:
-            cycle.prove(ProofGoal.of(command.values))
-        else:
-            self.is_over = True
-        self._status.obeyed = command.number
+    def _obey(self, posted: PostedCommand) -> None:
+        cycle = self._cycle
+        match posted.command:
+            case EnterState(state, known):
+                cycle.request(state, known)
+            case AwaitActivation(known):
+                cycle.start(known)
+            case WatchTrial(is_recording):
+                cycle.is_recording = is_recording
+                self._publish_metadata()
+            case SetBias(bias):
+                cycle.set_bias(bias)
+            case MoveJoints(goal, speed):
+                cycle.move_to(goal, speed)
+            case GiveProof(goal):
+                cycle.prove(goal)
+            case LeaveLoop():
+                self.is_over = True
+        self._status.obeyed = posted.number
 
     def _publish_metadata(self) -> None:
         self._shared.health.write(json.dumps(dict(self._hooks.metadata())).encode())

@@ -2,6 +2,7 @@
 
 import json
 import signal
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +13,52 @@ from acquisition.ipc.channel import ChannelClosedError
 from acquisition.ipc.child import Child, ChildContext, name_process
 from acquisition.ipc.heap import give_back_heap
 from acquisition.ipc.layout import SharedLayout
-from acquisition.ipc.rpc import RpcServer, bind, make_proxy
+from acquisition.ipc.requests import Dispatcher, Handlers, Request
 from acquisition.recording.recorder import Recorder, TrialRecording
 from acquisition.trial_file.header import TrialHeader
 from acquisition.trial_file.verify import VerifiedFile
 
 DRAIN_S = 0.02
 NICE = 5
+
+
+@dataclass(frozen=True, slots=True)
+class StartRecording(Request[None]):
+    """See `TrialRecording.start`."""
+
+    path: Path
+    header: TrialHeader
+
+
+@dataclass(frozen=True, slots=True)
+class WriteEvent(Request[None]):
+    """See `TrialRecording.event`."""
+
+    level: int
+    name: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class FinishRecording(Request[VerifiedFile]):
+    """See `TrialRecording.finish`."""
+
+    stop_reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class AbandonRecording(Request[None]):
+    """See `TrialRecording.abandon`."""
+
+
+def recorder_handlers(recorder: TrialRecording) -> Handlers:
+    """Return what carries the requests to a recorder out."""
+    return {
+        StartRecording: recorder.start,
+        WriteEvent: recorder.event,
+        FinishRecording: recorder.finish,
+        AbandonRecording: recorder.abandon,
+    }
 
 
 def main(context: ChildContext) -> None:
@@ -31,12 +71,12 @@ def main(context: ChildContext) -> None:
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     request(RealtimeRequest(nice=NICE, core=context.settings.get("core")))
     recorder = Recorder(context.shared, SystemClock())
-    server = RpcServer(bind(TrialRecording, recorder))
+    dispatcher = Dispatcher(recorder_handlers(recorder))
     try:
         while True:
             if context.channel.is_readable(DRAIN_S):
                 was_recording = recorder.is_recording
-                server.answer(context.channel)
+                dispatcher.answer(context.channel)
                 if was_recording and not recorder.is_recording:
                     give_back_heap()
             recorder.drain()
@@ -55,7 +95,6 @@ class RemoteRecorder:
 
     def __init__(self, child: Child, shared: SharedLayout) -> None:
         self._child = child
-        self._remote = make_proxy(TrialRecording, child.call)
         self._shared = shared
         self._is_recording = False
 
@@ -66,24 +105,24 @@ class RemoteRecorder:
 
     def start(self, path: Path, header: TrialHeader) -> None:
         """Begin a file with the last second of samples."""
-        self._remote.start(path.resolve(), header)
+        self._child.ask(StartRecording(path.resolve(), header))
         self._is_recording = True
 
     def event(self, level: int, name: str, text: str) -> None:
         """Write an event of now into the file, if one is open."""
-        self._remote.event(level, name, text)
+        self._child.ask(WriteEvent(level, name, text))
 
     def finish(self, stop_reason: str) -> VerifiedFile:
         """End, verify and publish the file."""
         self._is_recording = False
-        return self._remote.finish(stop_reason)
+        return self._child.ask(FinishRecording(stop_reason))
 
     def abandon(self) -> None:
         """Stop recording; what there is goes to the disk and stays as `.partial`."""
         if self._is_recording:
             self._is_recording = False
             if self._child.is_alive:
-                self._remote.abandon()
+                self._child.ask(AbandonRecording())
 
     @property
     def largest_backlog(self) -> int:

@@ -8,8 +8,8 @@ from pathlib import Path
 from mcap.opcode import Opcode
 
 from acquisition.errors import TrialFileError
+from acquisition.trial_file.records import MAGIC
 
-MAGIC = b"\x89MCAP0\r\n"
 _FOOTER = struct.Struct("<BQQQI")  # opcode, length, summary, summary offsets, crc
 _DATA_END = struct.Struct("<BQI")  # opcode, length, crc
 

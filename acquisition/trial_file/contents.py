@@ -1,11 +1,10 @@
 """What a trial file holds beside its messages: summary, metadata, attachments."""
 
-import io
-import struct
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import (
     Attachment,
@@ -13,6 +12,7 @@ from mcap.records import (
     Channel,
     ChunkIndex,
     Header,
+    McapRecord,
     Metadata,
     MetadataIndex,
     Schema,
@@ -21,25 +21,64 @@ from mcap.records import (
 from mcap.summary import Summary
 
 from acquisition.errors import TrialFileError
-from acquisition.trial_file.checksums import MAGIC, check_sections
-from acquisition.trial_file.chunks import (
-    RECORD_LIMIT,
-    RawRecord,
-    as_trial_file_error,
-    read_file,
-    record_at,
-    unpacked_limit,
+from acquisition.trial_file.checksums import check_sections
+from acquisition.trial_file.data_files import read_data
+from acquisition.trial_file.records import (
+    DAMAGE,
+    MAGIC,
+    body_at,
+    parse,
+    records_of,
 )
+from acquisition.trial_file.unpacking import DamageError
 
+RECORD_LIMIT = 16 * 2**20  # bytes of one record, and of one chunk unpacked
 MAX_CHUNKS = 100_000
 MAX_NAMED = 1_000  # metadata records and attachments
 MAX_METADATA = 2**20  # bytes of one metadata record
 MAX_SUMMARY = 8 * 2**20  # bytes; two hours of chunks need half of it
-_LENGTH = struct.Struct("<I")  # of a text, and of the texts of a mapping
-_INDEX_HEAD = struct.Struct("<QQQQI")  # start, end, offset, length, bytes of offsets
-_INDEX_OFFSET = struct.Struct("<HQ")  # channel, offset of its message index
-_INDEX_TAIL = struct.Struct("<QI")  # length of the indexes, length of the compression
-_INDEX_SIZES = struct.Struct("<QQ")  # packed, unpacked
+_SUMMARY: Mapping[int, type[McapRecord]] = {
+    Opcode.CHUNK_INDEX: ChunkIndex,
+    Opcode.STATISTICS: Statistics,
+    Opcode.SCHEMA: Schema,
+    Opcode.CHANNEL: Channel,
+    Opcode.METADATA_INDEX: MetadataIndex,
+    Opcode.ATTACHMENT_INDEX: AttachmentIndex,
+}
+_UNPACKED_FLOOR = 64 * 2**20
+_UNPACKED_RATIO = 100  # an arm at rest packs twenty times, zeros a thousand times
+_UNPACKED_MOST = 192 * 2**20  # ten minutes of cycles
+
+
+@contextmanager
+def as_trial_file_error(path: Path) -> Generator[None]:
+    """Turn whatever a damaged file can raise into a TrialFileError."""
+    try:
+        yield
+    except TrialFileError:
+        raise
+    except DamageError as error:
+        raise TrialFileError(path, f"has {error}") from error
+    except (*DAMAGE, OSError) as error:
+        detail = str(error) or type(error).__name__
+        raise TrialFileError(
+            path, f"is not a readable trial file ({detail})"
+        ) from error
+
+
+def read_file(path: Path) -> bytes:
+    """Return the whole file; a pipe or device is not waited for.
+
+    Raises:
+        TrialFileError: it cannot be read, is not a regular file, or is beyond all size.
+    """
+    with as_trial_file_error(path):
+        return read_data(path)
+
+
+def unpacked_limit(file_bytes: int) -> int:
+    """Return how many bytes all chunks of a file of `file_bytes` may unpack to."""
+    return min(_UNPACKED_MOST, _UNPACKED_FLOOR + _UNPACKED_RATIO * file_bytes)
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +86,6 @@ class Contents:
     """A whole MCAP file whose sections have the right checksums.
 
     Attributes:
-        path: the file.
         data: its data section, a view of all that was read.
         size: bytes of the file.
         summary: channels, schemas, statistics and where the chunks lie.
@@ -55,20 +93,11 @@ class Contents:
         attachments: content by name; the names are no paths.
     """
 
-    path: Path
     data: memoryview
     size: int
     summary: Summary
     metadata: dict[str, dict[str, str]]
     attachments: dict[str, bytes]
-
-    def record(self, offset: int, opcode: Opcode) -> memoryview:
-        """Return the body of the record of kind `opcode` at `offset`.
-
-        Raises:
-            TrialFileError: there is none in the data section.
-        """
-        return _record(self.data, offset, opcode, self.path)
 
 
 def read_contents(path: Path) -> Contents:
@@ -81,16 +110,18 @@ def read_contents(path: Path) -> Contents:
     with as_trial_file_error(path):
         sections = check_sections(data, path)
         if sections.footer - sections.summary > MAX_SUMMARY:
-            raise TrialFileError(path, "has a summary of over 8 MiB")
+            raise DamageError("a summary of over 8 MiB")
         whole = memoryview(data)
-        summary = _read_summary(whole, sections.summary, sections.footer, path)
-        _check_chunks(summary, sections.data_end, len(data), path)
-        _check_named(summary, len(data), path)
+        _check_profile(whole, path)
+        summary = _read_summary(whole[sections.summary : sections.footer])
+        if summary.statistics is None:
+            raise DamageError("no summary: was it closed properly?")
         body = whole[: sections.data_end]
-        metadata = [_metadata(body, i, path) for i in summary.metadata_indexes]
-        attachments = [_attachment(body, i, path) for i in summary.attachment_indexes]
+        _check_chunks(summary, len(body), len(data), path)
+        _check_named(summary, len(data), path)
+        metadata = [_metadata(body, i) for i in summary.metadata_indexes]
+        attachments = [_attachment(body, i) for i in summary.attachment_indexes]
     return Contents(
-        path=path,
         data=body,
         size=len(data),
         summary=summary,
@@ -99,67 +130,36 @@ def read_contents(path: Path) -> Contents:
     )
 
 
-def _read_summary(data: memoryview, start: int, end: int, path: Path) -> Summary:
-    """Return the summary, which fills the bytes from `start` to `end`."""
-    header = Header.read(_stream(_record(data, len(MAGIC), Opcode.HEADER, path)))
+def _check_profile(data: memoryview, path: Path) -> None:
+    header = parse(Header, body_at(data, len(MAGIC), Opcode.HEADER))
     if header.profile != "ros2":
         raise TrialFileError(path, f"has profile {header.profile[:20]!r}, not ros2")
+
+
+def _read_summary(data: memoryview) -> Summary:
     summary = Summary()
-    while start < end:
-        raw = record_at(data[:end], start)
-        if raw is None:
-            raise TrialFileError(path, "has a damaged summary")
-        _add_record(summary, raw)
-        start = raw.end
-    if summary.statistics is None:
-        raise TrialFileError(path, "has no summary: was it closed properly?")
+    for raw in records_of(data, what="a summary"):
+        if (kind := _SUMMARY.get(raw.opcode)) is not None:
+            _add_record(summary, parse(kind, raw.body))
     return summary
 
 
-def _add_record(summary: Summary, raw: RawRecord) -> None:
-    match raw.opcode:
-        case Opcode.CHUNK_INDEX:
-            summary.chunk_indexes.append(_chunk_index(raw.body))
-        case Opcode.STATISTICS:
-            summary.statistics = Statistics.read(_stream(raw.body))
-        case Opcode.SCHEMA:
-            schema = Schema.read(_stream(raw.body))
-            summary.schemas[schema.id] = schema
-        case Opcode.CHANNEL:
-            channel = Channel.read(_stream(raw.body))
-            summary.channels[channel.id] = channel
-        case Opcode.METADATA_INDEX:
-            summary.metadata_indexes.append(MetadataIndex.read(_stream(raw.body)))
-        case Opcode.ATTACHMENT_INDEX:
-            summary.attachment_indexes.append(AttachmentIndex.read(_stream(raw.body)))
+def _add_record(summary: Summary, record: McapRecord) -> None:
+    match record:
+        case ChunkIndex():
+            summary.chunk_indexes.append(record)
+        case Statistics():
+            summary.statistics = record
+        case Schema():
+            summary.schemas[record.id] = record
+        case Channel():
+            summary.channels[record.id] = record
+        case MetadataIndex():
+            summary.metadata_indexes.append(record)
+        case AttachmentIndex():
+            summary.attachment_indexes.append(record)
         case _:
             pass
-
-
-def _chunk_index(body: memoryview) -> ChunkIndex:
-    """Take a chunk index apart in four steps; there are hundreds in a file."""
-    start_ns, end_ns, offset, length, offset_bytes = _INDEX_HEAD.unpack_from(body)
-    at = _INDEX_HEAD.size + offset_bytes
-    offsets = dict(_INDEX_OFFSET.iter_unpack(body[_INDEX_HEAD.size : at]))
-    index_length, name_bytes = _INDEX_TAIL.unpack_from(body, at)
-    at += _INDEX_TAIL.size
-    packed, size = _INDEX_SIZES.unpack_from(body, at + name_bytes)
-    return ChunkIndex(
-        chunk_length=length,
-        chunk_start_offset=offset,
-        compression=str(body[at : at + name_bytes], "utf-8"),
-        compressed_size=packed,
-        message_end_time=end_ns,
-        message_index_length=index_length,
-        message_index_offsets=offsets,
-        message_start_time=start_ns,
-        uncompressed_size=size,
-    )
-
-
-def _stream(body: memoryview) -> ReadDataStream:
-    # From memory: whatever length a field states, no more than the body is read.
-    return ReadDataStream(io.BytesIO(body))
 
 
 def _check_chunks(summary: Summary, end: int, size: int, path: Path) -> None:
@@ -169,9 +169,9 @@ def _check_chunks(summary: Summary, end: int, size: int, path: Path) -> None:
         raise TrialFileError(path, f"states {len(chunks)} chunks of {total} bytes")
     for chunk in chunks:
         if chunk.uncompressed_size > RECORD_LIMIT:
-            raise TrialFileError(path, "has a chunk that states over 16 MiB")
+            raise DamageError("a chunk that states over 16 MiB")
         if chunk.chunk_start_offset + chunk.chunk_length > end:
-            raise TrialFileError(path, "has a chunk beyond its end")
+            raise DamageError("a chunk beyond its end")
 
 
 def _check_named(summary: Summary, size: int, path: Path) -> None:
@@ -183,40 +183,15 @@ def _check_named(summary: Summary, size: int, path: Path) -> None:
         raise TrialFileError(path, "states attachments larger than itself")
 
 
-def _metadata(data: memoryview, index: MetadataIndex, path: Path) -> Metadata:
-    body = _record(data, index.offset, Opcode.METADATA, path)
+def _metadata(data: memoryview, index: MetadataIndex) -> Metadata:
+    body = body_at(data, index.offset, Opcode.METADATA)
     if len(body) > min(index.length, MAX_METADATA):
-        raise TrialFileError(path, "has metadata of impossible length")
-    name, at = _text_at(body, 0)
-    (size,) = _LENGTH.unpack_from(body, at)
-    at, end = at + _LENGTH.size, at + _LENGTH.size + size
-    if end > len(body):
-        raise TrialFileError(path, "has metadata that end too early")
-    values: dict[str, str] = {}
-    while at < end:
-        key, at = _text_at(body, at)
-        values[key], at = _text_at(body, at)
-    return Metadata(name=name, metadata=values)
+        raise DamageError("metadata of impossible length")
+    return parse(Metadata, body)
 
 
-def _text_at(body: memoryview, at: int) -> tuple[str, int]:
-    """Return a text and the offset behind it; several hundred are in a file."""
-    (length,) = _LENGTH.unpack_from(body, at)
-    start, end = at + _LENGTH.size, at + _LENGTH.size + length
-    if end > len(body):
-        raise ValueError("a text that ends too early")
-    return str(body[start:end], "utf-8"), end
-
-
-def _attachment(data: memoryview, index: AttachmentIndex, path: Path) -> Attachment:
-    body = _record(data, index.offset, Opcode.ATTACHMENT, path)
+def _attachment(data: memoryview, index: AttachmentIndex) -> Attachment:
+    body = body_at(data, index.offset, Opcode.ATTACHMENT)
     if len(body) > min(index.length, RECORD_LIMIT):
-        raise TrialFileError(path, "has an attachment of impossible length")
-    return Attachment.read(_stream(body))
-
-
-def _record(data: memoryview, offset: int, opcode: Opcode, path: Path) -> memoryview:
-    raw = record_at(data, offset)
-    if raw is None or raw.opcode != opcode:
-        raise TrialFileError(path, f"has no {opcode.name.lower()} at byte {offset}")
-    return raw.body
+        raise DamageError("an attachment of impossible length")
+    return parse(Attachment, body)

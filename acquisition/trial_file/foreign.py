@@ -6,8 +6,8 @@ from pathlib import Path
 from mcap.records import Channel, Metadata
 
 from acquisition.errors import TrialFileError
-from acquisition.trial_file.checksums import MAGIC
-from acquisition.trial_file.chunks import read_file
+from acquisition.trial_file.contents import read_file
+from acquisition.trial_file.records import MAGIC
 from acquisition.trial_file.salvage import SoundRecords
 
 _LOOKED_AT = 5_000  # records; channels stand before their messages

@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 
 from acquisition.clock import RATE_HZ
 
+_DIGEST = "sha256:"  # begins the keys of attachments in the provenance
+
 
 @dataclass(frozen=True, slots=True)
 class TrialHeader:
@@ -44,3 +46,17 @@ class WriterCounts:
     first_cycle: int | None = None
     last_cycle: int | None = None
     messages: dict[str, int] = field(default_factory=dict[str, int])
+
+
+def digest_fields(digests: Mapping[str, str]) -> dict[str, str]:
+    """Return SHA-256 digests of attachments by name as metadata `provenance`."""
+    return {f"{_DIGEST}{name}": digest for name, digest in digests.items()}
+
+
+def attachment_digests(provenance: Mapping[str, str]) -> dict[str, str]:
+    """Return which attachments were written: their SHA-256 digests by name."""
+    return {
+        key.removeprefix(_DIGEST): digest
+        for key, digest in provenance.items()
+        if key.startswith(_DIGEST)
+    }

@@ -1,6 +1,5 @@
 """TrialReader: whole chunks into numpy arrays, damaged and hostile files refused."""
 
-import struct
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,9 +16,20 @@ from acquisition.schema import (
     TRUTH,
     Layout,
 )
-from acquisition.trial_file.chunks import Unpacker, as_trial_file_error, parse_chunk
-from acquisition.trial_file.contents import read_contents
+from acquisition.trial_file.contents import (
+    RECORD_LIMIT,
+    as_trial_file_error,
+    read_contents,
+)
 from acquisition.trial_file.foreign import foreign_reason
+from acquisition.trial_file.records import (
+    HEAD_BYTES,
+    body_at,
+    message_index,
+    parse_chunk,
+    unpacked,
+)
+from acquisition.trial_file.unpacking import Unpacker
 
 MAX_ROWS = 300_000  # ten minutes
 _FOREIGN = "Write t, v_t, F_n and F_t of it as a table, then: traction fit FILE."
@@ -33,8 +43,6 @@ _HEAD = np.dtype(
         ("publish_time", "<u8"),
     ]
 )
-_RECORD_BYTES = 9  # opcode and length, which the length does not count
-_INDEX = struct.Struct("<HI")  # channel, bytes of pairs (log time, offset)
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +83,7 @@ class TrialReader:
             if reason := foreign_reason(path):
                 raise TrialFileError(path, reason, hint=_FOREIGN) from error
             raise
-        self._unpacker = Unpacker(path)
+        self._unpacker = Unpacker(RECORD_LIMIT)
         self.path = path
         self.size = self._contents.size
         self.summary = self._contents.summary
@@ -155,7 +163,7 @@ class TrialReader:
         self, heads: Record, data: Record, layout: Layout, channel: int
     ) -> None:
         """Require that every row is a message of `channel` in this very layout."""
-        length = _HEAD.itemsize - _RECORD_BYTES + layout.size
+        length = _HEAD.itemsize - HEAD_BYTES + layout.size
         good = (heads["op"] == Opcode.MESSAGE) & (heads["length"] == length)
         if not bool((good & (heads["channel"] == channel)).all()):
             raise TrialFileError(self.path, "has an index that points at no message")
@@ -164,26 +172,26 @@ class TrialReader:
         if not all(bool((data[name] == wanted[name]).all()) for name in names):
             raise TrialFileError(self.path, "has messages of an unknown layout")
 
-    def _unpacked(self, index: ChunkIndex) -> bytes:
-        body = self._contents.record(index.chunk_start_offset, Opcode.CHUNK)
-        chunk = parse_chunk(body, self.path)
+    def _unpacked(self, index: ChunkIndex) -> memoryview:
+        body = body_at(self._contents.data, index.chunk_start_offset, Opcode.CHUNK)
+        chunk = parse_chunk(body, RECORD_LIMIT)
         actual = (len(body), chunk.size, chunk.compression, len(chunk.packed))
         if actual != (
-            index.chunk_length - _RECORD_BYTES,
+            index.chunk_length - HEAD_BYTES,
             index.uncompressed_size,
             index.compression,
             index.compressed_size,
         ):
             raise TrialFileError(self.path, "has a chunk that its index does not match")
-        return self._unpacker.unpack(chunk)
+        return unpacked(chunk, self._unpacker)
 
     def _message_offsets(self, index: ChunkIndex, channel: int) -> NDArray[np.uint64]:
         offset = index.message_index_offsets[channel]
-        body = self._contents.record(offset, Opcode.MESSAGE_INDEX)
-        actual, size = _INDEX.unpack_from(body)
-        if actual != channel or size % 16 or size != len(body) - _INDEX.size:
+        body = body_at(self._contents.data, offset, Opcode.MESSAGE_INDEX)
+        actual, pairs = message_index(body)
+        if actual != channel:
             raise TrialFileError(self.path, "has a damaged message index")
-        return np.frombuffer(body, "<u8", size // 8, _INDEX.size)[1::2]
+        return np.frombuffer(pairs, "<u8")[1::2]
 
     def _channel(self, topic: str, layout: Layout) -> int:
         """Return the channel of a topic whose messages have this layout."""
@@ -200,7 +208,9 @@ class TrialReader:
         raise TrialFileError(self.path, f"has no topic {topic}")
 
 
-def _gather(data: bytes, start: int, offsets: NDArray[np.intp], out: Record) -> None:
+def _gather(
+    data: memoryview, start: int, offsets: NDArray[np.intp], out: Record
+) -> None:
     """Set out[i] to the bytes of `data` from offsets[i] + start on.
 
     A view with a window at every byte takes the index; `np.take` would copy all

@@ -20,14 +20,17 @@ from acquisition.files import publish_file
 from acquisition.sample import Flag
 from acquisition.schema import CYCLE
 from acquisition.temporary_folders import temporary_folder
-from acquisition.trial_file.chunks import as_trial_file_error, read_file
-from acquisition.trial_file.contents import read_contents
+from acquisition.trial_file.contents import (
+    as_trial_file_error,
+    read_contents,
+    read_file,
+)
+from acquisition.trial_file.header import attachment_digests
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.salvage import Gap, Salvaged, SoundRecords
 from acquisition.trial_file.verify import VerifiedFile, verify_file
 from acquisition.trial_file.writer import CHUNK_BYTES
 
-_DIGEST = "sha256:"  # begins the keys of attachments in the provenance
 _MOST_BESIDE = 50  # files that are looked into
 _LONGEST_MISSED = 50_000_000  # ns; a loop that misses cycles for longer has ended
 _SECTION = "has data whose checksum is wrong"  # and no chunk or attachment is
@@ -189,11 +192,7 @@ class TrialCopy:
         elif record.name != "recovered" and record.name not in self.metadata:
             self.metadata.add(record.name)
             if record.name == "provenance":
-                self._digests = {
-                    name.removeprefix(_DIGEST): value
-                    for name, value in record.metadata.items()
-                    if name.startswith(_DIGEST)
-                }
+                self._digests = attachment_digests(record.metadata)
             self._writer.flush()  # or it would overtake the messages before it
             self._writer.add_metadata(record.name, record.metadata)
 
@@ -243,8 +242,8 @@ class Recovery:
         messages: how many it holds.
         bytes_dropped: of the source, damaged ones.
         losses: recording that was in them, as far as can be seen.
-        missing_attachments: names of those that are gone, and stand in no other file
-            beside it.
+        missing_attachments: names of those that `path` does not hold; of a source that
+            is broken, no other file beside it does either.
         reason: what is broken in the source; empty where it is whole.
         is_doubtful: something is broken that has no checksum of its own: a description,
             or an index.
@@ -291,7 +290,7 @@ def recover_file(source: Path) -> Recovery:
     except TrialFileError as error:
         reason = error.reason
     else:
-        return Recovery(source, source, verified, _message_count(source))
+        return _sound(source, verified)
     target = recovered_path(source)
     details = {
         "source": os.fsencode(source.name).decode(errors="replace"),
@@ -401,5 +400,14 @@ def _earlier(source: Path, target: Path, details: Mapping[str, str]) -> Recovery
     )
 
 
-def _message_count(path: Path) -> int:
-    return sum(TrialReader(path).topic_counts().values())
+def _sound(source: Path, verified: VerifiedFile) -> Recovery:
+    """Return what there is of a file that needs no recovery, or had one."""
+    reader = TrialReader(source)
+    written = attachment_digests(reader.metadata["provenance"])
+    return Recovery(
+        source=source,
+        path=source,
+        verified=verified,
+        messages=sum(reader.topic_counts().values()),
+        missing_attachments=tuple(n for n in written if n not in reader.attachments),
+    )

@@ -1,35 +1,39 @@
 """The sound records of a broken MCAP file; what is damaged between them is skipped."""
 
-import io
 import re
 import struct
-import zlib
 from collections.abc import Generator, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Message, Metadata, Schema
 
 from acquisition.errors import TrialFileError
 from acquisition.schema import schema_text
-from acquisition.trial_file.checksums import MAGIC
-from acquisition.trial_file.chunks import (
-    RawRecord,
-    Unpacker,
+from acquisition.trial_file.contents import (
+    RECORD_LIMIT,
     as_trial_file_error,
-    parse_chunk,
-    record_at,
     unpacked_limit,
 )
+from acquisition.trial_file.records import (
+    MAGIC,
+    RawRecord,
+    has_checksum,
+    is_whole_metadata,
+    message_index,
+    message_of,
+    parse,
+    parse_chunk,
+    record_at,
+    records_of,
+    unpacked,
+)
+from acquisition.trial_file.unpacking import DamageError, Unpacker
 from acquisition.trial_file.writer import topics_by_sizes
 
-_MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 _CHUNK_TIMES = struct.Struct("<QQ")  # start, end: the first of a chunk's body
-_CRC = struct.Struct("<I")
-_INDEX = struct.Struct("<HI")  # channel, bytes of pairs of 16
-_LENGTH = struct.Struct("<I")  # of a text, and of the texts of a mapping
+_CRC = struct.Struct("<I")  # of the data, at their end
 _LONGEST_NS = 3600 * 10**9  # a chunk that claims to be later than this is not believed
 # A record that can prove itself, or the end of the data, of less than 16 MiB.
 _PROVABLE = re.compile(rb"(?=[\x06\x09\x0c\x0f].{3}\x00{5})", re.DOTALL)
@@ -87,7 +91,7 @@ class SoundRecords:
         self._data = data
         self._view = memoryview(data)
         self._path = path
-        self._unpacker = Unpacker(path)
+        self._unpacker = Unpacker(RECORD_LIMIT)
         self._room = unpacked_limit(len(data))
         self._schemas = {0}
         self._channels: set[int] = set()
@@ -120,7 +124,7 @@ class SoundRecords:
             try:
                 with as_trial_file_error(self._path):
                     if raw is None:
-                        raise TrialFileError(self._path, "has a broken record")
+                        raise DamageError("a broken record")
                     yield from self._read(raw, at)
                     at = raw.end
             except TrialFileError as error:
@@ -191,9 +195,9 @@ class SoundRecords:
                     case Opcode.CHUNK:
                         return self._is_chunk(raw.body)
                     case Opcode.METADATA:
-                        return _is_metadata(raw.body)
+                        return is_whole_metadata(raw.body)
                     case Opcode.ATTACHMENT:
-                        return _has_checksum(raw.body)
+                        return has_checksum(raw.body)
                     case _:
                         return len(raw.body) == _CRC.size and self._is_framed(raw.end)
         except TrialFileError:
@@ -201,11 +205,11 @@ class SoundRecords:
 
     def _is_chunk(self, body: memoryview) -> bool:
         """Whether it is one whose checksum holds; what is tried counts as unpacked."""
-        chunk = parse_chunk(body, self._path)
+        chunk = parse_chunk(body, RECORD_LIMIT)
         if not chunk.crc or chunk.size > self._room:
             return False
         self._room -= chunk.size
-        self._unpacker.unpack(chunk)
+        unpacked(chunk, self._unpacker)
         self._room += chunk.size  # it is unpacked again when it is read
         return True
 
@@ -215,27 +219,27 @@ class SoundRecords:
             case Opcode.CHUNK:
                 yield from self._read_chunk(raw.body)
             case Opcode.METADATA:
-                yield Metadata.read(_stream(raw.body))
+                yield parse(Metadata, raw.body)
             case Opcode.ATTACHMENT:
                 yield from self._read_attachment(raw.body)
             case Opcode.SCHEMA | Opcode.CHANNEL | Opcode.MESSAGE:
                 yield self._parse(raw)
             case Opcode.HEADER if at == len(MAGIC):
                 pass
-            case Opcode.MESSAGE_INDEX if _is_index(raw.body):
-                pass
+            case Opcode.MESSAGE_INDEX:
+                message_index(raw.body)
             case opcode:  # perhaps a chunk once
-                raise TrialFileError(self._path, f"has a broken record, kind {opcode}")
+                raise DamageError(f"a broken record, kind {opcode}")
 
     def _read_chunk(self, body: memoryview) -> Generator[Salvaged]:
-        chunk = parse_chunk(body, self._path)
+        chunk = parse_chunk(body, RECORD_LIMIT)
         self._room -= chunk.size
         if self._room < 0:
-            raise TrialFileError(self._path, "has chunks that unpack to too much")
-        data = memoryview(self._unpacker.unpack(chunk))
+            raise DamageError("chunks that unpack to too much")
+        data = unpacked(chunk, self._unpacker)
         known = self._schemas.copy(), self._channels.copy()
         try:
-            records = [self._parse(raw) for raw in self._split(data)]
+            records = [self._parse(raw) for raw in _messages(data)]
         except _UnknownChannelError:
             self._schemas, self._channels = known
             definitions = self._definitions(data)
@@ -243,31 +247,20 @@ class SoundRecords:
                 self._define(definition)
             records = [
                 *definitions,
-                *(self._parse(raw) for raw in self._split(data)),
+                *(self._parse(raw) for raw in _messages(data)),
             ]
         times = [record.log_time for record in records if isinstance(record, Message)]
         if times and max(times) <= self.last_ns:
-            raise TrialFileError(self._path, "has a chunk out of order")
+            raise DamageError("a chunk out of order")
         yield from records
         self.last_ns = max(times, default=self.last_ns)
 
-    def _split(self, data: memoryview) -> Generator[RawRecord]:
-        at = 0
-        while at < len(data):
-            raw = record_at(data, at)
-            if raw is None:
-                raise TrialFileError(self._path, "has a chunk that ends in a record")
-            if raw.opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE):
-                yield raw
-            at = raw.end
-
     def _parse(self, raw: RawRecord) -> Schema | Channel | Message:
         if raw.opcode == Opcode.MESSAGE:
-            channel, sequence, log_time, publish_time = _MESSAGE.unpack_from(raw.body)
-            if channel not in self._channels:
-                raise _UnknownChannelError(self._path, "has messages without a channel")
-            content = bytes(raw.body[_MESSAGE.size :])
-            return Message(channel, log_time, content, publish_time, sequence)
+            message = message_of(raw.body)
+            if message.channel_id not in self._channels:
+                raise _UnknownChannelError("messages without a channel")
+            return message
         record = _definition(raw)
         self._define(record)
         return record
@@ -277,7 +270,7 @@ class SoundRecords:
             self._schemas.add(record.id)
             return
         if record.schema_id not in self._schemas:
-            raise TrialFileError(self._path, "has a channel without a schema")
+            raise DamageError("a channel without a schema")
         self._channels.add(record.id)
 
     def _definitions(self, data: memoryview) -> list[Schema | Channel]:
@@ -314,21 +307,21 @@ class SoundRecords:
     def _sizes(self, data: memoryview) -> dict[int, int]:
         """Return how long the first message of each channel is."""
         sizes: dict[int, int] = {}
-        for raw in self._split(data):
+        for raw in _messages(data):
             if raw.opcode == Opcode.MESSAGE:
-                channel = _MESSAGE.unpack_from(raw.body)[0]
-                sizes.setdefault(channel, len(raw.body) - _MESSAGE.size)
+                message = message_of(raw.body)
+                sizes.setdefault(message.channel_id, len(message.data))
         return sizes
 
     def _read_attachment(self, body: memoryview) -> Generator[Attachment]:
-        attachment = Attachment.read(_stream(body))
-        if _has_checksum(body):
+        attachment = parse(Attachment, body)
+        if has_checksum(body):
             yield attachment
         else:
             self.left_out.append(attachment.name)
 
 
-class _UnknownChannelError(TrialFileError):
+class _UnknownChannelError(DamageError):
     """A message refers to a channel that was not defined before it."""
 
 
@@ -346,8 +339,14 @@ def recorded_seconds(data: bytes) -> float:
 
 
 def _definition(raw: RawRecord) -> Schema | Channel:
-    record = Schema if raw.opcode == Opcode.SCHEMA else Channel
-    return record.read(_stream(raw.body))
+    return parse(Schema if raw.opcode == Opcode.SCHEMA else Channel, raw.body)
+
+
+def _messages(chunk: memoryview) -> Iterator[RawRecord]:
+    """Give the messages in a chunk, and what defines their channels."""
+    for raw in records_of(chunk, what="a chunk"):
+        if raw.opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE):
+            yield raw
 
 
 def _written(sizes: Mapping[int, int]) -> Iterable[Schema | Channel]:
@@ -363,34 +362,3 @@ def _written(sizes: Mapping[int, int]) -> Iterable[Schema | Channel]:
             schema_id=number,
             metadata={},
         )
-
-
-def _has_checksum(body: memoryview) -> bool:
-    """Whether the attachment is as it was written."""
-    return zlib.crc32(body[: -_CRC.size]) == _CRC.unpack(body[-_CRC.size :])[0]
-
-
-def _is_metadata(body: memoryview) -> bool:
-    """Whether the texts in it fill it exactly; it has no checksum of its own."""
-    at = _LENGTH.size + _LENGTH.unpack_from(body)[0]
-    end = at + _LENGTH.size + _LENGTH.unpack_from(body, at)[0]
-    at += _LENGTH.size
-    texts = 0
-    while at < end == len(body):
-        at += _LENGTH.size + _LENGTH.unpack_from(body, at)[0]
-        texts += 1
-    if at != len(body) or not texts or texts % 2:
-        return False
-    Metadata.read(_stream(body))
-    return True
-
-
-def _is_index(body: memoryview) -> bool:
-    if len(body) < _INDEX.size:
-        return False
-    size = _INDEX.unpack_from(body)[1]
-    return size == len(body) - _INDEX.size and size % 16 == 0
-
-
-def _stream(body: memoryview) -> ReadDataStream:
-    return ReadDataStream(io.BytesIO(body))

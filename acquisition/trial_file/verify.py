@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from acquisition.clock import PERIOD_NS
 from acquisition.errors import TrialFileError
-from acquisition.trial_file.chunks import as_trial_file_error
+from acquisition.trial_file.contents import as_trial_file_error
 from acquisition.trial_file.data_files import open_data
-from acquisition.trial_file.header import WriterCounts
+from acquisition.trial_file.header import WriterCounts, attachment_digests
 from acquisition.trial_file.reader import TopicRows, TrialReader
 
 PERIOD_TOLERANCE = 0.02
@@ -71,11 +71,7 @@ def verify_file(path: Path, counts: WriterCounts | None = None) -> VerifiedFile:
 
 
 def _check_attachments(reader: TrialReader) -> None:
-    provenance = reader.metadata["provenance"]
-    for key, digest in provenance.items():
-        if not key.startswith("sha256:"):
-            continue
-        name = key.removeprefix("sha256:")
+    for name, digest in attachment_digests(reader.metadata["provenance"]).items():
         actual = reader.attachments.get(name)
         if actual is None and not reader.is_complete:
             continue

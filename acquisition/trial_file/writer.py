@@ -15,7 +15,11 @@ from acquisition.files import publish_file, sync_directory
 from acquisition.formats import FORMAT
 from acquisition.sample import CHANNELS, Flag, Record
 from acquisition.schema import CYCLE, TRUTH, Layout, schema_text
-from acquisition.trial_file.header import TrialHeader, WriterCounts
+from acquisition.trial_file.header import (
+    TrialHeader,
+    WriterCounts,
+    digest_fields,
+)
 from acquisition.trial_file.views import VIEW_TOPICS, encode_can_batch, encode_views
 
 CHUNK_BYTES = 262_144
@@ -195,14 +199,14 @@ class TrialWriter:
             "rate_hz": str(header.rate_hz),
         }
         digests = {
-            f"sha256:{name}": hashlib.sha256(content).hexdigest()
+            name: hashlib.sha256(content).hexdigest()
             for name, content in header.attachments.items()
         }
         channels = {c.field: f"{c.unit} in {c.frame}; {c.sign}" for c in CHANNELS}
         metadata: dict[str, dict[str, str]] = {
             "trial": {"format_version": FORMAT, **header.trial},
             "clock": clock,
-            "provenance": {**header.provenance, **digests},
+            "provenance": {**header.provenance, **digest_fields(digests)},
             "channels": channels,
         }
         self._describe(metadata)

@@ -12,7 +12,9 @@ from pathlib import Path
 from typing import BinaryIO
 
 from acquisition.files import open_regular
+from acquisition.trial_file.unpacking import DamageError
 from analysis.logs.log_file import (
+    LARGEST_PART,
     MOST_TOPICS,
     LogMessage,
     LogTopic,
@@ -22,7 +24,6 @@ from analysis.logs.log_file import (
     damaged,
     short_type,
 )
-from analysis.logs.unpacking import LARGEST_PART, UnpackError, unpacked
 
 MAGIC = b"#ROSBAG V2.0\n"
 _MESSAGE, _CHUNK, _CONNECTION = 2, 5, 7
@@ -66,7 +67,7 @@ class BagLog(OneFile):
                         yield from self._of_chunk(header, data, wanted)
                     else:
                         yield from self._of_record(header, data, wanted)
-                except (UnpackError, struct.error, KeyError, IndexError) as error:
+                except (DamageError, struct.error, KeyError, IndexError) as error:
                     why = str(error) or "a record is damaged"
                     self.losses[:] = [f"nothing is read behind byte {offset}: {why}"]
                     return
@@ -77,7 +78,7 @@ class BagLog(OneFile):
     ) -> Iterator[LogMessage]:
         name = header[b"compression"].decode(errors="replace")
         (size,) = _SIZE.unpack(header[b"size"])
-        records, at = unpacked(data, name, size), 0
+        records, at = self.unpacker.unpack(data, name, size), 0
         while at < len(records):
             inner, data, at = _record_at(records, at)
             yield from self._of_record(inner, data, wanted)
@@ -121,10 +122,10 @@ def _record_of_file(file: BinaryIO) -> tuple[_Header, bytes] | None:
 def _part(file: BinaryIO, head: bytes) -> bytes:
     (size,) = _SIZE.unpack(head)
     if size > LARGEST_PART:
-        raise UnpackError(f"a record of {size} bytes")
+        raise DamageError(f"a record of {size} bytes")
     data = file.read(size)
     if len(data) < size:
-        raise UnpackError("the file is cut there")
+        raise DamageError("the file is cut there")
     return data
 
 
@@ -135,7 +136,7 @@ def _record_at(records: bytes, at: int) -> tuple[_Header, bytes, int]:
         (size,) = _SIZE.unpack_from(records, at)
         at += _SIZE.size
         if size > len(records) - at:
-            raise UnpackError("a record leads out of its chunk")
+            raise DamageError("a record leads out of its chunk")
         parts.append(records[at : at + size])
         at += size
     return _fields(parts[0]), parts[1], at
@@ -149,10 +150,10 @@ def _fields(header: bytes) -> _Header:
         (size,) = _SIZE.unpack_from(header, at)
         at += _SIZE.size
         if size > len(header) - at:
-            raise UnpackError("a field leads out of its header")
+            raise DamageError("a field leads out of its header")
         name, mark, value = header[at : at + size].partition(b"=")
         if not mark:
-            raise UnpackError("a header holds what is no field")
+            raise DamageError("a header holds what is no field")
         fields[name] = value
         at += size
     return fields

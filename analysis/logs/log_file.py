@@ -8,8 +8,11 @@ from pathlib import Path
 from typing import Literal, NamedTuple, Protocol
 
 from acquisition.errors import SettingsError
+from acquisition.trial_file.unpacking import Unpacker
 
 LARGEST_LOG = 2 * 10**9  # bytes on the disk
+LARGEST_PART = 64 * 2**20  # bytes of a record, and of a chunk unpacked
+LARGEST_RATIO = 100  # of a part unpacked to the same part packed
 MOST_MESSAGES = 10**7  # of the topics that are read
 LONGEST_NAME = 4096  # bytes of a topic, a type, a frame or a joint
 LARGEST_DEFINITION = 100_000  # bytes
@@ -90,6 +93,7 @@ class OneFile:
         self.topics: dict[str, LogTopic] = {}
         self.losses: list[str] = []
         self.unread: dict[str, str] = {}
+        self.unpacker = Unpacker(LARGEST_PART, LARGEST_RATIO)
         self.is_simulated = False  # some formats have no metadata that could say so
 
 

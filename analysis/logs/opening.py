@@ -8,16 +8,23 @@ from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import zstandard
-
 from acquisition.errors import SettingsError
 from acquisition.files import UnfitFileError, open_regular
-from analysis.logs import bag_log, mcap_log, sqlite_log
+from acquisition.trial_file.records import MAGIC as MCAP_MAGIC
+from acquisition.trial_file.unpacking import ZSTD_MAGIC, DamageError, unpack_file
+from analysis.logs import bag_log, sqlite_log
 from analysis.logs.bag_log import BagLog
-from analysis.logs.log_file import LARGEST_LOG, LogFile, LogMessage, LogTopic, damaged
+from analysis.logs.log_file import (
+    LARGEST_LOG,
+    LARGEST_PART,
+    LARGEST_RATIO,
+    LogFile,
+    LogMessage,
+    LogTopic,
+    damaged,
+)
 from analysis.logs.mcap_log import McapLog
 from analysis.logs.sqlite_log import SqliteLog
-from analysis.logs.unpacking import LARGEST_PART, LARGEST_RATIO, ZSTD_MAGIC
 
 _SUFFIXES = (".mcap", ".db3", ".bag", ".mcap.zstd", ".db3.zstd")
 _MOST_FILES = 200
@@ -93,7 +100,7 @@ def _opened(path: Path, scratch: Path) -> LogFile:
     if start.startswith(ZSTD_MAGIC):
         _unpack_file(path, scratch)
         path, start = scratch, _first_bytes(scratch)
-    if start.startswith(mcap_log.MAGIC):
+    if start.startswith(MCAP_MAGIC):
         return McapLog(path)
     if start.startswith(sqlite_log.MAGIC):
         return SqliteLog(path)
@@ -133,17 +140,11 @@ def _first_bytes(path: Path) -> bytes:
 def _unpack_file(path: Path, scratch: Path) -> None:
     """Write the content of a packed file into `scratch`."""
     most = min(LARGEST_LOG, max(2**20, LARGEST_RATIO * path.stat().st_size))
-    unpacker = zstandard.ZstdDecompressor(max_window_size=LARGEST_PART)
-    written = 0
     try:
         with (
             open_regular(path, is_link_followed=True) as packed,
             scratch.open("wb") as out,
         ):
-            for part in unpacker.read_to_iter(packed):
-                written += len(part)
-                if written > most:
-                    raise damaged(path, f"it unpacks to over {most} bytes")
-                out.write(part)
-    except zstandard.ZstdError as error:
-        raise damaged(path, f"cannot be unpacked ({error})") from error
+            unpack_file(packed, out, most, LARGEST_PART)
+    except DamageError as error:
+        raise damaged(path, str(error)) from error

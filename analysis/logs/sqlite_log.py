@@ -10,7 +10,9 @@ from typing import Any
 from urllib.parse import quote
 
 from acquisition.errors import SettingsError
+from acquisition.trial_file.unpacking import ZSTD_MAGIC, DamageError
 from analysis.logs.log_file import (
+    LARGEST_PART,
     MOST_TOPICS,
     LogMessage,
     LogTopic,
@@ -19,12 +21,6 @@ from analysis.logs.log_file import (
     checked_name,
     damaged,
     short_type,
-)
-from analysis.logs.unpacking import (
-    LARGEST_PART,
-    ZSTD_MAGIC,
-    UnpackError,
-    unpacked,
 )
 
 MAGIC = b"SQLite format 3\0"
@@ -78,10 +74,10 @@ class SqliteLog(OneFile):
                     if topic not in topics:
                         continue
                     if not (isinstance(received_ns, int) and isinstance(data, bytes)):
-                        raise UnpackError("a message is no bytes")
+                        raise DamageError("a message is no bytes")
                     if data.startswith(ZSTD_MAGIC):
-                        data = unpacked(data, "zstd")
-                except (sqlite3.Error, UnpackError, OverflowError) as error:
+                        data = self.unpacker.unpack(data, "zstd")
+                except (sqlite3.Error, DamageError, OverflowError) as error:
                     self.losses[:] = [f"nothing is read behind a message: {error}"]
                     return
                 yield LogMessage(topic, received_ns, data)

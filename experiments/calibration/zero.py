@@ -8,6 +8,7 @@ from collections.abc import Callable
 from acquisition.errors import PreflightError, TractionError
 from experiments.operator.console import GOOD, WARNING, Console
 from experiments.preflight.identity import check_identity, serial_numbers
+from experiments.rig.requests import DefinePosition, StartArm
 from experiments.rig.rig import Rig
 from wam.driver.home import check_home, home_error
 from wam.driver.startup import ArmInfo
@@ -36,7 +37,7 @@ def define_home(rig: Rig, console: Console, confirm: Callable[[], bool]) -> bool
         console.say("Nothing was changed. ARM: idle; it sinks slowly, support it.")
         return False
     _check_encoders(rig, _start(rig), console)  # it was moved until now
-    rig.backend.arm.define_position(home.tolist())
+    rig.backend.ask(DefinePosition(home.tolist()))
     console.check(GOOD, "zero", "positions defined at home")
     return True
 
@@ -44,7 +45,7 @@ def define_home(rig: Rig, console: Console, confirm: Callable[[], bool]) -> bool
 def _start(rig: Rig) -> ArmInfo:
     """Ask the arm who it is; raise PreflightError when it is not fit."""
     try:
-        return rig.backend.start_arm()
+        return rig.backend.ask(StartArm())
     except TractionError as error:
         state = error.arm_state or "not touched"
         raise PreflightError(error.message, hint=error.hint, arm_state=state) from error

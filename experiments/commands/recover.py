@@ -75,13 +75,15 @@ def obstacle_to_analysis(recovery: Recovery) -> str:
 
 def _plain(recovery: Recovery, obstacle: str) -> dict[str, object]:
     """Return what became of a file, for a program."""
-    is_whole = recovery.path == recovery.source
-    saved = "saved" if recovery.is_new else "saved before"
     if obstacle:
-        saved = "copied"
+        state = "copied"
+    elif recovery.path == recovery.source:
+        state = "whole"
+    else:
+        state = "saved" if recovery.is_new else "saved before"
     return {
         "source": str(recovery.source),
-        "state": "whole" if is_whole else saved,
+        "state": state,
         "reason": recovery.reason,
         "obstacle": obstacle,
         "is_doubtful": recovery.is_doubtful,
@@ -140,7 +142,16 @@ def _tell(recovery: Recovery, obstacle: str, console: Console) -> None:
         held = f"{verified.duration:.2f} s, {held}"
     if recovery.path == source:
         kind = "complete" if verified.is_complete else "sound, though incomplete"
+        lacks = ", ".join(recovery.missing_attachments)
+        if obstacle:
+            console.problem(
+                f"{WARNING} {source}: is {kind} ({held}), but it cannot be analysed: "
+                f"it lacks {lacks}."
+            )
+            return
         console.say(f"{GOOD} {source}: is {kind}, nothing to recover ({held}).")
+        if lacks:
+            console.say(f"{WARNING} It lacks {lacks}.")
         return
     verb = "saved" if recovery.is_new else "was recovered before,"
     if obstacle:

@@ -13,6 +13,14 @@ from experiments.commissioning.recording import Values, number, texts, words
 from experiments.commissioning.scene import Scene
 from experiments.commissioning.step import Step
 from experiments.rig.build import read_properties
+from experiments.rig.requests import (
+    CountAnswers,
+    LastAnswers,
+    Listen,
+    MeasureExchange,
+    OpenSensor,
+    StartArm,
+)
 from experiments.rig.rig import Rig
 from wam.bus.frames import MOTOR_NODES, SAFETY_NODE
 from wam.driver.puck_properties import (
@@ -33,7 +41,7 @@ def listen(rig: Rig, most: float = LISTENED) -> Iterator[tuple[float, Values]]:
     """Ask for nothing for `most` [s]; yield the share done and what was heard."""
     frames, seconds = 0, 0.0
     while seconds < most:
-        heard = rig.backend.arm.listen(_PORTION)
+        heard = rig.backend.ask(Listen(_PORTION))
         seconds += _PORTION
         frames += heard.frames
         yield (
@@ -71,7 +79,7 @@ def identify(rig: Rig, commissioned: Sequence[int | None] = ()) -> Values:
     refusal, warnings, nodes = "", list[str](), list[int]()
     degrees = np.full((2, len(MOTOR_NODES)), np.nan)  # of pucks, of motors
     try:
-        info = rig.backend.start_arm()
+        info = rig.backend.ask(StartArm())
         warnings, nodes = list(info.warnings), list(info.nodes)
         for i, puck in enumerate(info.pucks):
             told_of = (puck.health.puck_degc, puck.health.motor_degc)
@@ -80,11 +88,11 @@ def identify(rig: Rig, commissioned: Sequence[int | None] = ()) -> Values:
         refusal = error.message
         if not isinstance(error, UnfitDeviceError):
             refusal = str(error)
-    answers = rig.backend.arm.answers()
+    answers = rig.backend.ask(LastAnswers())
     names = sorted({name for answer in answers for name in answer})
     rows = [[answer.get(name) for name in names] for answer in answers]
     table = [[_SILENT if value is None else value for value in row] for row in rows]
-    counted = asdict(rig.backend.arm.count_answers(ASKED))
+    counted = asdict(rig.backend.ask(CountAnswers(ASKED)))
     return {
         "names": texts(names),
         "properties": np.array(table, dtype=np.int64).reshape(len(answers), len(names)),
@@ -180,8 +188,8 @@ def judge_identity(values: Values) -> Judgement:
 
 def time_replies(rig: Rig) -> Iterator[tuple[float, Values]]:
     """Ask for positions, leave questions out, then let the loop run, the arm idle."""
-    measured = rig.backend.arm.measure_exchange()
-    rig.backend.open_sensor()
+    measured = rig.backend.ask(MeasureExchange())
+    rig.backend.ask(OpenSensor())
     rig.backend.begin()
     loop_client = rig.backend.loop_client
     reader = rig.shared.cycles.reader()
@@ -226,14 +234,14 @@ def _collect_silence(scene: Scene) -> Values:
 
 def _collect_identity(scene: Scene) -> Values:
     values = identify(scene.rig, scene.serials)
-    scene.answers = scene.rig.backend.arm.answers()
+    scene.answers = scene.rig.backend.ask(LastAnswers())
     return values
 
 
 def _collect_times(scene: Scene) -> Values:
     if scene.info is None:
-        scene.info = scene.rig.backend.start_arm()
-        scene.answers = scene.rig.backend.arm.answers()
+        scene.info = scene.rig.backend.ask(StartArm())
+        scene.answers = scene.rig.backend.ask(LastAnswers())
     return scene.show(time_replies(scene.rig), "the loop runs, the arm idle")
 
 

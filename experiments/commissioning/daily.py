@@ -39,6 +39,7 @@ from experiments.commissioning.weights import POSES, bring, measure
 from experiments.messages import preflight_error
 from experiments.operator.console import BAD, GOOD
 from experiments.preflight.zero import zero_errors
+from experiments.rig.requests import MeasureExchange, StartArm
 from wam.model.arm_model import ArmModel
 from wam.model.constants import Array, load_constants
 
@@ -119,8 +120,8 @@ def collect(scene: Scene, files: RecordFolder, reference: Values) -> Values:
     """
     scene.say("Daily check, about 2 min   [q]uit. The arm is idle: support it.")
     heard = _heard(scene)
-    scene.rig.backend.start_arm()
-    times = scene.rig.backend.arm.measure_exchange()
+    scene.rig.backend.ask(StartArm())
+    times = scene.rig.backend.ask(MeasureExchange())
     scene.start()
     assert scene.info is not None
     changed = _changed(files, scene.inputs())

@@ -15,6 +15,7 @@ from experiments.commissioning.recording import Values
 from experiments.messages import FaultContext, fault_text, preflight_error
 from experiments.operator.console import Console
 from experiments.operator.prompts import Prompt
+from experiments.rig.requests import LastAnswers, OpenSensor, StartArm
 from experiments.rig.rig import Rig
 from experiments.rig.simulation import SimulatedHand
 from experiments.run.console_loop import TICK, ConsoleLoop
@@ -77,9 +78,9 @@ class Scene:
         """
         if self.loop_client.loop.is_running:
             return
-        self.info = self.rig.backend.start_arm()
-        self.answers = self.rig.backend.arm.answers()
-        self.sensor = self.rig.backend.open_sensor()
+        self.info = self.rig.backend.ask(StartArm())
+        self.answers = self.rig.backend.ask(LastAnswers())
+        self.sensor = self.rig.backend.ask(OpenSensor())
         self.rig.backend.begin()
 
     def inputs(self) -> dict[str, str]:

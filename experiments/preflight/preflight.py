@@ -31,8 +31,13 @@ from experiments.preflight.host_checks import (
 from experiments.preflight.identity import check_identity, serial_numbers
 from experiments.preflight.page import CheckResult, ChecksPage
 from experiments.preflight.zero import zero_errors
-from experiments.rig.arm_operations import EXCHANGE_CYCLES
 from experiments.rig.law_calibrations import forced_calibrations, law_words
+from experiments.rig.requests import (
+    EXCHANGE_CYCLES,
+    MeasureExchange,
+    OpenSensor,
+    StartArm,
+)
 from experiments.rig.rig import Rig
 from wam.driver.health import complaints, temperature_range
 from wam.driver.home import HOME_LIMIT, check_zero
@@ -138,7 +143,7 @@ def _check_host(rig: Rig, data: Path, page: ChecksPage, probe: DiskProbe) -> Non
 
 def _check_arm(rig: Rig, page: ChecksPage) -> ArmInfo:
     try:
-        info = rig.backend.start_arm()
+        info = rig.backend.ask(StartArm())
     except TractionError as error:
         page.add(BAD, "arm", error.message)
         raise not_reached(error, rig.settings.rig) from error
@@ -185,7 +190,7 @@ def _check_zero(rig: Rig, info: ArmInfo, add: AddLine) -> None:
 
 def _check_sensor(rig: Rig, arm_state: str, add: AddLine) -> dict[str, str]:
     try:
-        fields = rig.backend.open_sensor()
+        fields = rig.backend.ask(OpenSensor())
     except TractionError as error:
         add(BAD, "F/T sensor", str(error))
         raise as_preflight(error, arm_state) from error
@@ -220,8 +225,8 @@ def start_devices(rig: Rig) -> ArmInfo:
         PreflightError: the arm or the sensor is not fit.
     """
     try:
-        info = rig.backend.start_arm()
-        rig.backend.open_sensor()
+        info = rig.backend.ask(StartArm())
+        rig.backend.ask(OpenSensor())
     except TractionError as error:
         raise as_preflight(error, "not touched") from error
     rig.backend.begin()
@@ -230,7 +235,7 @@ def start_devices(rig: Rig) -> ArmInfo:
 
 def _check_exchange(rig: Rig, add: AddLine) -> None:
     """Grade the way from the request to the seventh position over this adapter."""
-    measured = rig.backend.arm.measure_exchange()
+    measured = rig.backend.ask(MeasureExchange())
     times = np.array(measured.replies_ns)
     lost = EXCHANGE_CYCLES - len(times)
     if len(times) < EXCHANGE_CYCLES // 2 or measured.jumps:

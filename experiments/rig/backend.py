@@ -1,7 +1,6 @@
 """The interface between the console and the devices, in this process or in others."""
 
 import os
-from collections.abc import Callable
 from contextlib import suppress
 from typing import Protocol
 
@@ -9,16 +8,12 @@ from acquisition.clock import Clock
 from acquisition.control_loop.loop import Loop
 from acquisition.control_loop.realtime import Grant
 from acquisition.control_loop.states import ArmState
-from acquisition.devices import SafetyMode, WrenchSensor
+from acquisition.devices import SafetyMode
 from acquisition.ipc.layout import SharedLayout
 from acquisition.ipc.loop_client import LoopClient
+from acquisition.ipc.requests import Answer, Dispatcher, Request
 from acquisition.recording.recorder import Recorder, TrialRecording
-from experiments.rig.arm_operations import ArmOperations
-from experiments.rig.build import LoopConfig, build_loop_server
-from experiments.rig.claim import release
-from wam.bus.link import CanLink
-from wam.driver.arm import WamArm
-from wam.driver.startup import ArmInfo
+from experiments.rig.arm_service import ArmService
 
 
 class RigBackend(Protocol):
@@ -26,11 +21,9 @@ class RigBackend(Protocol):
 
     Attributes:
         loop_client: the console's side of the loop.
-        arm: what is asked of the arm while the loop does not run.
     """
 
     loop_client: LoopClient
-    arm: ArmOperations
 
     @property
     def recorder(self) -> TrialRecording:
@@ -42,15 +35,11 @@ class RigBackend(Protocol):
         """Number of the process that writes them."""
         ...
 
-    def start_arm(self) -> ArmInfo:
-        """Find, wake and question the arm; raises as `WamArm.start`.
+    def ask(self, request: Request[Answer]) -> Answer:
+        """Return the answer of arm or sensor to one of `experiments.rig.requests`.
 
-        Where the bus is shared, another program's arm is refused first.
+        For the time in which the loop does not run; raises what the request says.
         """
-        ...
-
-    def open_sensor(self) -> dict[str, str]:
-        """Open the wrist sensor; return what it says about itself."""
         ...
 
     def sensor_metadata(self) -> dict[str, str]:
@@ -112,23 +101,11 @@ class InlineAdvance:
 class InProcessBackend:
     """Arm, sensor, loop and recorder in this thread, on any clock."""
 
-    def __init__(
-        self,
-        shared: SharedLayout,
-        clock: Clock,
-        arm: WamArm,
-        link: CanLink,
-        open_sensor: Callable[[], WrenchSensor],
-        parts: Callable[[WrenchSensor], LoopConfig],
-    ) -> None:
-        self._arm = arm
-        self._link = link
-        self.arm = ArmOperations(lambda: arm, clock, self._poll)
+    def __init__(self, shared: SharedLayout, clock: Clock, service: ArmService) -> None:
+        self._service = service
+        self._dispatcher = Dispatcher(service.handlers())
         self._shared = shared
         self._clock = clock
-        self._open_sensor = open_sensor
-        self._parts = parts
-        self._sensor: WrenchSensor | None = None
         self.recorder = Recorder(shared, clock)
         self._advance_loop: InlineAdvance | None = None  # once the loop runs
         self.loop_client = LoopClient(shared, clock, self._advance)
@@ -138,24 +115,19 @@ class InProcessBackend:
         """Number of this process, which writes the trials too."""
         return os.getpid()
 
-    def start_arm(self) -> ArmInfo:
-        """Find, wake and question the arm; raises as `WamArm.start`."""
-        return self.arm.start()
-
-    def open_sensor(self) -> dict[str, str]:
-        """Open the wrist sensor; return what it says about itself."""
-        self._sensor = self._open_sensor()
-        return self._sensor.describe()
+    def ask(self, request: Request[Answer]) -> Answer:
+        """Return the answer of arm or sensor; see `experiments.rig.requests`."""
+        return self._dispatcher.carry_out(request)
 
     def sensor_metadata(self) -> dict[str, str]:
         """Return what became of the sensor's samples since it was opened, as text."""
-        return self._sensor.stream_metadata() if self._sensor is not None else {}
+        return self._service.stream_metadata()
 
     def begin(self) -> None:
         """Let the loop run from here on, whenever the console waits."""
-        if self._sensor is None:
-            raise RuntimeError("the sensor was not opened")
-        loop_server = build_loop_server(self._parts(self._sensor))
+        self._service.begin()
+        loop_server = self._service.loop_server
+        assert loop_server is not None
         loop = Loop(loop_server, self._clock, stats=loop_server.stats)
         self._advance_loop = InlineAdvance(loop, self.recorder)
         self.loop_client.beat()
@@ -175,25 +147,17 @@ class InProcessBackend:
                 self.loop_client.request(ArmState.IDLE)
                 self._advance_loop.step()
                 return self.loop_client.status.state is ArmState.IDLE
-        return self.arm.idle()
+        return self._service.idle()
 
     def safety_mode(self) -> SafetyMode:
         """Return the safety module's newest mode."""
-        return self.arm.safety_mode()
+        return self._service.safety_mode()
 
     def close(self) -> None:
         """Idle the arm if it got torques, give bus and port back; safe to repeat."""
         self.recorder.abandon()
-        release(self._arm, self._link)
-        if self._sensor is not None:
-            self._sensor.close()
-            self._sensor = None
+        self._service.close()
         self._shared.close()
-
-    def _poll(self, now_ns: int) -> None:
-        """Read the sensor's port before the loop runs, or its buffer overflows."""
-        if self._sensor is not None:
-            self._sensor.poll(now_ns)
 
     def _advance(self, cycles: int) -> None:
         """Let `cycles` periods of the loop pass."""

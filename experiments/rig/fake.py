@@ -11,6 +11,7 @@ from acquisition.devices import WrenchSensor
 from acquisition.errors import SettingsError
 from acquisition.ipc.layout import SharedLayout
 from acquisition.simulation import SimulationControl
+from experiments.rig.arm_service import ArmAccess, ArmService
 from experiments.rig.backend import InProcessBackend, RigBackend
 from experiments.rig.build import (
     LawParts,
@@ -30,6 +31,8 @@ from experiments.settings.rig import RigSettings
 from ft_sensor.serial_line.link import SerialPort
 from ft_sensor.serial_line.sensor import SerialSensor
 from ft_sensor.vendors.registry import AnySensor
+from wam.bus.link import CanLink
+from wam.driver.arm import WamArm
 from wam.model.arm_model import ArmModel
 from wam.model.constants import load_constants
 from wam.model.tool import Tool, tool_metadata
@@ -155,24 +158,30 @@ def stepped(
     link = build_link(InProcessTransport(simulated.bus, clock), shared, clock)
     arm = build_arm(settings.rig, constants, link, clock)
 
-    def sensor() -> WrenchSensor:
+    def opened_sensor(arm: WamArm, link: CanLink) -> WrenchSensor:
         if settings.rig.ft_sensor.is_on_bus:
             return open_bus_sensor(arm, link, clock)
         return _opened_sensor(settings.rig, simulated.open_port(), clock)
 
-    def parts(opened: WrenchSensor) -> LoopConfig:
+    def loop_config(arm: WamArm, sensor: WrenchSensor) -> LoopConfig:
         return LoopConfig(
             rig=settings.rig,
             row=row,
             law=law,
             arm=arm,
-            sensor=opened,
+            sensor=sensor,
             shared=shared,
             clock=clock,
             is_simulated=True,
         )
 
-    backend = InProcessBackend(shared, clock, arm, link, sensor, parts)
+    access = ArmAccess(
+        open_bus=lambda: (arm, link),
+        check=lambda arm, link: None,  # the bus is its own
+        open_sensor=opened_sensor,
+        loop_config=loop_config,
+    )
+    backend = InProcessBackend(shared, clock, ArmService(access, clock))
     return clock, backend, simulation
 
 

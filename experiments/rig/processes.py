@@ -11,14 +11,21 @@ from acquisition.errors import LinkError, PreflightError, TractionError
 from acquisition.ipc.child import Child, ProcessLostError
 from acquisition.ipc.layout import SharedLayout
 from acquisition.ipc.loop_client import LoopClient
-from acquisition.ipc.rpc import make_proxy
+from acquisition.ipc.requests import Answer, Request
 from acquisition.ipc.shared_memory import require_ordered_stores
+from acquisition.ipc.simulation import AskDevices
 from acquisition.recording.recorder_process import RemoteRecorder
-from acquisition.simulation import DeviceServer
 from experiments.rig.arm_lock import ArmLock
-from experiments.rig.arm_operations import ArmOperations
-from experiments.rig.services import ControlService, SensorService
-from wam.driver.startup import ArmInfo
+from experiments.rig.requests import (
+    AskGrants,
+    AskSafetyMode,
+    AskStream,
+    BeginLoop,
+    ClaimArm,
+    IdleArm,
+    OpenSensor,
+    StartArm,
+)
 
 _CONTROL, _READER = "control", "sensor reader"  # names of processes
 
@@ -78,18 +85,16 @@ class MultiProcessBackend:
             self.fake = self._spawn_fake(jobs.fake)
         jobs.control["core"] = loop_core
         self._control = self._spawn_control()
-        self.arm, self._service = self._proxies()
         recorder = self._spawn(
             "recorder",
             "acquisition.recording.recorder_process:main",
             {"core": other_core},
         )
-        self._sensor: SensorService | None = None
+        self._reader: Child | None = None
         if jobs.reader is not None:
             jobs.reader["core"] = other_core
             target = "experiments.rig.workers:reader"
-            reader = self._spawn(_READER, target, jobs.reader)
-            self._sensor = make_proxy(SensorService, reader.call)
+            self._reader = self._spawn(_READER, target, jobs.reader)
         self.recorder = RemoteRecorder(recorder, shared)
         self.loop_client = LoopClient(shared, clock, self._advance)
 
@@ -98,44 +103,42 @@ class MultiProcessBackend:
         """Number of the process that writes the trials."""
         return self._children["recorder"].pid
 
-    def start_arm(self) -> ArmInfo:
-        """Find, wake and question the arm; raises as `WamArm.start`.
+    def ask(self, request: Request[Answer]) -> Answer:
+        """Return the answer of the process that has the device; see `requests`."""
+        kind = type(request)
+        if kind is StartArm:
+            self._claim()
+        child = self._reader if kind is OpenSensor else None
+        return (child or self._control).ask(request)
 
-        Raises:
-            PreflightError: also when another program has the arm; nothing is sent to
-                it then, not even at the end.
-        """
+    def _claim(self) -> None:
+        """Refuse another program's arm; nothing is sent to it then, nor at the end."""
         try:
-            self._service.claim()
+            self._control.ask(ClaimArm())
         except (PreflightError, LinkError):
             self._is_claimed = False
             raise
         self._is_claimed = True
-        return self.arm.start()
-
-    def open_sensor(self) -> dict[str, str]:
-        """Open the wrist sensor; return what it says about itself."""
-        return (self._sensor or self._service).open_sensor()
 
     def sensor_metadata(self) -> dict[str, str]:
         """Return what became of the sensor's samples since it was opened, as text.
 
         Nothing for a sensor on the arm's bus, whose process has a loop to run.
         """
-        return self._sensor.sensor_metadata() if self._sensor is not None else {}
+        return {} if self._reader is None else self._reader.ask(AskStream())
 
     def begin(self) -> None:
         """Let the loop run from here on."""
         self.loop_client.beat()
-        self._service.begin()
+        self._control.ask(BeginLoop())
 
     def grants(self) -> dict[str, list[Grant]]:
         """Return what the kernel granted to each process."""
         grants: dict[str, list[Grant]] = {}
         if not self.loop_client.loop.is_running:
-            grants[_CONTROL] = self._service.grants()
-        if self._sensor is not None:
-            grants[_READER] = self._sensor.grants()
+            grants[_CONTROL] = self._control.ask(AskGrants())
+        if self._reader is not None:
+            grants[_READER] = self._reader.ask(AskGrants())
         return grants
 
     @property
@@ -156,7 +159,7 @@ class MultiProcessBackend:
     def idle(self) -> bool:
         """Idle the arm; when its process has died, a new one does it.
 
-        An arm that `start_arm` has refused is left as it is.
+        An arm that was refused at its start is left as it is.
         """
         if not self._is_claimed:
             return False
@@ -164,13 +167,13 @@ class MultiProcessBackend:
             return self._rescue()
         if self.loop_client.loop.is_running:
             return self.loop_client.idle()
-        return self.arm.idle()
+        return self._control.ask(IdleArm())
 
     def safety_mode(self) -> SafetyMode:
         """Return the safety module's newest mode."""
         if self.loop_client.loop.is_running or not self._control.is_alive:
             return self.loop_client.status.safety
-        return self.arm.safety_mode()
+        return self._control.ask(AskSafetyMode())
 
     def close(self) -> None:
         """Idle the arm if it got torques and end all processes; safe to repeat."""
@@ -204,7 +207,7 @@ class MultiProcessBackend:
     def _spawn_fake(self, settings: dict[str, Any]) -> Child:
         """Start the simulated rig and tell the others where its devices are."""
         child = self._spawn("fake rig", "fakes.serving.rig_process:main", settings)
-        served = make_proxy(DeviceServer, child.call).devices()
+        served = child.ask(AskDevices())
         self._jobs.control["can"] = {
             "interface": served.interface,
             "channel": served.channel,
@@ -217,11 +220,6 @@ class MultiProcessBackend:
     def _spawn_control(self) -> Child:
         target = "experiments.rig.workers:control"
         return self._spawn(_CONTROL, target, self._jobs.control)
-
-    def _proxies(self) -> tuple[ArmOperations, ControlService]:
-        """Return what the process with the arm answers while its loop does not run."""
-        call = self._control.call
-        return make_proxy(ArmOperations, call), make_proxy(ControlService, call)
 
     def _spawn(self, name: str, target: str, settings: dict[str, Any]) -> Child:
         child = Child(name, target, settings, self._shared)
@@ -241,8 +239,7 @@ class MultiProcessBackend:
         """Idle the arm of a dead process through a new one."""
         self._children.pop(_CONTROL).stop()
         self._control = self._spawn_control()
-        self.arm, self._service = self._proxies()
         try:
-            return self.arm.idle()
+            return self._control.ask(IdleArm())
         except TractionError:
             return False

@@ -8,6 +8,7 @@ from typing import Any
 
 from acquisition.clock import Clock, SystemClock
 from acquisition.ipc.layout import SharedLayout
+from acquisition.ipc.simulation import RemoteSimulation
 from acquisition.simulation import SimulationControl
 from experiments.arguments import FRICTION, TimeMode
 from experiments.rig.arm_lock import ArmLock
@@ -31,7 +32,6 @@ from experiments.rig.law_calibrations import (
 )
 from experiments.rig.pace import WallPace
 from experiments.rig.processes import MultiProcessBackend, WorkerConfigs
-from experiments.rig.simulation import connect_simulation
 from experiments.settings.calibrations import with_calibrations
 from experiments.settings.load import Settings
 from experiments.settings.matrix import TerrainRow
@@ -160,7 +160,7 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
         jobs = _jobs(settings, row, calibrations, fields)
         backend = _start_processes(jobs, settings, shared, clock)
         if backend.fake is not None:
-            simulation = connect_simulation(backend.fake)
+            simulation = RemoteSimulation(backend.fake.ask)
     payload = payload_of(build_tool(settings.rig, row.foot))
     return Rig(
         clock=clock,

@@ -1,26 +1,7 @@
-"""What a simulated rig offers beyond a real one, and the hand of its operator."""
+"""The hand of a simulated operator."""
 
-import numpy as np
-
-from acquisition.ipc.child import Child
-from acquisition.ipc.rpc import make_proxy
-from acquisition.sample import Record
-from acquisition.simulation import SimulationControl, TruthSource
+from acquisition.simulation import SimulationControl
 from experiments.operator.prompts import Prompt, PromptState
-
-
-def connect_simulation(child: Child) -> SimulationControl:
-    """Return the handle of the simulation that `child` serves."""
-    source = make_proxy(TruthSource, child.call)
-
-    def take_truth() -> Record:
-        parts = [source.truth_part()]
-        while len(parts[-1]):
-            parts.append(source.truth_part())
-        return np.concatenate(parts)
-
-    return make_proxy(SimulationControl, child.call, {"take_truth": take_truth})
-
 
 _ASIDE = frozenset(
     {Prompt.PAUSED, Prompt.DAMPED, Prompt.NOTE}

@@ -9,27 +9,26 @@ from pathlib import Path
 
 from acquisition.clock import SystemClock
 from acquisition.control_loop.loop import Loop
-from acquisition.control_loop.realtime import Grant, RealtimeRequest, request
+from acquisition.control_loop.realtime import RealtimeRequest, request
 from acquisition.devices import WrenchSensor
 from acquisition.errors import TractionError
 from acquisition.ipc.channel import ChannelClosedError
 from acquisition.ipc.child import ChildContext, name_process
 from acquisition.ipc.layout import ProcessRole
 from acquisition.ipc.loop_server import LoopServer
-from acquisition.ipc.rpc import RpcServer, bind
+from acquisition.ipc.requests import Dispatcher
 from acquisition.ipc.shared_sensor import SharedSensor, publish
-from experiments.rig.arm_operations import ArmOperations
+from experiments.rig.arm_service import ArmAccess, ArmService
 from experiments.rig.build import (
     LoopConfig,
     build_arm,
     build_link,
-    build_loop_server,
     build_sensor,
     open_bus_sensor,
 )
-from experiments.rig.claim import check_alone, check_inactive, release
+from experiments.rig.claim import check_alone, check_inactive
 from experiments.rig.law_calibrations import LawCalibrations, build_law
-from experiments.rig.services import ControlService, SensorService
+from experiments.rig.requests import AskGrants, AskStream, OpenSensor
 from experiments.settings.matrix import TerrainRow
 from experiments.settings.rig import RigSettings
 from ft_sensor.serial_line.reconnect import ReconnectingSensor, stream_metadata
@@ -50,7 +49,7 @@ def control(context: ChildContext) -> None:
 
 
 class ControlWorker:
-    """The process that drives the arm, one thread; implements `ControlService`."""
+    """The process that drives the arm, one thread."""
 
     def __init__(self, context: ChildContext) -> None:
         settings = context.settings
@@ -65,11 +64,14 @@ class ControlWorker:
             self._row.foot,
             is_simulated=self._is_simulated,
         )
-        self._constants = self._law.model.constants
-        self._arm: WamArm | None = None
-        self._link: CanLink | None = None
-        self._sensor: WrenchSensor = SharedSensor(context.shared.wrenches)
-        self._loop_server: LoopServer | None = None
+        access = ArmAccess(
+            open_bus=self._open_bus,
+            check=self._check,
+            open_sensor=lambda arm, link: open_bus_sensor(arm, link, self._clock),
+            loop_config=self._loop_config,
+            sensor=SharedSensor(context.shared.wrenches),
+        )
+        self._service = ArmService(access, self._clock)
         self._is_orphaned = False
         signal.signal(signal.SIGTERM, self._note_orphaned)
         core = settings.get("core")
@@ -78,86 +80,55 @@ class ControlWorker:
 
     def serve(self) -> None:
         """Answer until the console hangs up; an arm that got torques is idled then."""
-        server = RpcServer(
-            bind(ArmOperations, ArmOperations(self._opened, self._clock)),
-            bind(ControlService, self),
-        )
+        service = self._service
+        dispatcher = Dispatcher(service.handlers(), {AskGrants: lambda: self._grants})
         try:
             while not self._is_orphaned:
-                server.answer(self._context.channel)
-                if self._loop_server is not None:
-                    self._run(self._loop_server)
-                    self._loop_server = None
+                dispatcher.answer(self._context.channel)
+                if service.loop_server is not None:
+                    self._run(service.loop_server)
+                    service.loop_server = None
         except ChannelClosedError:
             pass
         finally:
-            self._release()
+            service.release()
 
-    def claim(self) -> None:
-        """Open the bus and refuse an arm that is another program's.
+    def _open_bus(self) -> tuple[WamArm, CanLink]:
+        """Return the arm and its link, the bus open; raises LinkError."""
+        settings = self._context.settings
+        can = settings["can"]
+        address = can["interface"], can["channel"], can["bitrate"]
+        transport = open_transport(*address, self._clock)
+        link = build_link(transport, self._context.shared, self._clock)
+        noted = settings["lost_positions"]
+        arm = build_arm(
+            self._rig,
+            self._law.model.constants,
+            link,
+            self._clock,
+            settings["properties"],
+            Path(noted) if noted else None,
+        )
+        return arm, link
 
-        Raises:
-            PreflightError: another master talks, or the arm is active.
-            LinkError: the bus cannot be opened, or is down.
-        """
-        arm = self._opened()
-        if arm.sent_ns:  # it is this program's already
-            return
-        assert self._link is not None
+    def _check(self, arm: WamArm, link: CanLink) -> None:
+        """Refuse an arm that is another program's; raises PreflightError, LinkError."""
         can = self._context.settings["can"]
-        try:
-            bus = f"{can['interface']}:{can['channel']}"
-            check_alone(self._link, self._clock, bus)
-            check_inactive(arm)
-        except TractionError:
-            self._release()
-            raise
+        check_alone(link, self._clock, f"{can['interface']}:{can['channel']}")
+        check_inactive(arm)
 
-    def grants(self) -> list[Grant]:
-        """Return what the kernel granted."""
-        return self._grants
-
-    def open_sensor(self) -> dict[str, str]:
-        """Open a wrist sensor on the arm's bus; return its description."""
-        arm = self._opened()
-        assert self._link is not None
-        self._sensor = open_bus_sensor(arm, self._link, self._clock)
-        return self._sensor.describe()
-
-    def _opened(self) -> WamArm:
-        """Return the arm, its bus open; raises LinkError."""
-        if self._arm is None:
-            can = self._context.settings["can"]
-            address = can["interface"], can["channel"], can["bitrate"]
-            transport = open_transport(*address, self._clock)
-            link = self._link = build_link(transport, self._context.shared, self._clock)
-            properties = self._context.settings["properties"]
-            noted = self._context.settings["lost_positions"]
-            self._arm = build_arm(
-                self._rig,
-                self._constants,
-                link,
-                self._clock,
-                properties,
-                Path(noted) if noted else None,
-            )
-        return self._arm
-
-    def begin(self) -> None:
-        """Run the loop once this call is answered."""
-        arm = self._opened()
-        parts = LoopConfig(
+    def _loop_config(self, arm: WamArm, sensor: WrenchSensor) -> LoopConfig:
+        return LoopConfig(
             rig=self._rig,
             row=self._row,
             law=self._law,
             arm=arm,
-            sensor=self._sensor,
+            sensor=sensor,
             shared=self._context.shared,
             clock=self._clock,
             is_simulated=self._is_simulated,
             sound=self._sound,
         )
-        self._loop_server = build_loop_server(parts)
 
     def _run(self, loop_server: LoopServer) -> None:
         """Run the loop; whatever ends it, an arm that got torques is idled."""
@@ -168,16 +139,10 @@ class ControlWorker:
                     loop_server.orphan()
                 loop.step()
         finally:
-            arm = self._opened()
+            arm = self._service.arm
             if arm.sent_ns:  # any other arm is left as it is
                 arm.idle()
             loop_server.leave()
-
-    def _release(self) -> None:
-        """Idle the arm if it got torques from here, and give the bus back."""
-        if self._arm is not None and self._link is not None:
-            release(self._arm, self._link)
-        self._arm = self._link = None
 
     def _sound(self) -> None:
         """Sound the bell of the console's terminal, if it has one."""
@@ -200,7 +165,7 @@ def reader(context: ChildContext) -> None:
 
 
 class SensorWorker:
-    """The process that reads the sensor's port; implements `SensorService`."""
+    """The process that reads the sensor's port."""
 
     def __init__(self, context: ChildContext) -> None:
         self._context = context
@@ -214,11 +179,17 @@ class SensorWorker:
     def serve(self) -> None:
         """Answer the console and read what comes until it hangs up."""
         channel = self._context.channel
-        server = RpcServer(bind(SensorService, self))
+        dispatcher = Dispatcher(
+            {
+                OpenSensor: self.open_sensor,
+                AskStream: lambda: stream_metadata(self._reconnecting),
+                AskGrants: lambda: self._grants,
+            }
+        )
         try:
             while True:
                 if not self._is_open or channel.is_readable():
-                    server.answer(channel)
+                    dispatcher.answer(channel)
                 else:
                     self._read()
         except ChannelClosedError:
@@ -236,14 +207,6 @@ class SensorWorker:
         port = rig.ft_sensor.open_port(settings["port"]).port
         is_simulated = bool(settings["is_simulated"])
         return build_sensor(rig, port, self._clock, is_simulated=is_simulated)
-
-    def sensor_metadata(self) -> dict[str, str]:
-        """Return the statistics of the stream, as text."""
-        return stream_metadata(self._reconnecting)
-
-    def grants(self) -> list[Grant]:
-        """Return what the kernel granted."""
-        return self._grants
 
     def _read(self) -> None:
         """Publish what arrives within 20 ms; what is lost is looked for."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from acquisition.errors import TrialFileError
-from acquisition.trial_file.chunks import read_file
+from acquisition.trial_file.contents import read_file
 from acquisition.trial_file.data_files import is_there
 from acquisition.trial_file.salvage import recorded_seconds
 from experiments.messages import CATALOGUE

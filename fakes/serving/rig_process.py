@@ -9,14 +9,10 @@ from acquisition.clock import SystemClock
 from acquisition.control_loop.realtime import RealtimeRequest, request
 from acquisition.ipc.channel import Channel, ChannelClosedError
 from acquisition.ipc.child import ChildContext, name_process
-from acquisition.ipc.rpc import RpcServer, bind
+from acquisition.ipc.requests import Dispatcher
+from acquisition.ipc.simulation import AskDevices, simulation_handlers
 from acquisition.sample import Record
-from acquisition.simulation import (
-    DeviceServer,
-    ServedDevices,
-    SimulationControl,
-    TruthSource,
-)
+from acquisition.simulation import ServedDevices
 from acquisition.temporary_folders import temporary_folder
 from fakes.bus.hub import SocketHub
 from fakes.pucks.wire import WiredNetwork
@@ -25,7 +21,7 @@ from fakes.sensor.network import UdpDevice
 from fakes.sensor.pty import SerialPty
 from fakes.truth import Truth, truth_records
 from fakes.world.plain_world import simulated_rig
-from fakes.world.rig import FakeRig, LocalSimulation
+from fakes.world.rig import LocalSimulation
 from fakes.world_clock import TICK_NS, WorldClock
 from wam.model.constants import load_constants
 
@@ -70,10 +66,9 @@ class RigServer:
         self._pty = plug(choice, self._rig.stream, now_ns, folder / "sensor")
         rig.lay_cable(PtyCable(self._pty, clock))
         self._can_path = folder / "can"
-        self._server = RpcServer(
-            bind(SimulationControl, simulation),
-            bind(TruthSource, PlantTruth(rig)),
-            bind(DeviceServer, self),
+        self._dispatcher = Dispatcher(
+            simulation_handlers(simulation, self._truth_part),
+            {AskDevices: self.devices},
         )
 
     def devices(self) -> ServedDevices:
@@ -87,7 +82,7 @@ class RigServer:
             try:
                 while True:
                     if self._step(self._channel.fileno()):
-                        self._server.answer(self._channel)
+                        self._dispatcher.answer(self._channel)
             except ChannelClosedError:
                 end_ns = self._clock.now_ns() + LINGER_NS
             while self._hub.clients and self._clock.now_ns() < end_ns:
@@ -115,6 +110,14 @@ class RigServer:
         for _, can_id, data in self._wired.advance(now_ns):
             self._hub.send(can_id, data)
 
+    def _truth_part(self) -> Record:
+        """Return the oldest rows that were not taken yet; none ends the truth."""
+        plant, frame = self._rig.plant, self._rig.scene.frame
+        part = plant.truth.take(TRUTH_ROWS) if plant.truth is not None else Truth()
+        if not part.t_ns:
+            plant.take_truth()
+        return truth_records(part, frame)
+
     def _patience(self) -> float:
         """Return how long nothing will happen by itself [s]."""
         events = [self._wired.next_event_ns(), self._pty.next_event_ns()]
@@ -122,21 +125,6 @@ class RigServer:
         now_ns = self._clock.go_on()
         wait_ns = min([t - now_ns for t in times], default=TICK_NS)
         return max(0, min(wait_ns, TICK_NS)) * 1e-9
-
-
-class PlantTruth:
-    """The truth of a plant, a few rows at a time; implements `TruthSource`."""
-
-    def __init__(self, rig: FakeRig) -> None:
-        self._rig = rig
-
-    def truth_part(self) -> Record:
-        """Return the oldest rows that were not taken yet; none ends the truth."""
-        plant, frame = self._rig.plant, self._rig.scene.frame
-        part = plant.truth.take(TRUTH_ROWS) if plant.truth is not None else Truth()
-        if not part.t_ns:
-            plant.take_truth()
-        return truth_records(part, frame)
 
 
 def main(station: ChildContext) -> None:

@@ -13,6 +13,7 @@ from experiments.commissioning.evidence.record import (
     write_commissioning,
 )
 from experiments.preflight.connecting import connect_rig
+from experiments.rig.requests import LastAnswers, StartArm
 from experiments.rig.rig import Rig
 from experiments.settings.load import load_settings
 from wam.driver.startup import ArmInfo
@@ -32,7 +33,7 @@ def take_as_commissioned(config: Path, steps: Sequence[StepId] = GATED) -> None:
     settings = load_settings(config)
     rig = connect_rig(settings, settings.matrix.terrains[0], None)
     try:
-        record = sound_record(rig, rig.backend.start_arm(), steps)
+        record = sound_record(rig, rig.backend.ask(StartArm()), steps)
     finally:
         rig.backend.close()
     write_commissioning(config.parent, record)
@@ -42,7 +43,7 @@ def sound_record(
     rig: Rig, info: ArmInfo, steps: Sequence[StepId] = GATED
 ) -> Commissioning:
     """Return a record of `steps` for an arm that was started; all: it may be driven."""
-    present = present_inputs(rig, rig.backend.arm.answers(), info)
+    present = present_inputs(rig, rig.backend.ask(LastAnswers()), info)
     now = datetime.fromtimestamp(rig.clock.utc_ns() // 1_000_000_000, UTC)
     return record_of(steps, present, now)
 

@@ -13,7 +13,7 @@ from acquisition.errors import SettingsError, TrialFileError
 from acquisition.recording.recorder import seal
 from acquisition.settings import parse_toml, read_text
 from acquisition.trial_file import reader as trial_reader
-from acquisition.trial_file.chunks import RECORD_LIMIT, unpacked_limit
+from acquisition.trial_file.contents import RECORD_LIMIT, unpacked_limit
 from acquisition.trial_file.data_files import open_data
 from acquisition.trial_file.reader import MAX_ROWS, TrialReader
 from acquisition.trial_file.salvage import SoundRecords
@@ -111,7 +111,7 @@ def test_all_chunks_of_a_file_unpack_to_192_mib_at_most():
 
 def test_a_record_and_a_chunk_have_16_mib_at_most(tmp_path):
     path = tmp_path / "T01.mcap"
-    for size, reason in ((16 * MIB, "checksum"), (16 * MIB + 1, "over 16 MiB")):
+    for size, reason in ((16 * MIB, "states 16777216"), (16 * MIB + 1, "over 16 MiB")):
         salvage = SoundRecords(with_chunk(b"x", size, ""), path)
         list(salvage)
         assert reason in salvage.reason

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from experiments.rig.requests import StartArm
 from experiments.rig.rig import FakeOptions, build_rig
 from experiments.settings.load import load_settings
 
@@ -31,7 +32,7 @@ def test_one_process_asks_for_it_and_takes_it_along():
     settings = load_settings(None)
     rig = build_rig(settings, settings.row("S0"), FakeOptions("processes", seed=1))
     try:
-        rig.backend.start_arm()
+        rig.backend.ask(StartArm())
         grants = [grant for group in rig.backend.grants().values() for grant in group]
         asked = [grant.is_granted for grant in grants if "awake" in grant.what]
         assert asked == [True]

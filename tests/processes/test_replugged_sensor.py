@@ -2,6 +2,7 @@
 
 import pytest
 
+from experiments.rig.requests import OpenSensor, StartArm
 from experiments.rig.rig import FakeOptions, build_rig
 from experiments.settings.load import load_settings
 from tests.processes.watching import until
@@ -29,8 +30,8 @@ def is_fresh(rig):
 
 
 def test_a_sensor_is_read_again_after_it_was_unplugged(rig):
-    rig.backend.start_arm()
-    fields = rig.backend.open_sensor()
+    rig.backend.ask(StartArm())
+    fields = rig.backend.ask(OpenSensor())
     assert until(lambda: is_fresh(rig), 2)
     rig.simulation.inject("ft-unplugged")
     assert until(lambda: not is_fresh(rig), 2)
@@ -38,7 +39,7 @@ def test_a_sensor_is_read_again_after_it_was_unplugged(rig):
     rig.simulation.clear_faults()
     assert until(lambda: is_fresh(rig), FOUND_AGAIN), trouble(rig)
     assert rig.backend.sensor_metadata()["reopened"] == "1"
-    assert rig.backend.open_sensor()["model"] == fields["model"]
+    assert rig.backend.ask(OpenSensor())["model"] == fields["model"]
 
 
 def trouble(rig):

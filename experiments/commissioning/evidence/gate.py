@@ -20,6 +20,7 @@ from experiments.commissioning.evidence.record import Commissioning, read_commis
 from experiments.dates import is_ahead, is_fresh
 from experiments.messages import preflight_error
 from experiments.operator.console import BAD, GOOD, WARNING, AddLine
+from experiments.rig.requests import LastAnswers
 from experiments.rig.rig import Rig
 from wam.driver.startup import ArmInfo
 
@@ -141,7 +142,7 @@ def check_commissioned(
         record = read_commissioning(rig.settings.folder)
         if record is not None and record.is_simulated:
             record = None  # of no real arm
-        answers = rig.backend.arm.answers()
+        answers = rig.backend.ask(LastAnswers())
         present = present_inputs(rig, answers, info, sensor)
         known = {name: each for name, each in present.items() if name not in made_anew}
         found = lacks(record, known, now, rig.row.name)

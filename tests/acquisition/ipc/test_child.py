@@ -2,65 +2,76 @@
 
 import os
 import signal
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import pytest
 
 from acquisition.errors import LinkError
 from acquisition.ipc.child import Child, ProcessLostError
 from acquisition.ipc.layout import SharedLayout
-from acquisition.ipc.rpc import RpcServer, bind, make_proxy
+from acquisition.ipc.requests import Dispatcher, Request
 
 pytestmark = pytest.mark.wall_clock
 HERE = "tests.acquisition.ipc.test_child"
 
 
-class Answering(Protocol):
-    """What the child offers."""
-
-    def add(self, a: int, b: int) -> int: ...
-    def refuse(self) -> None: ...
-    def settings(self) -> dict[str, Any]: ...
-    def write(self, text: str) -> None: ...
-    def descriptors(self) -> list[str]: ...
-    def is_session_leader(self) -> bool: ...
-    def fail(self) -> float: ...
+@dataclass(frozen=True, slots=True)
+class AddNumbers(Request[int]):
+    a: int
+    b: int
 
 
-class Answers:
-    """Implements `Answering`."""
+@dataclass(frozen=True, slots=True)
+class RefuseThis(Request[None]):
+    pass
 
-    def __init__(self, context):
-        self.context = context
 
-    def add(self, a, b):
-        return a + b
+@dataclass(frozen=True, slots=True)
+class AskSettings(Request[dict[str, Any]]):
+    pass
 
-    def refuse(self):
-        raise LinkError("The bus is down.", hint="Plug it in.")
 
-    def settings(self):
-        return dict(self.context.settings)
+@dataclass(frozen=True, slots=True)
+class WriteStatus(Request[None]):
+    text: str
 
-    def write(self, text):
-        self.context.shared.status.write(text.encode())
 
-    def descriptors(self):
-        return descriptors()
+@dataclass(frozen=True, slots=True)
+class AskDescriptors(Request[list[str]]):
+    pass
 
-    def is_session_leader(self):
-        return os.getsid(0) == os.getpid()
 
-    def fail(self):
-        return 1 / 0
+@dataclass(frozen=True, slots=True)
+class IsSessionLeader(Request[bool]):
+    pass
+
+
+@dataclass(frozen=True, slots=True)
+class BreakDown(Request[float]):
+    pass
+
+
+def refuse():
+    raise LinkError("The bus is down.", hint="Plug it in.")
 
 
 def answering(context):
     """Be a child that answers until the console hangs up."""
-    server = RpcServer(bind(Answering, Answers(context)))
+    dispatcher = Dispatcher(
+        {
+            AddNumbers: lambda a, b: a + b,
+            RefuseThis: refuse,
+            AskSettings: lambda: dict(context.settings),
+            WriteStatus: lambda text: context.shared.status.write(text.encode()),
+            AskDescriptors: descriptors,
+            IsSessionLeader: lambda: os.getsid(0) == os.getpid(),
+            BreakDown: lambda: 1 / 0,
+        }
+    )
     while True:
-        server.answer(context.channel)
+        dispatcher.answer(context.channel)
 
 
 def descriptors():
@@ -100,56 +111,51 @@ def child(shared):
     child.stop()
 
 
-@pytest.fixture
-def remote(child):
-    return make_proxy(Answering, child.call)
+def test_a_child_answers_and_knows_its_settings(child):
+    assert child.ask(AddNumbers(2, 3)) == 5
+    assert child.ask(AskSettings()) == {"word": "go"}
 
 
-def test_a_child_answers_and_knows_its_settings(remote):
-    assert remote.add(2, 3) == 5
-    assert remote.settings() == {"word": "go"}
-
-
-def test_errors_of_a_child_arrive_as_errors(child, remote):
+def test_errors_of_a_child_arrive_as_errors(child):
     with pytest.raises(LinkError, match="The bus is down"):
-        remote.refuse()
+        child.ask(RefuseThis())
     assert child.is_alive
 
 
-def test_the_memory_is_shared(remote, shared):
-    remote.write("hello")
+def test_the_memory_is_shared(child, shared):
+    child.ask(WriteStatus("hello"))
     assert shared.status.read() == b"hello"
 
 
-def test_a_child_inherits_nothing_but_what_it_needs(remote):
+def test_a_child_inherits_nothing_but_what_it_needs(child):
     # stdin and stdout; the shared memory (a mapping keeps one of its own) and the last
     # words; the channel
     expected = ["/dev/null"] * 2 + ["/memfd"] * 3 + ["socket"]
-    assert remote.descriptors() == expected
-    assert remote.is_session_leader()
+    assert child.ask(AskDescriptors()) == expected
+    assert child.ask(IsSessionLeader())
 
 
-def test_a_killed_child_is_named_with_its_signal(child, remote):
+def test_a_killed_child_is_named_with_its_signal(child):
     os.kill(child.pid, signal.SIGKILL)
     with pytest.raises(ProcessLostError, match="helper process ended: killed by SIGKI"):
-        remote.add(1, 1)
+        child.ask(AddNumbers(1, 1))
     assert not child.is_alive
 
 
-def test_a_child_that_breaks_leaves_its_last_words(remote):
+def test_a_child_that_breaks_leaves_its_last_words(child):
     with pytest.raises(ProcessLostError, match="ZeroDivisionError"):
-        remote.fail()
+        child.ask(BreakDown())
 
 
 def test_a_child_that_fails_at_once_says_why(shared):
     child = Child("helper", f"{HERE}:failing", {"word": "nonsense"}, shared)
     with pytest.raises(ProcessLostError, match="told nonsense"):
-        child.call("anything", {})
+        child.ask(AskSettings())
     child.stop()
 
 
-def test_stopping_ends_a_child_and_can_be_repeated(child, remote):
-    remote.add(1, 1)
+def test_stopping_ends_a_child_and_can_be_repeated(child):
+    child.ask(AddNumbers(1, 1))
     child.stop()
     child.stop()
     assert not child.is_alive

@@ -1,4 +1,5 @@
 from dataclasses import fields
+from typing import get_args
 
 import pytest
 
@@ -9,9 +10,22 @@ from acquisition.control_loop.faults import (
     Fault,
     GuardVerdict,
 )
+from acquisition.control_loop.proof import ProofGoal, ProofKind
 from acquisition.control_loop.states import ArmState, ControlStatus
 from acquisition.devices import SafetyMode
-from acquisition.ipc.commands import CommandKind, CommandQueue, LoopStatus, StatusSlot
+from acquisition.ipc.commands import (
+    AwaitActivation,
+    Command,
+    CommandQueue,
+    EnterState,
+    GiveProof,
+    LeaveLoop,
+    LoopStatus,
+    MoveJoints,
+    SetBias,
+    StatusSlot,
+    WatchTrial,
+)
 from acquisition.ipc.layout import SharedLayout
 
 
@@ -20,35 +34,49 @@ def shared():
     return SharedLayout.create()
 
 
+COMMANDS = [
+    EnterState(ArmState.FLOAT, 3),
+    AwaitActivation(4),
+    WatchTrial(True),
+    WatchTrial(False),
+    SetBias((1.0, -2.0, 3.5, 0.0, 0.25, 6.0)),
+    MoveJoints((0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7), 0.25),
+    GiveProof(ProofGoal(ProofKind.RAMP, 4, -1.5, 2.0)),
+    LeaveLoop(),
+]
+
+
 def test_commands_arrive_in_order_with_their_numbers(shared):
     loop, console = CommandQueue(shared.commands), CommandQueue(shared.commands)
-    first = console.post(CommandKind.ENTER, ArmState.FLOAT)
-    console.post(CommandKind.MOVE, values=(0.1, 0.2))
+    numbers = [console.post(command) for command in COMMANDS]
     taken = loop.take()
-    assert [command.kind for command in taken] == [CommandKind.ENTER, CommandKind.MOVE]
-    assert [command.number for command in taken] == [first, first + 1]
-    assert taken[0].argument == ArmState.FLOAT
-    assert taken[1].values[:3] == (0.1, 0.2, 0.0)
+    assert [posted.command for posted in taken] == COMMANDS
+    assert [posted.number for posted in taken] == numbers
+    assert numbers == list(range(numbers[0], numbers[0] + len(COMMANDS)))
+
+
+def test_every_command_has_its_example():
+    assert {type(command) for command in COMMANDS} == {*get_args(Command)}
 
 
 def test_a_command_is_taken_once(shared):
     loop, console = CommandQueue(shared.commands), CommandQueue(shared.commands)
-    console.post(CommandKind.LEAVE)
+    console.post(LeaveLoop())
     assert len(loop.take()) == 1
     assert loop.take() == []
 
 
 def test_a_loop_that_begins_later_does_not_obey_old_commands(shared):
     console = CommandQueue(shared.commands)
-    console.post(CommandKind.ENTER, ArmState.FLOAT)
+    console.post(EnterState(ArmState.FLOAT, 0))
     assert CommandQueue(shared.commands).take() == []
 
 
 def test_numbers_go_on_when_a_console_comes_later(shared):
-    CommandQueue(shared.commands).post(CommandKind.LEAVE)
+    CommandQueue(shared.commands).post(LeaveLoop())
     console = CommandQueue(shared.commands)
     before = console.posted
-    assert console.post(CommandKind.LEAVE) == before + 1
+    assert console.post(LeaveLoop()) == before + 1
 
 
 def example(detail):

@@ -4,7 +4,14 @@ import pytest
 from acquisition.clock import PERIOD_NS
 from acquisition.control_loop.faults import Fault, ForceAge, verdict_for
 from acquisition.control_loop.states import ArmState, ControlStatus
-from acquisition.ipc.commands import CommandKind, CommandQueue, LoopStatus, StatusSlot
+from acquisition.ipc.commands import (
+    CommandQueue,
+    EnterState,
+    LoopStatus,
+    MoveJoints,
+    SetBias,
+    StatusSlot,
+)
 from acquisition.ipc.layout import ProcessRole, SharedLayout
 from acquisition.ipc.loop_client import LoopClient
 from fakes.clock import SteppedClock
@@ -30,11 +37,11 @@ class Room:
         self.clock.sleep_until(self.clock.now_ns() + cycles * PERIOD_NS)
         if not self.is_obeying:
             return
-        for command in self.queue.take():
+        for number, command in self.queue.take():
             self.commands.append(command)
-            self.status.obeyed = command.number
-            if command.kind is CommandKind.ENTER:
-                self.status.control = ControlStatus(ArmState(command.argument))
+            self.status.obeyed = number
+            if isinstance(command, EnterState):
+                self.status.control = ControlStatus(command.state)
         StatusSlot(self.shared.status).write(self.status)
 
 
@@ -97,5 +104,5 @@ def test_goals_and_biases_are_posted_as_given(room):
     room.loop_client.move_to(np.arange(7.0), 0.25)
     room.loop_client.set_bias([1, 2, 3, 4, 5, 6])
     room.loop_client.advance(0.02)
-    assert room.commands[0].values[:8] == (0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 0.25)
-    assert room.commands[1].values[:6] == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+    assert room.commands[0] == MoveJoints((0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0), 0.25)
+    assert room.commands[1] == SetBias((1.0, 2.0, 3.0, 4.0, 5.0, 6.0))

@@ -8,7 +8,17 @@ from acquisition.control_loop.loop import Tick
 from acquisition.control_loop.proof import ProofGoal, ProofKind
 from acquisition.control_loop.states import ArmState, ControlStatus
 from acquisition.devices import BusCondition
-from acquisition.ipc.commands import CommandKind, CommandQueue, StatusSlot
+from acquisition.ipc.commands import (
+    AwaitActivation,
+    CommandQueue,
+    EnterState,
+    GiveProof,
+    LeaveLoop,
+    MoveJoints,
+    SetBias,
+    StatusSlot,
+    WatchTrial,
+)
 from acquisition.ipc.layout import ProcessRole, SharedLayout
 from acquisition.ipc.loop_server import LoopHooks, LoopServer
 
@@ -89,11 +99,11 @@ def loop():
 
 
 def test_commands_reach_the_cycle_and_are_confirmed(loop):
-    loop.console.post(CommandKind.START, values=(3,))
-    loop.console.post(CommandKind.ENTER, ArmState.FLOAT, values=(4,))
-    loop.console.post(CommandKind.WATCH_TRIAL, 1)
-    loop.console.post(CommandKind.SET_BIAS, values=(1.0, 2.0, 3.0, 4.0, 5.0, 6.0))
-    number = loop.console.post(CommandKind.MOVE, values=(*GOAL, 0.25))
+    loop.console.post(AwaitActivation(3))
+    loop.console.post(EnterState(ArmState.FLOAT, 4))
+    loop.console.post(WatchTrial(True))
+    loop.console.post(SetBias((1.0, 2.0, 3.0, 4.0, 5.0, 6.0)))
+    number = loop.console.post(MoveJoints(GOAL, 0.25))
     loop.run(0.002)
     assert loop.cycle.requests == [("start", 3), (ArmState.FLOAT, 4)]
     assert loop.cycle.is_recording
@@ -104,7 +114,7 @@ def test_commands_reach_the_cycle_and_are_confirmed(loop):
 
 def test_proofs_reach_the_cycle(loop):
     ramp = ProofGoal(ProofKind.RAMP, 3, 0.5, 2.0)
-    loop.console.post(CommandKind.PROVE, values=ramp.values)
+    loop.console.post(GiveProof(ramp))
     loop.run(0.002)
     assert loop.cycle.goals == [ramp]
 
@@ -112,7 +122,7 @@ def test_proofs_reach_the_cycle(loop):
 def test_the_loop_ends_when_it_is_told_to_leave(loop):
     loop.run(0.01)
     assert not loop.loop_server.is_over
-    loop.console.post(CommandKind.LEAVE)
+    loop.console.post(LeaveLoop())
     loop.run(0.002)
     assert loop.loop_server.is_over
 
@@ -207,6 +217,6 @@ def test_the_bell_rings_first_when_a_minute_has_passed(loop):
 def test_what_the_devices_say_is_published_as_a_trial_begins(loop):
     loop.run(0.1)
     version = loop.shared.health.version
-    loop.console.post(CommandKind.WATCH_TRIAL, 1)
+    loop.console.post(WatchTrial(True))
     loop.run(0.002)
     assert loop.shared.health.version != version

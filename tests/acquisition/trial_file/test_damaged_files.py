@@ -11,7 +11,7 @@ import zstandard
 from acquisition.errors import TrialFileError
 from acquisition.recording.recorder import seal
 from acquisition.schema import CYCLE, schema_text
-from acquisition.trial_file.chunks import RECORD_LIMIT
+from acquisition.trial_file.contents import RECORD_LIMIT
 from acquisition.trial_file.data_files import size_limit
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.verify import verify_file

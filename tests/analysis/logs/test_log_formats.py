@@ -8,8 +8,9 @@ import zstandard
 from mcap.writer import Writer
 
 from acquisition.errors import SettingsError
+from acquisition.trial_file.unpacking import DamageError, Unpacker
+from analysis.logs.log_file import LARGEST_PART, LARGEST_RATIO
 from analysis.logs.opening import open_log
-from analysis.logs.unpacking import UnpackError, unpacked
 from tests.analysis.imported.gantry import Rubbing, write_bag, write_bag2
 
 SHORT = Rubbing(joint_rate=100.0, wrench_rate=100.0)
@@ -86,6 +87,26 @@ def test_a_topic_of_another_encoding_is_told_and_not_read(tmp_path):
         assert list(log.messages(["/log"])) == []
 
 
+@pytest.mark.parametrize("spoil", [False, True])
+def test_metadata_that_are_damaged_end_no_log(tmp_path, spoil):
+    """No message depends on them."""
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file, enable_crcs=False)
+        writer.start()
+        writer.add_metadata("trial", {"simulated": "true"})
+        schema = writer.register_schema("std_msgs/msg/String", "ros2msg", b"string s")
+        channel = writer.register_channel("/said", "cdr", schema)
+        writer.add_message(channel, 1, b"{}", 1)
+        writer.finish()
+    if spoil:
+        path.write_bytes(path.read_bytes().replace(b"simulated", b"\xffimulated"))
+    with open_log(path) as log:
+        assert log.is_simulated is not spoil
+        assert [m.topic for m in log.messages(log.topics)] == ["/said"]
+        assert log.losses == []
+
+
 def test_what_is_no_log_is_refused(tmp_path):
     for name, data, why in (
         ("a.csv", b"t,v_t\n1,2\n", "no log that is known"),
@@ -129,8 +150,9 @@ def test_a_bomb_is_refused_and_not_unpacked(compression):
 
     pack = {"zstd": zstandard.compress, "lz4": lz4.frame.compress, "bz2": bz2.compress}
     bomb = pack[compression](bytes(80 * 2**20))
+    unpacker = Unpacker(LARGEST_PART, LARGEST_RATIO)
     for size in (None, 80 * 2**20):
-        with pytest.raises(UnpackError):
-            unpacked(bomb, compression, size)
+        with pytest.raises(DamageError):
+            unpacker.unpack(bomb, compression, size)
     fine = np.random.default_rng(1).bytes(100_000)
-    assert unpacked(pack[compression](fine), compression, len(fine)) == fine
+    assert unpacker.unpack(pack[compression](fine), compression, len(fine)) == fine

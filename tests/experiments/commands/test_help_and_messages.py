@@ -21,9 +21,10 @@ from experiments.messages import CATALOGUE
 from experiments.operator.auto_operator import AutoOperator
 from experiments.operator.prompts import Prompt
 from experiments.preflight import preflight
-from experiments.rig.arm_operations import ArmOperations, ExchangeTimes
+from experiments.rig.arm_service import ArmService
 from experiments.rig.backend import InProcessBackend
 from experiments.rig.build import build_tool
+from experiments.rig.requests import ExchangeTimes
 from experiments.run import ready, runner
 from experiments.run import tare as taring
 from experiments.run.fault_plan import FaultPlan
@@ -382,7 +383,7 @@ def _plug_in_another(scene):
 
 
 def _no_exchange(scene):
-    scene.patch.setattr(ArmOperations, "measure_exchange", lambda _: ExchangeTimes([]))
+    scene.patch.setattr(ArmService, "measure_exchange", lambda _: ExchangeTimes([]))
     return resume(scene)
 
 

@@ -1,9 +1,12 @@
 import json
 
 import pytest
+from mcap.reader import make_reader
+from mcap.writer import Writer
 
 from acquisition.recording.recorder import seal
 from acquisition.trial_file.reader import TrialReader
+from acquisition.trial_file.recover import recover_file
 from tests.acquisition.trials import (
     make_cycles,
     make_header,
@@ -189,3 +192,75 @@ def test_a_copy_that_cannot_be_analysed_is_not_called_saved(folder):
     assert "it cannot be analysed: it lacks ft_cal" in done.err
     (again,) = json.loads(traction("recover", path, "--json").out)
     assert (again["state"], again["obstacle"]) == ("copied", "ft_calibration.toml")
+    copy = path.with_name("T09.recovered.mcap")
+    done = traction("recover", copy)
+    assert (done.code, done.out) == (6, "")
+    assert "incomplete (0.60 s, 300 cycles" in done.err
+    assert "it cannot be analysed: it lacks ft_calibration.toml" in done.err
+    (itself,) = json.loads(traction("recover", copy, "--json").out)
+    assert (itself["state"], itself["obstacle"]) == ("copied", "ft_calibration.toml")
+
+
+def rewritten(source, target, *, has_checksums):
+    """Write the messages and metadata of a file anew, as another program does."""
+    with source.open("rb") as file, target.open("wb") as out:
+        reader = make_reader(file)
+        writer = Writer(out, enable_data_crcs=has_checksums)
+        writer.start(profile="ros2", library="another")
+        for metadata in reader.iter_metadata():
+            writer.add_metadata(metadata.name, metadata.metadata)
+        channels = {}
+        for schema, channel, message in reader.iter_messages(log_time_order=False):
+            if channel.id not in channels:
+                number = writer.register_schema(
+                    schema.name, schema.encoding, schema.data
+                )
+                channels[channel.id] = writer.register_channel(
+                    channel.topic, channel.message_encoding, number
+                )
+            writer.add_message(
+                channels[channel.id],
+                message.log_time,
+                message.data,
+                message.publish_time,
+                message.sequence,
+            )
+        writer.finish()
+
+
+@pytest.mark.parametrize("has_checksums", [False, True])
+@pytest.mark.parametrize("is_complete", [False, True])
+def test_a_file_rewritten_without_its_attachments_is_not_called_saved(
+    folder, tmp_path, is_complete, has_checksums
+):
+    header = make_header(attachments={"terrain.toml": b"# no other file has it"})
+    whole = tmp_path / "T10.mcap"
+    writer = write_trial(whole, make_cycles(300), header)
+    if is_complete:
+        seal(writer, "travel")
+    else:
+        writer.close_partial()
+        recover_file(writer.partial).path.rename(whole)
+    path = folder / "trials" / "T10.mcap"
+    rewritten(whole, path, has_checksums=has_checksums)
+    done = traction("recover", path)
+    assert done.code == 6
+    assert "saved" not in done.out
+    assert "it cannot be analysed: it lacks terrain.toml" in done.err
+    (again,) = json.loads(traction("recover", path, "--json").out)
+    assert (again["state"], again["obstacle"]) == ("copied", "terrain.toml")
+    assert again["attachments_missing"] == ["terrain.toml"]
+
+
+def test_an_attachment_that_the_analysis_can_do_without_is_told(folder, tmp_path):
+    whole = tmp_path / "T10.mcap"
+    header = make_header(attachments={"config.toml": b"# no other file has it"})
+    writer = write_trial(whole, make_cycles(300), header)
+    writer.close_partial()
+    recover_file(writer.partial).path.rename(whole)
+    path = folder / "trials" / "T10.mcap"
+    rewritten(whole, path, has_checksums=True)
+    done = traction("recover", path)
+    assert (done.code, done.err) == (0, "")
+    assert "nothing to recover" in done.out
+    assert "It lacks config.toml." in done.out

@@ -17,6 +17,7 @@ from experiments.commissioning.evidence.order import GATED, ORDER, StepId
 from experiments.commissioning.evidence.record import NAME, Raw, write_commissioning
 from experiments.operator.console import BAD, GOOD, WARNING
 from experiments.preflight.connecting import connect_rig
+from experiments.rig.requests import LastAnswers, StartArm
 from experiments.rig.rig import FakeOptions
 from experiments.settings.load import load_settings
 from lab.guest.commissioned import sound_record
@@ -32,7 +33,7 @@ class Arm:
         settings = load_settings(config)
         fake = FakeOptions("fast", 1, 0.7, wrong=wrong)
         self.rig = connect_rig(settings, settings.matrix.terrains[0], fake)
-        self.info = self.rig.backend.start_arm()
+        self.info = self.rig.backend.ask(StartArm())
         self.lines = []
 
     def check(self, made_anew=()):
@@ -114,7 +115,7 @@ def test_a_sound_record_lets_through_and_recordings_say_what_is_open(config):
 def test_a_record_of_every_step_is_complete(config):
     arm = Arm(config)
     record = sound_record(arm.rig, arm.info)
-    present = present_inputs(arm.rig, arm.rig.backend.arm.answers(), arm.info)
+    present = present_inputs(arm.rig, arm.rig.backend.ask(LastAnswers()), arm.info)
     for step in ORDER[len(GATED) :]:
         subject = "S0" if step is StepId.CONTAINER else ""
         inputs = inputs_of(step, present)

@@ -12,6 +12,7 @@ from experiments.commissioning.evidence.gate import lacks
 from experiments.commissioning.evidence.inputs import present_inputs
 from experiments.commissioning.evidence.order import BASES, ORDER, TOLD
 from experiments.preflight.connecting import connect_rig
+from experiments.rig.requests import LastAnswers, OpenSensor, StartArm
 from experiments.rig.rig import FakeOptions
 from experiments.settings.calibrations import PREFIX
 from experiments.settings.load import load_settings
@@ -43,9 +44,9 @@ def connected(folder):
         settings, settings.matrix.terrains[0], FakeOptions("fast", 1, 0.7)
     )
     try:
-        info = rig.backend.start_arm()
-        answers = rig.backend.arm.answers()
-        return rig, answers, info, rig.backend.open_sensor()
+        info = rig.backend.ask(StartArm())
+        answers = rig.backend.ask(LastAnswers())
+        return rig, answers, info, rig.backend.ask(OpenSensor())
     finally:
         rig.backend.close()
 

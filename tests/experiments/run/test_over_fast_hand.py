@@ -8,6 +8,7 @@ import pytest
 from acquisition.control_loop.faults import Action
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import SafetyMode
+from experiments.rig.requests import OpenSensor, StartArm
 from experiments.rig.rig import FakeOptions, build_rig
 from experiments.settings.load import load_settings
 
@@ -34,8 +35,8 @@ class Bench:
         backend = self.rig.backend
         self.loop_client = backend.loop_client
         self.plant = self.rig.simulation.rig.plant
-        backend.start_arm()
-        backend.open_sensor()
+        backend.ask(StartArm())
+        backend.ask(OpenSensor())
         backend.begin()
         self.loop_client.start()
         self.loop_client.advance(0.1)
