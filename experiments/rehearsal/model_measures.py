@@ -1,6 +1,8 @@
 """Groups A, B and C of the bands, and E7: what the models of a study show."""
 
 from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
 
 import numpy as np
 
@@ -131,19 +133,19 @@ def _foreign(
 
 def _is_worse(errors: _Errors, name: str, tested: str) -> bool:
     """Whether a foreign model is worse than the own one, paired over the folds."""
-    from scipy.stats import wilcoxon
-
+    stats: Any = import_module("scipy.stats")  # it has no stubs
     foreign, own = errors.cells[name][tested], errors.cells[tested][tested]
     count = min(len(foreign), len(own))
     if count < 2 or foreign[:count] == own[:count]:
         return False
-    test = wilcoxon(foreign[:count], own[:count], alternative="greater")
-    return bool(test.pvalue < _SIGNIFICANT)  # pyright: ignore[reportAttributeAccessIssue]
+    test = stats.wilcoxon(foreign[:count], own[:count], alternative="greater")
+    return bool(test.pvalue < _SIGNIFICANT)
 
 
 def _chosen(errors: _Errors, stones: list[str]) -> dict[str, list[float]]:
     """Return how often the model with the least error is the right one."""
-    is_class, is_exact = [], []
+    is_class: list[bool] = []
+    is_exact: list[bool] = []
     for tested in errors.cells:
         trials = min(len(row[tested]) for row in errors.cells.values())
         for k in range(trials):
@@ -190,7 +192,8 @@ def _r2(result: TerrainResult) -> float:
 
 def _memory(result: TerrainResult) -> tuple[float, float]:
     """Return the residual's autocorrelation one and five kept samples on."""
-    one, five = [], []
+    one: list[float] = []
+    five: list[float] = []
     for trial, fold in _held_out(result):
         rest = _residual(trial, fold)
         one.append(_autocorrelation(rest, trial, 1))

@@ -189,7 +189,8 @@ def _creeping(motor: int) -> Row:
     arm = Arm(1700 if motor == 7 else 400, DAMPED_OR_IDLE, None, "")
     stopped = Cell(End.SOMEHOW, arm=arm)
     late = Cell(End.SOMEHOW, why="found when the arm becomes active")
-    return _row(stopped, preflight=late, idle=late, end=replace(OK, arm=arm))
+    then = "Damping does not slow the arm down: the sole's speed" if motor == 7 else ""
+    return _row(stopped, preflight=late, idle=late, end=replace(OK, arm=arm, then=then))
 
 
 _BEGUN = replace(
@@ -239,6 +240,12 @@ _SLIP = Cell(
     "Joint 7 moved",
     ("interrupted: joint7-slip",),
     Arm(100, "driven", HOLD, "holding"),
+)
+_SLIP_LATER = replace(
+    _SLIP,
+    arm=None,
+    why="watched in trials: stops the next one; let go, the foot swings back",
+    then=" rad/s > 4.00",
 )
 # What ends a trial leaves the arm to the console, which asks for hold 20 ms later.
 _BEYOND = Cell(
@@ -590,6 +597,12 @@ TABLE: dict[str, Row] = {
     "torque-limit": _limit(
         "Joint 2 was asked for ",
         "torque-limit",
+        idle=Cell(
+            End.ENDED,
+            "Joint 2 was asked for ",
+            why="found when the arm becomes active; without torque it falls",
+            then="Damping does not slow the arm down: kinetic energy",
+        ),
         **dict.fromkeys(("ready", "recording", "review"), _WEAK),
     ),
     "foot-speed": _limit(
@@ -605,13 +618,8 @@ TABLE: dict[str, Row] = {
         OK,
         preflight=_BRAKED,
         idle=_BRAKED,
-        tare=replace(_SLIP, arm=None, why="watched in trials: stops the next one"),
-        ready=replace(
-            _SLIP,
-            arm=None,
-            why="watched in trials: stops the next one; let go, the foot swings back",
-            then=" rad/s > 4.00",
-        ),
+        tare=_SLIP_LATER,
+        ready=_SLIP_LATER,
         recording=_SLIP,
         review=replace(OK, why="watched in trials only"),
     ),

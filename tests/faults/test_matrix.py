@@ -107,7 +107,7 @@ def check_words(seen, cell: Cell) -> None:
         return
     assert done.code == CODES[cell.end], done.err
     if cell.end is End.COMPLETE:
-        assert done.err == ""
+        assert cell.then in done.err if cell.then else done.err == ""
         assert cell.text in done.out
         return
     (*lines, last) = done.err.splitlines()

@@ -365,7 +365,8 @@ class WamArm:
             self._properties.pause(_MS)
             self._traffic.exchange(self._clock.now_ns())
         self._safety.heed_speed_faults()
-        if motor := self._traffic.balance.doubled():
+        motor = self._traffic.balance.doubled()
+        if motor and self._link.foreign_id is None:  # or the loop names who else asks
             raise PreflightError(
                 f"Puck {motor} answers more often than it is asked.",
                 hint="Look for a second puck of that number, a second program, or an "
