@@ -171,20 +171,34 @@ class TractionEstimates:
     def quantile(self, share: float) -> Array:
         """Return the traction [N] not reached with probability `share`, shape (n,)."""
         checked_shares((share,))
-        return self._forces_at(normal_scores((share,)))[0]
+        return self._forces_at(normal_scores((share,))[:, None])[0]
+
+    def at_scores(self, scores: Array) -> Array:
+        """Return the traction [N] at normal scores of each point, shape (count, n).
+
+        Beyond the outer shares it goes on with the slope of the last two, but not
+        across 0: where no quantile is below 0 no force is, and likewise above.
+
+        Args:
+            scores: normal scores of the force, shape (count, n).
+        """
+        least = np.where(self.forces[0] >= 0.0, 0.0, -np.inf)
+        most = np.where(self.forces[-1] <= 0.0, 0.0, np.inf)
+        return np.clip(self._forces_at(scores), least, most)
 
     def _integrated(self) -> tuple[Array, Array]:
         """Return weights, shape (64,), and forces [N], shape (64, n), of moments."""
         nodes, weights = np.polynomial.legendre.leggauss(_NODES)
         shares = tuple((0.5 * (nodes + 1.0)).tolist())
-        return 0.5 * weights, self._forces_at(normal_scores(shares))
+        return 0.5 * weights, self._forces_at(normal_scores(shares)[:, None])
 
-    def _forces_at(self, wanted: Array) -> Array:
-        """Return the forces [N] at these normal scores, shape (k, n)."""
-        known = normal_scores(self.shares)
-        i = np.clip(np.searchsorted(known, wanted, "right") - 1, 0, known.size - 2)
-        way = (wanted - known[i]) / (known[i + 1] - known[i])
-        return self.forces[i] + way[:, None] * (self.forces[i + 1] - self.forces[i])
+    def _forces_at(self, scores: Array) -> Array:
+        """Return the forces [N] at normal scores of shape (k, n) or (k, 1), (k, n)."""
+        known, column = normal_scores(self.shares), np.arange(self.forces.shape[1])
+        i = np.clip(np.searchsorted(known, scores, "right") - 1, 0, known.size - 2)
+        way = (scores - known[i]) / (known[i + 1] - known[i])
+        left, right = self.forces[i, column], self.forces[i + 1, column]
+        return left + way * (right - left)
 
 
 @dataclass(frozen=True, slots=True)

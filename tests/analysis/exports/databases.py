@@ -10,6 +10,7 @@ from analysis.exports.source import TerrainExport
 from analysis.study.distribution import SHARES, NewTrialPrediction
 from analysis.terrains.database import to_text
 from analysis.terrains.known import KnownTerrain, TerrainDatabase
+from analysis.terrains.path_copula import PathCopula
 from analysis.terrains.table import Table, rows_of
 from tests.analysis.terrains.tables import normal_table
 
@@ -18,6 +19,7 @@ DIGEST = "0123456789abcdef" * 4
 F_N = tuple(np.round(np.linspace(-0.2, 12.4, 24), 6).tolist())
 V_T = tuple(np.round(np.geomspace(0.005, 0.2, 20), 8).tolist())
 LEVEL_SD = {"S0": 0.5, "TF": 0.3}
+COPULA = {"S0": PathCopula(0.3, 0.6, 0.15), "TF": PathCopula(0.9, 2.0, 0.05)}
 BEND = {"S0": 3.0, "TF": None}
 
 
@@ -87,6 +89,7 @@ def terrain(kind, name=None):
         titles={"gp_se": "GP (SE)", "gp_se_trial": "GP (SE, new trial)"},
         recogniser="gp_se",
         break_away=from_rest(kind),
+        copula=COPULA[kind],
     )
 
 
