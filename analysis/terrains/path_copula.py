@@ -122,7 +122,7 @@ def fit_copula(trials: Sequence[ScoredTrial]) -> PathCopula | None:
 
     low, high = (0.0, _TAUS[0], _TAUS[0]), (1.0, _TAUS[1], _TAUS[1])
     best = least_squares(distances, _START, bounds=(low, high), x_scale=_START)
-    return PathCopula(*best.x.tolist())
+    return PathCopula(*(round(value, 6) for value in best.x.tolist()))
 
 
 def lag_correlation(trials: Sequence[ScoredTrial], lag: int) -> float:
