@@ -8,13 +8,17 @@ distribution comes back exactly.
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.data.series import Array
-from analysis.study.distribution import checked_shares
+from analysis.study.distribution import (
+    checked_shares,
+    forces_at_scores,
+    normal_scores,
+)
 
 Rows = tuple[tuple[float, ...], ...]
 
@@ -88,14 +92,6 @@ class Table:
 def rows_of(values: Array) -> Rows:
     """Return an array of shape (n, m) as n rows of m numbers."""
     return tuple(tuple(row) for row in values.tolist())
-
-
-@lru_cache
-def normal_scores(shares: tuple[float, ...]) -> Array:
-    """Return what a standard normal variable does not reach with these shares, (q,)."""
-    from scipy.special import ndtri
-
-    return ndtri(np.array(shares))
 
 
 def _bracket(axis: tuple[float, ...], value: float) -> tuple[int, float]:
@@ -194,11 +190,7 @@ class TractionEstimates:
 
     def _forces_at(self, scores: Array) -> Array:
         """Return the forces [N] at normal scores of shape (k, n) or (k, 1), (k, n)."""
-        known, column = normal_scores(self.shares), np.arange(self.forces.shape[1])
-        i = np.clip(np.searchsorted(known, scores, "right") - 1, 0, known.size - 2)
-        way = (scores - known[i]) / (known[i + 1] - known[i])
-        left, right = self.forces[i, column], self.forces[i + 1, column]
-        return left + way * (right - left)
+        return forces_at_scores(self.forces, normal_scores(self.shares), scores)
 
 
 @dataclass(frozen=True, slots=True)

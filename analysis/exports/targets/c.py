@@ -12,8 +12,9 @@ from analysis.exports.folder import ExportTarget, Files
 from analysis.exports.names import shown
 from analysis.exports.rest import REST_POINTS, rest_distances, rest_risks
 from analysis.exports.source import ExportedTerrain, TerrainExport
+from analysis.study.distribution import normal_scores
 from analysis.terrains.recognition import TAU
-from analysis.terrains.table import Table, TractionEstimates, normal_scores
+from analysis.terrains.table import Table, TractionEstimates
 
 HEADER = "traction_terrains.h"
 _NORMAL_POINTS, _NORMAL_END = 513, 6.0

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from acquisition.errors import SettingsError
-from analysis.study.distribution import SHARES
+from analysis.study.distribution import SHARES, normal_scores
 from analysis.terrains.path_copula import (
     PathCopula,
     ScoredTrial,
     fit_copula,
     lag_correlation,
 )
-from analysis.terrains.table import TractionEstimates, normal_scores
+from analysis.terrains.table import TractionEstimates
 from tests.analysis.exports.databases import database
 
 DT = 0.01
