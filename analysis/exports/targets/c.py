@@ -1,4 +1,4 @@
-"""A C99 header: quantiles, risks and belief over terrains."""
+"""A C99 header: quantiles, risks, sampled paths and belief over terrains."""
 
 from dataclasses import astuple
 from importlib import resources
