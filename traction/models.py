@@ -288,7 +288,7 @@ def load_terrains(path: Path | str) -> TerrainDatabase:
 
     `known.terrain("S0").predict(F_n=3.5, v_t=0.05)` is the traction to expect [N],
     `.slip_risk(required, F_n)` answers for a push from rest, `.risk_in_motion` for a
-    foot that slides.
+    foot that slides, `.sample(F_n, v_t, dt, seed)` draws new trials along a path.
 
     Raises:
         SettingsError: the file cannot be read or is none.

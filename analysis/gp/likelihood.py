@@ -132,7 +132,7 @@ class Likelihood:
         self.kernel, self.noise = kernel, noise
         self.X, self.r, self.trials = X, r, trials
         self._covariance = kernel.over(X)
-        self._shared = shared_over(noise, X, trials)
+        self._shared = shared_over(noise, trials)
         shape = (r.size, r.size)
         self._C, self._inverse = (np.zeros(shape, order="F") for _ in range(2))
         self._last: tuple[bytes, Array, float] = b"", r, 0.0

@@ -13,14 +13,13 @@ from analysis.gp.noise import Noise
 from analysis.gp.regression import GaussianProcess
 from analysis.gp.search import climb_from, distinct_tops
 
-_SIZES = frozenset({"sf", "sn", "sc", "sp", "so"})  # in the unit of the outputs
+_SIZES = frozenset({"sf", "sn", "sc"})  # in the unit of the outputs
 _VANISHED = 2.0  # below where a search begins: a spread there has no slope to leave by
 
 
 def refit_gp(
     process: GaussianProcess,
     y: Array,
-    ratio: float = 1.0,
     noise: Noise | None = None,
 ) -> GaussianProcess:
     """Return a process of other outputs or noise over the same rows.
@@ -31,18 +30,15 @@ def refit_gp(
     Args:
         process: what to begin with.
         y: training outputs, shape (n,).
-        ratio: standard deviation of `y` over that of the outputs of `process`.
         noise: by default that of `process`; parameters that it does not share with it
             begin where they do in any search.
     """
     wanted = noise or process.noise
     names = (*process.kernel.names, *process.noise.names)
-    size = [float(name.rpartition("_")[2] in _SIZES) for name in names]
     own = dict(zip(wanted.names, wanted.start(float(np.std(y))).tolist(), strict=True))
     starts = []
     for theta in distinct_tops(process.kernel, process.starts):
-        moved = theta + np.log(ratio) * np.array(size)
-        known = own | dict(zip(names, moved.tolist(), strict=True))
+        known = own | dict(zip(names, theta.tolist(), strict=True))
         for name, value in own.items():
             if name.rpartition("_")[2] in _SIZES:
                 known[name] = max(known[name], value - _VANISHED)

@@ -202,7 +202,7 @@ def _factor(
     """Return the factor of the covariance of training rows."""
     theta_kernel, theta_noise = split(kernel, theta)
     S, _ = noise.evaluate(theta_noise, X)
-    blocks = shared_over(noise, X, trials)(theta_noise).blocks
+    blocks = shared_over(noise, trials)(theta_noise).blocks
     K, _ = kernel.over(X)(theta_kernel)  # its upper triangle
     return factorise(K, S, blocks=blocks)
 

@@ -1,16 +1,14 @@
-"""What the rows of one trial share: variance components of a random effect.
+"""What the rows of one trial share: the variance component of a random effect.
 
-To the covariance of rows i, j of the same trial (E_ij = 1, otherwise 0) are added
+To the covariance of rows i, j of the same trial (E_ij = 1, otherwise 0) is added
 
     sc^2 E_ij           a level of its own in every trial
-    sp^2 E_ij f_i f_j   a level in proportion to f = F_n / mean |F_n|
 
 (a mixed model, Laird and Ware 1982; Rasmussen and Williams 2006, section 2.7, for
 components in the covariance). A new trial shares nothing with the rows fitted to: its
-predicted mean is that of the kernel alone, and both components add to its variance.
+predicted mean is that of the kernel alone, and the component adds to its variance.
 
-The components are a `Noise`: theta is that of the noise within a trial, then log sc
-and log sp of those that are there.
+It is a `Noise`: theta is that of the noise within a trial, then log sc.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,8 +21,8 @@ import numpy as np
 from analysis.data.series import Array, Indices
 from analysis.gp.noise import ConstantNoise, Noise
 
-_EFFECT = 0.3  # sc or sp over sd(y) that a search starts with
-_SPAN = (-6.0, 1.0)  # of the logarithm of a component over sd(y)
+_EFFECT = 0.3  # sc over sd(y) that a search starts with
+_SPAN = (-6.0, 1.0)  # of the logarithm of sc over sd(y)
 
 
 class TrialRows(NamedTuple):
@@ -62,24 +60,18 @@ class SharedAt(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class TrialNoise:
-    """Noise within a trial, and what its rows share.
+    """Noise within a trial, and the level that its rows share.
 
     Attributes:
         within: noise of single rows.
-        has_level: every trial has a level of its own (sc).
-        has_ratio: every trial has a level in proportion to F_n (sp).
-        load: f at the standardised F_n z is load[0] + load[1] z.
     """
 
     within: Noise = ConstantNoise()  # noqa: RUF009 - it is frozen and has no fields
-    has_level: bool = True
-    has_ratio: bool = False
-    load: tuple[float, float] = (1.0, 0.0)
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the hyperparameters: those within, then the shared ones."""
-        return (*self.within.names, *self._shared_names())
+        """Names of the hyperparameters: those within, then that of the level."""
+        return (*self.within.names, "log_sc")
 
     def variance(self, theta: Array, X: Array) -> Array:
         """Return the variance of a measurement of a new trial around the kernel's mean.
@@ -88,13 +80,11 @@ class TrialNoise:
             theta: hyperparameters of this noise.
             X: standardised inputs, shape (n, d).
         """
-        within, _ = self._split(theta)
-        return self.within.variance(within, X) + self.trial_variance(theta, X)
+        return self.within.variance(theta[:-1], X) + self.level_variance(theta)
 
-    def trial_variance(self, theta: Array, X: Array) -> Array:
-        """Return the part that is the same for a whole trial, sc^2 + sp^2 f^2, (n,)."""
-        sc, sp = self._components(self._split(theta)[1])
-        return sc**2 + (sp * self._relative_load(X)) ** 2
+    def level_variance(self, theta: Array) -> float:
+        """Return the part that is the same for a whole trial, sc^2."""
+        return float(np.exp(theta[-1])) ** 2
 
     def evaluate(
         self, theta: Array, X: Array
@@ -103,85 +93,49 @@ class TrialNoise:
 
         `shared` gives the rest.
         """
-        within, shared = self._split(theta)
-        S, contract = self.within.evaluate(within, X)
-        return S, lambda d: np.concatenate([contract(d), np.zeros(shared.size)])
+        S, contract = self.within.evaluate(theta[:-1], X)
+        return S, lambda d: np.append(contract(d), 0.0)
 
-    def shared(self, X: Array, trials: TrialRows) -> Callable[[Array], SharedAt]:
+    def shared(self, trials: TrialRows) -> Callable[[Array], SharedAt]:
         """Return what gives the covariances inside the trials for any theta.
 
         Args:
-            X: standardised inputs, shape (n, d).
-            trials: where these rows come from.
+            trials: where the rows come from.
         """
-        f = self._relative_load(X)
-        parts = [(rows, f[rows]) for rows in trials.blocks()]
+        parts = trials.blocks()
         return lambda theta: self._shared_at(theta, parts)
 
     def log_prior(self, theta: Array) -> tuple[float, Array]:
-        """Return the prior of the noise within; the shared components have none."""
-        within, shared = self._split(theta)
-        prior, slope = self.within.log_prior(within)
-        return prior, np.concatenate([slope, np.zeros(shared.size)])
+        """Return the prior of the noise within; the level has none."""
+        prior, slope = self.within.log_prior(theta[:-1])
+        return prior, np.append(slope, 0.0)
 
     def start(self, sd_y: float) -> Array:
-        """Return a start: sc = sp = 0.3 sd(y)."""
-        sizes = [_EFFECT * sd_y, _EFFECT * sd_y]
-        shared = np.log(np.array(sizes))[self._present()]
-        return np.concatenate([self.within.start(sd_y), shared])
+        """Return a start: sc = 0.3 sd(y)."""
+        return np.append(self.within.start(sd_y), np.log(_EFFECT * sd_y))
 
     def bounds(self, sd_y: float) -> Array:
-        """Return the logarithms of sc and sp within log sd(y) + [-6, 1]."""
-        sizes = [np.log(sd_y) + np.array(_SPAN)] * 2
-        shared = np.array(sizes)[self._present()]
-        return np.vstack([self.within.bounds(sd_y), shared])
+        """Return the logarithm of sc within log sd(y) + [-6, 1]."""
+        return np.vstack([self.within.bounds(sd_y), np.log(sd_y) + np.array(_SPAN)])
 
-    def _shared_at(
-        self, theta: Array, parts: Sequence[tuple[slice, Array]]
-    ) -> SharedAt:
-        sc, sp = self._components(self._split(theta)[1])
-        blocks = [(rows, sc**2 + sp**2 * (f * f[:, None])) for rows, f in parts]
+    def _shared_at(self, theta: Array, parts: Sequence[slice]) -> SharedAt:
+        variance = self.level_variance(theta)
+        blocks = [
+            (rows, np.full((rows.stop - rows.start,) * 2, variance)) for rows in parts
+        ]
 
         def contract(W: Array) -> Array:
-            sums = np.zeros(2)
-            for rows, f in parts:
-                inside = W[rows, rows]
-                sums += inside.sum(), f @ inside @ f
-            slope = sums * [2.0 * sc**2, 2.0 * sp**2]
-            padding = np.zeros(len(self.within.names))
-            return np.concatenate([padding, slope[self._present()]])
+            inside = sum(float(W[rows, rows].sum()) for rows in parts)
+            return np.append(np.zeros(len(self.within.names)), 2.0 * variance * inside)
 
         return SharedAt(blocks, contract)
 
-    def _shared_names(self) -> list[str]:
-        names = ("log_sc", "log_sp")
-        return [names[k] for k in np.flatnonzero(self._present())]
 
-    def _present(self) -> np.ndarray:
-        """Return which of sc and sp are there, shape (2,)."""
-        return np.array([self.has_level, self.has_ratio])
-
-    def _split(self, theta: Array) -> tuple[Array, Array]:
-        count = len(self.within.names)
-        return theta[:count], theta[count:]
-
-    def _components(self, shared: Array) -> Array:
-        """Return (sc, sp), 0 for a component that is not there."""
-        values = np.zeros(2)
-        values[self._present()] = np.exp(shared)
-        return values
-
-    def _relative_load(self, X: Array) -> Array:
-        return self.load[0] + self.load[1] * X[:, 0]
-
-
-def shared_over(
-    noise: Noise, X: Array, trials: TrialRows | None
-) -> Callable[[Array], SharedAt]:
+def shared_over(noise: Noise, trials: TrialRows | None) -> Callable[[Array], SharedAt]:
     """Return what gives the covariances that rows of one trial share, for any theta.
 
     There are none unless the noise has such components and the trials are known.
     """
     if isinstance(noise, TrialNoise) and trials is not None:
-        return noise.shared(X, trials)
+        return noise.shared(trials)
     return lambda theta: SharedAt((), lambda W: np.zeros(theta.size))

@@ -27,12 +27,13 @@ from analysis.gp.kernels import SquaredExponential
 from analysis.study.crossval import fold_groups
 from analysis.study.jobs import Store, Workers, run_tasks
 from analysis.study.models import FitOptions
-from analysis.study.new_trial import FAMILIES, LEAST_GAIN, NORMAL, NewTrialFit
+from analysis.study.new_trial import NewTrialFit
 
 WAY = "way"  # since the last drop: from F_t and v_t of any trial
 SPAN = 0.2  # s over which changes are held against those of F_t
 REPEATED = 0.3  # share of the changes that is that of F_t, from which on it repeats it
 FEWEST = 3  # trials
+LEAST_GAIN = 0.05  # nat
 
 _STONES_DROP, _PLATE_DROP = 1.5, 0.4  # N between two extremes of the force
 _FOLDS = 10
@@ -209,24 +210,21 @@ def judge_covariates(task: CovariateTask) -> CovariateFold:
     A column that no model can be fitted with is missing.
     """
     try:
-        without, family = _densities(task, None, FAMILIES)
+        without = _densities(task, None)
     except TractionError:
         return CovariateFold({})
-    families = tuple(dict.fromkeys((NORMAL, family)))
     gains: dict[str, tuple[float, ...]] = {}
     for k, column in enumerate(task.columns):
         try:
-            found, _ = _densities(task, k, families)
+            found = _densities(task, k)
         except TractionError:
             continue
         gains[column] = tuple(b - a for a, b in zip(without, found, strict=True))
     return CovariateFold(gains)
 
 
-def _densities(
-    task: CovariateTask, column: int | None, families: Sequence[str]
-) -> tuple[list[float], str]:
-    """Return the log density per sample of trials left out, and the family chosen."""
+def _densities(task: CovariateTask, column: int | None) -> list[float]:
+    """Return the log density per sample of trials left out."""
     tables = [rows.with_column(column) for rows in task.trials]
     fitted = [rows for k, rows in enumerate(tables) if k not in task.left_out]
     joined, options = SampleTable.joined(fitted), task.options
@@ -235,15 +233,13 @@ def _densities(
     chosen = np.random.default_rng(key).choice(joined.count, count, replace=False)
     training = TrainingSet(joined, tuple(rows.count for rows in fitted), chosen)
     kernel = SquaredExponential(joined.inputs.shape[1])
-    fit = NewTrialFit(training, None, options.effect, families)
-    model = fit.fit(kernel)
-    found = [
+    model = NewTrialFit(training, None).fit(kernel)
+    return [
         float(
             model.predict(rows.F_n, rows.v_t, rows.further).log_density(rows.F_t).mean()
         )
         for rows in (tables[k] for k in task.left_out)
     ]
-    return found, model.choice.chosen
 
 
 def _result(

@@ -2,14 +2,16 @@
 
 The force of a new trial is predicted as
 
-    z ~ N(m, w + b s),  s = k / chi^2_k,  y = c exp-warped back from z = c log(y + c)
+    F_t = m + u + sqrt(w) e,    u ~ N(0, b k / (k - 2)),    k = trials - 1
 
-with w the variance within a trial, model included, and b the variance between trials.
-A few trials say little about b: their number less one is k, and s stands for what b may
-be (the posterior of a variance under Jeffreys' prior). The mixture is taken over 40
-equally probable values of s, so that its distribution function is a plain mean.
+with m the mean, w the variance within a trial, model included, and e the residuals of
+trials left out, given by their quantiles. b is the variance between trials: so many
+trials know it with k degrees of freedom, and what it is expected to be, given them, is
+larger (mean of its posterior under Jeffreys' prior; Gelman et al. 2013, section 3.2).
 
-A `ShapeMap` may be put on top of the normal scores.
+The distribution is kept as forces at nine shares. Between them forces are linear in the
+normal score of the share, and beyond the outer ones they go on with the same slope: a
+normal distribution comes back exactly.
 """
 
 from collections.abc import Sequence
@@ -21,17 +23,15 @@ import numpy as np
 
 from acquisition.errors import SettingsError
 from analysis.data.series import Array
-from analysis.study.skew import ShapeMap, log_warp_slope, unwarped, warped
 
 SHARES = (0.01, 0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95, 0.99)
 FEWEST = 4  # degrees of freedom of a variance between trials, however few there are
 
-_MIXED = 40  # values of the variance between trials
 _NODES = 64  # shares that moments and scores are integrated over
-_RATIOS = 129  # of variance between trials over all of it, for quantiles
-_LOWEST = -37.0  # normal score of a quantile at most; double precision ends there
-_STEPS, _ROUNDING = 50, 1e-11  # of Newton's method, mostly five; the last one's length
-_EDGE = 1e-12  # a share nearer to 0 or 1 has no normal score worth the name
+_RATIOS = 21  # of variance between trials over all of it, for quantiles
+_FARTHEST = 37.0  # normal score of a quantile at most; double precision ends there
+_REACH, _POINTS = 8.0, 321  # standard deviations of a grid to invert a sum on, its size
+_STEP = 1e-6  # standard deviations between two quantiles at least
 
 
 class Distribution(Protocol):
@@ -74,20 +74,33 @@ class NewTrialPrediction:
     """F_t of a trial that no model was fitted to.
 
     Attributes:
-        centre: mean of z, shape (n,).
-        within: variance of z within a trial, noise and model included, shape (n,).
-        between: variance of z between trials, shape (n,).
-        freedom: degrees of freedom of the variance between trials.
-        c: of the warp z = c log(y + c) [N]; None for z = y.
-        shape: of the distribution, where it was worth one.
+        forces: F_t [N] that is not reached with each of `SHARES`, shape (9, n).
     """
 
-    centre: Array
-    within: Array
-    between: Array
-    freedom: int
-    c: float | None = None
-    shape: ShapeMap | None = None
+    forces: Array
+
+    @classmethod
+    def of(
+        cls,
+        centre: Array,
+        within: Array,
+        between: Array,
+        residuals: tuple[float, ...],
+    ) -> "NewTrialPrediction":
+        """Return the distribution around a mean.
+
+        Args:
+            centre: mean [N], shape (n,).
+            within: variance within a trial, noise and model included [N^2], shape (n,).
+            between: variance between trials as it is to be expected [N^2], shape (n,).
+            residuals: quantiles of what a trial leaves around its level, over the root
+                of the variance within, at `SHARES`.
+        """
+        total = within + between
+        ratio = between / np.maximum(total, np.finfo(float).tiny)
+        grid = np.linspace(0.0, 1.0, _RATIOS)
+        width = [np.interp(ratio, grid, row) for row in _sum_quantiles(residuals)]
+        return cls(centre + np.sqrt(total) * np.array(width))
 
     @property
     def point(self) -> Array:
@@ -111,33 +124,19 @@ class NewTrialPrediction:
         """Return the probability of less than F_t [N], each (n,)."""
         from scipy.special import ndtr
 
-        x = self.normal_score(F_t)
-        return ndtr(x if self.shape is None else self.shape.score(x))
+        return ndtr(self.normal_score(F_t))
 
     def quantiles(self, shares: Sequence[float] | Array) -> Array:
         """Return the forces [N] that are not reached with these shares, (q, n)."""
-        from scipy.special import ndtr, ndtri
+        from scipy.special import ndtri
 
-        wanted = checked_shares(shares)
-        if self.shape is not None:
-            wanted = ndtr(self.shape.inverse(ndtri(wanted)))
-        total = self.within + self.between
-        ratio = self.between / np.maximum(total, np.finfo(float).tiny)
-        grid = np.linspace(0.0, 1.0, _RATIOS)
-        table = _mixture_quantiles(tuple(wanted.tolist()), self.freedom)
-        width = np.array([np.interp(ratio, grid, column) for column in table])
-        return unwarped(self.centre + np.sqrt(total) * width, self.c)
+        scores = np.clip(ndtri(checked_shares(shares)), -_FARTHEST, _FARTHEST)
+        return forces_at_scores(self.forces, normal_scores(SHARES), scores[:, None])
 
     def log_density(self, F_t: Array) -> Array:
         """Return the log density of F_t [N] in log 1/N, shape (n,)."""
-        far, variance = self._distances(F_t)
-        each = -0.5 * (far**2 / variance + np.log(2.0 * np.pi * variance))
-        highest = each.max(axis=0)
-        density = highest + np.log(np.exp(each - highest).mean(axis=0))
-        density = density + log_warp_slope(F_t, self.c)
-        if self.shape is None:
-            return density
-        return density + self.shape.log_gain(self.normal_score(F_t))
+        score, slope = self._scores(F_t)
+        return np.log(slope) - 0.5 * (score**2 + np.log(2.0 * np.pi))
 
     def ranked_probability(self, F_t: Array) -> Array:
         """Return the continuous ranked probability score of F_t [N], shape (n,)."""
@@ -145,17 +144,44 @@ class NewTrialPrediction:
         return expected_pinball(F_t, self.quantiles(nodes), nodes, weights)
 
     def normal_score(self, F_t: Array) -> Array:
-        """Return the normal score of F_t [N] before the shape is put on, (n,)."""
-        from scipy.special import ndtr, ndtri
+        """Return the normal score of F_t [N], shape (n,)."""
+        return self._scores(F_t)[0]
 
-        far, variance = self._distances(F_t)
-        share = ndtr(far / np.sqrt(variance)).mean(axis=0)
-        return ndtri(np.clip(share, _EDGE, 1.0 - _EDGE))
+    def _scores(self, F_t: Array) -> tuple[Array, Array]:
+        """Return normal scores of F_t and their slopes in it [1/N], each (n,)."""
+        known, column = normal_scores(SHARES), np.arange(F_t.size)
+        inside = self.forces[1:-1]
+        i = np.count_nonzero(inside <= F_t, axis=0)
+        low = self.forces[i, column]
+        slope = (known[i + 1] - known[i]) / (self.forces[i + 1, column] - low)
+        return known[i] + slope * (F_t - low), slope
 
-    def _distances(self, F_t: Array) -> tuple[Array, Array]:
-        """Return z - m, shape (n,), and every variance it may have, shape (40, n)."""
-        variance = self.within + self.between * _mixed(self.freedom)[:, None]
-        return warped(F_t, self.c) - self.centre, variance
+
+def residual_quantiles(parts: Sequence[Array]) -> tuple[float, ...]:
+    """Return quantiles of residuals at `SHARES`, every trial with the same weight.
+
+    Those of a standard normal distribution where there are fewer than two trials.
+
+    Args:
+        parts: of every trial what it leaves around its level, over the root of the
+            predicted variance.
+    """
+    parts = [part for part in parts if part.size > 1]
+    if len(parts) < 2:
+        return tuple(normal_scores(SHARES).tolist())
+    values = np.concatenate(parts)
+    weight = np.concatenate([np.full(part.size, 1.0 / part.size) for part in parts])
+    order = np.argsort(values)
+    reached = np.cumsum(weight[order]) - 0.5 * weight[order]
+    found = np.interp(SHARES, reached / weight.sum(), values[order])
+    rising = np.maximum.accumulate(found - _STEP * np.arange(found.size))
+    return tuple((rising + _STEP * np.arange(found.size)).tolist())
+
+
+def expected_variance(variance: float, trials: int) -> float:
+    """Return what a variance between trials is expected to be, known from so many."""
+    freedom = max(trials - 1, FEWEST)
+    return variance * freedom / (freedom - 2)
 
 
 def checked_shares(shares: Sequence[float] | Array) -> Array:
@@ -172,6 +198,29 @@ def checked_shares(shares: Sequence[float] | Array) -> Array:
             hint="Write e.g. quantiles([0.05, 0.5, 0.95]).",
         )
     return wanted.astype(np.float64)
+
+
+@lru_cache
+def normal_scores(shares: tuple[float, ...]) -> Array:
+    """Return what a standard normal variable does not reach with these shares, (q,)."""
+    from scipy.special import ndtri
+
+    return ndtri(np.array(shares))
+
+
+def forces_at_scores(forces: Array, known: Array, scores: Array) -> Array:
+    """Return forces [N] at normal scores, shape (k, n).
+
+    Args:
+        forces: at known scores, shape (q, n).
+        known: these scores, increasing, shape (q,).
+        scores: of each point, shape (k, n), or of all of them, (k, 1).
+    """
+    i = np.clip(np.searchsorted(known, scores, "right") - 1, 0, known.size - 2)
+    way = (scores - known[i]) / (known[i + 1] - known[i])
+    column = np.arange(forces.shape[1])
+    left, right = forces[i, column], forces[i + 1, column]
+    return left + way * (right - left)
 
 
 def expected_pinball(F_t: Array, values: Array, nodes: Array, weights: Array) -> Array:
@@ -194,36 +243,23 @@ def _nodes() -> tuple[Array, Array]:
     return 0.5 * (nodes + 1.0), 0.5 * weights
 
 
-@lru_cache
-def _mixed(freedom: int) -> Array:
-    """Return equally probable values of k / chi^2_k, shape (40,)."""
-    from scipy.special import chdtri
-
-    middles = (np.arange(_MIXED) + 0.5) / _MIXED
-    return freedom / chdtri(freedom, middles)
-
-
 @lru_cache(maxsize=256)
-def _mixture_quantiles(shares: tuple[float, ...], freedom: int) -> Array:
-    """Return quantiles of the mixture of unit variance, shape (q, 129).
+def _sum_quantiles(residuals: tuple[float, ...]) -> Array:
+    """Return quantiles at `SHARES` of sqrt(1 - r) e + sqrt(r) n, shape (9, 21).
 
-    A column for every ratio from 0 to 1 of the variance between trials to all of it.
-    Newton's method on the normal score of the share that is reached, nearly a straight
-    line in the quantile; in the lower half, whose shares lose no digits.
+    A column for every ratio r from 0 to 1; n is standard normal.
+
+    Args:
+        residuals: quantiles of e.
     """
     from scipy.special import ndtr, ndtri
 
-    ratio = np.linspace(0.0, 1.0, _RATIOS)
-    spread = np.sqrt(1.0 - ratio + ratio * _mixed(freedom)[:, None, None])
-    score = ndtri(np.array(shares))[:, None]
-    wanted = np.maximum(-np.abs(score), _LOWEST)
-    quantile = np.repeat(wanted, _RATIOS, axis=1)
-    for _ in range(_STEPS):
-        each = quantile / spread
-        reached = ndtri(ndtr(each).mean(axis=0))
-        slope = np.mean(np.exp(0.5 * (reached**2 - each**2)) / spread, axis=0)
-        step = (reached - wanted) / slope
-        quantile = quantile - step
-        if np.abs(step).max(initial=0.0) < _ROUNDING:
-            break
-    return -np.sign(score) * quantile
+    known, (nodes, weights) = normal_scores(SHARES), _nodes()
+    e = forces_at_scores(np.array(residuals)[:, None], known, ndtri(nodes)[:, None])
+    widest = max(_REACH, 1.5 * float(np.abs(e).max()))
+    x, columns = np.linspace(-widest, widest, _POINTS), [np.array(residuals)]
+    for ratio in np.linspace(0.0, 1.0, _RATIOS)[1:]:
+        share = weights @ ndtr((x - np.sqrt(1.0 - ratio) * e) / np.sqrt(ratio))
+        is_inside = (share > 0.0) & (share < 1.0)
+        columns.append(np.interp(known, ndtri(share[is_inside]), x[is_inside]))
+    return np.column_stack(columns)

@@ -20,7 +20,7 @@ from analysis.gp.refit import refit_gp
 from analysis.gp.regression import GaussianProcess, fit_gp
 from analysis.study.distribution import Distribution
 from analysis.study.metrics import Prediction
-from analysis.study.new_trial import EFFECTS, LEVEL, NewTrialModel, fit_new_trial
+from analysis.study.new_trial import NewTrialFit, NewTrialModel
 from analysis.study.noise_selection import NoiseChoice, TailedNoise, choose_noise
 from analysis.tustin.model import TustinBounds, TustinFit, TustinForm, fit_tustin
 
@@ -51,11 +51,9 @@ class FitOptions:
         is_nn_as_printed: eq. (5) as printed, c = 0, for the NN kernel.
         draws: mixtures of trials for the intervals of Tustin parameters, and of the
             components of a trial (100 at most); 0 for none.
-        effect: of a trial in the models of a new trial: "constant", "proportional" to
-            F_n, or "both".
 
     Raises:
-        SettingsError: an unknown model or effect, or fewer than one point.
+        SettingsError: an unknown model, or fewer than one point.
     """
 
     bounds: TustinBounds = field(default_factory=TustinBounds)
@@ -65,7 +63,6 @@ class FitOptions:
     form: TustinForm = field(default_factory=TustinForm)
     is_nn_as_printed: bool = False
     draws: int = 200
-    effect: str = LEVEL
 
     def __post_init__(self) -> None:
         unknown = [name for name in self.models if name not in MODELS]
@@ -74,11 +71,6 @@ class FitOptions:
                 f"No study of {', '.join(unknown) or 'the models'} with "
                 f"{self.gp_points} points.",
                 hint=f"The models are {', '.join(MODELS)}; give at least one point.",
-            )
-        if self.effect not in EFFECTS:
-            raise SettingsError(
-                f"There is no effect of a trial {self.effect!r}.",
-                hint=f"The effects are {', '.join(EFFECTS)}.",
             )
 
 
@@ -260,9 +252,9 @@ class ModelFitter:
     def new_trial(
         self, kernel: Kernel, *, is_around_tustin: bool = False
     ) -> NewTrialModel:
-        """Return the model of a new trial, of the family that suits the trials."""
+        """Return the model of a new trial, around the Tustin curve or a constant."""
         curve = self.curve() if is_around_tustin else None
-        return fit_new_trial(self.training, kernel, curve, self.options.effect)
+        return NewTrialFit(self.training, curve).fit(kernel)
 
     @property
     def se_kernel(self) -> SquaredExponential:

@@ -40,9 +40,8 @@ from analysis.study.crossval import FoldResult, ModelFold
 from analysis.study.digests import code_digest, value_digest
 from analysis.study.metrics import Score
 from analysis.study.models import GpModel, TustinModel
-from analysis.study.new_trial import FamilyChoice, LevelSpread, NewTrialModel
+from analysis.study.new_trial import NewTrialModel
 from analysis.study.noise_selection import NoiseChoice, TailedNoise
-from analysis.study.skew import ShapeMap
 from analysis.study.terrain_fit import PooledTustinFit
 from analysis.study.trial_components import TrialComponents
 from analysis.tustin import model as tustin
@@ -61,12 +60,10 @@ TYPES = KERNELS | {
     for kind in (
         BreakAwayModel,
         Family,
-        FamilyChoice,
         FoldResult,
         GaussianProcess,
         GpModel,
         Interval,
-        LevelSpread,
         ModelFold,
         NewTrialModel,
         NoiseChoice,
@@ -75,7 +72,6 @@ TYPES = KERNELS | {
         PushLaw,
         SampleTable,
         Score,
-        ShapeMap,
         Start,
         TailedNoise,
         TrialComponents,

@@ -32,7 +32,7 @@ from analysis.gp.trial_level import (
 )
 from analysis.gp.trial_noise import TrialNoise, TrialRows
 from analysis.study.models import FitOptions
-from analysis.study.new_trial import UNSEEN, spread_rows
+from analysis.study.new_trial import spread_rows
 from analysis.tustin.identifiability import Interval
 
 LEAST_GAIN = 1.4  # log likelihood that a level must gain: 5 % on the edge of its range
@@ -40,6 +40,7 @@ LEAST_GAIN = 1.4  # log likelihood that a level must gain: 5 % on the edge of it
 _STREAM = 3_000_000  # apart from folds, terrain fits and tables
 _DRAWS = 100  # of trials with replacement, at most
 _ENDS = (2.5, 97.5)  # % of the draws
+_UNSEEN = 2  # rows for each that the function is fitted to, to judge its residuals
 _FEWEST = 3  # trials that a spread between them can be seen in
 
 
@@ -138,7 +139,7 @@ def fit_components(task: ComponentsTask) -> TrialComponents | None:
     )
     inputs, lengths = np.column_stack([F_n, v_t]), [t.t.size for t in task.trials]
     # residuals of rows that the function is fitted to are too small: most are not
-    chosen = spread_rows(lengths, min(task.options.gp_points, sum(lengths) // UNSEEN))
+    chosen = spread_rows(lengths, min(task.options.gp_points, sum(lengths) // _UNSEEN))
     label = np.repeat(np.arange(len(lengths)), lengths)[chosen]
     try:
         process = fit_gp(

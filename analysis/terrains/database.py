@@ -8,6 +8,7 @@ edge.
 """
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -22,6 +23,7 @@ from analysis.data.recorded_factors import checked_factors
 from analysis.data.series import Array
 from analysis.terrains.classifier import SurfaceClassifier
 from analysis.terrains.known import KnownTerrain, TerrainDatabase
+from analysis.terrains.path_copula import PathCopula
 from analysis.terrains.table import Rows, Table
 
 FORMAT, VERSION = "traction-terrain-db", "1.0"
@@ -68,6 +70,12 @@ class _Model(BaseModel):
     quantiles: Many[_Rows]
 
 
+class _Copula(BaseModel):
+    level: float = Field(ge=0.0, le=1.0)
+    tau_stick: float = Field(gt=0.0, allow_inf_nan=False)
+    tau_slide: float = Field(gt=0.0, allow_inf_nan=False)
+
+
 class _Terrain(BaseModel):
     kind: str
     incline_deg: float | None = Field(default=None, ge=-90, le=90)
@@ -79,6 +87,7 @@ class _Terrain(BaseModel):
     models: Entries[str, _Model]
     roughness: Entries[int, _Finite] = Field(default_factory=dict[int, float])
     break_away: Annotated[Any, AfterValidator(_break_away)] = None
+    copula: _Copula | None = None
 
 
 class _Axes(BaseModel):
@@ -152,7 +161,7 @@ def _database(file: _File) -> TerrainDatabase:
 
 
 def _terrain(name: str, terrain: _Terrain, file: _File) -> KnownTerrain:
-    models = terrain.models
+    models, copula = terrain.models, terrain.copula
     for wanted in (file.default, file.recogniser):
         if wanted not in models:
             raise ValueError(f"{name} lacks the model {wanted!r:.80}")
@@ -172,6 +181,7 @@ def _terrain(name: str, terrain: _Terrain, file: _File) -> KnownTerrain:
         recogniser=file.recogniser,
         roughness=terrain.roughness,
         break_away=terrain.break_away,
+        copula=None if copula is None else PathCopula(**copula.model_dump()),
     )
 
 
@@ -232,7 +242,7 @@ def to_text(database: TerrainDatabase) -> str:
 
 
 def _stored(terrain: KnownTerrain) -> _Terrain:
-    known = terrain.break_away
+    known, copula = terrain.break_away, terrain.copula
     return _Terrain.model_construct(
         kind=terrain.kind,
         incline_deg=terrain.incline_deg,
@@ -251,6 +261,7 @@ def _stored(terrain: KnownTerrain) -> _Terrain:
         },
         roughness=terrain.roughness,
         break_away=None if known is None else known.to_dict(),
+        copula=None if copula is None else _Copula.model_construct(**asdict(copula)),
     )
 
 

@@ -21,8 +21,10 @@ from analysis.terrains.recognition import Expert, TerrainScores, score_trial
 from analysis.terrains.verdict import WindowLimits
 from analysis.terrains.windows import RESID, WINDOWS, window_features, windows_of
 
-RARE = 0.01  # share of windows that strain a terrain of their own beyond its limit
-SMOOTH = 0.0125  # share of a terrain's own windows that are smoother than its limit
+REFUSED = 0.08  # share of a terrain's own windows that may count as of none
+_SMOOTH_PER_STRAINED = (
+    2.0  # windows refused as too smooth per one that strains too much
+)
 SURE = 0.98  # probability from which an answer counts as sure
 _BINS = 10
 
@@ -92,22 +94,37 @@ class StudyEvidence:
     def limits(
         self, terrain: str, size: int, without: int | None = None
     ) -> WindowLimits:
-        """Return the limits of a terrain's windows.
+        """Return the limits that leave a terrain's windows refused as often as allowed.
 
-        Stones strain their models alike and share that limit; every terrain has its own
-        least roughness.
+        Each trial is held against the windows of the others: the limits are shares of
+        all of them, so chosen that `REFUSED` of the windows of a trial left out lie
+        beyond. Stones strain their models alike and share that limit; every terrain has
+        its own least roughness.
         """
         own = [t for t in self.trials[terrain] if t.number != without]
-        roughness = [trial.overlapping[size][:, RESID] for trial in own]
-        strain = [
-            trial.strains(name, size, overlap=True)
-            for name in self._alike(terrain)
-            for trial in self.trials[name]
-            if trial.number != without
-        ]
+        roughness = {t.number: t.overlapping[size][:, RESID] for t in own}
+        strain = {t.number: t.strains(terrain, size, overlap=True) for t in own}
+        alike: dict[int, list[Array]] = {}
+        for name in self._alike(terrain):
+            for trial in self.trials[name]:
+                if trial.number != without:
+                    strains = trial.strains(name, size, overlap=True)
+                    alike.setdefault(trial.number, []).append(strains)
+        every = {number: np.concatenate(parts) for number, parts in alike.items()}
+        share = _allowed_share(
+            [
+                np.minimum(
+                    _share_up_to(roughness[k], _without(roughness, k))
+                    / _SMOOTH_PER_STRAINED,
+                    _share_up_to(-strain[k], -_without(every, k)),
+                )
+                for k in roughness
+                if len(roughness) > 1
+            ]
+        )
         return WindowLimits(
-            _quantile(roughness, SMOOTH, -np.inf),
-            _quantile(strain, 1.0 - RARE, np.inf),
+            _quantile(roughness.values(), share * _SMOOTH_PER_STRAINED, -np.inf),
+            _quantile(every.values(), 1.0 - share, np.inf),
         )
 
     def _alike(self, terrain: str) -> tuple[str, ...]:
@@ -120,7 +137,29 @@ class StudyEvidence:
         return tuple(name for name in self.trials if self.surface[name] == surface)
 
 
-def _quantile(parts: Sequence[Array], share: float, empty: float) -> float:
+def _allowed_share(parts: Sequence[Array]) -> float:
+    """Return the share of windows beyond the limit of strain.
+
+    Args:
+        parts: of each trial left out the smallest such share that refuses a window;
+            without any of them both limits refuse windows of their own.
+    """
+    alone = REFUSED / (1.0 + _SMOOTH_PER_STRAINED)
+    return min(_quantile(parts, REFUSED, alone), 1.0 / _SMOOTH_PER_STRAINED)
+
+
+def _share_up_to(values: Array, others: Array) -> Array:
+    """Return the share of `others` not above each value; 1 without any, shape (n,)."""
+    if others.size == 0:
+        return np.ones(values.shape)
+    return np.searchsorted(np.sort(others), values, "right") / others.size
+
+
+def _without(parts: Mapping[int, Array], number: int) -> Array:
+    return np.concatenate([part for k, part in parts.items() if k != number])
+
+
+def _quantile(parts: Iterable[Array], share: float, empty: float) -> float:
     values = np.concatenate([np.zeros(0), *parts])
     return float(np.quantile(values, share)) if values.size else empty
 

@@ -18,9 +18,11 @@ from analysis.study.distribution import SHARES
 from analysis.study.jobs import Batch, Store, Workers, run_batches, run_tasks
 from analysis.study.models import GP_SE, GP_SE_TRIAL, TITLES, FitOptions, ModelFitter
 from analysis.study.study import Study
+from analysis.study.terrain_fit import TerrainResult
 from analysis.terrains.database import to_text
 from analysis.terrains.identify import Identification
 from analysis.terrains.known import KnownTerrain, TerrainDatabase
+from analysis.terrains.path_copula import PathCopula, ScoredTrial, fit_copula
 from analysis.terrains.table import Table, rows_of
 
 POINTS = 32  # of each axis
@@ -119,12 +121,33 @@ def database_of(
             recogniser=recogniser,
             roughness=_roughness(identification, task.terrain),
             break_away=from_rest.get(task.terrain),
+            copula=copula_of(
+                study.terrains[task.terrain], default, study.options.prepare.slowest
+            ),
         )
         for task, fitted in zip(tasks, tables, strict=True)
         if default in fitted and recogniser in fitted
     }
     surfaces = None if identification is None else identification.classifier
     return to_text(TerrainDatabase(known, study.simulated, made_utc, surfaces))
+
+
+def copula_of(result: TerrainResult, model: str, slowest: float) -> PathCopula | None:
+    """Return how forces of a terrain's trials hang together; None where not known.
+
+    Each trial is scored by the model that was fitted without it.
+
+    Args:
+        result: the terrain with its folds.
+        model: name of the model.
+        slowest: a foot that is slower sticks [m/s].
+    """
+    held_out = [(result.trials[k], fold.model) for k, fold in result.left_out(model)]
+    scored = [
+        ScoredTrial.of(trial, fitted.predict(trial.F_n, trial.v_t), slowest)
+        for trial, fitted in held_out
+    ]
+    return fit_copula(scored)
 
 
 def _table(forces: Array, axes: tuple[Array, Array]) -> Table:

@@ -6,9 +6,11 @@ believes it.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from numbers import Real
+from math import inf
+from numbers import Integral, Real
 from typing import Any, overload
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from acquisition.errors import SettingsError
@@ -18,6 +20,7 @@ from analysis.data.series import Array
 from analysis.data.terrain_kinds import Value
 from analysis.study.metrics import Prediction
 from analysis.terrains.classifier import SurfaceClassifier
+from analysis.terrains.path_copula import PathCopula
 from analysis.terrains.points import points_of
 from analysis.terrains.table import SlipRisk, Table, TractionEstimate, TractionEstimates
 
@@ -44,6 +47,7 @@ class KnownTerrain:
         break_away: what it gives before a foot at rest slips; None = not known.
         incline_deg: along the push, positive downhill [degrees]; None where unknown.
         factors: of its recordings, the foot among them, by name; None = does not apply.
+        copula: how forces along a path hang together; None = not known.
     """
 
     name: str
@@ -61,6 +65,7 @@ class KnownTerrain:
     break_away: BreakAwayModel | None = None
     incline_deg: float | None = None
     factors: Mapping[str, Value] = field(default_factory=dict[str, Value])
+    copula: PathCopula | None = None
 
     @overload
     def predict(self, F_n: float, v_t: float, model: str = "") -> TractionEstimate: ...
@@ -100,6 +105,54 @@ class KnownTerrain:
         loads, speeds = points_of(F_n, v_t)
         is_outside = ~table.covers_many(loads, speeds)
         return TractionEstimates(table.shares, table.over(loads, speeds), is_outside)
+
+    def sample(
+        self,
+        F_n: ArrayLike,
+        v_t: ArrayLike,
+        dt: float,
+        seed: int | np.random.Generator,
+        count: int = 1,
+    ) -> Array:
+        """Return traction forces of new trials along a path [N], shape (count, n).
+
+        Each row is one trial: its level holds along the whole path, and neighbouring
+        forces resemble each other; see `analysis.terrains.path_copula`. A foot slower
+        than the slowest one measured sticks. Outside of the measured range forces are
+        those of its edge. Where no quantile of the table is below 0, no force is.
+
+        Args:
+            F_n: normal force at every step [N], shape (n,).
+            v_t: slip velocity at every step [m/s], shape (n,).
+            dt: time from one step to the next [s].
+            seed: of the draws, or what draws them.
+            count: trials.
+
+        Raises:
+            SettingsError: F_n and v_t are not finite or not of one shape, dt is not
+                positive and finite, there is no such seed or count, or it is not
+                known how forces of the terrain hang together.
+        """
+        if self.copula is None:
+            raise SettingsError(
+                f"{self.name}: how its forces hang together is not known.",
+                hint="Export a database of two trials or more of each terrain anew.",
+            )
+        loads, speeds = points_of(F_n, v_t)
+        if not (isinstance(dt, Real) and 0.0 < dt < inf):
+            raise SettingsError(
+                f"dt = {dt!r:.60} is no time between two steps.",
+                hint="Give a positive number of seconds, e.g. dt=0.01.",
+            )
+        if not (isinstance(count, Integral) and count > 0):
+            raise SettingsError(
+                f"count = {count!r:.60} is no number of trials.",
+                hint="Give a whole number of at least 1.",
+            )
+        normals = _generator(seed).standard_normal((int(count), 1 + loads.size))
+        is_stuck = np.abs(speeds) < self._table("").v_t[0]
+        scores = self.copula.scores(is_stuck, float(dt), normals)
+        return self.predict(loads, speeds).at_scores(scores)
 
     def prediction(self, F_n: Array, v_t: Array) -> Prediction:
         """Return the recogniser's answer as a model of the study gives it."""
@@ -156,6 +209,17 @@ class KnownTerrain:
                 hint=f"Models: {', '.join(self.tables)}.",
             )
         return table
+
+
+def _generator(seed: int | np.random.Generator) -> np.random.Generator:
+    if isinstance(seed, np.random.Generator):
+        return seed
+    if not isinstance(seed, Integral) or seed < 0:
+        raise SettingsError(
+            f"seed = {seed!r:.60} is no seed.",
+            hint="Give a whole number of at least 0, or a generator of numpy.",
+        )
+    return np.random.default_rng(int(seed))
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,13 +8,17 @@ distribution comes back exactly.
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.data.series import Array
-from analysis.study.distribution import checked_shares
+from analysis.study.distribution import (
+    checked_shares,
+    forces_at_scores,
+    normal_scores,
+)
 
 Rows = tuple[tuple[float, ...], ...]
 
@@ -90,14 +94,6 @@ def rows_of(values: Array) -> Rows:
     return tuple(tuple(row) for row in values.tolist())
 
 
-@lru_cache
-def normal_scores(shares: tuple[float, ...]) -> Array:
-    """Return what a standard normal variable does not reach with these shares, (q,)."""
-    from scipy.special import ndtri
-
-    return ndtri(np.array(shares))
-
-
 def _bracket(axis: tuple[float, ...], value: float) -> tuple[int, float]:
     """Return (lower point, share of the way to the next), clamped to the axis."""
     if value <= axis[0]:
@@ -171,20 +167,30 @@ class TractionEstimates:
     def quantile(self, share: float) -> Array:
         """Return the traction [N] not reached with probability `share`, shape (n,)."""
         checked_shares((share,))
-        return self._forces_at(normal_scores((share,)))[0]
+        return self._forces_at(normal_scores((share,))[:, None])[0]
+
+    def at_scores(self, scores: Array) -> Array:
+        """Return the traction [N] at normal scores of each point, shape (count, n).
+
+        Beyond the outer shares it goes on with the slope of the last two, but not
+        across 0: where no quantile is below 0 no force is, and likewise above.
+
+        Args:
+            scores: normal scores of the force, shape (count, n).
+        """
+        least = np.where(self.forces[0] >= 0.0, 0.0, -np.inf)
+        most = np.where(self.forces[-1] <= 0.0, 0.0, np.inf)
+        return np.clip(self._forces_at(scores), least, most)
 
     def _integrated(self) -> tuple[Array, Array]:
         """Return weights, shape (64,), and forces [N], shape (64, n), of moments."""
         nodes, weights = np.polynomial.legendre.leggauss(_NODES)
         shares = tuple((0.5 * (nodes + 1.0)).tolist())
-        return 0.5 * weights, self._forces_at(normal_scores(shares))
+        return 0.5 * weights, self._forces_at(normal_scores(shares)[:, None])
 
-    def _forces_at(self, wanted: Array) -> Array:
-        """Return the forces [N] at these normal scores, shape (k, n)."""
-        known = normal_scores(self.shares)
-        i = np.clip(np.searchsorted(known, wanted, "right") - 1, 0, known.size - 2)
-        way = (wanted - known[i]) / (known[i + 1] - known[i])
-        return self.forces[i] + way[:, None] * (self.forces[i + 1] - self.forces[i])
+    def _forces_at(self, scores: Array) -> Array:
+        """Return the forces [N] at normal scores of shape (k, n) or (k, 1), (k, n)."""
+        return forces_at_scores(self.forces, normal_scores(self.shares), scores)
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,7 +30,7 @@ def export_terrains(
         SessionError: no session has a kept trial.
         TrialFileError: `out` exists or cannot be written.
     """
-    judged = FitOptions(seed=order.seed, models=(GP_SE,), draws=0)
+    judged = FitOptions(seed=order.seed, models=(GP_SE, GP_SE_TRIAL), draws=0)
     analysed = study_sessions(sessions, data, order, console, judged)
     study = analysed.study
     options = replace(

@@ -20,7 +20,7 @@ from tests.borders.tables import judged, text
 
 _ONE = np.ones(1)
 _NORMAL = Prediction(_ONE, _ONE)
-_MIXED = NewTrialPrediction(_ONE, _ONE, _ONE, freedom=4)
+_MIXED = NewTrialPrediction(np.arange(9.0)[:, None])
 _GRID = np.array([(1.0, 2.0), (3.0, 4.0)])
 _TABLE = normal_table((1.0, 5.0), (0.01, 0.2), _GRID, _GRID)
 _TERRAIN = KnownTerrain("S0", "small", 1, 9, 0.0, {}, {"m": _TABLE}, {}, "m")

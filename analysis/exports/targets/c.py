@@ -1,5 +1,6 @@
-"""A C99 header: quantiles, risks and belief over terrains."""
+"""A C99 header: quantiles, risks, sampled paths and belief over terrains."""
 
+from dataclasses import astuple
 from importlib import resources
 
 import numpy as np
@@ -11,8 +12,9 @@ from analysis.exports.folder import ExportTarget, Files
 from analysis.exports.names import shown
 from analysis.exports.rest import REST_POINTS, rest_distances, rest_risks
 from analysis.exports.source import ExportedTerrain, TerrainExport
+from analysis.study.distribution import normal_scores
 from analysis.terrains.recognition import TAU
-from analysis.terrains.table import Table, TractionEstimates, normal_scores
+from analysis.terrains.table import Table, TractionEstimates
 
 HEADER = "traction_terrains.h"
 _NORMAL_POINTS, _NORMAL_END = 513, 6.0
@@ -98,18 +100,23 @@ def _constants(export: TerrainExport) -> str:
 
 def _terrain(terrain: ExportedTerrain, export: TerrainExport) -> str:
     name, is_float = f"traction_{terrain.identifier}", export.is_float
-    values = np.array(terrain.table.forces).transpose(1, 2, 0)
+    forces = np.array(terrain.table.forces).transpose(1, 2, 0)
     known = terrain.known
     recogniser = known.tables[known.recogniser or known.default]
     parts = [
         f"/* {shown(terrain.name)}: {export.trials_are} */",
-        _array(f"{name}_forces", values, is_float),
+        _array(f"{name}_forces", forces, is_float),
         _array(f"{name}_moments", _moments(recogniser), is_float),
     ]
     rest = "0"
     if known.has_from_rest:
         parts.append(_rest(name, known.from_rest, is_float))
         rest = f"&{name}_from_rest"
+    copula = "0"
+    if known.copula is not None:
+        values = _numbers(np.array(astuple(known.copula)), is_float)
+        parts.append(f"static const traction_copula {name}_copula = {{{values}}};\n")
+        copula = f"&{name}_copula"
     loads, speeds = len(terrain.table.F_n), len(terrain.table.v_t)
     grid = f"{loads}, {speeds}, traction_F_n, traction_v_t"
     parts.append(
@@ -120,6 +127,7 @@ static const traction_terrain {name}_terrain = {{
     {{{grid}, {name}_moments}},
     {_number(known.rho, is_float)},
     {rest},
+    {copula},
 }};
 
 static inline int {name}_quantiles(traction_real F_n, traction_real v_t,
@@ -148,6 +156,13 @@ static inline int {name}_risk_rest(traction_real F_t, traction_real F_n,
                                    traction_real *p)
 {{
     return traction_risk_rest(&{name}_terrain, F_t, F_n, p);
+}}
+
+static inline int {name}_sample(traction_trial *trial, traction_real F_n,
+                                traction_real v_t, traction_real dt,
+                                traction_real normal, traction_real *F_t)
+{{
+    return traction_sample(&{name}_terrain, trial, F_n, v_t, dt, normal, F_t);
 }}
 """
     )

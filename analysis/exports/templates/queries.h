@@ -20,12 +20,20 @@ typedef struct {
     const traction_real *risk;
 } traction_rest;
 
+/* How normal scores of the forces of one trial hang together. */
+typedef struct {
+    traction_real level; /* share of their variance that is the trial's own level */
+    traction_real tau_stick; /* correlation time of the rest while it sticks [s] */
+    traction_real tau_slide; /* the same while it moves [s] */
+} traction_copula;
+
 typedef struct {
     const char *name;
     traction_table forces; /* [N], TRACTION_SHARES columns */
     traction_table moments; /* of the recogniser: mean and sd [N] */
     traction_real rho; /* of its residual, from one sample to the next */
     const traction_rest *rest; /* 0 = not known */
+    const traction_copula *copula; /* 0 = not known */
 } traction_terrain;
 
 typedef struct {
@@ -39,6 +47,13 @@ typedef struct {
     traction_real residual[TRACTION_TERRAINS];
     int has_before;
 } traction_belief;
+
+/* A trial that is drawn step by step; begins with traction_begin_trial. */
+typedef struct {
+    traction_real level; /* normal score of the trial */
+    traction_real rest; /* of the step before */
+    int has_before;
+} traction_trial;
 
 static inline int traction_is_finite(traction_real x)
 {
@@ -244,6 +259,54 @@ static inline int traction_risk_rest(const traction_terrain *terrain, traction_r
     }
     return F_n < rest->loads[0] || F_n > rest->loads[1] || F_t < rest->forces[0]
            || F_t > rest->forces[1];
+}
+
+/* Square root of a number from 0 to 1. */
+static inline traction_real traction_root(traction_real x)
+{
+    return x > 0 ? traction_exp(traction_log(x) / 2) : (traction_real)0;
+}
+
+/* Begin a trial with a level of its own; `normal` is a standard normal number. */
+static inline void traction_begin_trial(traction_trial *trial, traction_real normal)
+{
+    trial->level = normal;
+    trial->rest = (traction_real)0;
+    trial->has_before = 0;
+}
+
+/* Draw F_t [N] of the trial's next step, dt [s] after the one before; `normal` is a
+   standard normal number, a new one for every step. A foot slower than measured sticks.
+   Beyond the outer shares the force goes on with the slope of the last two, but not
+   across 0. -1 too where dt is not positive or the terrain has no copula; the trial
+   stays as it is then. */
+static inline int traction_sample(const traction_terrain *terrain,
+                                  traction_trial *trial, traction_real F_n,
+                                  traction_real v_t, traction_real dt,
+                                  traction_real normal, traction_real *F_t)
+{
+    const traction_copula *copula = terrain->copula;
+    traction_real out[TRACTION_SHARES], slowest = terrain->forces.v_t[0], r, score, way;
+    int k, i = 0, code;
+    *F_t = (traction_real)0;
+    if (!copula || !traction_is_finite(dt) || !traction_is_finite(normal) || dt <= 0)
+        return -1;
+    code = traction_quantiles(terrain, F_n, v_t, out);
+    if (code < 0)
+        return code;
+    r = v_t < slowest && v_t > -slowest ? copula->tau_stick : copula->tau_slide;
+    r = trial->has_before ? traction_exp(-dt / r) : (traction_real)0;
+    trial->rest = r * trial->rest + traction_root(1 - r * r) * normal;
+    trial->has_before = 1;
+    score = traction_root(copula->level) * trial->level
+            + traction_root(1 - copula->level) * trial->rest;
+    for (k = 1; k < TRACTION_SHARES - 1; k++)
+        i += traction_scores[k] <= score;
+    way = (score - traction_scores[i]) / (traction_scores[i + 1] - traction_scores[i]);
+    *F_t = out[i] + way * (out[i + 1] - out[i]);
+    if ((out[0] >= 0 && *F_t < 0) || (out[TRACTION_SHARES - 1] <= 0 && *F_t > 0))
+        *F_t = (traction_real)0;
+    return code;
 }
 
 /* Begin anew: every terrain is as probable as the others. */

@@ -7,9 +7,14 @@ import numpy as np
 from analysis.breakaway.censored import Family
 from analysis.breakaway.model import BREAK_AWAY, SLIDING, BreakAwayModel, PushLaw
 from analysis.exports.source import TerrainExport
-from analysis.study.distribution import SHARES, NewTrialPrediction
+from analysis.study.distribution import (
+    SHARES,
+    NewTrialPrediction,
+    normal_scores,
+)
 from analysis.terrains.database import to_text
 from analysis.terrains.known import KnownTerrain, TerrainDatabase
+from analysis.terrains.path_copula import PathCopula
 from analysis.terrains.table import Table, rows_of
 from tests.analysis.terrains.tables import normal_table
 
@@ -18,7 +23,8 @@ DIGEST = "0123456789abcdef" * 4
 F_N = tuple(np.round(np.linspace(-0.2, 12.4, 24), 6).tolist())
 V_T = tuple(np.round(np.geomspace(0.005, 0.2, 20), 8).tolist())
 LEVEL_SD = {"S0": 0.5, "TF": 0.3}
-BEND = {"S0": 3.0, "TF": None}
+COPULA = {"S0": PathCopula(0.3, 0.6, 0.15), "TF": PathCopula(0.9, 2.0, 0.05)}
+SKEW = {"S0": 0.4, "TF": 0.0}
 
 
 def median_force(name):
@@ -30,13 +36,13 @@ def median_force(name):
 
 
 def new_trial(name, median):
-    from analysis.study.skew import warped
-
     size = np.full(median.size, 1.0)
     within = {"S0": 2.2, "TF": 0.15}[name] ** 2 * size
-    c = BEND[name]
-    centre = warped(median.ravel(), c)
-    return NewTrialPrediction(centre, within, LEVEL_SD[name] ** 2 * size, 9, c)
+    scores = normal_scores(SHARES)
+    skewed = scores + SKEW[name] * (scores**2 - 1.0) / 2.0
+    return NewTrialPrediction.of(
+        median.ravel(), within, LEVEL_SD[name] ** 2 * size, tuple(skewed)
+    )
 
 
 def from_rest(name, *, seed=1):
@@ -72,7 +78,6 @@ def terrain(kind, name=None):
     parameters = {
         "theta": {"log_sf": 1.0, "log_sc": log(LEVEL_SD[kind])},
         "trials": 10,
-        "c": BEND[kind],
     }
     return KnownTerrain(
         name=name or kind,
@@ -87,6 +92,7 @@ def terrain(kind, name=None):
         titles={"gp_se": "GP (SE)", "gp_se_trial": "GP (SE, new trial)"},
         recogniser="gp_se",
         break_away=from_rest(kind),
+        copula=COPULA[kind],
     )
 
 

@@ -11,11 +11,12 @@ from analysis.breakaway.censored import Family
 from analysis.breakaway.model import BREAK_AWAY
 from analysis.exports.folder import target_files
 from analysis.exports.rest import rest_distances, rest_risks
+from analysis.exports.source import TerrainExport
 from analysis.exports.targets.c import HEADER
 from analysis.study.metrics import Prediction
 from analysis.terrains.recognition import TAU, log_densities
 from tests.analysis.exports.compiled import FLAGS, ask, build
-from tests.analysis.exports.databases import V_T, database, export, points
+from tests.analysis.exports.databases import DIGEST, V_T, database, export, points
 
 
 def written(folder, **options):
@@ -185,6 +186,84 @@ def test_a_sample_outside_the_tables_is_no_evidence(header):
     answers = np.frombuffer(done.stdout).reshape(-1, 3)
     assert answers[:, 2].tolist() == [0.0, 1.0, -1.0]
     assert (answers[1:, :2] == answers[0, :2]).all()
+
+
+SAMPLE = """
+#include <stdio.h>
+#include "traction_terrains.h"
+
+int main(void)
+{
+    double in[4];
+    traction_trial trial;
+    if (fread(in, sizeof in, 1, stdin) != 1)
+        return 1;
+    traction_begin_trial(&trial, (traction_real)in[3]);
+    while (fread(in, sizeof in, 1, stdin) == 1) {
+        traction_real F_t;
+        int code = traction_NAME_sample(&trial, in[0], in[1], in[2], in[3], &F_t);
+        double sent[2];
+        sent[0] = F_t;
+        sent[1] = code;
+        fwrite(sent, sizeof sent, 1, stdout);
+    }
+    return 0;
+}
+"""
+
+
+def drawn_in_c(folder, name, level, *columns):
+    """Return forces and codes of one trial for rows of F_n, v_t, dt and normals."""
+    program = build(folder, SAMPLE.replace("NAME", name), *FLAGS)
+    rows = np.vstack([[0.0, 0.0, 0.0, level], np.column_stack(columns)])
+    done = subprocess.run(
+        [program], input=rows.tobytes(), capture_output=True, check=True
+    )
+    return np.frombuffer(done.stdout).reshape(-1, 2).T
+
+
+@pytest.mark.parametrize("name", ["S0", "TF"])
+@pytest.mark.parametrize("dt", [0.002, 0.01, 0.7])
+def test_a_sampled_path_equals_python(header, name, dt):
+    F_n, v_t = points(4000)
+    v_t[1500:1700] = 0.001  # the foot sticks
+    known, seed = database().terrain(name), 11
+    expected = known.sample(F_n, v_t, dt, seed)[0]
+    level, *normals = np.random.default_rng(seed).standard_normal(1 + F_n.size)
+    forces, codes = drawn_in_c(
+        header, name, level, F_n, v_t, np.full(F_n.size, dt), normals
+    )
+    assert np.abs(forces - expected).max() <= 1e-9 * np.abs(expected).max()
+    assert np.array_equal(codes, known.predict(F_n, v_t).is_extrapolated)
+
+
+def test_a_refused_step_leaves_the_trial_as_it_was(header):
+    F_n, v_t, dt, normal = np.full((4, 9), [[4.0], [0.05], [0.01], [0.5]])
+    for column, place, value in (
+        (F_n, 1, np.nan),
+        (v_t, 2, np.inf),
+        (dt, 3, 0.0),
+        (dt, 4, -0.01),
+        (dt, 5, np.nan),
+        (normal, 6, np.inf),
+    ):
+        column[place] = value
+    forces, codes = drawn_in_c(header, "S0", 0.2, F_n, v_t, dt, normal)
+    assert codes.tolist() == [0.0, *[-1.0] * 6, 0.0, 0.0]
+    assert not forces[1:7].any()
+    sound = [0, 7, 8]
+    columns = (column[sound] for column in (F_n, v_t, dt, normal))
+    assert np.array_equal(drawn_in_c(header, "S0", 0.2, *columns)[0], forces[sound])
+
+
+def test_a_terrain_without_a_copula_is_not_sampled(tmp_path):
+    known = database()
+    terrains = {n: replace(t, copula=None) for n, t in known.terrains.items()}
+    bare = TerrainExport.of(replace(known, terrains=terrains), DIGEST, "1")
+    (tmp_path / HEADER).write_bytes(target_files("c", bare)[HEADER])
+    ones = np.ones(3)
+    forces, codes = drawn_in_c(tmp_path, "S0", 0.0, 4.0 * ones, 0.05 * ones, ones, ones)
+    assert (forces.tolist(), codes.tolist()) == ([0.0] * 3, [-1.0] * 3)
 
 
 def test_names_that_look_like_parts_of_the_header_compile(tmp_path):

@@ -1,7 +1,7 @@
 """Tables of terrains whose forces are normal."""
 
-from analysis.study.distribution import SHARES
-from analysis.terrains.table import Table, normal_scores, rows_of
+from analysis.study.distribution import SHARES, normal_scores
+from analysis.terrains.table import Table, rows_of
 
 
 def normal_table(F_n, v_t, mean, sd):

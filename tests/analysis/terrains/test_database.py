@@ -17,6 +17,7 @@ from analysis.terrains.database import load, to_text
 from analysis.terrains.export import database_of
 from analysis.terrains.known import KnownTerrain, TerrainDatabase
 from analysis.terrains.logistic import RidgeLogistic
+from analysis.terrains.path_copula import PathCopula
 from analysis.terrains.table import Table, rows_of
 from analysis.terrains.windows import FEATURES
 from tests.analysis.exports.databases import from_rest
@@ -62,6 +63,19 @@ def test_what_is_written_is_read_again(tmp_path):
     first, second = (d.terrain("S0").predict(3.0, 0.1) for d in (database, again))
     assert second.forces == pytest.approx(first.forces, rel=1e-4)
     assert again.terrain("S0").parameters == {"gp_se_trial": {"c": 3.0}}
+    assert again.terrain("S0").copula is None
+
+
+def test_a_copula_is_kept_and_bounded(tmp_path):
+    copula = PathCopula(0.25, 1.5, 0.2)
+    known = skewed(copula=copula)
+    assert load(saved(tmp_path, to_text(known))).terrain("S0").copula == copula
+    content = json.loads(to_text(known))
+    content["terrains"]["S0"]["copula"]["tau_stick"] = 0.0
+    with pytest.raises(SettingsError, match="tau_stick"):
+        load(saved(tmp_path, content))
+    del content["terrains"]["S0"]["copula"]  # as files have been
+    assert load(saved(tmp_path, content)).terrain("S0").copula is None
 
 
 def test_factors_and_incline_are_kept_and_bounded(tmp_path):

@@ -11,6 +11,7 @@ from acquisition.errors import SettingsError
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.samples import SampleTable
 from analysis.data.series import TractionSeries
+from analysis.data.tables import load_tables
 from analysis.study.metrics import Prediction
 from analysis.study.models import GP_SE, TUSTIN, FitOptions, ModelFitter
 from analysis.study.study import StudyOptions, run_study
@@ -204,6 +205,19 @@ def test_recorded_stones_and_not_names_decide_what_a_terrain_counts_as():
     assert kinds == study.kinds
 
 
+@pytest.mark.shared_data
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_unknown_ground_is_refused_and_known_ground_seldom(shared_data):
+    trials = load_tables([shared_data / "rehearsal_trials.npz"])
+    fit = FitOptions(models=(GP_SE,), draws=0)
+    study = run_study(trials, StudyOptions(fit=fit), simulated=True)
+    for size, exclusion in identify_study(study).exclusions.items():
+        assert exclusion.false_alarms < 0.1, size
+        assert exclusion.flat_among_rocky > 0.7, size
+        assert exclusion.rocky_among_flat > 0.7, size
+
+
 # --- the database ---------------------------------------------------------------------
 
 
@@ -215,6 +229,16 @@ def test_the_database_answers_as_the_models_do(study, path):
     # quantiles are kept to 0.1 mN
     assert answer.quantile(0.5) == pytest.approx(answer.mean, abs=1e-4)
     assert answer.quantile(0.05) < answer.mean < answer.quantile(0.95)
+
+
+def test_the_database_samples_paths_by_the_correlation_of_trials_left_out(path):
+    for name in LEVELS:
+        known = load(path).terrain(name)
+        # 0.98 from one recorded sample to the next, 2 ms, with the level of a trial
+        assert 0.02 < known.copula.tau_slide < 0.5
+        forces = known.sample(np.full(300, 3.5), 0.05, 0.01, seed=1, count=200)
+        near = np.mean([np.corrcoef(forces[:, k : k + 2].T)[0, 1] for k in range(299)])
+        assert 0.7 < near < 1.0
 
 
 def test_one_point_and_many_points_agree(path):

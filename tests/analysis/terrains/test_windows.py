@@ -16,6 +16,7 @@ from analysis.terrains.classifier import (
     fit_surfaces,
 )
 from analysis.terrains.evidence import (
+    REFUSED,
     StudyEvidence,
     SurfaceProbability,
     TrialEvidence,
@@ -284,6 +285,49 @@ def test_limits_leave_out_the_trial_that_is_judged(study_evidence):
     with_it, without = more.limits("S0", 100), more.limits("S0", 100, without=9)
     assert with_it.roughness < without.roughness - 1.0
     assert without == study_evidence.limits("S0", 100)
+
+
+def made_up(name, number, rng):
+    """Return a trial of 1000 samples that is rougher and more strained than others."""
+    rough, strain = rng.normal(0.0, 0.3), np.exp(rng.normal(0.0, 0.4))
+    n = 1000
+    scores = TerrainScores(
+        (name,), np.zeros((n, 1)), np.ones((n, 1)), strain * rng.chisquare(1, (n, 1))
+    )
+
+    def features(count):
+        rows = np.zeros((count, len(FEATURES)))
+        rows[:, RESID] = rough + rng.normal(0.0, 0.3, count)
+        return rows
+
+    return TrialEvidence(
+        number,
+        scores,
+        {s: features(len(windows_of(n, s))) for s in WINDOWS},
+        {s: features(len(windows_of(n, s, overlap=True))) for s in WINDOWS},
+    )
+
+
+@pytest.mark.parametrize("surface", [ROCKY_GROUND, FLAT_GROUND])
+@pytest.mark.parametrize("trials", [10, 40])
+def test_as_many_windows_of_trials_left_out_are_refused_as_allowed(surface, trials):
+    shares = []
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        own = [made_up("S0", k, rng) for k in range(trials)]
+        found = exclusion_of(StudyEvidence({"S0": own}, {"S0": surface}), 50)
+        shares.append(found.false_alarms)
+    assert np.mean(shares) == pytest.approx(REFUSED, abs=0.02)
+
+
+def test_a_single_trial_refuses_some_of_its_own_windows():
+    rng = np.random.default_rng(3)
+    trial = made_up("S0", 0, rng)
+    limits = StudyEvidence({"S0": [trial]}, {"S0": FLAT_GROUND}).limits("S0", 50)
+    roughness = trial.overlapping[50][:, RESID]
+    strains = trial.strains("S0", 50, overlap=True)
+    refused = [limits.exclude(*pair) for pair in zip(roughness, strains, strict=True)]
+    assert 0.0 < np.mean(refused) <= REFUSED + 2 / len(refused)  # two limits, rounded
 
 
 def test_trials_beyond_the_number_of_the_other_kind_s_are_left_out(study_evidence):

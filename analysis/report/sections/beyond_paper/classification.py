@@ -16,7 +16,7 @@ from analysis.report.style import (
     plain,
     shade_table,
 )
-from analysis.terrains.evidence import Exclusion
+from analysis.terrains.evidence import REFUSED, Exclusion
 from analysis.terrains.identify import KEPT_PER_SECOND, Confusion, Identification
 
 if TYPE_CHECKING:
@@ -99,8 +99,8 @@ def surface_table(identification: Identification) -> ReportTable:
         note="Flat or rocky: logistic regression on features of the window, fitted to "
         "trials of other numbers; right: mean over the two; calibration error: mean "
         "difference of probability and share. None: a window that strains the "
-        "likeliest terrain's model more than 99 % of its own windows, or is smoother "
-        "than 98.75 % of them; limits from trials of other numbers.",
+        "likeliest terrain's model, or is smooth, as few of its own windows are; by "
+        f"limits from trials of other numbers that may refuse {REFUSED:.0%} of these.",
         section=ReportSection.BEYOND,
     )
 

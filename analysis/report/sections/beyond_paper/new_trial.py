@@ -15,9 +15,10 @@ from analysis.report.velocity_panels import (
     one_per_kind,
     panels,
 )
+from analysis.study.distribution import SHARES
 from analysis.study.metrics import compare
 from analysis.study.models import GP_SE_NOISE, GP_SE_TRIAL
-from analysis.study.new_trial import NewTrialModel, family_counts
+from analysis.study.new_trial import NewTrialModel
 from analysis.study.study import Study
 from analysis.study.terrain_fit import mean_of
 from analysis.study.trial_components import TrialComponents
@@ -33,30 +34,30 @@ _LEAST = (
 def new_trial_tables(results: StudyResults) -> list[ReportTable]:
     """Return the tables on predictions of a new trial; one without rows is left out."""
     tables = [
-        family_table(results.study),
+        residual_table(results.study),
         worth_table(results.study),
         oracle_table(results),
     ]
     return [table for table in tables if table.rows]
 
 
-def family_table(study: Study) -> ReportTable:
-    """Return which family of distributions the trials chose, and what it gains."""
+def residual_table(study: Study) -> ReportTable:
+    """Return how residuals of a new trial are distributed, and what that gains."""
     rows: list[list[str]] = []
     for name, result in study.terrains.items():
         fitted = [fold.model for fold in result.models(GP_SE_TRIAL)]
         models = [model for model in fitted if isinstance(model, NewTrialModel)]
         if not models:
             continue
-        counts = family_counts(models)
+        ends = [SHARES.index(share) for share in (0.05, 0.95)]
+        low, high = np.mean([[m.residuals[k] for k in ends] for m in models], axis=0)
         before, after = (result.scores(m, "nlpd") for m in (GP_SE_NOISE, GP_SE_TRIAL))
         paired, mean = compare(before, after), mean_of(after)
         rows.append(
             [
                 name,
-                ", ".join(f"{family} {n}" for family, n in counts.items() if n),
-                str(sum(model.shape is not None for model in models)),
-                str(sum(model.choice.clipped for model in models)),
+                f"{np.mean([model.level_sd for model in models]):.2f}",
+                f"{low:+.2f} to {high:+.2f}",
                 "–" if mean is None else f"{mean:.3f}",
                 "–" if paired is None else f"{-paired.difference:+z.3f}",
             ]
@@ -65,17 +66,16 @@ def family_table(study: Study) -> ReportTable:
         name="Predictive distribution of a new trial",
         header=(
             "terrain",
-            "family by folds",
-            "with shape by folds",
-            "rows clipped",
+            "spread of levels [N]",
+            "5 to 95 % of residuals [sd]",
             "NLPD [nat]",
             "gain over chosen noise [nat]",
         ),
         rows=rows,
-        note="A Gaussian process with an effect of the trial. Normal noise, noise that "
-        "changes with load and velocity, or normal noise of the warped force "
-        "c log(F_t + c): chosen in every fold among its training trials, each left "
-        "out in turn. Scores are of trials left out of the fold.",
+        note="A Gaussian process whose noise changes with load and velocity, a level "
+        "of every trial, and the quantiles of residuals of training trials, each left "
+        "out in turn; those of a normal distribution are -1.64 to +1.64. Means over "
+        "folds. Scores are of trials left out of the fold.",
         section=ReportSection.BEYOND,
     )
 
