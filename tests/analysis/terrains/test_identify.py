@@ -11,10 +11,10 @@ from acquisition.errors import SettingsError
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.samples import SampleTable
 from analysis.data.series import TractionSeries
-from analysis.data.tables import load_tables
 from analysis.study.metrics import Prediction
 from analysis.study.models import GP_SE, TUSTIN, FitOptions, ModelFitter
 from analysis.study.study import StudyOptions, run_study
+from analysis.tables.loading import load_tables
 from analysis.terrains.database import load
 from analysis.terrains.export import TableTask, database_of, training_set
 from analysis.terrains.identify import Confusion, identify_study
