@@ -6,7 +6,7 @@ from acquisition.clock import Clock
 from acquisition.errors import SessionError
 from experiments.session.derivation import derive, sidecar_of
 from experiments.session.reducer import SessionState, apply, refusal, replay
-from experiments.session.sidecar import KEEP, TrialName, sums_of
+from experiments.session.sidecar import KEEP, sums_of
 from experiments.session.states import Event
 from experiments.session.store import SessionFolder, iso_utc
 
@@ -47,9 +47,9 @@ class Journal:
 
     def _sums(self, entry: dict[str, object]) -> dict[str, object]:
         """Return checksum and size of the trial that an event keeps."""
-        state, number = apply(self.state, entry), int(str(entry["trial"]))
-        kept = state.attempt_at(TrialName(number, state.kept_attempt(number)))
-        return sums_of(sidecar_of(self.folder, kept))
+        after, known = apply(self.state, entry).kept_trials, self.state.attempts
+        judged = [sidecar_of(self.folder, kept) for kept in after if kept not in known]
+        return sums_of(judged[0]) if judged else {}
 
     def saved(self) -> str:
         """Return what is safe on the disk, for a message."""

@@ -126,6 +126,22 @@ def test_no_report_is_made_of_a_session_whose_journal_lost_lines(data, lose):
     assert "Not as in the journal: S001 events.jsonl " in done.err
 
 
+@pytest.mark.parametrize("lose", LOSSES)
+@pytest.mark.parametrize("command", [("resume", "S001"), ("redo", "S001", "T01")])
+def test_a_session_whose_journal_lost_lines_is_not_opened_nor_changed(
+    data, lose, command
+):
+    """What follows from the journal would be the only witness of the loss."""
+    session = only_session(data)
+    lose(session)
+    before = {p: p.read_bytes() for p in session.rglob("*.*") if p.name != ".lock"}
+    done = traction(*command, "--data", data)
+    assert done.code == 6
+    assert "S001 events.jsonl " in done.err
+    after = {p: p.read_bytes() for p in session.rglob("*.*") if p.name != ".lock"}
+    assert after == before
+
+
 @pytest.mark.parametrize("lose", [_empty, _missing, _cut_behind_first])
 def test_a_changed_trial_is_found_without_the_journal(data, lose):
     session = only_session(data)
