@@ -87,10 +87,18 @@ def _derive_trial(
     is_elsewhere = _is_elsewhere(folder, attempt, others)
     for suffix in _SUFFIXES if is_elsewhere else ():
         if is_there(_file(other, suffix)):
-            move_file(_file(other, suffix), _file(place, suffix))
+            _move(_file(other, suffix), _file(place, suffix))
     _write_changed(_file(place, ".json"), sidecar_of(folder, attempt))
     if is_elsewhere and is_there(_file(other, ".json")):
         remove_file(_file(other, ".json"))
+
+
+def _move(source: Path, target: Path) -> None:
+    """Move a file; in a copy of a session that a kill had left in both places, once."""
+    if is_there(target) and sha256_of(source) == sha256_of(target):
+        remove_file(source)
+    else:
+        move_file(source, target)
 
 
 def _other_place(folder: SessionFolder, attempt: Attempt) -> Path:

@@ -211,6 +211,15 @@ def test_a_damaged_sidecar_is_replaced_and_moves_no_recording(folder, damaged):
     assert derived_files(folder) == before
 
 
+def test_a_copy_of_a_session_that_has_a_recording_in_both_places_is_in_line(folder):
+    before = derived_files(folder)
+    shutil.copy(folder.trials / "T01.mcap", folder.rejected / "T01a.mcap")
+    shutil.copy(folder.rejected / "T02a.mcap", folder.rejected / "T02c.mcap")
+    derive(folder, replay(folder.events()))
+    (folder.rejected / "T02c.mcap").unlink()  # of no attempt: left alone
+    assert derived_files(folder) == before
+
+
 def test_nothing_is_derived_from_a_journal_that_is_lost(folder):
     before = derived_files(folder)
     (folder.path / "events.jsonl").unlink()
