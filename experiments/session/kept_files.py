@@ -11,7 +11,7 @@ from acquisition.errors import SessionError, TrialFileError
 from acquisition.trial_file.data_files import is_there, list_folder
 from experiments.session.data_files import line_faults, read_json, sha256_of
 from experiments.session.reducer import replay
-from experiments.session.sidecar import KEEP, Attempt, TrialName
+from experiments.session.sidecar import KEEP, Attempt, TrialName, sums_of
 from experiments.session.states import Event
 from experiments.session.store import JOURNAL_FILE, SUMMARY_FILE, SessionFolder
 
@@ -89,8 +89,9 @@ def _compare(
             faults.append((f"trials/{path.name}", "is kept, but is not in the journal"))
             attempt = attempt if type(attempt) is int else 1
             name = TrialName(int(stem[1:]), attempt) if stem[1:].isdigit() else None
-            if name is not None:
-                faults += _check_trial(folder, Attempt(name), digest)
+            if name is not None:  # the sidecar is the only one that knows the checksum
+                orphan = Attempt(name, sums=sums_of(fields))
+                faults += _check_trial(folder, orphan, digest)
     return faults
 
 
@@ -229,29 +230,23 @@ def _check_trial(
 ) -> list[tuple[str, str]]:
     """Return (file, problem) for each file of a kept trial that is not sound.
 
-    Its files may have yet to follow the journal. Where that states no checksum, the
-    sidecar's is the only one.
+    Its files may have yet to follow the journal.
     """
     name = kept.name
     stems = (folder.trials / name.kept, folder.rejected / name.rejected)
     sidecars = [read_json(stem.with_name(f"{stem.name}.json")) for stem in stems]
     own = [s for s in sidecars if s.get("attempt") == name.attempt]
-    sidecar = own[0] if own else dict[str, Any]()
-    stated, faults = sidecar.get("sha256"), list[tuple[str, str]]()
-    if not sidecar:
+    faults: list[tuple[str, str]] = []
+    if not own:
         faults.append((f"trials/{name.kept}.json", "is missing or unreadable"))
-    elif stated != (kept.sha256 or stated):
+    elif own[0].get("sha256") != kept.sha256:
         faults.append((f"trials/{name.kept}.json", "states another checksum"))
-    if kept.sha256 and folder.find_kept(kept, digest) is not None:
+    if folder.find_kept(kept, digest) is not None:
         return faults
     recordings = (stem.with_name(f"{stem.name}.mcap") for stem in stems)
     path = next((path for path in recordings if is_there(path)), None)
-    if path is None:
-        faults.append((f"trials/{name.kept}.mcap", "is missing"))
-    elif kept.sha256 or (stated and digest(path) != stated):
-        size, before = path.stat().st_size, kept.size or sidecar.get("size")
-        faults.append((f"trials/{name.kept}.mcap", _changed(size, before)))
-    return faults
+    problem = _changed(path.stat().st_size, kept.size) if path else "is missing"
+    return [*faults, (f"trials/{name.kept}.mcap", problem)]
 
 
 def _changed(size: int, before: object) -> str:
