@@ -68,7 +68,7 @@ def _make_session(
         trial = {"trial": number, "attempt": 1}
         events += [
             {"event": Event.TRIAL_STARTED, **trial},
-            {"event": Event.TRIAL_RECORDED, **trial},
+            {"event": Event.TRIAL_RECORDED, **trial, "recording": sums},
             {"event": Event.TRIAL_KEPT, **trial, **sums},
         ]
         sidecar = {"trial": stem.name, "attempt": 1, "verdict": "keep", **sums}

@@ -37,6 +37,8 @@ from experiments.operator.console import WARNING, Console
 from experiments.report.choices import ReportRequest
 from experiments.report.sessions import report_sessions
 from experiments.session.data_files import reading, write_new
+from experiments.session.derivation import derive
+from experiments.session.reducer import replay
 from experiments.session.store import SessionFolder, iso_utc
 
 SESSIONS, TABLES, RESULTS = "sessions", "tables", "results"
@@ -138,7 +140,10 @@ def _write_texts(
 
 
 def _copy_session(session: SessionFolder, to: Path) -> SessionFolder:
-    """Copy what a session recorded; nothing that leads out of it."""
+    """Copy what a session recorded, in line with its journal.
+
+    Nothing that leads out of it is copied.
+    """
     copy = replace(session, path=to / session.path.name)
     for name in _FOLDERS:
         source, target = session.path / name, copy.path / name
@@ -149,6 +154,7 @@ def _copy_session(session: SessionFolder, to: Path) -> SessionFolder:
             with reading(path), os.fdopen(open_data(path), "rb") as file:
                 content = file.read()
             write_new(target / path.name, content)
+    derive(copy, replay(copy.events()))
     return copy
 
 

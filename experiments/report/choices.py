@@ -156,7 +156,7 @@ def choose_sessions(
         hint = "For example: traction report S012"
         raise SessionError("Name the sessions to report, or use --all.", hint=hint)
     if every:
-        sessions = [s for s in list_sessions(data) if s.kept_trials() or _keeps(s)]
+        sessions = [s for s in list_sessions(data) if replay(s.events()).kept]
     else:
         sessions = [find_session(data, name) for name in dict.fromkeys(names)]
     if not sessions:
@@ -168,11 +168,6 @@ def choose_sessions(
         what, hint = (t.format_map(values) for t in (message.what, message.do))
         raise SessionError(what, hint=hint)
     return sessions
-
-
-def _keeps(session: SessionFolder) -> bool:
-    """Return whether the journal keeps a trial, whatever became of its files."""
-    return bool(replay(session.events()).kept)
 
 
 def tell_missing(

@@ -1,11 +1,11 @@
 """Tables of sessions, cells, checks, settings and provenance in a report."""
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import cast
 
 import numpy as np
 
-from acquisition.trial_file.data_files import list_folder
 from analysis.data.recorded_factors import FOOT, value_text
 from analysis.data.terrain_kinds import kind_title
 from analysis.report.held_trial import HeldTrial
@@ -14,6 +14,8 @@ from analysis.report.traction_ratio import traction_ratio
 from analysis.study.models import GP_SE, TUSTIN
 from analysis.study.study import Study
 from experiments.session.data_files import read_json
+from experiments.session.derivation import sidecar_of
+from experiments.session.reducer import SessionState, replay
 from experiments.session.store import SessionFolder
 
 _ROW = (
@@ -56,25 +58,28 @@ def report_tables(
 ) -> list[ReportTable]:
     """Return sessions, rejected trials, preflight, settings, provenance and files."""
     every = [trial for group in trials.values() for trial in group]
+    states = {session.path: replay(session.events()) for session in sessions}
     return [
-        _session_table(sessions),
-        _rejected_table(sessions),
+        _session_table(sessions, states),
+        _rejected_table(sessions, states),
         _preflight_table(sessions),
         _matrix_table(trials),
         _provenance(every),
-        _files(sessions),
+        _files(sessions, states),
     ]
 
 
-def _session_table(sessions: Sequence[SessionFolder]) -> ReportTable:
+def _session_table(
+    sessions: Sequence[SessionFolder], states: Mapping[Path, SessionState]
+) -> ReportTable:
     rows = [
         (
             s.id,
             s.terrain,
             s.path.name[:10],
             "SIMULATED" if s.is_simulated else "LIVE",
-            str(len(list_folder(s.trials, "T??.mcap"))),
-            str(len(s.rejected_sidecars())),
+            str(len(states[s.path].kept)),
+            str(states[s.path].rejected),
         )
         for s in sessions
     ]
@@ -86,18 +91,21 @@ def _session_table(sessions: Sequence[SessionFolder]) -> ReportTable:
     )
 
 
-def _rejected_table(sessions: Sequence[SessionFolder]) -> ReportTable:
+def _rejected_table(
+    sessions: Sequence[SessionFolder], states: Mapping[Path, SessionState]
+) -> ReportTable:
     rows = [
         (
             s.id,
-            f"{sidecar.get('trial', '?')} attempt {sidecar.get('attempt', '?')}",
-            str(sidecar.get("status", "")),
-            str(sidecar.get("reason", "")),
-            str(sidecar.get("who", "")),
-            str(sidecar.get("when", "")),
+            f"{attempt.name.kept} attempt {attempt.name.attempt}",
+            str(sidecar_of(s, attempt).get("status", "")),
+            attempt.verdict.reason,
+            attempt.verdict.who,
+            attempt.verdict.when,
         )
         for s in sessions
-        for sidecar in s.rejected_sidecars()
+        for attempt in states[s.path].attempts
+        if attempt.is_rejected
     ]
     return ReportTable(
         "Acceptance: rejected and interrupted trials",
@@ -168,14 +176,14 @@ def _few(values: set[str]) -> str:
     return f"{len(values)} different values, in the trial files"
 
 
-def _files(sessions: Sequence[SessionFolder]) -> ReportTable:
-    rows: list[tuple[str, str, str]] = []
-    for session in sessions:
-        for path in list_folder(session.trials, "T*.json"):
-            sidecar = read_json(path)
-            name = f"{session.path.name}/trials/{path.stem}.mcap"
-            digest, size = (str(sidecar.get(key, "?")) for key in ("sha256", "size"))
-            rows.append((name, size, digest))
+def _files(
+    sessions: Sequence[SessionFolder], states: Mapping[Path, SessionState]
+) -> ReportTable:
+    rows = [
+        (f"{s.path.name}/{kept.place}.mcap", str(kept.size or "?"), kept.sha256 or "?")
+        for s in sessions
+        for kept in states[s.path].kept_trials
+    ]
     return ReportTable("Trial files", ("file", "bytes", "SHA-256"), rows)
 
 

@@ -19,8 +19,7 @@ from experiments.run.console_loop import ConsoleLoop
 from experiments.run.stop import ArmFaultError, StopFlag
 from experiments.run.trial import SessionMetadata, TrialArchive
 from experiments.session.journal import Journal
-from experiments.session.reducer import KEEP, REJECT
-from experiments.session.sidecar import TrialName
+from experiments.session.sidecar import KEEP, REJECT, TrialName
 from experiments.session.states import Event
 
 UNDO_NS = 10_000_000_000  # a verdict can be taken back for so long [ns]
@@ -49,8 +48,6 @@ class FlowState:
         fault_context: where in the session a fault would occur now; every step that
             waits for a person sets it.
         page: the newest review, line by line; of `say_page`.
-        last_recorded: the newest trial that no tare has followed yet; set by `record`,
-            taken by `tare`.
         is_last: no trial begins after this one; of `ready` and `verdicts`.
         estimate: expected duration, as of the first kept trial [s]; of
             `update_estimate`.
@@ -62,7 +59,6 @@ class FlowState:
 
     fault_context: FaultContext = field(default_factory=FaultContext)
     page: tuple[str, ...] = ()
-    last_recorded: TrialName | None = None
     is_last: bool = False
     estimate: float | None = None
     ticked: set[int] = field(default_factory=set[int])

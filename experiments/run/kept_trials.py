@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from analysis.data.load import RecordedTrial
 from experiments.operator.graphs import KeptRow, WayTrace
+from experiments.session.derivation import kept_sidecars
 from experiments.session.store import SessionFolder
-from experiments.session.trial_files import kept_sidecars
 
 TRACE_CELLS = 72  # shares of the way in a trace
 
@@ -64,6 +64,12 @@ def _kept_row(sidecar: Mapping[str, Any]) -> KeptRow:
 
 def _number_or_none(value: object) -> float | None:
     return float(value) if isinstance(value, float | int) else None
+
+
+def kept_ratios(folder: SessionFolder) -> list[float]:
+    """Return the quick fits of the trials kept so far."""
+    ratios = (sidecar.get("ratio") for sidecar in kept_sidecars(folder))
+    return [ratio for ratio in ratios if isinstance(ratio, float)]
 
 
 def kept_traces(folder: SessionFolder) -> list[dict[str, NDArray[np.float64]]]:

@@ -37,8 +37,8 @@ from analysis.data.quality import (
 from experiments.operator.console import BAD, GOOD, WARNING
 from experiments.operator.graphs import WayTrace, trace_lines
 from experiments.run.kept_trials import plain_trace, traces_of
+from experiments.session.derivation import kept_sidecars
 from experiments.session.store import SessionFolder
-from experiments.session.trial_files import kept_sidecars
 
 STALE_SHARE = 0.01  # of the cycles
 ENOUGH_EARLIER = 3  # trials before which nothing is odd
@@ -90,8 +90,10 @@ class Review:
         return self.ratio if np.isfinite(self.ratio) else None
 
     def plain(self) -> dict[str, object]:
-        """Return what the running table and later reviews need, for the sidecar."""
+        """Return what the running table and later reviews need, for the journal."""
         return {
+            "ratio": self.known_ratio,
+            "coverage": self.counts.tolist(),
             "slips": self.slips,
             "v_t": None if np.isnan(self.v_t) else round(self.v_t, 4),
             "traces": {trace.name: plain_trace(trace) for trace in self.traces},

@@ -6,7 +6,6 @@ from dataclasses import replace
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import BusCondition, SafetyMode
 from acquisition.sample import MOTOR_FRESH_SHIFT
-from acquisition.trial_file.data_files import list_folder
 from experiments.messages import BUS_WORDS, preflight_error, pucks_have
 from experiments.operator.keys import KeyAction, key_action, screen_keys
 from experiments.operator.prompts import Prompt
@@ -164,13 +163,14 @@ def _view_last(context: RunContext, name: TrialName) -> None:
     """Say the newest review again, or that of the last kept trial on the disk."""
     del name
     if not context.state.page:
-        kept = list_folder(context.metadata.folder.trials, "T??.mcap")
+        folder, kept = context.metadata.folder, context.journal.state.kept_trials
         if not kept:
             context.say("There is no trial to look at yet.")
             return
-        review = context.console_loop.run_aside(lambda: review_trial(kept[-1]))
+        path = folder.path / f"{kept[-1].place}.mcap"
+        review = context.console_loop.run_aside(lambda: review_trial(path))
         lines = [f" {mark} {text}" for mark, text in review.lines()]
-        context.say_page([f"{kept[-1].stem}, recorded before:", *lines])
+        context.say_page([f"{path.stem}, recorded before:", *lines])
         return
     context.say_page(context.state.page)
 

@@ -26,11 +26,11 @@ from experiments.rig.rig import Rig
 from experiments.run.console_loop import TICK
 from experiments.run.context import RunContext, RunServices
 from experiments.run.fault_plan import FaultTrigger
-from experiments.run.kept_trials import kept_traces
+from experiments.run.kept_trials import kept_ratios, kept_traces
 from experiments.run.quality import review_trial
 from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.run.trial import EndDetector, PaceMonitor, trial_header
-from experiments.session.sidecar import TrialName, TrialOutcome
+from experiments.session.sidecar import TrialName, TrialOutcome, recording_of
 from experiments.session.states import Event
 from wam.control.friction_compensation import SWUNG_MOTOR
 
@@ -197,23 +197,24 @@ def _end(
         )
     except TrialFileError as error:
         raise _lost("write-failed", context, name, error) from error
-    archive.write_sidecar(name, verified, outcome)
-    context.state.last_recorded = name
+    folder, recording = context.metadata.folder, recording_of(verified, outcome)
+    review = None
+    if outcome.status == "complete":
+        path = folder.trials / f"{name.kept}.mcap"
+        review = context.console_loop.run_aside(lambda: review_trial(path))
+        recording |= review.plain()
     details = {"trial": name.number, "attempt": name.attempt}
-    context.append(Event.TRIAL_RECORDED, **details)
+    context.append(Event.TRIAL_RECORDED, **details, recording=recording)
     written = (
         f"{name.kept} {outcome.status} {outcome.seconds:.2f} s · {verified.cycles} "
         "samples · written and verified"
     )
-    if outcome.status == "complete":
-        path = context.metadata.folder.trials / f"{name.kept}.mcap"
-        review = context.console_loop.run_aside(lambda: review_trial(path))
-        lines = [f" {m} {text}" for m, text in review.lines(archive.kept_ratios())]
+    if review is not None:
+        lines = [f" {m} {text}" for m, text in review.lines(kept_ratios(folder))]
         warnings = [f" {WARNING} {line}" for line in friction]
-        kept = kept_traces(context.metadata.folder)
+        kept = kept_traces(folder)
         traces = review.trace_lines(kept, name.kept, context.console.width)
         context.say_page([written, *lines, *warnings, *traces])
-        archive.write_sidecar(name, verified, outcome, review)
         return
     context.say(written)
     context.reject(name, f"interrupted: {outcome.reason}")

@@ -150,8 +150,8 @@ def resume_session(folder: SessionFolder, request: ResumeRequest) -> int:
     """
     _check_kind(folder, request)
     with session_lock(folder):
-        journal = _recovered(folder, request.console)
         _check_kept(folder, request)
+        journal = _recovered(folder, request.console)
         if journal.state.phase is SessionPhase.CRASHED and journal.state.is_complete:
             journal.append(Event.ENDED, reason="complete")
             request.console.say(CATALOGUE["complete"].text({"session": folder.id}))
@@ -169,8 +169,8 @@ def redo(
     """
     _check_kind(folder, request)
     with session_lock(folder):
-        journal = _recovered(folder, request.console)
         _check_kept(folder, request)
+        journal = _recovered(folder, request.console)
         return _reopen(
             journal, request, Event.REDO, {"trial": number, "reason": reason}
         )
@@ -202,6 +202,8 @@ def _recovered(folder: SessionFolder, console: Console) -> Journal:
 
 def _check_kept(folder: SessionFolder, request: ResumeRequest) -> None:
     """Refuse to go on beside kept trials that are gone, unless that is allowed.
+
+    What is derived anew is a witness of what the journal has lost, until it is.
 
     Raises:
         KeptDataError: kept trials are missing or changed.

@@ -24,7 +24,6 @@ from experiments.run.pose_walk import PoseWalk
 from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.session.sidecar import TrialName
 from experiments.session.states import Event
-from experiments.session.trial_files import write_next_tare
 from experiments.settings.calibrations import PREFIX
 from ft_sensor.calibration.sensor_file import SensorCalibration, sensor_from_toml
 from ft_sensor.payload import Payload
@@ -209,31 +208,17 @@ def _accept(context: RunContext, name: TrialName, result: TareResult) -> None:
     rig.tared, rig.tared_ns = tared, result.t_ns
     bias = tared.bias.tolist()
     context.loop_client.set_bias(bias)
+    before = context.journal.state.untared
     context.append(
         Event.TARED,
         trial_number=name.number,
-        bias=[round(v, 4) for v in bias],
+        t_ns=rig.tared_ns,
+        bias=bias,
         spread=round(float(result.spread), 3),
     )
-    _close_bracket(context, change)
-
-
-def _close_bracket(context: RunContext, change: float) -> None:
-    """Write the tare into the sidecar of the trial before it.
-
-    Args:
-        context: the session.
-        change: of the zero since the tare before that trial [N].
-    """
-    name, rig = context.state.last_recorded, context.rig
-    if name is None:
-        return
-    context.state.last_recorded = None
-    for doubt in zero_doubts(change):
-        context.say(f"{WARNING} {name.kept}: {doubt.text}.")
-    tare = {"t_ns": rig.tared_ns, "bias": rig.tared.bias.tolist()}
-    folder = context.metadata.folder
-    context.console_loop.run_aside(lambda: write_next_tare(folder, name, tare))
+    if before is not None:
+        for doubt in zero_doubts(change):
+            context.say(f"{WARNING} {before.kept}: {doubt.text}.")
 
 
 def _likely(rig: Rig, change: WeightChange) -> dict[str, str]:

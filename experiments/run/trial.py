@@ -1,4 +1,4 @@
-"""One trial on its way to the disk: header, end conditions, sidecar, flight record."""
+"""One trial on its way to the disk: header, end conditions, flight record."""
 
 import json
 from collections import deque
@@ -16,16 +16,8 @@ from acquisition.trial_file.writer import FLIGHT_TOPICS, TRUTH_TOPICS, TrialWrit
 from analysis.data.recorded_factors import tread_of
 from experiments import provenance
 from experiments.rig.rig import Rig
-from experiments.run.quality import Review
-from experiments.session.data_files import write_json
-from experiments.session.sidecar import (
-    TIME_LIMIT,
-    TrialName,
-    TrialOutcome,
-    sidecar_of,
-)
+from experiments.session.sidecar import TIME_LIMIT, TrialName
 from experiments.session.store import SessionFolder, iso_utc
-from experiments.session.trial_files import kept_sidecars
 from ft_sensor.calibration.files import payload_to_toml, terrain_to_toml
 from wam.model.arm_model import urdf
 
@@ -231,33 +223,3 @@ class TrialArchive:
         except TrialFileError as error:
             return f"No flight record: {error}"
         return f"Flight record: faults/{path.name}."
-
-    def write_sidecar(
-        self,
-        name: TrialName,
-        verified: VerifiedFile,
-        outcome: TrialOutcome,
-        review: Review | None = None,
-    ) -> None:
-        """Write what is known of a sealed trial beside it, without a verdict.
-
-        Args:
-            name: the attempt.
-            verified: what reading the file back has shown.
-            outcome: how the recording ended.
-            review: what the trial is worth; None = not looked at.
-
-        Raises:
-            TrialFileError: the disk is full or gone.
-        """
-        details = sidecar_of(name, verified, outcome)
-        if review is not None:
-            details |= {"ratio": review.known_ratio, "coverage": review.counts.tolist()}
-            details |= review.plain()
-        write_json(self.metadata.folder.trials / f"{name.kept}.json", details)
-
-    def kept_ratios(self) -> list[float]:
-        """Return the quick fits of the trials kept so far, from their sidecars."""
-        kept = kept_sidecars(self.metadata.folder)
-        ratios = (sidecar.get("ratio") for sidecar in kept)
-        return [ratio for ratio in ratios if isinstance(ratio, float)]

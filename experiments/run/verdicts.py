@@ -14,7 +14,6 @@ from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.session.annotations import LONGEST_TEXT, clean_text
 from experiments.session.sidecar import TrialName, TrialOutcome
 from experiments.session.states import Event
-from experiments.session.trial_files import add_remark
 
 _ENDED = "session ended at the review"
 _NO_VERDICT = (
@@ -173,8 +172,8 @@ def _write_note(services: RunServices, name: TrialName | None, text: str) -> Non
     services.append(
         Event.NOTED, trial=name.number, attempt=name.attempt, text=text, who=who
     )
-    sidecar = add_remark(services.metadata.folder, name, text, who)
-    services.say(f"Noted on {sidecar}: {text}")
+    stem = services.journal.state.attempt_at(name).stem
+    services.say(f"Noted on {stem}: {text}")
 
 
 def _later(services: RunServices, name: TrialName) -> str:

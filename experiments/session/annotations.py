@@ -10,14 +10,13 @@ from experiments.operator.console import WARNING
 from experiments.operator.terminal import login_name
 from experiments.session.crash_recovery import recover_session
 from experiments.session.data_files import sha256_of
+from experiments.session.derivation import sidecar_of
 from experiments.session.journal import Journal, open_journal
-from experiments.session.kept_files import recorded_facts
 from experiments.session.lock import session_lock
-from experiments.session.reducer import KEEP, refusal
-from experiments.session.sidecar import TrialName
+from experiments.session.reducer import refusal
+from experiments.session.sidecar import KEEP, TrialName
 from experiments.session.states import Event
 from experiments.session.store import SessionFolder
-from experiments.session.trial_files import add_remark, check_sidecar, find_sidecar
 
 LONGEST_TEXT = 2000  # characters
 _TRIAL = re.compile(r"^T?0*(?P<number>[1-9]\d?)(?P<letters>[a-z]{0,3})$")
@@ -80,11 +79,10 @@ def add_note(folder: SessionFolder, trial: str, text: str, who: str) -> str:
             journal.append(Event.NOTED, text=text, who=who)
             return f"Noted on {folder.id}."
         name = _find_attempt(journal, trial)
-        check_sidecar(folder, name)
         journal.append(
             Event.NOTED, trial=name.number, attempt=name.attempt, text=text, who=who
         )
-        return f"Noted on {folder.id} {add_remark(folder, name, text, who)}."
+        return f"Noted on {folder.id} {journal.state.attempt_at(name).stem}."
 
 
 def change_verdict(
@@ -100,7 +98,6 @@ def change_verdict(
     with session_lock(folder):
         journal = _journal(folder)
         name = _find_attempt(journal, trial)
-        check_sidecar(folder, name)
         fields: dict[str, object] = {
             "trial": name.number,
             "attempt": name.attempt,
@@ -116,9 +113,7 @@ def change_verdict(
             )
         remarks = _check_file(journal, name) if verdict == KEEP else []
         journal.append(Event.VERDICT, **fields)
-        path = f"trials/{name.kept}"
-        if verdict != KEEP:
-            path = f"rejected/{name.rejected}"
+        path = journal.state.attempt_at(name).place
         kept, wanted = len(journal.state.kept), journal.state.wanted
         return [
             *remarks,
@@ -171,7 +166,8 @@ def _find_attempt(journal: Journal, trial: str) -> TrialName:
         )
     attempt = attempt or kept or 1
     if attempt > last:
-        known = " ".join(f"T{n:02d}" for n, _ in journal.state.attempts) or "none yet"
+        names = dict.fromkeys(a.name.kept for a in journal.state.attempts)
+        known = " ".join(names) or "none yet"
         raise SessionError(
             f"There is no {trial} in {journal.folder.id}.", hint=f"Trials: {known}."
         )
@@ -184,16 +180,10 @@ def _check_file(journal: Journal, name: TrialName) -> list[str]:
     Raises:
         SessionError: there is no file of it, or another than was recorded.
     """
-    sidecar = find_sidecar(journal.folder, name)
-    is_kept = journal.state.kept_attempt(name.number) == name.attempt
-    path = journal.folder.rejected / f"{name.rejected}.mcap"
-    if is_kept:
-        path = journal.folder.trials / f"{name.kept}.mcap"
-    wanted = recorded_facts(journal.folder.events(), name).get("sha256")
-    digest = sha256_of(path) if is_there(path) else ""
-    if not digest or any(
-        digest != s for s in (sidecar.get("sha256"), wanted or digest)
-    ):
+    attempt = journal.state.attempt_at(name)
+    sidecar = sidecar_of(journal.folder, attempt)
+    path = journal.folder.path / f"{attempt.place}.mcap"
+    if not is_there(path) or sha256_of(path) != sidecar.get("sha256"):
         raise SessionError(
             f"{path.name} is missing or is not what was recorded.",
             hint="It cannot count. Nothing was changed.",

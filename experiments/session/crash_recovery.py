@@ -7,17 +7,12 @@ from acquisition.errors import SessionError, TrialFileError
 from acquisition.temporary_folders import remove_abandoned
 from acquisition.trial_file.data_files import is_claimed, is_there, list_folder
 from acquisition.trial_file.recover import ROOM, recover_file, recovered_path
-from acquisition.trial_file.verify import VerifiedFile, verify_file
-from experiments.session.data_files import move_file, read_json, remove_file, write_json
+from experiments.session.data_files import move_file, remove_file
+from experiments.session.derivation import derive, read_recording
 from experiments.session.journal import Journal
-from experiments.session.sidecar import TrialName, TrialOutcome, sidecar_of
+from experiments.session.sidecar import TrialName
 from experiments.session.states import OPEN, Event, SessionPhase
 from experiments.session.store import SessionFolder
-from experiments.session.trial_files import (
-    find_sidecar,
-    last_decisions,
-    move_trial_files,
-)
 
 WHO = "traction"  # author of an automatic verdict
 PATIENCE_NS = 20_000_000_000  # to write and verify the longest trial takes a few s
@@ -41,21 +36,16 @@ def recover_session(journal: Journal) -> str:
     _sweep(folder)
     if journal.state.phase in OPEN:
         journal.append(Event.CRASH_FOUND)
-    for decision in last_decisions(folder.events()):
-        if find_sidecar(folder, decision.name):
-            move_trial_files(folder, decision)
+    else:
+        derive(folder, journal.state)
     number = journal.state.running
     if journal.state.phase is not SessionPhase.CRASHED or number is None:
         return ""
     name = TrialName(number, journal.state.attempt(number))
-    _gather(folder, name)
-    journal.append(
-        Event.TRIAL_REJECTED,
-        trial=number,
-        attempt=name.attempt,
-        reason=REASON,
-        who=WHO,
-    )
+    details: dict[str, object] = {"trial": number, "attempt": name.attempt}
+    if not journal.state.attempt_at(name).is_recorded:
+        details["recording"] = _gather(folder, name)
+    journal.append(Event.TRIAL_REJECTED, **details, reason=REASON, who=WHO)
     return f"{name.kept} will be redone, its data are in rejected/{name.rejected}.*"
 
 
@@ -72,19 +62,21 @@ def _wait_for_recorder(folder: SessionFolder) -> None:
         clock.sleep_until(clock.now_ns() + _PAUSE_NS)
 
 
-def _gather(folder: SessionFolder, name: TrialName) -> None:
-    """Give what there is of the trial its names in trials/, with a sidecar."""
-    sidecar = folder.trials / f"{name.kept}.json"
-    if read_json(sidecar).get("attempt") == name.attempt:
-        return
+def _gather(folder: SessionFolder, name: TrialName) -> dict[str, object]:
+    """Put what there is of a trial into rejected/; return the recording's numbers."""
     path = folder.trials / f"{name.kept}.mcap"
     partial = path.with_name(path.name + ".partial")
     if is_there(partial) and not is_there(path):
         _recover(partial, path)
-    for source, kind in ((partial, ".partial"), (_truth(partial), ".truth.partial")):
+    for source, kind in (
+        (partial, ".partial"),
+        (_truth(partial), ".truth.partial"),
+        (_truth(path), ".truth.mcap"),
+        (path, ".mcap"),
+    ):
         if is_there(source):
             move_file(source, folder.rejected / f"{name.rejected}{kind}")
-    write_json(sidecar, sidecar_of(name, _verified(path), TrialOutcome("crash")))
+    return read_recording(folder.rejected / f"{name.rejected}.mcap")
 
 
 def _recover(partial: Path, path: Path) -> None:
@@ -97,16 +89,8 @@ def _recover(partial: Path, path: Path) -> None:
     path.chmod(0o444)
 
 
-def _verified(path: Path) -> VerifiedFile | None:
-    """Return what `path` holds, None where it cannot be read."""
-    try:
-        return verify_file(path)
-    except TrialFileError:
-        return None
-
-
-def _truth(partial: Path) -> Path:
-    return partial.with_name(partial.name.replace(".mcap", ".truth.mcap"))
+def _truth(path: Path) -> Path:
+    return path.with_name(path.name.replace(".mcap", ".truth.mcap"))
 
 
 def _sweep(folder: SessionFolder) -> None:

@@ -10,15 +10,10 @@ from typing import Any, cast
 from acquisition.errors import SessionError, TrialFileError
 from acquisition.trial_file.data_files import is_there, list_folder
 from experiments.session.data_files import line_faults, read_json, sha256_of
-from experiments.session.reducer import KEEP, replay
-from experiments.session.sidecar import TrialName
+from experiments.session.reducer import replay
+from experiments.session.sidecar import KEEP, Attempt, TrialName, sums_of
 from experiments.session.states import Event
 from experiments.session.store import JOURNAL_FILE, SUMMARY_FILE, SessionFolder
-from experiments.session.trial_files import (
-    decision_of,
-    find_sidecar,
-    kept_sidecars,
-)
 
 _NAMED = 6  # deviations in one message
 _Facts = Mapping[str, Any]
@@ -75,15 +70,15 @@ def _compare(
         TrialFileError: a file or folder that all depends on cannot be read.
     """
     events, text = folder.events(), folder.journal_text()
-    kept = [TrialName(*pair) for pair in sorted(replay(events).kept_attempts)]
+    state = replay(events)
     faults = [(JOURNAL_FILE, fault) for fault in line_faults(text)]
     if (otherwise := contradiction(folder, events)) is not None:
         faults.append((otherwise.file, otherwise.problem))
-    judged = {d.name for d in map(decision_of, events) if d is not None}
+    judged = {attempt.name for attempt in state.attempts if attempt.verdicts}
     faults += _unknown_to_journal(folder, text, {name.kept for name in judged})
-    for name in kept:
+    for attempt in state.kept_trials:
         try:
-            faults += _check_trial(folder, name, recorded_facts(events, name), digest)
+            faults += _check_trial(folder, attempt, digest)
         except TrialFileError as error:
             faults.append((_below(folder, error), error.reason))
     for path in list_folder(folder.trials, "T??.json"):
@@ -94,8 +89,9 @@ def _compare(
             faults.append((f"trials/{path.name}", "is kept, but is not in the journal"))
             attempt = attempt if type(attempt) is int else 1
             name = TrialName(int(stem[1:]), attempt) if stem[1:].isdigit() else None
-            if name is not None:
-                faults += _check_trial(folder, name, {}, digest)
+            if name is not None:  # the sidecar is the only one that knows the checksum
+                orphan = Attempt(name, sums=sums_of(fields))
+                faults += _check_trial(folder, orphan, digest)
     return faults
 
 
@@ -183,7 +179,7 @@ def stated_id(folder: SessionFolder) -> str:
 def repeated_trials(folder: SessionFolder, original: SessionFolder) -> set[str]:
     """Return the names of the trials of a copy that its original has as well."""
     sums = [
-        {str(s.get("trial")): s.get("sha256") for s in kept_sidecars(one)}
+        {kept.name.kept: kept.sha256 for kept in replay(one.events()).kept_trials}
         for one in (folder, original)
     ]
     return {name for name, sha256 in sums[0].items() if sums[1].get(name) == sha256}
@@ -229,39 +225,28 @@ def kept_data_error(deviations: Sequence[Deviation]) -> KeptDataError:
     )
 
 
-def recorded_facts(events: Sequence[_Facts], name: TrialName) -> _Facts:
-    """Return the event that kept the attempt last."""
-    fields: _Facts = {}
-    for event in events:
-        decision = decision_of(event)
-        if decision is not None and decision.name == name and decision.verdict == KEEP:
-            fields = event
-    return fields
-
-
 def _check_trial(
-    folder: SessionFolder,
-    name: TrialName,
-    event: _Facts,
-    digest: Callable[[Path], str],
+    folder: SessionFolder, kept: Attempt, digest: Callable[[Path], str]
 ) -> list[tuple[str, str]]:
-    """Return (file, problem) for each file of a kept trial that is not sound."""
-    sidecar = find_sidecar(folder, name)
-    path = folder.trials / f"{name.kept}.mcap"
-    if not is_there(path) and is_there(folder.rejected / f"{name.rejected}.json"):
-        path = folder.rejected / f"{name.rejected}.mcap"  # follows at the next opening
-    stated, faults = sidecar.get("sha256"), list[tuple[str, str]]()
-    wanted = event.get("sha256", stated)
-    if not sidecar:
+    """Return (file, problem) for each file of a kept trial that is not sound.
+
+    Its files may have yet to follow the journal.
+    """
+    name = kept.name
+    stems = (folder.trials / name.kept, folder.rejected / name.rejected)
+    sidecars = [read_json(stem.with_name(f"{stem.name}.json")) for stem in stems]
+    own = [s for s in sidecars if s.get("attempt") == name.attempt]
+    faults: list[tuple[str, str]] = []
+    if not own:
         faults.append((f"trials/{name.kept}.json", "is missing or unreadable"))
-    elif stated != wanted:
+    elif own[0].get("sha256") != kept.sha256:
         faults.append((f"trials/{name.kept}.json", "states another checksum"))
-    if not is_there(path):
-        faults.append((f"trials/{path.name}", "is missing"))
-    elif wanted and digest(path) != wanted:
-        size, before = path.stat().st_size, event.get("size", sidecar.get("size"))
-        faults.append((f"trials/{path.name}", _changed(size, before)))
-    return faults
+    if folder.find_kept(kept, digest) is not None:
+        return faults
+    recordings = (stem.with_name(f"{stem.name}.mcap") for stem in stems)
+    path = next((path for path in recordings if is_there(path)), None)
+    problem = _changed(path.stat().st_size, kept.size) if path else "is missing"
+    return [*faults, (f"trials/{name.kept}.mcap", problem)]
 
 
 def _changed(size: int, before: object) -> str:

@@ -5,9 +5,16 @@ from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Any, cast
 
+from experiments.session.sidecar import (
+    KEEP,
+    REJECT,
+    Attempt,
+    TrialName,
+    Verdict,
+    sums_of,
+)
 from experiments.session.states import TABLE, Event, PhaseChange, SessionPhase
 
-KEEP, REJECT = "keep", "reject"
 _EVENTS = {str(event): event for event in Event}
 _AXES = 6  # of a wrench
 _Facts = Mapping[str, Any]
@@ -20,10 +27,11 @@ class SessionState:
     Attributes:
         phase: where it stands.
         terrain: name of the terrain.
+        operator: who opened it last.
         wanted: how many kept trials make it complete.
         kept_attempts: (number, attempt) of the kept trials, in the order of keeping.
-        rejected: how many attempts were rejected or interrupted.
-        attempts: how many attempts each number has had so far.
+        attempts: every attempt so far, in the order of their names.
+        untared: the newest attempt of this opening that no tare has followed yet.
         running: number of the trial without a verdict, None between trials.
         redoing: number of the trial that is to be repeated, None where none is.
         is_redo: it was opened to repeat one trial and for nothing else.
@@ -36,10 +44,11 @@ class SessionState:
 
     phase: SessionPhase = SessionPhase.PLANNED
     terrain: str = ""
+    operator: str = ""
     wanted: int = 0
     kept_attempts: tuple[tuple[int, int], ...] = ()
-    rejected: int = 0
-    attempts: tuple[tuple[int, int], ...] = ()
+    attempts: tuple[Attempt, ...] = ()
+    untared: TrialName | None = None
     running: int | None = None
     redoing: int | None = None
     is_redo: bool = False
@@ -66,6 +75,17 @@ class SessionState:
         return tuple(number for number, _ in self.kept_attempts)
 
     @property
+    def kept_trials(self) -> list[Attempt]:
+        """The kept attempts, in the order of their numbers."""
+        names = {TrialName(*pair) for pair in self.kept_attempts}
+        return [attempt for attempt in self.attempts if attempt.name in names]
+
+    @property
+    def rejected(self) -> int:
+        """How many attempts were rejected or interrupted."""
+        return sum(attempt.is_rejected for attempt in self.attempts)
+
+    @property
     def is_complete(self) -> bool:
         """Whether every wanted trial was kept."""
         return len(self.kept_attempts) >= self.wanted > 0
@@ -87,11 +107,25 @@ class SessionState:
 
     def attempt(self, number: int) -> int:
         """Return how many attempts trial `number` has had, 0 before the first."""
-        return dict(self.attempts).get(number, 0)
+        own = (a.name.attempt for a in self.attempts if a.name.number == number)
+        return max(own, default=0)
 
     def kept_attempt(self, number: int) -> int:
         """Return which attempt at trial `number` is the kept one, 0 for none."""
         return dict(self.kept_attempts).get(number, 0)
+
+    def attempt_at(self, name: TrialName) -> Attempt:
+        """Return what the journal says of an attempt, nothing where it has none."""
+        known = (attempt for attempt in self.attempts if attempt.name == name)
+        return next(known, Attempt(name))
+
+    def with_attempt(self, changed: Attempt) -> "SessionState":
+        """Return the state with `changed` in the place of the attempt of its name."""
+        others = [a for a in self.attempts if a.name != changed.name]
+        attempts = sorted(
+            [*others, changed], key=lambda a: (a.name.number, a.name.attempt)
+        )
+        return replace(self, attempts=tuple(attempts))
 
 
 def refusal(state: SessionState, event: _Facts) -> str:
@@ -221,9 +255,10 @@ def _start(state: SessionState, event: _Facts) -> SessionState:
 
 
 def _open(state: SessionState, event: _Facts) -> SessionState:
-    del event
+    operator = str(event.get("operator") or state.operator)
     openings = state.openings + 1
     state = replace(state, openings=openings, ended="", redoing=None, is_redo=False)
+    state = replace(state, operator=operator, untared=None)
     return replace(state, tares=0, first_bias=(), last_bias=())
 
 
@@ -241,55 +276,100 @@ def _tare(state: SessionState, event: _Facts) -> SessionState:
     bias = _numbers(event.get("bias"))
     if len(bias) != _AXES:
         return state
-    first = state.first_bias or bias
-    return replace(state, tares=state.tares + 1, first_bias=first, last_bias=bias)
+    t_ns = _whole(event, "t_ns")
+    if state.untared is not None and t_ns:
+        before = state.attempt_at(state.untared)
+        tare = {"t_ns": t_ns, "bias": list(bias)}
+        state = state.with_attempt(replace(before, next_tare=tare))
+    state = replace(state, untared=None, tares=state.tares + 1, last_bias=bias)
+    return replace(state, first_bias=state.first_bias or bias)
 
 
 def _start_trial(state: SessionState, event: _Facts) -> SessionState:
     number = _whole(event, "trial")
-    attempts = dict(state.attempts)
-    attempts[number] = attempts.get(number, 0) + 1
-    return replace(state, running=number, attempts=tuple(sorted(attempts.items())))
+    name = TrialName(number, state.attempt(number) + 1)
+    return replace(state.with_attempt(Attempt(name)), running=number)
+
+
+def _record(state: SessionState, event: _Facts) -> SessionState:
+    recorded = replace(_running(state), is_recorded=True)
+    state = state.with_attempt(_with_recording(recorded, event))
+    return replace(state, untared=recorded.name)
 
 
 def _keep(state: SessionState, event: _Facts) -> SessionState:
-    number = _whole(event, "trial")
+    attempt = _running(state)
     # A line that is lost may have begun an attempt: this one states its own.
-    attempt = max(state.attempt(number), _whole(event, "attempt"))
-    attempts = {**dict(state.attempts), number: attempt}
-    redoing = None if state.redoing == number else state.redoing
-    return replace(
-        state,
-        running=None,
-        kept_attempts=(*state.kept_attempts, (number, attempt)),
-        attempts=tuple(sorted(attempts.items())),
-        redoing=redoing,
-    )
+    newest = max(attempt.name.attempt, _whole(event, "attempt"))
+    others = tuple(other for other in state.attempts if other != attempt)
+    kept = replace(attempt, name=TrialName(attempt.name.number, newest))
+    redoing = None if state.redoing == kept.name.number else state.redoing
+    state = replace(state, attempts=others, running=None, redoing=redoing)
+    return _judge(state, kept, KEEP, event)
 
 
 def _reject(state: SessionState, event: _Facts) -> SessionState:
-    del event
-    return replace(state, running=None, rejected=state.rejected + 1)
+    rejected = _with_recording(_running(state), event)
+    return _judge(replace(state, running=None), rejected, REJECT, event)
 
 
 def _set_aside(state: SessionState, event: _Facts) -> SessionState:
     number = _whole(event, "trial")
-    kept = tuple(pair for pair in state.kept_attempts if pair[0] != number)
-    return replace(state, kept_attempts=kept, rejected=state.rejected + 1)
+    name = TrialName(number, state.kept_attempt(number))
+    return _judge(state, state.attempt_at(name), REJECT, event)
 
 
 def _change_verdict(state: SessionState, event: _Facts) -> SessionState:
     number, attempt = _whole(event, "trial"), _whole(event, "attempt")
     is_kept = state.kept_attempt(number) == attempt
-    if is_kept == (event.get("verdict") == KEEP):
-        return state
-    is_redone = state.is_redo and state.phase is SessionPhase.READY
-    if is_redone:
+    is_changed = is_kept != (event.get("verdict") == KEEP)
+    if is_changed and state.is_redo and state.phase is SessionPhase.READY:
         state = replace(state, redoing=number if is_kept else None)
-    if is_kept:
-        return _set_aside(state, event)
-    kept = (*state.kept_attempts, (number, attempt))
-    return replace(state, kept_attempts=kept, rejected=state.rejected - 1)
+    judged = state.attempt_at(TrialName(number, attempt))
+    return _judge(state, judged, str(event["verdict"]), event)
+
+
+def _note(state: SessionState, event: _Facts) -> SessionState:
+    name = TrialName(_whole(event, "trial"), _whole(event, "attempt"))
+    if not 1 <= name.attempt <= state.attempt(name.number):
+        return state  # of the session
+    attempt = state.attempt_at(name)
+    note = {"text": _text(event, "text"), "who": _text(event, "who")}
+    notes = (*attempt.notes, {**note, "when": _text(event, "utc")})
+    return state.with_attempt(replace(attempt, notes=notes))
+
+
+def _judge(
+    state: SessionState, attempt: Attempt, verdict: str, event: _Facts
+) -> SessionState:
+    """Return the state after a verdict on an attempt."""
+    texts = (_text(event, key) for key in ("reason", "who", "utc"))
+    attempt = attempt.judged(Verdict(verdict, *texts))
+    pair = (attempt.name.number, attempt.name.attempt)
+    kept = state.kept_attempts
+    if verdict != KEEP:
+        kept = tuple(other for other in kept if other != pair)
+    else:
+        attempt = replace(attempt, sums={**attempt.sums, **sums_of(event)})
+        kept = kept if pair in kept else (*kept, pair)
+    return replace(state.with_attempt(attempt), kept_attempts=kept)
+
+
+def _running(state: SessionState) -> Attempt:
+    number = state.running or 0
+    return state.attempt_at(TrialName(number, state.attempt(number)))
+
+
+def _with_recording(attempt: Attempt, event: _Facts) -> Attempt:
+    """Return the attempt with the numbers of its recording that an event brought."""
+    recording = event.get("recording")
+    if not isinstance(recording, Mapping):
+        return attempt
+    return replace(attempt, recording=cast("Mapping[str, object]", recording))
+
+
+def _text(event: _Facts, key: str) -> str:
+    return str(event.get(key) or "")
 
 
 _CHANGES: Mapping[Event, Callable[[SessionState, _Facts], SessionState]] = {
@@ -299,9 +379,11 @@ _CHANGES: Mapping[Event, Callable[[SessionState, _Facts], SessionState]] = {
     Event.TARED: _tare,
     Event.SET_ASIDE: _set_aside,
     Event.TRIAL_STARTED: _start_trial,
+    Event.TRIAL_RECORDED: _record,
     Event.TRIAL_KEPT: _keep,
     Event.TRIAL_REJECTED: _reject,
     Event.VERDICT: _change_verdict,
+    Event.NOTED: _note,
     Event.ENDED: _end,
     Event.GIVEN_UP: _end,
 }

@@ -1,15 +1,18 @@
-"""A trial on the disk: its name, and the sidecar with what is known of it."""
+"""An attempt at a trial: its name, what the journal says of it, and its sidecar."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from acquisition.trial_file.verify import VerifiedFile
 
+KEEP, REJECT = "keep", "reject"
 TIME_LIMIT = 30.0  # s, a trial is over then
 COMPLETE = frozenset({"travel", "key", "time-limit"})
+_SUMS = {"sha256": str, "size": int}
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,13 +58,11 @@ class TrialOutcome:
         return "complete" if self.reason in COMPLETE else "interrupted"
 
 
-def sidecar_of(
-    name: TrialName, verified: VerifiedFile | None, outcome: TrialOutcome
+def recording_of(
+    verified: VerifiedFile | None, outcome: TrialOutcome
 ) -> dict[str, object]:
-    """Return the sidecar of an attempt without a verdict; no file where None."""
+    """Return what the journal states of a recording; no file where None."""
     return {
-        "trial": name.kept,
-        "attempt": name.attempt,
         "sha256": verified.sha256 if verified else "",
         "size": verified.size if verified else 0,
         "cycles": verified.cycles if verified else 0,
@@ -70,9 +71,108 @@ def sidecar_of(
         "status": outcome.status,
         "stop_reason": outcome.reason,
         "displacement": round(outcome.displacement, 4),
-        "verdict": "",
-        "reason": "",
-        "who": "",
-        "when": "",
-        "history": [],
     }
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """A verdict on an attempt.
+
+    Attributes:
+        verdict: "keep" or "reject"; "" for none yet.
+        reason: why; may be empty for "keep".
+        who: whose verdict it is.
+        when: UTC as text.
+    """
+
+    verdict: str = ""
+    reason: str = ""
+    who: str = ""
+    when: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Attempt:
+    """One attempt at a trial, as the journal has it.
+
+    Attributes:
+        name: number and attempt.
+        is_recorded: its recording was ended and verified.
+        recording: numbers of the recording and of its review; empty in journals that
+            left them to the sidecar.
+        sums: checksum and size as of the newest event that kept it.
+        verdicts: every verdict on it, oldest first.
+        notes: remarks on it: `text`, `who` and `when`.
+        next_tare: the tare that followed it: `t_ns`, its host time [ns], and `bias`,
+            the reading without load [N, N m]; empty before.
+    """
+
+    name: TrialName
+    is_recorded: bool = False
+    recording: Mapping[str, object] = field(default_factory=dict[str, object])
+    sums: Mapping[str, object] = field(default_factory=dict[str, object])
+    verdicts: tuple[Verdict, ...] = ()
+    notes: tuple[Mapping[str, object], ...] = ()
+    next_tare: Mapping[str, object] = field(default_factory=dict[str, object])
+
+    @property
+    def verdict(self) -> Verdict:
+        """The newest verdict."""
+        return self.verdicts[-1] if self.verdicts else Verdict()
+
+    @property
+    def is_rejected(self) -> bool:
+        """Whether its files belong into rejected/."""
+        return self.verdict.verdict == REJECT
+
+    @property
+    def stem(self) -> str:
+        """Name of its files without suffix: "T04"."""
+        return self.name.rejected if self.is_rejected else self.name.kept
+
+    @property
+    def place(self) -> str:
+        """The same with the folder: "trials/T04"."""
+        return f"{'rejected' if self.is_rejected else 'trials'}/{self.stem}"
+
+    @property
+    def sha256(self) -> str:
+        """Checksum of the recording; empty where the journal states none."""
+        return str({**self.recording, **self.sums}.get("sha256", ""))
+
+    @property
+    def size(self) -> object:
+        """Size of the recording [bytes]; None where the journal states none."""
+        return {**self.recording, **self.sums}.get("size")
+
+    def judged(self, verdict: Verdict) -> Attempt:
+        """Return the attempt after a verdict; one that is repeated changes nothing."""
+        if verdict == self.verdict:
+            return self
+        return replace(self, verdicts=(*self.verdicts, verdict))
+
+    def sidecar(self, other: Mapping[str, object]) -> dict[str, object]:
+        """Return the content of the sidecar.
+
+        Args:
+            other: numbers of the recording from elsewhere; used where the journal
+                states none.
+        """
+        fields = {
+            **(self.recording or other),
+            **self.sums,
+            "trial": self.name.kept,
+            "attempt": self.name.attempt,
+            **asdict(self.verdict),
+            "history": [asdict(verdict) for verdict in self.verdicts[:-1]],
+        }
+        if self.notes:
+            fields["notes"] = [dict(note) for note in self.notes]
+        if self.next_tare:
+            fields["next_tare"] = dict(self.next_tare)
+        return fields
+
+
+def sums_of(fields: Mapping[str, object]) -> dict[str, object]:
+    """Return checksum and size of a recording, as far as `fields` state them."""
+    return {key: fields[key] for key in _SUMS if type(fields.get(key)) is _SUMS[key]}

@@ -56,7 +56,7 @@ def _counted_once(seen: list[SeenSession]) -> list[SeenSession]:
     )
 
     again_numbered = repeated_numbers([session.folder for session in seen])
-    folders = {session.folder.id: session.folder for session in seen}
+    folders = {s.folder.id: s.folder for s in seen if s.summary.problem is None}
     result: list[SeenSession] = []
     for folder, summary in ((s.folder, s.summary) for s in seen):
         # what was copied is not sound: it states another id

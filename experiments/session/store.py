@@ -26,10 +26,11 @@ from experiments.session.data_files import (
     journal_line,
     journal_problem,
     parse_line,
-    read_json,
     sha256_of,
     writing,
 )
+from experiments.session.reducer import replay
+from experiments.session.sidecar import Attempt
 
 JOURNAL_FILE = "events.jsonl"
 SUMMARY_FILE = "session.json"  # written after each line of the journal
@@ -40,7 +41,6 @@ _FOLDER = re.compile(
 )
 LONGEST_NAME = 64
 MOST_EVENTS = 50_000
-_TRIAL_FILE = re.compile(r"^T\d\d[a-z]*\.json$")
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,45 +130,26 @@ class SessionFolder:
         return [event for event in lines if event is not None]
 
     def kept_trials(self, digest: Callable[[Path], str] | None = None) -> list[Path]:
-        """Return the kept trial files, in order, whose checksum is right.
+        """Return the files of the kept trials whose checksum is right, in order.
 
-        It is right where sidecar and journal state it.
+        The journal decides which are kept and what is right; where a kill has cut a
+        verdict short, the file has yet to leave rejected/.
 
         Args:
             digest: what computes the checksum of a file; None = `sha256_of`.
         """
-        digest = digest or sha256_of
-        recorded = self.recorded_sums()
-        kept: list[Path] = []
-        for sidecar in list_folder(self.trials, "T*.json"):
-            if not _TRIAL_FILE.match(sidecar.name):
-                continue
-            fields = read_json(sidecar)
-            path = sidecar.with_suffix(".mcap")
-            stated, attempt = fields.get("sha256"), fields.get("attempt")
-            number = int(sidecar.stem[1:3])
-            key = (number, attempt if type(attempt) is int else 0)
-            is_recorded = recorded.get(key) == stated
-            is_sound = is_recorded and is_there(path) and digest(path) == stated
-            if fields.get("verdict") == "keep" and is_sound:
-                kept.append(path)
-        return kept
+        kept = replay(self.events()).kept_trials
+        files = (self.find_kept(attempt, digest or sha256_of) for attempt in kept)
+        return [path for path in files if path is not None]
 
-    def recorded_sums(self) -> dict[tuple[int, int], str]:
-        """Return the SHA-256 in the journal of every (trial, attempt) that has one."""
-        return {
-            (event["trial"], event["attempt"]): event["sha256"]
-            for event in self.events()
-            if isinstance(event.get("sha256"), str) and _is_pair(event)
-        }
-
-    def rejected_sidecars(self) -> list[dict[str, Any]]:
-        """Return the sidecars of rejected and interrupted trials."""
-        return [read_json(path) for path in list_folder(self.rejected, "T*.json")]
-
-
-def _is_pair(event: Mapping[str, object]) -> bool:
-    return type(event.get("trial")) is int and type(event.get("attempt")) is int
+    def find_kept(self, kept: Attempt, digest: Callable[[Path], str]) -> Path | None:
+        """Return the file of a kept trial; None where none has the right checksum."""
+        name = kept.name
+        at_trials = self.trials / f"{name.kept}.mcap"
+        for path in (at_trials, self.rejected / f"{name.rejected}.mcap"):
+            if kept.sha256 and is_there(path) and digest(path) == kept.sha256:
+                return path
+        return None
 
 
 def list_sessions(data: Path) -> list[SessionFolder]:

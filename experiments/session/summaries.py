@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from acquisition.errors import TrialFileError
-from experiments.session.store import SUMMARY_FILE, list_sessions
+from experiments.session.store import list_sessions
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -28,8 +28,8 @@ class SessionSummary:
         kept: names of the kept trials whose checksum is right, "T01".
         rejected: how many attempts were rejected or interrupted.
         is_resumable: its journal leaves something to be recorded, or to be put away.
-        operator: who recorded it, as session.json has it.
-        phase: where it stands, as session.json has it.
+        operator: who opened it last.
+        phase: where it stands; "opening" before its first event.
         deviations: what is missing or changed of the kept trials.
         problem: what leads out of the session, cannot be read or contradicts its name;
             None for nothing.
@@ -113,7 +113,6 @@ def summarise(
         folder: the session.
         digest: computes the checksum of a file; None = no checksum is computed.
     """
-    from experiments.session.data_files import read_json
     from experiments.session.kept_files import (
         compare_kept,
         contradiction,
@@ -126,16 +125,15 @@ def summarise(
     deviations = tuple(compare_kept(folder, digest)) if digest else ()
     try:
         events = folder.events()
-        kept = folder.kept_trials(digest or (lambda _: ""))
-        rejected = len(folder.rejected_sidecars())
+        state = replay(events)
+        kept = [a for a in state.kept_trials if digest and folder.find_kept(a, digest)]
         owner_of(folder)
-        fields = read_json(folder.path / SUMMARY_FILE)
         return SessionSummary(
-            kept=tuple(path.stem for path in kept),
-            rejected=rejected,
-            is_resumable=is_unfinished(replay(events)),
-            operator=str(fields.get("operator", "")),
-            phase=str(fields.get("phase", "opening")),
+            kept=tuple(attempt.name.kept for attempt in kept),
+            rejected=state.rejected,
+            is_resumable=is_unfinished(state),
+            operator=state.operator,
+            phase=str(state.phase) if events else "opening",
             deviations=deviations,
             problem=contradiction(folder, events),
         )

@@ -14,7 +14,6 @@ from experiments.session.reducer import SessionState, replay
 from experiments.session.sidecar import TrialName
 from experiments.session.states import OPEN, RESUMABLE, SessionPhase
 from experiments.session.store import SessionFolder, list_sessions
-from experiments.session.trial_files import find_sidecar
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,14 +96,14 @@ def _seconds(folder: SessionFolder, state: SessionState) -> float | None:
     """Return what there is of a trial that was cut short [s], None for nothing.
 
     The recorder ends the file of a console that was killed: it has its final name
-    then, and no sidecar.
+    then, and the journal does not say that it was recorded.
     """
     name = TrialName(state.running or 0, state.attempt(state.running or 0))
     path = folder.trials / f"{name.kept}.mcap.partial"
     try:
         if not is_there(path):
             path = path.with_suffix("")
-        if not is_there(path) or find_sidecar(folder, name):
+        if not is_there(path) or state.attempt_at(name).is_recorded:
             return None
         return recorded_seconds(read_file(path))
     except TrialFileError:

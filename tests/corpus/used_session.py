@@ -11,9 +11,8 @@ from acquisition.clock import SystemClock
 from acquisition.trial_file.verify import verify_file
 from acquisition.trial_file.writer import publish
 from experiments.__main__ import main
-from experiments.session.data_files import write_json
 from experiments.session.journal import Journal
-from experiments.session.sidecar import TrialName, TrialOutcome, sidecar_of
+from experiments.session.sidecar import TrialName, TrialOutcome, recording_of
 from experiments.session.states import Event
 from experiments.session.store import create_session
 from tests.acquisition.trials import make_cycles, write_trial
@@ -67,9 +66,8 @@ def _record(journal: Journal, name: TrialName, verdict: Event) -> None:
     writer = write_trial(path, cycles, block=CYCLES // 2)
     writer.finish("travel")
     publish(writer)
-    sidecar = sidecar_of(name, verify_file(path), TrialOutcome("travel"))
-    write_json(path.with_suffix(".json"), sidecar)
-    journal.append(Event.TRIAL_RECORDED, **fields)
+    recording = recording_of(verify_file(path), TrialOutcome("travel"))
+    journal.append(Event.TRIAL_RECORDED, **fields, recording=recording)
     journal.append(verdict, **fields, reason="", who="mk")
 
 

@@ -33,7 +33,8 @@ PERIOD_NS = 20_000_000  # 50 Hz
 NICE = 10
 _LOOK_EVERY = 25  # periods between two looks for the session's process
 _EVENT_LEVEL, _EVENT_NAME = 20, "session"
-_HIDDEN = {"event", "utc", "fake", "config"}  # fields of the journal without news
+# Fields of the journal without news, and many numbers.
+_HIDDEN = {"event", "utc", "fake", "config", "recording"}
 
 
 class WatchedSession:

@@ -19,7 +19,7 @@ from experiments.export.crate import (
 )
 from experiments.export.credits import LICENCES, Author, Credits
 from experiments.export.rebuilding import compare_tables
-from tests.experiments.program import digest, traction
+from tests.experiments.program import digest, only_session, traction
 
 ROOT = Path(__file__).parents[3]
 VALIDATOR = ROOT / ".venv-crate" / "bin" / "python"
@@ -191,10 +191,21 @@ def published(recorded, tmp_path_factory):
     folder = tmp_path_factory.mktemp("published")
     data, to = folder / "data", folder / "crate"
     shutil.copytree(recorded.data, data)
+    session = only_session(data)
+    for path in session.glob("trials/T01.*"):  # as a kill leaves a trial kept again
+        path.rename(session / "rejected" / path.name.replace("T01", "T01a"))
     done = traction("publish", "S001", "--to", to, *AUTHOR, "--data", data)
     assert done.code == 0
+    assert [path.name for path in session.glob("trials/*.json")] == ["T02.json"]
     assert "name who pushed: auto" in done.out
     return to
+
+
+@pytest.mark.slow
+def test_a_published_session_is_in_line_with_its_journal(published):
+    files = published.glob("sessions/*/trials/*.json")
+    assert sorted(path.name for path in files) == ["T01.json", "T02.json"]
+    assert list(published.glob("sessions/*/rejected/*")) == []
 
 
 @pytest.mark.slow

@@ -208,9 +208,11 @@ def test_a_note_between_two_trials_holds_the_arm_meanwhile(tmp_path):
 def test_the_last_kept_trial_is_viewed_before_there_is_a_new_one(
     tmp_path, capsys, monkeypatch
 ):
-    context = make_context(tmp_path, Keys("v", " "))
-    for name in ("T01", "T02", "T03"):
-        (context.metadata.folder.trials / f"{name}.mcap").touch()
+    context = make_context(tmp_path, Keys("v", " "), trials=4)
+    for number in (1, 2, 3):
+        for event in (Event.TRIAL_STARTED, Event.TRIAL_RECORDED, Event.TRIAL_KEPT):
+            context.journal.append(event, trial=number, attempt=1)
+    (context.metadata.folder.trials / "T04.mcap").touch()  # of no verdict
     lines = SimpleNamespace(lines=lambda: [("✓", "sound")])
     reviewed_paths = []
     monkeypatch.setattr(

@@ -1,4 +1,3 @@
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +9,7 @@ from analysis.data.lag import ForceLag
 from analysis.data.plausibility import Doubt
 from experiments.operator.console import BAD, GOOD, WARNING
 from experiments.run.quality import review_trial, thin_so_far
-from experiments.session.store import SessionFolder
+from experiments.session.store import create_session
 from tests.disturbances.rewriting import rewrite
 
 
@@ -166,23 +165,26 @@ SPARSE = [[0, 0, 0, 0], [0, 900, 3, 0], [0, 900, 900, 0], [0, 0, 0, 0]]
 FULL = [[0, 900, 900, 0], [0, 0, 900, 0], [0, 0, 0, 0], [0, 0, 0, 0]]
 
 
-def session(folder, *coverages, verdict="keep"):
-    """Return a session whose sidecars have these coverages."""
-    (folder / "trials").mkdir()
+def session(data, *coverages, verdict="trial-kept"):
+    """Return a session whose trials have these coverages."""
+    folder = create_session(data, "S0", is_simulated=True, utc_ns=0)
+    folder.append_event({"event": "session-started", "terrain": "S0", "trials": 9})
+    folder.append_event({"event": "activated"})
     for k, coverage in enumerate(coverages, 1):
-        details = {"verdict": verdict, "coverage": coverage}
-        (folder / "trials" / f"T{k:02d}.json").write_text(json.dumps(details))
-    return SessionFolder(folder, "S001", "S0", is_simulated=False)
+        recording = {"sha256": "", "coverage": coverage}
+        folder.append_event({"event": "trial-started", "trial": k})
+        fields = {"event": "trial-recorded", "trial": k, "recording": recording}
+        folder.append_event(fields)
+        folder.append_event({"event": verdict, "trial": k})
+    return folder
 
 
 def test_the_samples_of_all_kept_trials_are_counted(tmp_path):
-    (tmp_path / "one").mkdir()
-    one = session(tmp_path / "one", [[0, 9, 9, 0], *SPARSE[1:]])
+    one = session(tmp_path, [[0, 9, 9, 0], *SPARSE[1:]])
     assert thin_so_far(one) == "slower than 0.05 m/s, above 5 N"
     assert thin_so_far(session(tmp_path, SPARSE, FULL)) == ""
 
 
 def test_rejected_and_damaged_trials_count_nothing(tmp_path):
-    (tmp_path / "rejected").mkdir()
-    assert thin_so_far(session(tmp_path / "rejected", SPARSE, verdict="reject")) == ""
+    assert thin_so_far(session(tmp_path, SPARSE, verdict="trial-rejected")) == ""
     assert thin_so_far(session(tmp_path, [[1, 2]], "none", None)) == ""

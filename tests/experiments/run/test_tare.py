@@ -165,12 +165,16 @@ def test_the_foot_is_guided_until_it_is_still_and_then_held(tmp_path):
     assert context.loop_client.advanced == pytest.approx(0.3 + 1.02, abs=0.03)
 
 
+def keep_first(context):
+    """Let a first trial be recorded and kept."""
+    for name in (Event.TRIAL_STARTED, Event.TRIAL_RECORDED, Event.TRIAL_KEPT):
+        context.journal.append(name, trial=1, attempt=1)
+
+
 def test_a_tare_is_written_to_the_trial_before_it_and_the_next_one_is_not(tmp_path):
     context = lifted(tmp_path)
+    keep_first(context)
     sidecar = context.metadata.folder.trials / "T01.json"
-    sidecar.parent.mkdir(exist_ok=True)
-    sidecar.write_text(json.dumps({"attempt": 1, "verdict": "keep"}))
-    context.state.last_recorded = TrialName(1, 1)
     take_tare(context, TrialName(2, 1))
     written = json.loads(sidecar.read_text())
     assert written["verdict"] == "keep"
@@ -187,7 +191,7 @@ def test_a_tare_is_written_to_the_trial_before_it_and_the_next_one_is_not(tmp_pa
 def test_a_zero_that_moved_between_two_tares_is_told(tmp_path, capsys, moved, is_told):
     context = lifted(tmp_path, residual=5.0)
     take_tare(context, TrialName(1, 1))
-    context.state.last_recorded = TrialName(1, 1)
+    keep_first(context)
     context.loop_client.force = lambda seconds: 0.1 + moved
     take_tare(context, TrialName(2, 1))
     words = f"T01: the sensor's zero moved by {moved} N"
@@ -371,13 +375,13 @@ def test_the_first_fault_of_a_tare_is_due_at_its_beginning(tmp_path):
     assert due[0] == (FaultTrigger.TARE, 4, 0.0)
 
 
-def test_the_journal_has_the_bias_to_a_tenth_of_a_millinewton(tmp_path):
+def test_the_journal_has_the_bias_as_the_loop_uses_it(tmp_path):
     context = lifted(tmp_path)
     context.loop_client.force = lambda s: 0.1 + 1.23456e-4 + 0.1003456 * (s > 0.8)
     take_tare(context, TrialName(1, 1))
     (event,) = events(context, Event.TARED)
-    assert event["bias"][0] == round(context.loop_client.bias[0], 4)
-    assert event["bias"][0] != round(event["bias"][0], 3)
+    assert event["bias"] == context.loop_client.bias
+    assert event["t_ns"] == context.rig.tared_ns
     assert event["spread"] == pytest.approx(0.1, abs=0.02)
     assert event["spread"] == round(event["spread"], 3)
 

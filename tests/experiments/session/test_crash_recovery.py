@@ -13,7 +13,7 @@ from acquisition.trial_file.recover import ROOM
 from acquisition.trial_file.verify import verify_file
 from experiments.session import crash_recovery
 from experiments.session.crash_recovery import recover_session
-from experiments.session.data_files import read_json, sha256_of, write_json
+from experiments.session.data_files import read_json, sha256_of
 from experiments.session.journal import Journal, open_journal
 from experiments.session.states import Event, SessionPhase
 from experiments.session.store import create_session
@@ -85,10 +85,8 @@ def record(book, number, attempt, verdict):
     path = book.folder.trials / f"T{number:02d}.mcap"
     path.write_bytes(f"{number}.{attempt}".encode())
     path.with_suffix(".truth.mcap").write_bytes(f"truth {number}.{attempt}".encode())
-    name = f"T{number:02d}"
-    sidecar = {"trial": name, "attempt": attempt, "sha256": sha256_of(path)}
-    write_json(path.with_suffix(".json"), sidecar)
-    book.append(Event.TRIAL_RECORDED, **fields)
+    recording = {"sha256": sha256_of(path), "size": path.stat().st_size}
+    book.append(Event.TRIAL_RECORDED, **fields, recording=recording)
     book.append(verdict, **fields, reason="", who="mk")
 
 
@@ -110,7 +108,7 @@ def check_agreement(folder):
         assert (folder.trials / f"T{number:02d}.mcap").read_text() == (
             f"{number}.{attempt}"
         )
-    assert len(folder.rejected_sidecars()) == book.state.rejected
+    assert len(list(folder.rejected.glob("T*.json"))) == book.state.rejected
     names = {f.name for f in [*folder.trials.iterdir(), *folder.rejected.iterdir()]}
     assert not [name for name in names if name.endswith((".tmp", ".partial"))]
 
@@ -186,8 +184,9 @@ def test_a_running_trial_is_recovered_rejected_and_its_source_kept(crashed):
 def test_a_sealed_trial_without_a_verdict_is_put_away_whole(crashed):
     path = crashed.folder.trials / "T01.mcap"
     path.write_bytes(b"1.1")
-    sidecar = {"trial": "T01", "attempt": 1, "displacement": 0.4, "verdict": ""}
-    write_json(path.with_suffix(".json"), sidecar)
+    recording = {"sha256": sha256_of(path), "displacement": 0.4}
+    fields = {"trial": 1, "attempt": 1}
+    crashed.append(Event.TRIAL_RECORDED, **fields, recording=recording)
     recover_session(crashed)
     fields = read_json(crashed.folder.rejected / "T01a.json")
     assert (fields["displacement"], fields["verdict"]) == (0.4, "reject")

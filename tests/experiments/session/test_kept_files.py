@@ -126,6 +126,22 @@ def test_no_report_is_made_of_a_session_whose_journal_lost_lines(data, lose):
     assert "Not as in the journal: S001 events.jsonl " in done.err
 
 
+@pytest.mark.parametrize("lose", LOSSES)
+@pytest.mark.parametrize("command", [("resume", "S001"), ("redo", "S001", "T01")])
+def test_a_session_whose_journal_lost_lines_is_not_opened_nor_changed(
+    data, lose, command
+):
+    """What follows from the journal would be the only witness of the loss."""
+    session = only_session(data)
+    lose(session)
+    before = {p: p.read_bytes() for p in session.rglob("*.*") if p.name != ".lock"}
+    done = traction(*command, "--data", data)
+    assert done.code == 6
+    assert "S001 events.jsonl " in done.err
+    after = {p: p.read_bytes() for p in session.rglob("*.*") if p.name != ".lock"}
+    assert after == before
+
+
 @pytest.mark.parametrize("lose", [_empty, _missing, _cut_behind_first])
 def test_a_changed_trial_is_found_without_the_journal(data, lose):
     session = only_session(data)
@@ -207,14 +223,19 @@ def test_verify_wants_sessions_or_all(data):
     assert traction("verify", "--data", data).code == 2
 
 
-def test_what_is_left_is_exported_if_that_is_allowed(data, config):
-    (only_session(data) / "trials" / "T01.json").unlink()
+@pytest.mark.parametrize(
+    ("lost", "exported"),
+    [("T01.mcap", ["T02.csv"]), ("T01.json", ["T01.csv", "T02.csv"])],
+)
+def test_what_is_left_is_exported_if_that_is_allowed(data, config, lost, exported):
+    """The journal keeps a trial, and a sidecar follows: it is named, and no more."""
+    (only_session(data) / "trials" / lost).unlink()
     to = data.parent / "tables"
     arguments = ("export", "S001", "--to", to, "--allow-missing")
     done = traction(*arguments, "--data", data, "--config", config)
     assert done.code == 0
-    assert "T01.json" in done.err
-    assert [path.name for path in to.glob("*/T0?.csv")] == ["T02.csv"]
+    assert lost in done.err
+    assert sorted(path.name for path in to.glob("*/T0?.csv")) == exported
 
 
 def test_a_report_without_a_kept_trial_says_so_at_its_top(data, config):

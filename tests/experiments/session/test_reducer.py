@@ -56,14 +56,15 @@ events = st.lists(
 
 
 def check_possible(state):
-    attempts = dict(state.attempts)
     assert len(set(state.kept)) == len(state.kept)
-    assert all(number >= 1 for number in attempts)
-    # nothing is kept that was never attempted
-    assert all(1 <= k <= attempts[number] for number, k in state.kept_attempts)
+    assert all(attempt.name.number >= 1 for attempt in state.attempts)
+    # nothing is kept that was never attempted, or whose newest verdict is another
+    named = {(a.name.number, a.name.attempt): a.verdict.verdict for a in state.attempts}
+    kept = {pair for pair, verdict in named.items() if verdict == "keep"}
+    assert kept == set(state.kept_attempts)
     running = 0 if state.running is None else 1
     # every attempt is kept, rejected or running
-    assert sum(attempts.values()) == len(state.kept) + state.rejected + running
+    assert len(state.attempts) == len(state.kept) + state.rejected + running
     assert state.running not in state.kept
     is_unjudged = state.phase in {
         SessionPhase.RECORDING,

@@ -63,20 +63,36 @@ def test_a_torn_last_line_of_the_journal_is_left_out(tmp_path):
     assert [event["event"] for event in session.events()] == ["session-started"]
 
 
-def test_only_trials_with_verdict_and_right_checksum_count(tmp_path):
+def record(session, number, verdict, *, is_sound=True):
+    """Record a trial without a sidecar, and judge it in the journal alone."""
+    path = session.trials / f"T{number:02d}.mcap"
+    path.write_bytes(b"trial %d" % number)
+    sums = {"sha256": store.sha256_of(path) if is_sound else "0" * 64}
+    fields = {"trial": number, "attempt": 1}
+    session.append_event({"event": "trial-started", **fields})
+    session.append_event({"event": "trial-recorded", **fields, "recording": sums})
+    session.append_event({"event": verdict, **fields})
+    return path
+
+
+def test_trials_that_the_journal_keeps_count_where_their_checksum_is_right(tmp_path):
     session = create(tmp_path)
-    for number, (verdict, is_sound) in enumerate(
-        [("keep", True), ("keep", False), ("reject", True)], 1
-    ):
-        path = session.trials / f"T{number:02d}.mcap"
-        path.write_bytes(b"trial %d" % number)
-        checksum = store.sha256_of(path) if is_sound else "0" * 64
-        fields = {"verdict": verdict, "sha256": checksum, "attempt": 1}
-        write_json(path.with_suffix(".json"), fields)
-        recorded = {"event": "trial-kept", "trial": number, "attempt": 1}
-        session.append_event({**recorded, "sha256": checksum})
+    session.append_event({"event": "session-started", "terrain": "S0", "trials": 4})
+    session.append_event({"event": "activated"})
+    sound = record(session, 1, "trial-kept")
+    record(session, 2, "trial-kept", is_sound=False)
+    record(session, 3, "trial-rejected")
     write_json(session.trials / "T04.json", {"verdict": "keep", "sha256": ""})
-    assert [path.name for path in session.kept_trials()] == ["T01.mcap"]
+    assert session.kept_trials() == [sound]
+
+
+def test_a_kept_trial_counts_before_its_files_have_followed(tmp_path):
+    session = create(tmp_path)
+    session.append_event({"event": "session-started", "terrain": "S0", "trials": 1})
+    session.append_event({"event": "activated"})
+    recorded = record(session, 1, "trial-kept")
+    rejected = recorded.rename(session.rejected / "T01a.mcap")
+    assert session.kept_trials() == [rejected]
 
 
 def test_json_is_replaced_whole_or_not_at_all(tmp_path, monkeypatch):

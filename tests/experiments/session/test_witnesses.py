@@ -4,6 +4,7 @@ A small session of two kept trials and a rejected one, damaged in one way at a t
 """
 
 import json
+import shutil
 
 import pytest
 
@@ -308,11 +309,13 @@ def test_the_second_folder_of_a_number_is_named_with_the_first(data, session):
 
 def test_trials_of_a_copy_are_told_by_their_content(data, session):
     copy = session.path.with_name("2027-01-15_S002_TF.fake")
-    (copy / "trials").mkdir(parents=True)
-    for name in ("T01.json", "T02.json"):
-        content = (session.path / "trials" / name).read_bytes()
-        (copy / "trials" / name).write_bytes(content)
-    change_json(copy / "trials/T02.json", sha256="0" * 64)
+    shutil.copytree(session.path, copy)
+    events = find_session(data, "S002").events()
+    for event in events:
+        if event["event"] == "trial-kept" and event["trial"] == 2:
+            event["sha256"] = "0" * 64
+    text = b"".join(journal_line(event, n) for n, event in enumerate(events, 1))
+    (copy / "events.jsonl").write_bytes(text)
     assert repeated_trials(find_session(data, "S002"), session) == {"T01"}
 
 
