@@ -350,12 +350,13 @@ def test_a_seed_that_is_no_number_is_a_usage_error(tmp_path, seed):
     assert "expected a whole number >= 0, e.g. 1" in done.err.splitlines()[-1]
 
 
-def test_a_damaged_sidecar_makes_a_trial_count_for_nothing(copied, config):
+def test_a_damaged_sidecar_is_named_and_its_trial_counts(copied, config):
     for path in only_session(copied).glob("trials/T0?.json"):
         path.write_bytes(b"[" * 100_000)
     done = traction("status", "--json", "--data", copied, "--config", config)
     counts = [line["kept"] for line in json.loads(done.out)]
-    assert (done.code, sum(counts)) == (6, 0)
+    assert (done.code, sum(counts)) == (6, 2)
+    assert "trials/T01.json is missing or unreadable" in done.err
 
 
 # --- fit ------------------------------------------------------------------------------

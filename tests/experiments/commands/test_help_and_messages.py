@@ -1,6 +1,7 @@
 """Every message of the catalogue, raised through the whole program."""
 
 import functools
+import json
 import os
 import re
 import shutil
@@ -459,6 +460,9 @@ def _complete(scene):
     first, *rest, _ = path.read_bytes().splitlines(keepends=True)
     start = journal_line({**(parse_line(first) or {}), "trials": 1}, 1)
     path.write_bytes(b"".join([start, *rest]))
+    summary = scene.folder / "session.json"
+    fields = {**json.loads(summary.read_text()), "events": 1 + len(rest)}
+    summary.write_text(json.dumps(fields))
     return resume(scene)
 
 

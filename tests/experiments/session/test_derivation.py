@@ -258,7 +258,7 @@ def kills(operations):
 
 
 @pytest.mark.timeout(120)
-def test_after_a_kill_at_any_write_the_files_are_those_of_the_last_event(
+def test_after_a_kill_at_any_write_readers_count_and_files_are_those_of_the_last_event(
     told, tmp_path
 ):
     story, recording = told
@@ -267,6 +267,8 @@ def test_after_a_kill_at_any_write_the_files_are_those_of_the_last_event(
         disk.write(tmp_path / str(number))
         (folder,) = list_sessions(tmp_path / str(number))
         events = folder.events()
+        assert len(folder.kept_trials()) == len(replay(events).kept)
+        assert compare_kept(folder) == []
         derive(folder, replay(events))
         if events:
             assert derived_files(folder) == story.after[len(events)]
