@@ -156,8 +156,8 @@ class Scene:
     def _tick(self, prompt: Prompt) -> str:
         """Let 20 ms pass and return the key pressed; raises as `ask`.
 
-        The guard has nothing to say of an idle arm in E-stop, and its pucks tell no
-        positions: what a step recorded from now on would be of no arm.
+        The guard reports nothing for an idle arm in E-stop, and its pucks send no
+        positions: whatever a step recorded from then on would mean nothing.
         """
         key = self.console_loop.tick(prompt)
         if self.loop_client.status.safety is SafetyMode.E_STOP:

@@ -204,11 +204,10 @@ def _accept(context: RunContext, name: TrialName, result: TareResult) -> None:
     rotation = rig.model.sole_pose(position)[1]
     tared = rig.payload.tared(np.array(result.wrench), rotation)
     _check_residual(rig, tared, rotation)
-    change = float(np.linalg.norm(tared.bias[:3] - rig.tared.bias[:3]))
     rig.tared, rig.tared_ns = tared, result.t_ns
     bias = tared.bias.tolist()
     context.loop_client.set_bias(bias)
-    before = context.journal.state.untared
+    before = context.journal.state
     context.append(
         Event.TARED,
         trial_number=name.number,
@@ -216,9 +215,10 @@ def _accept(context: RunContext, name: TrialName, result: TareResult) -> None:
         bias=bias,
         spread=round(float(result.spread), 3),
     )
-    if before is not None:
-        for doubt in zero_doubts(change):
-            context.say(f"{WARNING} {before.kept}: {doubt.text}.")
+    if before.untared is not None and before.last_bias:
+        change = tared.bias[:3] - np.array(before.last_bias[:3])
+        for doubt in zero_doubts(float(np.linalg.norm(change))):
+            context.say(f"{WARNING} {before.untared.kept}: {doubt.text}.")
 
 
 def _likely(rig: Rig, change: WeightChange) -> dict[str, str]:

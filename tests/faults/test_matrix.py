@@ -41,6 +41,7 @@ DAILY = {
     ("estop", "end"),
     ("overspeed", "review"),
     ("ft-garbled", "preflight"),
+    ("bus-shared", "preflight"),
     ("can-silence", MOVING),
     ("overspeed", MOVING),
     ("safety-silent", MOVING),

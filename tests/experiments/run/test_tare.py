@@ -133,8 +133,7 @@ def lifted(tmp_path, *keys, mass=0.0, residual=0.5, calibrations=None):
     rig.backend.loop_client = LiftedFoot(rig.clock)
     rig.frame = SimpleNamespace(height=lambda position: position[2])
     rig.model = SimpleNamespace(sole_pose=lambda q: (np.zeros(3), np.eye(3)))
-    rig.payload = rig.tared = payload(mass)
-    rig.is_simulated = True
+    rig.payload, rig.is_simulated = payload(mass), True
     rig.row = SimpleNamespace(name="TF", foot="tread", reset=())
     rig.settings = SimpleNamespace(
         calibrations=calibrations or {},
@@ -196,6 +195,20 @@ def test_a_zero_that_moved_between_two_tares_is_told(tmp_path, capsys, moved, is
     take_tare(context, TrialName(2, 1))
     words = f"T01: the sensor's zero moved by {moved} N"
     assert (words in capsys.readouterr().out) is is_told
+
+
+def test_a_zero_of_another_opening_is_compared_with_none(tmp_path, capsys):
+    context = lifted(tmp_path, residual=50.0)
+    take_tare(context, TrialName(1, 1))
+    keep_first(context)
+    context.journal.append(Event.ENDED, reason="unfinished")
+    context.journal.append(Event.RESUMED)
+    context.journal.append(Event.ACTIVATED)
+    context.loop_client.force = lambda seconds: 20.0
+    take_tare(context, TrialName(2, 1))
+    assert "zero moved" not in capsys.readouterr().out
+    sidecar = context.metadata.folder.trials / "T01.json"
+    assert "next_tare" not in json.loads(sidecar.read_text())
 
 
 def test_the_operator_is_asked_to_lift_all_the_time(tmp_path):
