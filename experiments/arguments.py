@@ -185,9 +185,9 @@ def add_table_form(parser: ArgumentParser) -> None:
     group.add_argument(
         "--columns",
         metavar="t=..,v_t=..,F_n=..,F_t=..",
-        help="names in a CSV or Parquet file, or places from 1; a name with commas in "
-        "quotes; trial=.. and terrain=..: columns of a CSV whose words say which rows "
-        "belong together",
+        help="names in a CSV or Parquet file, or places from 1; an item with a comma "
+        "in quotes; trial=.. and terrain=..: columns of a CSV whose words say which "
+        "rows belong together",
     )
     group.add_argument(
         "--unit", metavar="v_t=mm/s,..", help="units where a header gives none"
@@ -198,10 +198,23 @@ def add_table_form(parser: ArgumentParser) -> None:
         help="columns with the other sign, e.g. F_n below zero in compression",
     )
     group.add_argument(
+        "--sep",
+        default=",",
+        metavar="CHAR",
+        help="what separates the columns of a CSV: , by default, ; or another "
+        "character, tab, or blanks for runs of blanks",
+    )
+    group.add_argument(
         "--decimal",
         choices=(".", ","),
+        default=".",
         metavar="MARK",
-        help="decimal mark, . or , of a CSV in which the other one groups thousands",
+        help="decimal mark of a CSV: . by default, or ,",
+    )
+    group.add_argument(
+        "--skip",
+        metavar="LINES",
+        help="lines of a CSV that are no part of the table, e.g. 1-3,5",
     )
     group.add_argument(
         "--rate",

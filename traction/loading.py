@@ -78,7 +78,9 @@ def load_tables(
     units: Mapping[str, str] | None = None,
     rate: float | None = None,
     negate: Iterable[str] = (),
-    decimal: str | None = None,
+    separator: str = ",",
+    decimal: str = ".",
+    skipped: Iterable[int] = (),
 ) -> TrialSet:
     """Return the trials of tables: those of `traction export`, or of other programs.
 
@@ -94,7 +96,9 @@ def load_tables(
         units: of columns whose header gives none, e.g. {"v_t": "mm/s"}.
         rate: rows per second where a CSV has no time [Hz].
         negate: columns with the other sign, e.g. ["F_n"].
-        decimal: "." or ",", where the other one groups thousands in a CSV.
+        separator: between the columns of a CSV: one character, or "blanks".
+        decimal: decimal mark of a CSV, "." or ",".
+        skipped: lines of a CSV that are no part of the table, from 1.
 
     Raises:
         SettingsError: a table that is missing, too large, changed, or none.
@@ -107,7 +111,15 @@ def load_tables(
                 hint='Several files go into a list: load_tables(["a.csv", "b.csv"]).',
             )
     tables = tables_by_terrain(
-        files, columns, terrain, None, units, rate, tuple(negate), decimal
+        files,
+        columns,
+        terrain,
+        units=units,
+        rate=rate,
+        negate=tuple(negate),
+        separator=separator,
+        decimal=decimal,
+        skipped=frozenset(skipped),
     )
     name = files[0].name if len(files) == 1 else f"{len(files)} files"
     return TrialSet(

@@ -13,8 +13,8 @@ from acquisition.clock import RATE_HZ
 from acquisition.errors import SettingsError
 from analysis.data.series import Array
 from analysis.tables.columns import COLUMNS
-from analysis.tables.reading import TrialTable
 from analysis.tables.refusals import refusal
+from analysis.tables.trial_table import TrialTable
 
 MOST_MISSING = 0.2  # share of the rows without a value
 GAP = 1.0  # s between two rows
@@ -76,7 +76,7 @@ def check_order(path: Path, table: TrialTable, rows: Array) -> None:
     if not backward.size:
         return
     row = int(backward[0]) + 1
-    where = table.place(int(kept[row]))
+    where = table.location(int(kept[row]))
     before, now = float(t[row - 1]), float(t[row])
     if now == before:
         hint = "The times have too few digits: leave t out and give --rate HZ."
@@ -113,7 +113,7 @@ def _missing(path: Path, table: TrialTable, rows: Array) -> Iterator[str]:
     count = int(np.count_nonzero(lacking))
     if count > MOST_MISSING * len(rows):
         column = COLUMNS[int(is_missing.sum(axis=0).argmax())]
-        first = table.place(int(lacking.argmax()))
+        first = table.location(int(lacking.argmax()))
         raise refusal(
             path,
             f"{count} of {len(rows)} rows lack a value, most of them in {column}; the "
@@ -122,11 +122,11 @@ def _missing(path: Path, table: TrialTable, rows: Array) -> Iterator[str]:
             f"pandas.read_csv('{path}').interpolate().",
         )
     if count:
-        first = table.place(int(lacking.argmax()))
+        first = table.location(int(lacking.argmax()))
         yield f"{_counted(count)} without a value dropped, the first is {first}"
     infinite = np.isinf(rows).any(axis=1)
     if infinite.any():
-        first = table.place(int(infinite.argmax()))
+        first = table.location(int(infinite.argmax()))
         count = int(np.count_nonzero(infinite))
         yield f"{_counted(count)} with an infinite value dropped, the first is {first}"
 
@@ -164,8 +164,8 @@ def _wild(table: TrialTable, rows: Array) -> Iterator[str]:
             first = int(same.argmax())
             yield (
                 f"{COLUMNS[k]} is {rows[first, k]:.6g} in {_counted(count)}, the first "
-                f"is {table.place(first)}, elsewhere {others:.3g} at most: a word for "
-                "a missing value? Leave the cells empty"
+                f"is {table.location(first)}, elsewhere {others:.3g} at most: a word "
+                "for a missing value? Leave the cells empty"
             )
             continue
         spared = max(3, -(-size.size // 1000))
@@ -174,7 +174,7 @@ def _wild(table: TrialTable, rows: Array) -> Iterator[str]:
         if wild.size:
             first = int(wild[0])
             yield (
-                f"{COLUMNS[k]} is {rows[first, k]:.6g} in {table.place(first)}"
+                f"{COLUMNS[k]} is {rows[first, k]:.6g} in {table.location(first)}"
                 f"{f' and wild in {wild.size - 1} more rows' if wild.size > 1 else ''}"
                 f", elsewhere {usual:.3g} at most: a spike? Leave the cell empty"
             )
@@ -190,7 +190,7 @@ def _gaps(table: TrialTable, rows: Array) -> Iterator[str]:
         first = int(wide[0])
         more = f", and {wide.size - 1} more gaps" if wide.size > 1 else ""
         yield (
-            f"gap of {steps[first]:.4g} s before {table.place(int(kept[first + 1]))}"
+            f"gap of {steps[first]:.4g} s before {table.location(int(kept[first + 1]))}"
             f"{more}; nothing is averaged or integrated across it"
         )
 

@@ -1,5 +1,6 @@
 """Names and units of the columns of a table: of its header or the command line."""
 
+import csv
 import re
 from collections.abc import Mapping, Sequence
 
@@ -9,6 +10,7 @@ COLUMNS = ("t", "v_t", "F_n", "F_t")
 PREPARED = "kept_row"  # a column of tables that were prepared before
 TRIAL, TERRAIN = "trial", "terrain"  # columns of words that part a table
 GROUPS = (TRIAL, TERRAIN)
+_MOST_SKIPPED = 10_000  # last line that --skip takes
 MOST_INPUTS = 6  # beside F_n and v_t
 SIMULATED = "simulated"  # 1 in every row where the devices were simulated
 _TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "d": 86_400.0}
@@ -36,11 +38,6 @@ _SIGNS = str.maketrans(
     {"\u2212": "-", "\u00b5": "u", "\u03bc": "u", "\u00a0": " ", "\u2007": " "}
 )
 _HEADER = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*)[\])]")
-_BRACKETED = re.compile(r"[\[(](?P<unit>[^\[\]()]*)[\])]")
-_PART = re.compile(
-    r"\s*(?P<name>[^=,]*?)\s*=\s*(?:\"(?P<quoted>(?:[^\"]|\"\")*)\"|(?P<bare>[^,\"]*?))"
-    r"\s*(?:,|$)"
-)
 # Names that other programs give the columns, without case, blanks and signs.
 _KNOWN_AS = {
     "t": {"t", "time", "times", "timestamp", "ts", "seconds", "sec", "zeit", "temps"},
@@ -59,9 +56,9 @@ def plain(text: str) -> str:
 
 
 def parse_columns(text: str) -> dict[str, str]:
-    """Return the names of the columns from `t=t_s,v_t="Speed, foot",F_n=3,...`.
+    """Names of the columns from `t=t_s,"v_t=Speed, foot",F_n=3,...`.
 
-    A name with commas stands in quotes; a number that is no name is a place, from 1.
+    An item with commas stands in quotes; a number that is no name is a place, from 1.
     Columns that are not mentioned keep their own name. `trial=` and `terrain=` name
     columns whose words say which rows belong together.
 
@@ -70,22 +67,32 @@ def parse_columns(text: str) -> dict[str, str]:
             one that was named before.
     """
     columns: dict[str, str] = {}
-    at = 0
-    while at < len(text):
-        part = _PART.match(text, at)
-        if part is None:
-            raise _not_named(text, text[at:])
-        quoted = part["quoted"]
-        column = part["bare"] if quoted is None else quoted.replace('""', '"')
-        if not column or part["name"] not in {*COLUMNS, *GROUPS}:
-            raise _not_named(text, part[0].strip(" ,"))
-        if part["name"] in columns:
+    for part in _items("--columns", text):
+        name, _, column = (piece.strip() for piece in part.partition("="))
+        if not column or name not in {*COLUMNS, *GROUPS}:
+            raise _not_named(text, part)
+        if name in columns:
             raise SettingsError(
-                f"--columns {text}: {part['name']} is named twice.", hint="Leave one."
+                f"--columns {text}: {name} is named twice.", hint="Leave one."
             )
-        columns[part["name"]] = plain(column)
-        at = part.end()
+        columns[name] = column
     return {name: name for name in COLUMNS} | columns
+
+
+def _items(option: str, text: str) -> list[str]:
+    """Items of an option, as a row of CSV: one with a comma stands in quotes.
+
+    Raises:
+        SettingsError: quotes do not close.
+    """
+    try:
+        rows = list(csv.reader([text], skipinitialspace=True, strict=True))
+    except csv.Error as error:
+        raise SettingsError(
+            f"{option} {text[:60]}: its quotes do not fit ({error}).",
+            hint='Put an item with a comma into quotes: "Speed, foot".',
+        ) from error
+    return [item for part in rows[0] if (item := plain(part).strip())] if rows else []
 
 
 def _not_named(text: str, part: str) -> SettingsError:
@@ -102,7 +109,7 @@ def parse_inputs(text: str) -> tuple[str, ...]:
         SettingsError: v_t or F_n is missing, a name stands twice or is no input, or
             there are too many.
     """
-    names = [plain(part).strip() for part in text.split(",") if part.strip()]
+    names = _items("--inputs", text)
     own = [name for name in names if name in {"v_t", "F_n"}]
     further = tuple(name for name in names if name not in own)
     taken = {*COLUMNS, *GROUPS, PREPARED, SIMULATED}
@@ -132,7 +139,7 @@ def parse_covariates(text: str, known: Sequence[str] | None = None) -> tuple[str
         SettingsError: there is no such column, a name stands twice or is that of an
             input, or there are too many.
     """
-    names = tuple(plain(part).strip() for part in text.split(",") if part.strip())
+    names = tuple(_items("--covariate", text))
     taken = {*COLUMNS, *GROUPS, PREPARED, SIMULATED} & set(names)
     strangers = [] if known is None else [n for n in names if n not in known]
     reason = ""
@@ -158,7 +165,7 @@ def parse_units(text: str) -> dict[str, str]:
         SettingsError: a part is not NAME=UNIT, or the column has no such unit.
     """
     units: dict[str, str] = {}
-    for part in filter(None, plain(text).split(",")):
+    for part in _items("--unit", text):
         name, equals, unit = (piece.strip() for piece in part.partition("="))
         if not equals or unit not in UNITS.get(name, {}):
             raise SettingsError(
@@ -175,7 +182,7 @@ def parse_names(text: str) -> tuple[str, ...]:
     Raises:
         SettingsError: one is none.
     """
-    names = tuple(part.strip() for part in text.split(",") if part.strip())
+    names = tuple(_items("--negate", text))
     strangers = [name for name in names if name not in COLUMNS]
     if strangers or not names:
         raise SettingsError(
@@ -184,6 +191,31 @@ def parse_names(text: str) -> tuple[str, ...]:
             hint="Write e.g. --negate F_n,F_t",
         )
     return names
+
+
+def parse_separator(text: str) -> str:
+    """The character between columns from `;`, `tab` or `blanks`."""
+    return {"tab": "\t", "\\t": "\t"}.get(text, text)
+
+
+def parse_lines(text: str) -> frozenset[int]:
+    """Numbers of lines from `1-3,5`.
+
+    Raises:
+        SettingsError: a part is no line, or there are too many.
+    """
+    lines: set[int] = set()
+    for part in _items("--skip", text):
+        first, dash, last = part.partition("-")
+        last = last if dash else first
+        is_span = all(n.isascii() and n.isdecimal() for n in (first, last))
+        if not is_span or not 1 <= int(first) <= int(last) <= _MOST_SKIPPED:
+            raise SettingsError(
+                f"--skip {text[:60]}: {part!r} is no line.",
+                hint=f"Write e.g. --skip 1-3,5, up to {_MOST_SKIPPED}.",
+            )
+        lines |= set(range(int(first), int(last) + 1))
+    return frozenset(lines)
 
 
 def split_header(header: str) -> tuple[str, str]:
@@ -199,16 +231,6 @@ def split_header(header: str) -> tuple[str, str]:
     within = f"{re.split(r'[ _]', name)[-1]}/{unit}"
     is_stated = unit in _EVERY_UNIT and within not in _EVERY_UNIT
     return (name, unit) if is_stated else (header, "")
-
-
-def unit_of_cell(cell: str) -> str | None:
-    """Return the unit that a cell of a row of units states, "" for none.
-
-    None where the cell is no unit that any column can have.
-    """
-    match = _BRACKETED.fullmatch(cell)
-    unit = match["unit"].strip() if match else cell
-    return unit if unit in _EVERY_UNIT or unit in {"", "-", "1"} else None
 
 
 def factor(name: str, stated: str, asked: str) -> float:
@@ -270,7 +292,7 @@ def columns_hint(header: Sequence[str], wanted: Mapping[str, str]) -> str:
         header: the names that the table has.
         wanted: names that were looked for, by column of the analysis or by input.
     """
-    parts: list[str] = []
+    items: list[str] = []
     lacking: set[str] = set()
     for name, column in wanted.items():
         is_there = bool(find_column(header, column))
@@ -278,10 +300,12 @@ def columns_hint(header: Sequence[str], wanted: Mapping[str, str]) -> str:
             lacking.add(name)
         if name in {*COLUMNS, *GROUPS}:
             known = [column] if is_there else _usual(header, name)
-            parts.append(f"{name}={_quoted(known[0]) if len(known) == 1 else '...'}")
+            items.append(f"{name}={known[0] if len(known) == 1 else '...'}")
     if lacking and not lacking & {*COLUMNS, *GROUPS}:
         return "Name columns that it has: --inputs v_t,F_n,... or --covariate NAME"
-    return "Name them: --columns " + ",".join(parts)
+    row = ",".join(f'"{item}"' if "," in item else item for item in items)
+    is_plain = re.fullmatch(r"[\w.=,/]*", row, re.ASCII) is not None
+    return "Name them: --columns " + (row if is_plain else f"'{row}'")
 
 
 def place_hint(name: str, places: Sequence[int]) -> str:
@@ -306,7 +330,3 @@ def _usual(header: Sequence[str], name: str) -> list[str]:
         for column in bare
         if re.sub(r"[^a-z]", "", column.lower()) in _KNOWN_AS.get(name, ())
     ]
-
-
-def _quoted(name: str) -> str:
-    return f"'\"{name}\"'" if "," in name or " " in name else name

@@ -307,7 +307,8 @@ def _read(path: Path) -> DataPackage:
     except OSError as error:
         raise SettingsError(
             f"{path}: cannot be read ({error.strerror}).",
-            hint="Give tables, or a folder of traction export.",
+            hint="Give the tables themselves, or a folder of traction export. Names of "
+            "folders such as terrain=S0 are not read: --terrain states it.",
         ) from error
     except ValidationError as error:
         raise SettingsError(

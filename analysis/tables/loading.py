@@ -2,7 +2,7 @@
 
 Every byte is taken as hostile: sizes are checked before anything is unpacked, nothing
 is unpickled, and whatever does not fit becomes one SettingsError that names the file.
-How text is read stands in `reading`.
+Text is read by `text`.
 """
 
 import glob
@@ -33,15 +33,16 @@ from analysis.tables.data_package import (
 )
 from analysis.tables.other_formats import ENOUGH, check_kind, not_an_npz
 from analysis.tables.parquet import MAGIC, read_parquet
-from analysis.tables.reading import TextRequest, TrialTable, read_text_table
 from analysis.tables.refusals import refusal
-from analysis.tables.times import since_first
+from analysis.tables.text import BLANKS, TextForm, read_text_table
+from analysis.tables.trial_table import TrialTable
 
 DEFAULT_TERRAIN = "table"
 LARGEST_FILE = 24_000_000  # bytes of a table; six times in memory
 LARGEST_RATIO = 100  # of a larger npz unpacked to the same npz packed
 PARTS = 8  # of the free memory, of which an npz or all trials of a CSV may take one
 _TRIAL = 12_000  # bytes that a trial costs in memory at least, however few its rows
+_LARGE_TIME = 1e6  # of its unit; times beyond count from some epoch
 _LARGEST_INPUT = 1e12  # of its unit; squares of larger ones leave the double numbers
 
 _ZIP = b"PK"  # how an npz begins
@@ -66,8 +67,10 @@ def load_tables(
     units: Mapping[str, str] | None = None,
     rate: float | None = None,
     negate: Sequence[str] = (),
-    decimal: str | None = None,
     inputs: Sequence[str] = (),
+    separator: str = ",",
+    decimal: str = ".",
+    skipped: frozenset[int] = frozenset(),
 ) -> dict[str, list[TractionSeries]]:
     """Return the trials in `paths` by terrain, in the order of the files.
 
@@ -87,16 +90,17 @@ def load_tables(
         rate: rows of a CSV per second, where it has no time [Hz].
         negate: columns with the other sign, e.g. F_n of a machine that counts
             compression below zero.
-        decimal: "." or ",", the decimal mark of a CSV in which the other one groups
-            thousands.
-        inputs: columns of numbers that are inputs of models beside F_n and v_t.
+        inputs: further columns of numbers: inputs of models beside F_n and v_t.
+        separator: one character between the columns of a CSV, or "blanks" for runs of
+            blanks.
+        decimal: decimal mark of a CSV, "." or ",".
+        skipped: lines of a CSV that are no part of the table, from 1.
 
     Raises:
         SettingsError: a file that is missing, too large, or not what it should be.
     """
     _check_names({*(columns or {})} - {*GROUPS} | {*(units or {}), *negate})
-    if decimal not in {None, ".", ","}:
-        raise SettingsError(f"{decimal!r} is no decimal mark.", hint='Give "." or ",".')
+    _check_layout(separator, decimal)
     if not (rate is None or _is_rate(rate)):
         raise SettingsError(f"{rate!r} is no rate.", hint="Give rows per second [Hz].")
     if terrain is not None and "terrain" in (columns or {}):
@@ -105,15 +109,45 @@ def load_tables(
             hint="Leave out one: --terrain, or terrain= of --columns.",
         )
     columns = {n: n for n in (*COLUMNS, *inputs)} | dict(columns or {})
-    request = TextRequest(columns, rate, decimal)
-    form = _TableForm(request, terrain, stones or {}, units or {}, frozenset(negate))
+    text = TextForm(columns, separator, decimal, skipped, rate)
+    form = _TableForm(text, terrain, stones or {}, units or {}, frozenset(negate))
     trials: dict[str, list[TractionSeries]] = {}
     for path in (each for given in paths for each in _expanded(given)):
         for series in _load(path, form):
             trials.setdefault(series.terrain, []).append(series)
     if not trials:
         raise SettingsError("No table was given.", hint="Name at least one file.")
+    _check_further_units([series for found in trials.values() for series in found])
     return trials
+
+
+def _check_layout(separator: str, decimal: str) -> None:
+    if decimal not in {".", ","}:
+        raise SettingsError(f"{decimal!r} is no decimal mark.", hint='Give "." or ",".')
+    is_one = len(separator) == 1 and not separator.isalnum() and separator not in '.+-"'
+    if not (is_one or separator == BLANKS):
+        raise SettingsError(
+            f"{separator!r} cannot separate columns.",
+            hint=f"Give one character such as , or ; or a tab, or {BLANKS}.",
+        )
+
+
+def _check_further_units(trials: Sequence[TractionSeries]) -> None:
+    """Refuse a further column that has one unit here and another there."""
+    first: dict[str, TractionSeries] = {}
+    for series in trials:
+        for name in series.further:
+            other = first.setdefault(name, series)
+            units = [each.units.get(name, "") for each in (other, series)]
+            if units[0] != units[1]:
+                here, there = (
+                    f"in {unit}" if unit else "without a unit" for unit in units
+                )
+                raise SettingsError(
+                    f"Column {name} is {here} in {other.name} and {there} in "
+                    f"{series.name}.",
+                    hint="Save all tables with one unit of it.",
+                )
 
 
 def _is_rate(rate: object) -> bool:
@@ -164,7 +198,7 @@ class _TableForm:
         negate: columns with the other sign.
     """
 
-    text: TextRequest
+    text: TextForm
     terrain: str | None
     stones: Mapping[str, str]
     units: Mapping[str, str]
@@ -179,19 +213,18 @@ class _TableForm:
             SettingsError: a unit is not known or is stated otherwise, or the rows make
                 no trial.
         """
-        rows, epoch = self._in_own_units(name, table)
+        rows = self._in_own_units(name, table)
         is_timed = (
             table.is_in_seconds
             or table.is_prepared
             or self.text.rate is not None
-            or bool(table.units.get("t") or self.units.get("t") or epoch)
+            or bool(table.units.get("t") or self.units.get("t"))
         )
         notes: list[str] = []
         if not origin.session:
             check_order(path, table, rows)
             check_clock(path, rows, is_timed)
-            found = notes_of(path, table, rows)
-            notes = [*table.notes, *filter(None, [epoch]), *found]
+            notes = list(notes_of(path, table, rows))
         if further := list(table.further.values()):
             _check_inputs(path, table.further)
             lacking = ~np.isfinite(np.column_stack(further)).all(axis=1)
@@ -205,6 +238,7 @@ class _TableForm:
             stones=self.stones.get(terrain, origin.stones),
             incline_deg=origin.incline_deg,
             factors=origin.factors,
+            units={n: u for n, u in table.units.items() if n in table.further},
             stamped_lag=origin.force_age,
             is_prepared=table.is_prepared,
             is_simulated=origin.simulated or table.is_simulated is True,
@@ -213,14 +247,13 @@ class _TableForm:
             further=table.further,
         )
 
-    def _in_own_units(self, name: str, table: TrialTable) -> tuple[Array, str]:
-        """Return the rows in s, m/s and N, shape (n, 4), and what is an epoch."""
-        stated, asked = dict(table.units), self.units
-        t, unit, epoch = since_first(
-            table.rows[:, 0], stated.get("t") or asked.get("t", "")
-        )
-        if unit and not asked.get("t"):
-            stated["t"] = unit
+    def _in_own_units(self, name: str, table: TrialTable) -> Array:
+        """The rows in s, m/s and N, shape (n, 4); large times from the first one."""
+        stated, asked = table.units, self.units
+        t = table.rows[:, 0]
+        first = float(t[np.isfinite(t)][0]) if np.isfinite(t).any() else 0.0
+        if abs(first) > _LARGE_TIME:  # keeps the digits of the steps
+            t = t - first
         try:
             factors = np.array(
                 [factor(n, stated.get(n, ""), asked.get(n, "")) for n in COLUMNS]
@@ -230,7 +263,7 @@ class _TableForm:
             raise SettingsError(f"{where}: {error.message}", hint=error.hint) from error
         signs = np.array([-1.0 if n in self.negate else 1.0 for n in COLUMNS])
         rows = np.column_stack([t, table.rows[:, 1:]])
-        return rows * factors * signs, epoch
+        return rows * factors * signs
 
 
 def _check_inputs(path: Path, further: Mapping[str, Array]) -> None:
@@ -352,7 +385,7 @@ def _parts(path: Path, table: TrialTable, rate: float | None) -> list[_TablePart
     places = dict.fromkeys(keys)
     for name, words in table.groups.items():
         if "" in words:
-            where = table.place(words.index(""))
+            where = table.location(words.index(""))
             raise refusal(path, f"{where}: no {name}", "Name it in every row.")
     if len(places) > (most := most_trials()):
         raise refusal(

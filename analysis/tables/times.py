@@ -1,4 +1,4 @@
-"""Times of a table in seconds from numbers, epochs and ISO 8601; pure."""
+"""Times by ISO 8601 in seconds; pure."""
 
 import re
 from collections.abc import Sequence
@@ -14,10 +14,6 @@ _ISO = re.compile(
     r"\s*(?P<zone>Z|z|[+-]\d\d(?::?\d\d)?)?",
     re.ASCII,
 )
-# 2001 to 2100 since 1970, by unit: a number of one is none of the others.
-_FIRST, _LAST = 9.78e8, 4.11e9  # s
-_LONGEST_STEP = 60.0  # s; a counter from another start has other steps
-_EPOCHS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 
 class IsoTimes(NamedTuple):
@@ -69,39 +65,3 @@ def iso_times(cells: Sequence[str], missing: frozenset[str]) -> IsoTimes:
 def _whole_seconds(base: str, zone: str) -> int:
     zone = "+00:00" if zone in "Zz" else zone
     return int(datetime.fromisoformat(base + zone).timestamp())
-
-
-class SinceFirst(NamedTuple):
-    """Times from an epoch.
-
-    Attributes:
-        t: since the first one, in the unit of the column, shape (n,).
-        unit: of the column.
-        note: what was found; "" where the times are no epoch.
-    """
-
-    t: NDArray[np.float64]
-    unit: str
-    note: str
-
-
-def since_first(t: NDArray[np.float64], unit: str) -> SinceFirst:
-    """Return times since the first where they count from 1970.
-
-    Args:
-        t: times, shape (n,); not finite where there is none.
-        unit: of the column; "" where none is stated, then an epoch has that of its
-            size.
-    """
-    finite = t[np.isfinite(t)]
-    if not finite.size:
-        return SinceFirst(t, unit, "")
-    low, high = float(finite.min()), float(finite.max())
-    step = float(np.median(np.abs(np.diff(finite)))) if finite.size > 1 else 0.0
-    for name in (unit,) if unit else tuple(_EPOCHS):
-        second = _EPOCHS.get(name, np.nan)
-        is_since_1970 = low * second >= _FIRST and high * second <= _LAST
-        if is_since_1970 and step * second <= _LONGEST_STEP:
-            note = f"t counts {name} since 1970" + ("" if unit else " by its size")
-            return SinceFirst(t - finite[0], name, note)
-    return SinceFirst(t, unit, "")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from experiments.arguments import (
     add_analysis,
@@ -14,11 +13,6 @@ from experiments.arguments import (
     add_seed,
     add_table_form,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from analysis.data.series import TractionSeries
 
 EXAMPLES = """\
   traction fit trials.npz --to fit
@@ -73,6 +67,7 @@ def run(args: argparse.Namespace) -> int:
     start_workers(args.scheduler)
     from analysis.study.covariates import WAY
     from analysis.tables.columns import parse_covariates, parse_inputs
+    from experiments.named_tables import load_named_tables
     from experiments.operator.console import Console
     from experiments.report.choices import ReportRequest, analysis_choices
     from experiments.report.external_tables import report_tables_of_trials
@@ -92,37 +87,12 @@ def run(args: argparse.Namespace) -> int:
         raise SettingsError(
             f"--covariate and --inputs both name {both}.", hint="Leave one out."
         )
-    trials = _load(args, inputs)
+    trials = load_named_tables(args, args.files, inputs, args.stones)
     beside = [name for name in columns if name != WAY]
-    tested = _load(args, (*inputs, *beside)) if beside else trials
+    tested = trials
+    if beside:
+        further = (*inputs, *beside)
+        tested = load_named_tables(args, args.files, further, args.stones)
     page = report_tables_of_trials(args.files, args.to, trials, tested, order, console)
     console.say(str(page))
     return 0
-
-
-def _load(
-    args: argparse.Namespace, inputs: Sequence[str]
-) -> dict[str, list[TractionSeries]]:
-    """Return the trials by terrain, with further columns; raises SettingsError."""
-    from analysis.data.terrain_kinds import parse_stones
-    from analysis.tables.columns import (
-        parse_columns,
-        parse_names,
-        parse_units,
-    )
-    from analysis.tables.loading import load_tables
-
-    columns = parse_columns(args.columns) if args.columns else None
-    stones = parse_stones(args.stones) if args.stones else None
-    units = parse_units(args.unit) if args.unit else None
-    return load_tables(
-        args.files,
-        columns,
-        args.terrain,
-        stones,
-        units,
-        args.rate,
-        negate=parse_names(args.negate) if args.negate else (),
-        decimal=args.decimal,
-        inputs=inputs,
-    )

@@ -74,23 +74,13 @@ def run(args: argparse.Namespace) -> int:
 def _series(args: argparse.Namespace) -> list[TractionSeries]:
     """Return the trials of all files, recorded ones and tables."""
     from analysis.data.load import load_trial
-    from analysis.tables.columns import parse_columns, parse_names, parse_units
-    from analysis.tables.loading import load_tables
+    from experiments.named_tables import load_named_tables
 
     recorded = [path for path in args.files if path.suffix == ".mcap"]
     tables = [path for path in args.files if path.suffix != ".mcap"]
     result = [load_trial(path).series() for path in recorded]
     if tables:
-        columns = parse_columns(args.columns) if args.columns else None
-        by_terrain = load_tables(
-            tables,
-            columns,
-            args.terrain,
-            units=parse_units(args.unit) if args.unit else None,
-            rate=args.rate,
-            negate=parse_names(args.negate) if args.negate else (),
-            decimal=args.decimal,
-        )
+        by_terrain = load_named_tables(args, tables)
         result += [series for group in by_terrain.values() for series in group]
     return result
 

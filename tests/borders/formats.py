@@ -151,5 +151,7 @@ FORMATS: tuple[Border, ...] = (
     refused("packed by xz", b"\xfd7zXZ\0", "unxz -k"),
     refused("packed by zstd", b"\x28\xb5\x2f\xfd\0", "unzstd"),
     refused("a PDF", b"%PDF-1.7", "Give the table itself"),
-    refused("a packed PDF", gzip.compress(b"%PDF-1.7\n%x\n"), "A table has a header"),
+    refused(
+        "a packed PDF", gzip.compress(b"%PDF-1.7\n%x\n"), "no column t, v_t, F_n, F_t"
+    ),
 )

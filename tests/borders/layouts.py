@@ -40,12 +40,12 @@ LAYOUTS: tuple[Border, ...] = (
     refused(
         "UTF-16 without a byte-order mark",
         _PLAIN.encode("utf-16-le"),
-        "iconv -f UTF-16LE",
+        "line 1: a zero byte; this is no UTF-8 text",
     ),
     refused(
         "UTF-16 that was cut within a character",
         b"\xff\xfe" + _PLAIN.encode("utf-16-le")[:-1],
-        "the file ends in the middle of a character",
+        "is not UTF-16",
     ),
     table("a Ctrl-Z behind the last row", _PLAIN + "\x1a"),
     table(
@@ -57,31 +57,64 @@ LAYOUTS: tuple[Border, ...] = (
         text(names=("t", "speed m/s", "F_n", "F_t")),
         columns={"v_t": "speed m/s"},
     ),
-    table(
-        "units below an empty line",
-        text(_MM).replace("\n", "\n\ns,mm/s,N,N\n", 1),
-    ),
-    refused("UTF-32", b"\xff\xfe\0\0" + _PLAIN.encode("utf-32-le"), "UTF-32"),
+    refused("UTF-32", b"\xff\xfe\0\0" + _PLAIN.encode("utf-32-le"), "a zero byte"),
     refused(
         "a byte of Windows-1252 in a comment",
         b"# Kr\xe4fte\n" + _PLAIN.encode(),
         "line 1: byte 0xe4",
     ),
     refused("a zero byte in line 3", "t,v_t,F_n,F_t\n1,2,3,4\n5,\0,6,7\n", "line 3"),
-    table("semicolons and points", text(delimiter=";")),
-    table("semicolons and decimal commas", text(delimiter=";", mark=",")),
-    table("tabs and points", text(delimiter="\t")),
-    table("tabs and decimal commas", text(delimiter="\t", mark=",")),
-    table("single blanks", text(delimiter=" ")),
-    table("columns padded with blanks", _PADDED),
+    table("semicolons and points", text(delimiter=";"), separator=";"),
+    table(
+        "semicolons and decimal commas",
+        text(delimiter=";", mark=","),
+        separator=";",
+        decimal=",",
+    ),
+    table("tabs and points", text(delimiter="\t"), separator="\t"),
+    table(
+        "tabs and decimal commas",
+        text(delimiter="\t", mark=","),
+        separator="\t",
+        decimal=",",
+    ),
+    table("single blanks", text(delimiter=" "), separator="blanks"),
+    table("columns padded with blanks", _PADDED, separator="blanks"),
+    refused("semicolons that nothing states", text(delimiter=";"), "--sep ';'"),
+    refused("tabs that nothing states", text(delimiter="\t"), "--sep tab"),
+    refused("blanks that nothing states", text(delimiter=" "), "--sep blanks"),
+    refused(
+        "decimal commas that nothing states",
+        text(delimiter=";", mark=","),
+        "Decimal marks ',': --decimal ,",
+        separator=";",
+    ),
+    refused(
+        "a letter between columns", _PLAIN, "'e' cannot separate columns", separator="e"
+    ),
     table("blanks after the commas", text(delimiter=", ")),
     table(
         "quoted cells with decimal commas, between commas",
         text([['"' + c.replace(".", ",") + '"' for c in row] for row in ROWS]),
+        decimal=",",
     ),
-    table("sep=; in the first line", "sep=;\n" + text(delimiter=";")),
-    table("sep=| in the first line", "sep=|\n" + text(delimiter="|")),
-    table("a delimiter at the end of every row", text([[*row, ""] for row in ROWS])),
+    table(
+        "sep=; in the first line",
+        "sep=;\n" + text(delimiter=";"),
+        separator=";",
+        skipped=frozenset({1}),
+    ),
+    refused(
+        "sep=; in the first line, not left out",
+        "sep=;\n" + text(delimiter=";"),
+        "the names of the columns stand in line 2",
+        separator=";",
+    ),
+    refused(
+        "a comma at the end of every row",
+        text([[*row, ""] for row in ROWS]),
+        "line 2: 5 cells below 4 names",
+    ),
     table("further columns", text(_WIDE, names=(*NAMES, "T", "state"))),
     table(
         "columns in another order", text(_MIXED, names=("F_t", "x", "v_t", "F_n", "t"))
@@ -120,38 +153,31 @@ LAYOUTS: tuple[Border, ...] = (
     refused(
         "no header",
         "\n".join(_LINES[1:]),
-        "counted from 1: --columns t=1,v_t=2,F_n=3,F_t=4",
-    ),
-    table(
-        "no header, columns by place",
-        "\n".join(_LINES[1:]),
-        columns=dict(zip(NAMES, "1234", strict=True)),
+        "4 numbers stand where the names of the columns were expected",
     ),
     table(
         "columns by place keep the header's unit",
         text(_MM, names=("a", "b [mm/s]", "c", "d")),
         columns=dict(zip(NAMES, "1234", strict=True)),
     ),
-    flagged(
-        "lines that begin with # before the header",
-        "# rig: demo\n# date: today\n" + _PLAIN,
-        "2 lines before the header skipped",
-    ),
-    flagged(
-        "lines that begin with % before the header",
-        "% demo\n" + _PLAIN,
-        "1 line before the header skipped",
-    ),
-    flagged(
-        "free lines before the header",
+    table(
+        "lines before the header, left out",
         "Machine 7\nOperator: mk, room 3\n\n" + _PLAIN,
-        "2 lines before the header skipped",
+        skipped=frozenset({1, 2, 3}),
     ),
-    table("a header behind # (numpy.savetxt)", "# " + text(delimiter=" ")),
     refused(
-        "a header behind 70 other lines",
-        "# x\n" * 70 + _PLAIN,
-        "within the first 64 lines",
+        "lines before the header",
+        "Machine 7\nOperator: mk, room 3\n\n" + _PLAIN,
+        "line 1: the names of the columns stand in line 4. Leave out what stands above "
+        "them: --skip 1-3",
+    ),
+    refused(
+        "a line left out that is none", _PLAIN, "--skip 99", skipped=frozenset({99})
+    ),
+    table(
+        "a header behind # (numpy.savetxt)",
+        "# " + text(delimiter=" "),
+        separator="blanks",
     ),
     table(
         "units in square brackets",
@@ -161,19 +187,22 @@ LAYOUTS: tuple[Border, ...] = (
         "units in round brackets",
         text(_MM, names=("t (s)", "v_t(mm/s)", "F_n (N)", "F_t")),
     ),
-    table(
-        "units in the header, beside blanks",
+    refused(
+        "units in the header, separated by blanks, too",
         text(_MM, " ", ("t [s]", "v_t [mm/s]", "F_n [N]", "F_t [N]")),
+        "line 2: 4 cells below 8 names",
+        separator="blanks",
     ),
-    table("a row of units", text([["s", "mm/s", "N", "N"], *_MM])),
     table(
-        "a row of units in brackets, one empty",
-        text([["[s]", "[mm/s]", "", "[N]"], *_MM]),
+        "a row of units, left out and stated",
+        text([["s", "mm/s", "N", "N"], *_MM]),
+        skipped=frozenset({2}),
+        units={"v_t": "mm/s"},
     ),
     refused(
-        "a row of units that contradicts the header",
-        text([["s", "m/s", "N", "N"], *_MM], names=("t", "v_t [mm/s]", "F_n", "F_t")),
-        "line 2: v_t is in m/s here and in mm/s in the header",
+        "a row of units",
+        text([["s", "mm/s", "N", "N"], *_MM]),
+        "line 2, column t: 's' stands where a number",
     ),
     table(
         "micro as U+03BC",
@@ -208,11 +237,12 @@ LAYOUTS: tuple[Border, ...] = (
         "row names without a name (write.table of R)",
         text([[str(k), *row] for k, row in enumerate(ROWS, 1)], " "),
         "line 2: 5 cells below 4 names",
+        separator="blanks",
     ),
     refused(
         "decimal commas between commas",
         text(mark=","),
-        "line 2: 8 cells below 4 names: commas stand between the columns and inside",
+        "line 2: 8 cells below 4 names",
     ),
     refused(
         "a quote that never closes",
@@ -232,7 +262,7 @@ LAYOUTS: tuple[Border, ...] = (
     refused(
         "prose",
         "Dear colleague,\nplease find the data below.\n",
-        "A table has a header",
+        "no column t, v_t, F_n, F_t; it has Dear colleague",
     ),
     refused(
         "a line of 70,000 characters", _HEAD + "1" * 70_000, "line 2: a line exceeds"
@@ -297,5 +327,5 @@ LAYOUTS: tuple[Border, ...] = (
         text([row[1:] for row in ROWS], names=NAMES[1:]),
         "--rate HZ",
     ),
-    refused("a rate beside a time", _PLAIN, "has a time of its own", rate=500.0),
+    refused("a rate beside a time", _PLAIN, "it has a time of its own", rate=500.0),
 )

@@ -29,9 +29,6 @@ _QUOTED = text(
     with_column(2, lambda k, old: '"' + old.replace(".", ",") + '"'),
     names=("t", "v_t", "F_n [mN]", "F_t"),
 )
-_WHOLE = [
-    [str(2 * k), str(80 + k % 7), r[2], str(3000 + k % 3)] for k, r in enumerate(ROWS)
-]
 _T = VALUES[:, 0]
 
 
@@ -89,54 +86,43 @@ NUMBERS: tuple[Border, ...] = (
     refused(
         "points that group thousands beside decimal commas",
         _GERMAN,
-        "line 2, column F_n: '22.051' stands where one decimal mark throughout",
-    ),
-    table("points that group thousands, with --decimal ,", _GERMAN, decimal=","),
-    refused("quoted 22,051 beside 0.0799", _QUOTED, "--decimal , or --decimal ."),
-    table("quoted 22,051, with --decimal .", _QUOTED, decimal="."),
-    refused(
-        "whole numbers and 22,051 beside semicolons",
-        text([[c.replace(".", ",") for c in r] for r in _WHOLE], ";"),
-        "every comma or point stands before three digits",
+        "line 2, column F_n: '22.051' stands where a number with decimal mark ','",
+        separator=";",
+        decimal=",",
     ),
     refused(
-        "whole numbers and 22.051 beside semicolons",
-        text(_WHOLE, ";"),
-        "every comma or point stands before three digits",
+        "quoted 22,051 beside 0.0799",
+        _QUOTED,
+        "'22,051' stands where a number with decimal mark '.'",
     ),
     refused(
         "both marks in one number",
         _SEMI.replace("22,051", "1.022,051"),
-        "points and commas",
+        "'1.022,051' stands where a number with decimal mark ','",
+        separator=";",
+        decimal=",",
     ),
     refused(
         "an apostrophe between thousands",
         text(_scaled(2, 1e3), names=_names(F_n="mN")).replace("22051.0", "22'051"),
-        '"22\'051" stands where a number without groups',
-    ),
-    table(
-        "an apostrophe between thousands, with --decimal .",
-        text(
-            with_column(2, lambda k, old: old.replace(".", "'")), names=_names(F_n="mN")
-        ),
-        decimal=".",
+        '"22\'051" stands where a number',
     ),
     refused(
         "a blank between thousands",
         text(with_column(2, lambda k, old: old.replace(".", " "))),
-        "'22 051' stands where a number without groups",
+        "'22 051' stands where a number",
     ),
     refused(
-        "a mark that groups no thousands, with --decimal ,",
+        "points, with --decimal ,",
         text(),
-        "a number with the decimal mark ','",
+        "a number with decimal mark ','",
         decimal=",",
     ),
     table("exponents", text(with_column(1, lambda k, old: f"{float(old):.6e}"))),
     refused(
         "a word",
         text(with_cell(17, 1, "fast")),
-        "line 19, column v_t: 'fast' stands where a number was expected",
+        "line 19, column v_t: 'fast' stands where a number",
     ),
     refused(
         "a hexadecimal number",
@@ -223,28 +209,21 @@ NUMBERS: tuple[Border, ...] = (
         units={"t": "s"},
         expected=values(t=np.arange(COUNT)),
     ),
-    flagged(
+    table(
         "seconds since 1970",
         text(with_column(0, lambda k, old: f"{1_700_000_000 + float(old):.3f}")),
-        "t counts s since 1970 by its size",
         expected=values(
             t=np.array([float(f"{1_700_000_000 + t:.3f}") for t in _T]) - 1_700_000_000
         ),
     ),
-    flagged(
-        "ms since 1970",
+    refused(
+        "ms since 1970 that nothing states",
         text(_times(1_700_000_000, 1000)),
-        "t counts ms since 1970 by its size",
+        "--unit t=ms",
     ),
-    flagged(
-        "us since 1970",
-        text(_times(1_700_000_000, 1_000_000)),
-        "t counts us since 1970 by its size",
-    ),
-    flagged(
+    table(
         "ns since 1970 by the header",
         text(_times(1_048_576_000, 1_000_000_000), names=_names(t="ns")),
-        "t counts ns since 1970",
     ),
     table("ISO 8601 with a zone", text(_iso("Z"))),
     table("ISO 8601 with +01:00", text(_iso("+01:00"))),

@@ -20,8 +20,8 @@ from acquisition.trial_file.salvage import SoundRecords
 from analysis.data.memory import share_of_memory
 from analysis.study.store import LARGEST, MOST_BYTES
 from analysis.tables import loading as tables
-from analysis.tables.encoding import LONGEST_LINE
 from analysis.tables.loading import LARGEST_FILE, PARTS, load_tables, most_trials
+from analysis.tables.text import LONGEST_LINE
 from analysis.terrains import database
 from experiments.operator.scripted import ScriptedOperator
 from experiments.session.data_files import journal_line, parse_object

@@ -1,4 +1,4 @@
-"""Files of sixteen dialects are read as their description says."""
+"""Files of sixteen dialects are read as their description says, once it is stated."""
 
 import json
 
@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from acquisition.errors import SettingsError
-from analysis.tables.columns import parse_names
 from analysis.tables.loading import load_tables
 
 pytestmark = pytest.mark.shared_data
@@ -30,6 +29,19 @@ DIALECTS = (
 )
 
 
+# What has to be stated of a file: it is neither RFC 4180 nor in N, m/s and s.
+STATED = {
+    "semicolon_comma": {"separator": ";", "decimal": ","},
+    "utf16_tab": {"separator": "\t"},
+    "sep_line": {"separator": ";", "skipped": frozenset({1})},
+    "units_row": {"units": {"v_t": "mm/s"}, "skipped": frozenset({2})},
+    "preamble_hash": {"skipped": frozenset({1, 2})},
+    "space_columns": {"separator": "blanks"},
+    "german_thousands": {"separator": ";", "decimal": ","},
+    "negative_load": {"negate": ("F_n",)},
+}
+
+
 @pytest.fixture(scope="module")
 def folder(shared_data):
     return shared_data / "real" / "csv_dialects"
@@ -47,15 +59,19 @@ def test_every_dialect_is_tested(expected):
 @pytest.mark.parametrize("dialect", DIALECTS)
 def test_a_dialect_is_read_or_refused_as_it_is_described(folder, expected, dialect):
     path, wanted = folder / f"{dialect}.csv", expected[dialect]
-    option, _, columns = wanted["options"].partition(" ")
-    assert option in {"", "--negate"}
-    negate = parse_names(columns) if option else ()
+    stated = STATED.get(dialect, {})
     if wanted["want"] == "refused":
         with pytest.raises(SettingsError, match=rf"{dialect}\.csv, line \d+"):
-            load_tables([path], negate=negate)
+            load_tables([path], **stated)
         return
-    ((series,),) = load_tables([path], negate=negate).values()
+    ((series,),) = load_tables([path], **stated).values()
     sums = [column.sum() for column in (series.t, series.v_t, series.F_n, series.F_t)]
     assert len(series.t) == wanted["rows"]
     assert series.dropped_rows == wanted.get("dropped", 0)
     np.testing.assert_allclose(sums, wanted["sums"], atol=5e-5)
+
+
+@pytest.mark.parametrize("dialect", [n for n in STATED if n != "negative_load"])
+def test_a_dialect_that_nothing_states_is_refused_with_a_line(folder, dialect):
+    with pytest.raises(SettingsError, match=rf"{dialect}\.csv, line \d+"):
+        load_tables([folder / f"{dialect}.csv"])

@@ -159,6 +159,16 @@ def test_an_input_that_models_cannot_compute_with_is_refused(tmp_path):
         load(path)
 
 
+@pytest.mark.parametrize("other", ["angle [rad]", "angle"])
+def test_a_further_column_of_two_units_is_refused(tmp_path, other):
+    for name, header in (("a.csv", "angle [deg]"), ("b.csv", other)):
+        path = a_table(tmp_path / name)
+        path.write_text(path.read_text().replace("angle", header, 1))
+    paths = [tmp_path / "a.csv", tmp_path / "b.csv"]
+    with pytest.raises(SettingsError, match=r"Column angle is in deg in a\.csv"):
+        load_tables(paths, COLUMNS, rate=1.0, inputs=("angle",))
+
+
 def test_a_terrain_is_given_once(tmp_path):
     with pytest.raises(SettingsError, match="a column of it is named too"):
         load(a_table(tmp_path / "runs.csv"), terrain="c")

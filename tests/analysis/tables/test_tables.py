@@ -9,7 +9,12 @@ from hypothesis import strategies as st
 from acquisition.errors import SettingsError
 from analysis.data.terrain_kinds import parse_stones
 from analysis.tables import loading as tables
-from analysis.tables.columns import parse_columns, parse_units
+from analysis.tables.columns import (
+    parse_columns,
+    parse_inputs,
+    parse_lines,
+    parse_units,
+)
 from analysis.tables.loading import load_tables
 
 GOOD = "t,v_t,F_n,F_t\n0,0.1,2,1\n0.1,0.1,2,1\n0.2,0.1,2,1\n"
@@ -46,10 +51,11 @@ def test_csv_without_a_terrain_is_called_table(tmp_path):
     assert list(load_tables([write(tmp_path, GOOD)])) == ["table"]
 
 
-@pytest.mark.parametrize("delimiter", [";", "\t"])
-def test_semicolons_and_tabs_are_read_with_decimal_commas(tmp_path, delimiter):
-    text = GOOD.replace(",", delimiter).replace(".", ",")
-    (series,) = load_tables([write(tmp_path, text)])["table"]
+@pytest.mark.parametrize("separator", [";", "\t"])
+def test_a_stated_separator_and_decimal_comma_are_read(tmp_path, separator):
+    text = GOOD.replace(",", separator).replace(".", ",")
+    path = write(tmp_path, text)
+    (series,) = load_tables([path], separator=separator, decimal=",")["table"]
     assert series.v_t[0] == 0.1
     assert series.t[-1] == 0.2
 
@@ -98,8 +104,32 @@ def test_a_column_that_stands_there_twice_is_refused(tmp_path, header):
 
 def test_a_number_with_comma_and_point_is_refused(tmp_path):
     path = write(tmp_path, "t;v_t;F_n;F_t\n0;0.1;1,234.5;1\n1;0.1;2;1\n2;0.1;2;1\n")
-    with pytest.raises(SettingsError, match="points and commas"):
-        load_tables([path])
+    with pytest.raises(SettingsError, match=r"line 2, column F_n: '1,234\.5'"):
+        load_tables([path], separator=";")
+
+
+@pytest.mark.parametrize(
+    ("text", "lines"), [("1", {1}), ("1-3,5", {1, 2, 3, 5}), (" 2 , 4", {2, 4})]
+)
+def test_lines_are_listed_singly_or_from_to(text, lines):
+    assert parse_lines(text) == lines
+
+
+@pytest.mark.parametrize("text", ["0", "3-1", "x", "1-", "1-99999999", "-2"])
+def test_a_list_of_lines_that_is_none_is_refused(text):
+    with pytest.raises(SettingsError, match=r"--skip .* is no line"):
+        parse_lines(text)
+
+
+@pytest.mark.parametrize("text", ['"v_t=a', 't=t_s,"v_t="a"'])
+def test_quotes_of_an_option_that_do_not_close_are_refused(text):
+    with pytest.raises(SettingsError, match="quotes do not fit"):
+        parse_columns(text)
+
+
+def test_an_item_with_a_comma_stands_in_quotes():
+    assert parse_columns('t=t_s,"v_t=Speed, foot"')["v_t"] == "Speed, foot"
+    assert parse_inputs('v_t,F_n,"Skid, deg"') == ("Skid, deg",)
 
 
 @pytest.mark.parametrize("text", ["v_t", "v_t=km/h", "x=m", "v_t=N"])

@@ -1,0 +1,48 @@
+"""Tables that the options of a command name and describe."""
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from analysis.data.series import TractionSeries
+from analysis.data.terrain_kinds import parse_stones
+from analysis.tables.columns import (
+    parse_columns,
+    parse_lines,
+    parse_names,
+    parse_separator,
+    parse_units,
+)
+from analysis.tables.loading import load_tables
+
+
+def load_named_tables(
+    args: argparse.Namespace,
+    files: Sequence[Path],
+    inputs: Sequence[str] = (),
+    stones: str | None = None,
+) -> dict[str, list[TractionSeries]]:
+    """Read tables as `experiments.arguments.add_table_form` describes them.
+
+    Args:
+        args: of the command line.
+        files: the tables.
+        inputs: further columns of numbers.
+        stones: size of the stones by terrain, as `--stones` gives it.
+
+    Raises:
+        SettingsError: an option is none, or a table does not fit them.
+    """
+    return load_tables(
+        files,
+        columns=parse_columns(args.columns) if args.columns else None,
+        terrain=args.terrain,
+        stones=parse_stones(stones) if stones else None,
+        units=parse_units(args.unit) if args.unit else None,
+        rate=args.rate,
+        negate=parse_names(args.negate) if args.negate else (),
+        inputs=inputs,
+        separator=parse_separator(args.sep),
+        decimal=args.decimal,
+        skipped=parse_lines(args.skip) if args.skip else frozenset(),
+    )
