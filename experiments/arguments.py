@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Literal
 
+DEFAULT_DATA = Path("data")
 FRICTION = 0.4  # of the simulated joints, as a share of another arm's; ASSUMED
 CABLES = (8.0, 25.0)  # Hz, resonance of joints on cables; ASSUMED
 _SHARDS = 10_000  # of one study, at most
@@ -32,7 +33,7 @@ def add_global_options(
     group.add_argument(
         "--data",
         type=Path,
-        default=left_out or Path("data"),
+        default=left_out or DEFAULT_DATA,
         metavar="DIR",
         help="data folder",
     )

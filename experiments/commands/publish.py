@@ -26,7 +26,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         required=True,
         metavar="NAME",
-        help='"Family, Given" or "Family, Given <ORCID>"; can be repeated',
+        help='"Family, Given", "Family, Given <ORCID>" or the name of an '
+        "organisation; can be repeated",
     )
     parser.add_argument(
         "--licence", choices=_LICENCES, required=True, help="licence of the data"

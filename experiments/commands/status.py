@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from experiments.arguments import DEFAULT_DATA
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
 
@@ -25,6 +27,7 @@ EXAMPLES = """\
 _HEADER = ("terrain", "kind", "kept", "trials", "rejected", "sessions")
 _LOOK_NS = 1_000_000_000
 _NOT_AS_KEPT = 6  # exit code
+_NO_FOLDER = 2  # exit code
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -49,12 +52,13 @@ def run(args: argparse.Namespace) -> int:
     from experiments.operator.console import Console
     from experiments.session.status_table import (
         count_rows,
+        facts_of_row,
         find_deviations,
         see_sessions,
     )
-    from experiments.session.summaries import Checksums
+    from experiments.session.summaries import Checksums, glance_sessions, recorded_facts
     from experiments.session.upcoming import next_steps
-    from experiments.session.where import parse_where
+    from experiments.session.where import check_values, parse_where
     from experiments.settings.load import load_settings
 
     matrix = load_settings(args.config).matrix
@@ -74,9 +78,16 @@ def run(args: argparse.Namespace) -> int:
         notes = table_notes(args.data, known, terrains, where, lines)
         return StatusTable(lines, notes, steps, find_deviations(seen, where))
 
+    if where:
+        seen = glance_sessions(args.data)
+        known = [facts_of_row(row) for row in matrix.terrains]
+        known += [s.facts | recorded_facts(s.folder, where) for s in seen]
+        check_values(where, [*known, {"kind": "live"}, {"kind": "simulated"}])
     if args.follow:
         return _follow(lambda: look().plain(), console)
-    return _show(look(), console, is_json=args.json)
+    code = _show(look(), console, is_json=args.json)
+    is_misnamed = args.data != DEFAULT_DATA and not args.data.is_dir()
+    return _NO_FOLDER if is_misnamed else code
 
 
 @dataclass(frozen=True, slots=True)

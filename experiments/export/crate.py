@@ -146,7 +146,12 @@ class _CrateBuilder:
         name = "Process Run Crate"
         profile = self._entity(_PROFILE, "CreativeWork", name=name, version="0.5")
         people = [
-            self._person(author.crate_id, author.name) for author in about.authors
+            self._agent(
+                author.crate_id,
+                author.name,
+                "Person" if author.is_person else "Organization",
+            )
+            for author in about.authors
         ]
         self.crate.name = about.title
         self.crate.description = about.description
@@ -169,7 +174,7 @@ class _CrateBuilder:
             description="One push of the foot across the container.",
             startTime=start,
             endTime=end,
-            agent=self._person(f"#operator-{_slug(operator)}", operator),
+            agent=self._agent(f"#operator-{_slug(operator)}", operator),
         )
 
     def add_study(self, study: StudyAction) -> None:
@@ -207,9 +212,9 @@ class _CrateBuilder:
         about = {"@type": kind, **properties}
         return self.crate.add(ContextEntity(self.crate, identifier, properties=about))
 
-    def _person(self, identifier: str, name: str) -> object:
+    def _agent(self, identifier: str, name: str, kind: str = "Person") -> object:
         if identifier not in self.people:
-            self.people[identifier] = self._entity(identifier, "Person", name=name)
+            self.people[identifier] = self._entity(identifier, kind, name=name)
         return self.people[identifier]
 
     def _tool(self, software: str, commit: str) -> object:

@@ -56,15 +56,20 @@ LICENCES = {
 
 @dataclass(frozen=True, slots=True)
 class Author:
-    """A person who publishes.
+    """A person or an organisation that publishes.
 
     Attributes:
-        name: "Family, Given", or any other name.
+        name: "Family, Given" of a person, or the name of an organisation.
         orcid: "0000-0002-1825-0097"; empty where there is none.
     """
 
     name: str
     orcid: str = ""
+
+    @property
+    def is_person(self) -> bool:
+        """Whether the name is "Family, Given", or has an ORCID, which persons have."""
+        return bool(self.orcid) or "," in self.name
 
     @property
     def crate_id(self) -> str:
@@ -111,7 +116,7 @@ def parse_author(text: str) -> Author:
     if match is None or not match["name"].isprintable() or len(text) > _LONGEST:
         raise SettingsError(
             f"--author {text[:60]!r} is not a name.",
-            hint='Write "Family, Given" or "Family, Given <ORCID>".',
+            hint='Write "Family, Given", "Family, Given <ORCID>" or an organisation.',
         )
     orcid = (match["orcid"] or "").removeprefix("https://orcid.org/")
     if orcid and not _is_orcid(orcid):
@@ -167,7 +172,8 @@ def datacite_json(about: Credits) -> str:
 
 def _creator(author: Author) -> dict[str, object]:
     family, comma, given = (part.strip() for part in author.name.partition(","))
-    creator: dict[str, object] = {"name": author.name, "nameType": "Personal"}
+    kind = "Personal" if author.is_person else "Organizational"
+    creator: dict[str, object] = {"name": author.name, "nameType": kind}
     if comma and given:
         creator |= {"familyName": family, "givenName": given}
     if author.orcid:

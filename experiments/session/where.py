@@ -1,7 +1,7 @@
 """Conditions of `--where`: a key, =, !=, <, <=, > or >=, and a number or a word."""
 
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 
 from acquisition.errors import SettingsError
@@ -18,7 +18,7 @@ KEYS = (
     "session",
     "operator",
 )
-_CONDITION = re.compile(r"([A-Za-z][A-Za-z0-9_]*)\s*(!=|<=|>=|=|<|>)(.+)")
+_CONDITION = re.compile(r"([A-Za-z][A-Za-z0-9_]*)\s*(!=|<=|>=|=|<|>)([^=<>!].*)")
 _ORDERED = ("<", "<=", ">", ">=")
 
 
@@ -107,6 +107,33 @@ def parse_where(text: str, factors: Collection[str] = ()) -> Where:
             )
         conditions.append(condition)
     return Where(tuple(conditions))
+
+
+def check_values(where: Where, known: Iterable[Mapping[str, Value]]) -> None:
+    """Refuse a condition on a value that nothing has: it would match nothing.
+
+    Args:
+        where: the conditions.
+        known: facts of the terrains and sessions that there are.
+
+    Raises:
+        SettingsError: no fact has the value that = or != names; the known ones are
+            named.
+    """
+    facts = list(known)
+    for condition in where.conditions:
+        if condition.sign in _ORDERED:
+            continue
+        values = {each[condition.key] for each in facts if condition.key in each}
+        same = Condition(condition.key, "=", condition.value)
+        if any(map(same.holds, values)):
+            continue
+        names = sorted("-" if value is None else str(value) for value in values)
+        raise SettingsError(
+            f"--where {condition}: no terrain or session has {condition.key} "
+            f"{condition.value!r}.",
+            hint=f"There is {', '.join(names[:40]) or 'none yet'}.",
+        )
 
 
 def _number(value: Value) -> float | None:

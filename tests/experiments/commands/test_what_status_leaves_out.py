@@ -28,7 +28,8 @@ def test_a_whole_board_has_no_remarks(config, data):
 
 
 def test_a_data_folder_that_does_not_exist_is_named(config, tmp_path):
-    done = status(config, tmp_path / "typo")
+    done = traction("status", "--config", config, "--data", tmp_path / "typo")
+    assert done.code == 2
     assert f"no data folder {tmp_path / 'typo'}" in done.err
 
 
@@ -57,8 +58,8 @@ def test_a_session_renamed_to_another_terrain_is_damaged(config, data):
 
 
 def test_a_condition_that_matches_nothing_is_said(config, data):
-    done = status(config, data, "--where", "stones=huge,kind=live", "--json")
-    assert "Nothing matches --where stones=huge,kind=live" in done.err
+    done = status(config, data, "--where", "terrain=TF,stones=big", "--json")
+    assert "Nothing matches --where terrain=TF,stones=big" in done.err
     assert json.loads(done.out) == []
 
 

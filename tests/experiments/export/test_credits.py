@@ -2,6 +2,7 @@
 
 import argparse
 import json
+from dataclasses import replace
 
 import pytest
 import yaml
@@ -68,6 +69,20 @@ def test_a_citation_has_what_its_format_requires(about):
     assert second == {"name": "A laboratory"}
     assert citation["license"] == "CC-BY-4.0"
     assert citation["date-released"] == "2027-03-14"
+
+
+@pytest.mark.parametrize(
+    ("text", "kind"),
+    [
+        ("Curie, Marie", "Personal"),
+        ("Plato <0000-0002-1825-0097>", "Personal"),
+        ("Institute of Loose Stones", "Organizational"),
+    ],
+)
+def test_datacite_tells_persons_from_organisations(about, text, kind):
+    by_one = replace(about, authors=[parse_author(text)])
+    (creator,) = json.loads(datacite_json(by_one))["creators"]
+    assert creator["nameType"] == kind
 
 
 def test_datacite_has_its_required_fields_and_leaves_the_doi_open(about):

@@ -6,7 +6,7 @@ import pytest
 
 from acquisition.errors import SettingsError
 from experiments.session.upcoming import next_steps, suggest_order
-from experiments.session.where import parse_where
+from experiments.session.where import check_values, parse_where
 from experiments.settings.load import load_settings
 from experiments.settings.matrix import Design
 
@@ -40,11 +40,34 @@ def test_numbers_are_compared_and_words_are_equal_or_not(text, holds):
 
 
 @pytest.mark.parametrize(
-    "text", ["d50~3", "hope=1", "d50", "=3", "d50>", "moisture<wet"]
+    "text",
+    ["d50~3", "hope=1", "d50", "=3", "d50>", "moisture<wet", "d50==3", "d50=>3"],
 )
 def test_what_is_no_condition_is_refused(text):
     with pytest.raises(SettingsError):
         parse_where(text, ("d50", "moisture"))
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("terrain=s0", "There is B0, S0."),
+        ("kind=fake", "There is live, simulated."),
+        ("incline_deg=7", "There is 0.0, 15.0."),
+        ("incline_deg!=7", "There is 0.0, 15.0."),
+        ("load=5", "There is -."),
+        ("operator=ada", "There is none yet."),
+    ],
+)
+def test_a_value_that_nothing_has_is_refused_and_the_known_ones_are_named(text, says):
+    facts = [
+        {"terrain": "S0", "incline_deg": 15.0, "kind": "live"},
+        {"terrain": "B0", "incline_deg": 0.0, "kind": "simulated", "load": None},
+    ]
+    with pytest.raises(SettingsError) as refused:
+        check_values(parse_where(text, ("load",)), facts)
+    assert refused.value.hint == says
+    check_values(parse_where("terrain=S0,incline_deg>99,kind=live"), facts)
 
 
 def matrix(order="randomised", **details):
