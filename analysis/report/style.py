@@ -9,10 +9,12 @@ needed.
 
 import io
 import json
+import os
 import re
+import sys
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -83,25 +85,33 @@ FIRST_COLOUR, SECOND_COLOUR = "#0072B2", "#D55E00"
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """Draw with the project's style inside the block."""
+    """Draw with the project's style inside the block, whatever the user's is."""
     require_matplotlib()
     import matplotlib as mpl
 
     with mpl.rc_context():
+        mpl.rcdefaults()
         mpl.rcParams.update(_STYLE)
         yield
 
 
 def require_matplotlib() -> None:
-    """Load matplotlib.
+    """Load matplotlib; a backend of the user that is not installed is passed over.
 
     Raises:
         MissingLibraryError: it is not installed.
     """
+    if "matplotlib.figure" in sys.modules:
+        return
+    backend = os.environ.pop("MPLBACKEND", None)  # matplotlib fails where it is unknown
     try:
-        import matplotlib.figure  # noqa: F401
+        import matplotlib.figure
     except ModuleNotFoundError as error:
         raise MissingLibraryError("matplotlib", "report") from error
+    if backend is not None:
+        os.environ["MPLBACKEND"] = backend
+        with suppress(ValueError):
+            matplotlib.rcParams["backend"] = backend
 
 
 @cache
