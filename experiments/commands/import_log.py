@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from analysis.data.terrain_kinds import Value
-    from analysis.imported.estimates import Estimate
-    from analysis.imported.importing import ImportRequest, Tare
+    from analysis.logs.estimates import Estimate
+    from analysis.logs.importing import ImportRequest, Tare
 
 EXAMPLES = """\
   traction import log.mcap --urdf robot.urdf --list     topics, rates, links
@@ -135,7 +135,7 @@ def run(args: argparse.Namespace) -> int:
 
     console = Console(color=not args.no_color)
     if args.list:
-        from analysis.imported.log_listing import listing
+        from analysis.logs.log_listing import listing
 
         for line in listing(args.log, args.urdf):
             console.say(line)
@@ -150,7 +150,7 @@ def run(args: argparse.Namespace) -> int:
         from acquisition.extras import require_extra
 
         require_extra("parquet")
-    from analysis.imported.importing import import_log
+    from analysis.logs.importing import import_log
     from experiments.export.imported_tables import write_imported
 
     imported = import_log(request_of(args))
@@ -183,7 +183,7 @@ def _plain(args: argparse.Namespace) -> dict[str, str]:
 
 def request_of(args: argparse.Namespace) -> ImportRequest:
     """Return what is asked for; raises SettingsError."""
-    from analysis.imported.importing import ImportRequest
+    from analysis.logs.importing import ImportRequest
 
     _refuse_both(args, "along", "heading")
     _refuse_both(args, "normal", "incline")

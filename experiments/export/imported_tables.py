@@ -9,17 +9,17 @@ from pathlib import Path
 from acquisition.files import open_regular
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.recorded_factors import value_text
-from analysis.imported.channels import Clocked, JointChannel, WrenchChannel
-from analysis.imported.importing import ImportedLog, ImportedTrial
-from analysis.imported.record import (
+from analysis.logs.channels import Clocked, JointChannel, WrenchChannel
+from analysis.logs.importing import ImportedLog, ImportedTrial
+from analysis.logs.log_file import LogTopic
+from analysis.logs.opening import log_files
+from analysis.logs.record import (
     RECORD,
     ImportedFigure,
     ImportedFile,
     ImportedTopic,
     ImportRecord,
 )
-from analysis.logs.log_file import LogTopic
-from analysis.logs.opening import log_files
 from analysis.tables.data_package import TableOrigin
 from experiments import provenance
 from experiments.export.quantities import KEPT, QUANTITIES, kept_rule

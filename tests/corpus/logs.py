@@ -5,14 +5,14 @@ from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
-from analysis.imported.channels import stamp_of, wrench_fields
-from analysis.imported.importing import ImportRequest, import_log
-from analysis.imported.record import RECORD, read_record
-from analysis.imported.robot import RobotLeg, parse_urdf
+from analysis.logs.channels import stamp_of, wrench_fields
 from analysis.logs.decoding import MessageError, decoded
 from analysis.logs.definitions import DefinitionError, message_type
+from analysis.logs.importing import ImportRequest, import_log
 from analysis.logs.opening import open_log
-from tests.analysis.imported.gantry import URDF, Rubbing, write_bag, write_bag2
+from analysis.logs.record import RECORD, read_record
+from analysis.logs.robot import RobotLeg, parse_urdf
+from tests.analysis.logs.gantry import URDF, Rubbing, write_bag, write_bag2
 
 SHORT = Rubbing(joint_rate=100.0, wrench_rate=100.0)
 _MESSAGE = bytes([0, 1, 0, 0]) + bytes(200)

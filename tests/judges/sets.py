@@ -11,7 +11,7 @@ import numpy as np
 
 from acquisition.errors import SettingsError
 from analysis.data.prepare import PrepareOptions, moving_average, prepare_trial
-from analysis.imported.importing import ImportRequest, import_log
+from analysis.logs.importing import ImportRequest, import_log
 from analysis.tables.columns import parse_columns, parse_names
 from analysis.tables.loading import load_tables
 from ft_sensor.payload import Payload

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from analysis.imported.record import ImportedFigure, ImportedTopic, ImportRecord
+from analysis.logs.record import ImportedFigure, ImportedTopic, ImportRecord
 from analysis.report.section import ReportSection, ReportTable, Section
 
 _ESTIMATED = "The wrench was estimated by the robot, not measured at the foot."

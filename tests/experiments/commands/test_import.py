@@ -6,7 +6,7 @@ import re
 import pytest
 
 from analysis.tables.loading import load_tables
-from tests.analysis.imported.gantry import Rubbing, write_bag, write_bag2, write_urdf
+from tests.analysis.logs.gantry import Rubbing, write_bag, write_bag2, write_urdf
 from tests.experiments.program import traction
 
 LOG = Rubbing(strokes=2)

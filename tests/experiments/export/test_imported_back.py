@@ -12,7 +12,7 @@ from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.views import VIEW_TOPICS, encode_views
 from analysis.data.load import load_trial
 from analysis.data.prepare import PrepareOptions, moving_average, prepare_trial
-from analysis.imported.importing import ImportRequest, import_log
+from analysis.logs.importing import ImportRequest, import_log
 from analysis.logs.opening import open_log
 from analysis.tables.loading import load_tables
 from experiments.export.standard_topics import standard_topics

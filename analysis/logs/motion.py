@@ -12,7 +12,7 @@ from acquisition.clock import RATE_HZ
 from analysis.data.filters import local_polynomial
 from analysis.data.prepare import PrepareOptions
 from analysis.data.series import Array
-from analysis.imported.channels import JointChannel
+from analysis.logs.channels import JointChannel
 
 _ORDER = 2  # of the local polynomial
 _SPAN = PrepareOptions().smoothing / RATE_HZ  # s: that of the moving average

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from analysis.data.series import Array
-from analysis.imported.channels import JointChannel
-from analysis.imported.motion import JointMotion, interpolated, seconds_since
+from analysis.logs.channels import JointChannel
+from analysis.logs.motion import JointMotion, interpolated, seconds_since
 
 _LONGEST = 0.05  # s that are looked at
 LATEST = 0.004  # s

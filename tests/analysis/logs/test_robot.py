@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from acquisition.errors import SettingsError
-from analysis.imported.robot import RobotLeg, parse_urdf
+from analysis.logs.robot import RobotLeg, parse_urdf
 from wam.model.arm_model import ArmModel, urdf
 from wam.model.constants import load_constants
 

@@ -5,8 +5,8 @@ import pytest
 
 from acquisition.errors import SettingsError
 from analysis.data.prepare import moving_average
-from analysis.imported.importing import ImportRequest, import_log
-from tests.analysis.imported.gantry import Rubbing, write_bag, write_bag2, write_urdf
+from analysis.logs.importing import ImportRequest, import_log
+from tests.analysis.logs.gantry import Rubbing, write_bag, write_bag2, write_urdf
 
 
 @pytest.fixture(scope="module")

@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.imported.channels import stamp_of, wrench_fields
-from analysis.imported.robot import read_urdf
+from analysis.logs.channels import stamp_of, wrench_fields
 from analysis.logs.log_file import LogTopic
 from analysis.logs.opening import open_log
+from analysis.logs.robot import read_urdf
 
 _NS = 1e-9
 _MOST = 200  # topics and names that are shown

@@ -21,7 +21,7 @@ from analysis.data.plausibility import SLOWEST, doubts_of, free_moment
 from analysis.data.prepare import PrepareOptions, moving_average, prepare_trial
 from analysis.data.series import Array, TractionSeries
 from analysis.data.terrain_kinds import Value
-from analysis.imported.channels import (
+from analysis.logs.channels import (
     ChannelReader,
     JointChannel,
     WrenchChannel,
@@ -30,7 +30,7 @@ from analysis.imported.channels import (
     joint_states,
     read_wrench,
 )
-from analysis.imported.estimates import (
+from analysis.logs.estimates import (
     LONGEST_LAG,
     SURE,
     Bools,
@@ -44,24 +44,24 @@ from analysis.imported.estimates import (
     tare_of,
     turn_deg,
 )
-from analysis.imported.motion import (
+from analysis.logs.log_file import LogFile
+from analysis.logs.motion import (
     JointMotion,
     joint_motion,
     mean_around,
     rows_averaged,
     seconds_since,
 )
-from analysis.imported.robot import FramePath, RobotLeg, Urdf, read_urdf
-from analysis.imported.signs import (
+from analysis.logs.opening import open_log
+from analysis.logs.robot import FramePath, RobotLeg, Urdf, read_urdf
+from analysis.logs.signs import (
     Check,
     moment_warnings,
     side_warnings,
     sign_checks,
     way_warnings,
 )
-from analysis.imported.velocities import compare_velocities
-from analysis.logs.log_file import LogFile
-from analysis.logs.opening import open_log
+from analysis.logs.velocities import compare_velocities
 from ft_sensor.payload import Payload, traction
 from wam.model.constants import GRAVITY
 
