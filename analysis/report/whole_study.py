@@ -13,7 +13,7 @@ from analysis.study.study import (
     run_study_beside,
     run_study_shard,
 )
-from analysis.terrains.export import break_away_batch
+from analysis.terrains.tabulation import break_away_batch
 
 Recorded = Mapping[str, Sequence[TractionSeries]]
 

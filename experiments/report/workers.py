@@ -6,7 +6,7 @@ _WORK = (  # what fits and figures need, the first needed first
     "analysis.breakaway.fitting",
     "analysis.study.study",
     "analysis.study.store",
-    "analysis.terrains.export",
+    "analysis.terrains.tabulation",
     "analysis.report.page",
     "scipy.signal",
     "matplotlib.figure",

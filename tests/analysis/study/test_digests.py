@@ -13,7 +13,7 @@ from analysis.study.crossval import run_fold
 from analysis.study.digests import ROOT, code_digest, source_files
 from analysis.study.terrain_fit import fit_terrain
 from analysis.study.trial_components import fit_components
-from analysis.terrains.export import tabulate
+from analysis.terrains.tabulation import tabulate
 
 FOLDS = "analysis.study.crossval"
 

@@ -17,7 +17,7 @@ from analysis.report.style import LOAD_LABEL, Axes, Figure, panel_grid, plain
 from analysis.study.models import GP_SE
 from analysis.study.study import Study
 from analysis.study.terrain_fit import TerrainResult
-from analysis.terrains.export import break_away_of
+from analysis.terrains.tabulation import break_away_of
 
 if TYPE_CHECKING:
     from analysis.report.results import StudyResults

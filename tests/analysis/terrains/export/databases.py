@@ -6,13 +6,13 @@ import numpy as np
 
 from analysis.breakaway.censored import Family
 from analysis.breakaway.model import BREAK_AWAY, SLIDING, BreakAwayModel, PushLaw
-from analysis.exports.source import TerrainExport
 from analysis.study.distribution import (
     SHARES,
     NewTrialPrediction,
     normal_scores,
 )
 from analysis.terrains.database import to_text
+from analysis.terrains.export.exported import TerrainExport
 from analysis.terrains.known import KnownTerrain, TerrainDatabase
 from analysis.terrains.path_copula import PathCopula
 from analysis.terrains.table import Table, rows_of

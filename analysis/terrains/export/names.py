@@ -5,7 +5,7 @@ import pkgutil
 import re
 from collections.abc import Iterable
 
-TARGETS = "analysis.exports.targets"  # package, a module for each
+TARGETS = "analysis.terrains.export.targets"  # package, a module for each
 _LONGEST, _LONGEST_SHOWN = 40, 60  # characters
 
 

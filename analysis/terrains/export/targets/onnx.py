@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from analysis.exports.folder import ExportTarget, Files
-from analysis.exports.names import shown
-from analysis.exports.source import ExportedTerrain, TerrainExport
+from analysis.terrains.export.exported import ExportedTerrain, TerrainExport
+from analysis.terrains.export.folder import ExportTarget, Files
+from analysis.terrains.export.names import shown
 
 OPSET, IR_VERSION = 13, 8
 INPUT, OUTPUT = "x", "F_t"

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from acquisition.errors import SettingsError
 from acquisition.extras import require_extra
-from analysis.exports.names import TARGETS, target_names
-from analysis.exports.source import TerrainExport
+from analysis.terrains.export.exported import TerrainExport
+from analysis.terrains.export.names import TARGETS, target_names
 
 README, SOURCE = "README.md", "source.json"
 Files = Mapping[str, bytes]

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from acquisition.errors import MissingLibraryError
-from analysis.exports.folder import target_files
-from tests.analysis.exports.databases import database, export, points
-from tests.analysis.exports.written import write
+from analysis.terrains.export.folder import target_files
+from tests.analysis.terrains.export.databases import database, export, points
+from tests.analysis.terrains.export.written import write
 
 ROW = np.array([[3.5, 0.05]], dtype=np.float32)
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from acquisition.errors import SettingsError
-from analysis.exports.names import identifiers, shown
+from analysis.terrains.export.names import identifiers, shown
 from analysis.terrains.known import KnownTerrain, TerrainDatabase
 from analysis.terrains.table import Table
 

@@ -9,14 +9,20 @@ import pytest
 
 from analysis.breakaway.censored import Family
 from analysis.breakaway.model import BREAK_AWAY
-from analysis.exports.folder import target_files
-from analysis.exports.rest import rest_distances, rest_risks
-from analysis.exports.source import TerrainExport
-from analysis.exports.targets.c import HEADER
 from analysis.study.metrics import Prediction
+from analysis.terrains.export.exported import TerrainExport
+from analysis.terrains.export.folder import target_files
+from analysis.terrains.export.rest_table import rest_distances, rest_risks
+from analysis.terrains.export.targets.c import HEADER
 from analysis.terrains.recognition import TAU, log_densities
-from tests.analysis.exports.compiled import FLAGS, ask, build
-from tests.analysis.exports.databases import DIGEST, V_T, database, export, points
+from tests.analysis.terrains.export.compiled import FLAGS, ask, build
+from tests.analysis.terrains.export.databases import (
+    DIGEST,
+    V_T,
+    database,
+    export,
+    points,
+)
 
 
 def written(folder, **options):

@@ -1,7 +1,7 @@
 """Exported files on the disk."""
 
-from analysis.exports.folder import target_files
-from tests.analysis.exports.databases import export
+from analysis.terrains.export.folder import target_files
+from tests.analysis.terrains.export.databases import export
 
 
 def write(folder, target, **options):

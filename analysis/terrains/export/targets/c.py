@@ -8,11 +8,11 @@ import numpy as np
 from acquisition.errors import SettingsError
 from analysis.breakaway.model import BREAK_AWAY, BreakAwayModel
 from analysis.data.series import Array
-from analysis.exports.folder import ExportTarget, Files
-from analysis.exports.names import shown
-from analysis.exports.rest import REST_POINTS, rest_distances, rest_risks
-from analysis.exports.source import ExportedTerrain, TerrainExport
 from analysis.study.distribution import normal_scores
+from analysis.terrains.export.exported import ExportedTerrain, TerrainExport
+from analysis.terrains.export.folder import ExportTarget, Files
+from analysis.terrains.export.names import shown
+from analysis.terrains.export.rest_table import REST_POINTS, rest_distances, rest_risks
 from analysis.terrains.recognition import TAU
 from analysis.terrains.table import Table, TractionEstimates
 
@@ -31,7 +31,7 @@ def _sections(export: TerrainExport) -> list[str]:
     A query over further numbers of a terrain is a function there, a member of
     `traction_terrain`, and a line of `_terrain`.
     """
-    queries = resources.files("analysis.exports.templates") / "queries.h"
+    queries = resources.files("analysis.terrains.export.targets") / "queries.h"
     return [
         _head(export),
         _constants(export),

@@ -6,10 +6,10 @@ import re
 import pytest
 
 from acquisition.errors import SettingsError
-from analysis.exports.folder import parse_targets, target_files
-from analysis.exports.names import identifiers, shown, target_names
-from analysis.exports.source import TerrainExport
-from tests.analysis.exports.databases import DIGEST, database, export
+from analysis.terrains.export.exported import TerrainExport
+from analysis.terrains.export.folder import parse_targets, target_files
+from analysis.terrains.export.names import identifiers, shown, target_names
+from tests.analysis.terrains.export.databases import DIGEST, database, export
 
 HOSTILE = (
     '*/ int x; /* "\\\n#error ]]> --> <a> & ../../etc ??/',
@@ -29,7 +29,7 @@ def test_both_are_there():
 
 
 THIRD = """
-from analysis.exports.folder import ExportTarget
+from analysis.terrains.export.folder import ExportTarget
 
 TARGET = ExportTarget(
     "A third", lambda e: {"a.txt": e.origin.encode()}, lambda e: ("What it is.",) * 6
@@ -38,7 +38,7 @@ TARGET = ExportTarget(
 
 
 def test_a_third_target_is_one_file(tmp_path, monkeypatch):
-    from analysis.exports import targets
+    from analysis.terrains.export import targets
 
     (tmp_path / "third.py").write_text(THIRD)
     monkeypatch.setattr(targets, "__path__", [*targets.__path__, str(tmp_path)])

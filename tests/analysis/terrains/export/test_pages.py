@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 from analysis.terrains.database import load
-from tests.analysis.exports.compiled import FLAGS, build
-from tests.analysis.exports.databases import database, database_file
-from tests.analysis.exports.written import write
+from tests.analysis.terrains.export.compiled import FLAGS, build
+from tests.analysis.terrains.export.databases import database, database_file
+from tests.analysis.terrains.export.written import write
 
-DOCS = Path(__file__).parents[3] / "docs"
+DOCS = Path(__file__).parents[4] / "docs"
 
 
 def block(page, language):
