@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from analysis.breakaway.model import BreakAwayModel
 from analysis.report.sections.beyond_paper.break_away import (
     BREAK_AWAY_UNITS,
     TerrainBreakAway,
@@ -40,6 +39,7 @@ from analysis.report.surfaces import (
 )
 from analysis.study.fits import CsvRow
 from analysis.study.models import GP_SE
+from analysis.study.slip_risk import BreakAwayModel
 from analysis.study.study import Study
 from analysis.terrains.identify import Identification, identify_study
 

@@ -2,11 +2,11 @@
 
 from collections.abc import Callable, Mapping, Sequence
 
-from analysis.breakaway.model import BreakAwayModel
 from analysis.data.series import TractionSeries
 from analysis.data.terrain_kinds import terrain_kind
 from analysis.study.crossval import Prepared
 from analysis.study.jobs import Batch, Progress, Shard, Store
+from analysis.study.slip_risk import BreakAwayModel
 from analysis.study.study import (
     Study,
     StudyOptions,

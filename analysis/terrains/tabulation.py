@@ -8,15 +8,14 @@ from typing import Any
 import numpy as np
 
 from acquisition.errors import SettingsError, TractionError
-from analysis.breakaway.fitting import fit_planned
-from analysis.breakaway.model import BreakAwayModel
-from analysis.breakaway.recorded import BreakAwayOptions, plan_break_away
 from analysis.data.prepare import PreparedTrial, PrepareOptions
 from analysis.data.samples import SampleTable, TrainingSet
 from analysis.data.series import Array
+from analysis.study.break_away_fit import BreakAwayOptions, fit_planned, plan_break_away
 from analysis.study.distribution import SHARES
 from analysis.study.jobs import Batch, Store, Workers, run_batches, run_tasks
 from analysis.study.models import GP_SE, GP_SE_TRIAL, TITLES, FitOptions, ModelFitter
+from analysis.study.slip_risk import BreakAwayModel
 from analysis.study.study import Study
 from analysis.study.terrain_fit import TerrainResult
 from analysis.terrains.database import to_text

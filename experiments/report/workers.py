@@ -3,7 +3,7 @@
 from acquisition.worker_processes import available_cores, prepare_workers
 
 _WORK = (  # what fits and figures need, the first needed first
-    "analysis.breakaway.fitting",
+    "analysis.study.break_away_fit",
     "analysis.study.study",
     "analysis.study.store",
     "analysis.terrains.tabulation",

@@ -6,9 +6,8 @@ sliding, a + b F_n of F_t: what is left is one distribution for all loads.
 
 import numpy as np
 
-from analysis.breakaway.censored import Family
-from analysis.breakaway.model import BREAK_AWAY, BreakAwayModel
 from analysis.data.series import Array
+from analysis.study.slip_risk import BREAK_AWAY, BreakAwayModel
 
 REST_POINTS = 2049
 _REFERENCE_LOAD = 3.5  # N, where the slope of a law of break-away begins
@@ -20,8 +19,7 @@ def rest_distances(model: BreakAwayModel) -> Array:
     In log F_t [nat] or, where the model is of sliding, in F_t [N]; shape (2049,).
     """
     _, _, spread, trial_sd = model.law.values
-    is_skew = model.kind == BREAK_AWAY and model.family is Family.WEIBULL
-    low, high = (14.0, 4.0) if is_skew else (5.5, 5.5)
+    low, high = (14.0, 4.0) if model.kind == BREAK_AWAY else (5.5, 5.5)
     return np.linspace(
         -low * spread - 5.5 * trial_sd, high * spread + 5.5 * trial_sd, REST_POINTS
     )

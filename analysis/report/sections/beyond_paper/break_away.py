@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from analysis.breakaway.model import BREAK_AWAY, SLIDING, BreakAwayModel
-from analysis.breakaway.pushes import FootPush, find_pushes
-from analysis.breakaway.survival import SurvivalCurve, kaplan_meier, pit_limit
 from analysis.data.series import Array
 from analysis.report.section import FigureSpec, ReportSection, ReportTable
 from analysis.report.style import LOAD_LABEL, Axes, Figure, panel_grid, plain
 from analysis.study.models import GP_SE
+from analysis.study.pushes import FootPush, find_pushes
+from analysis.study.slip_risk import BREAK_AWAY, SLIDING, BreakAwayModel
 from analysis.study.study import Study
+from analysis.study.survival import SurvivalCurve, kaplan_meier, pit_limit
 from analysis.study.terrain_fit import TerrainResult
 from analysis.terrains.tabulation import break_away_of
 

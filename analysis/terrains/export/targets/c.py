@@ -6,9 +6,9 @@ from importlib import resources
 import numpy as np
 
 from acquisition.errors import SettingsError
-from analysis.breakaway.model import BREAK_AWAY, BreakAwayModel
 from analysis.data.series import Array
 from analysis.study.distribution import normal_scores
+from analysis.study.slip_risk import BREAK_AWAY, BreakAwayModel
 from analysis.terrains.export.exported import ExportedTerrain, TerrainExport
 from analysis.terrains.export.folder import ExportTarget, Files
 from analysis.terrains.export.names import shown

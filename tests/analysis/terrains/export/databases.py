@@ -4,13 +4,12 @@ from math import log
 
 import numpy as np
 
-from analysis.breakaway.censored import Family
-from analysis.breakaway.model import BREAK_AWAY, SLIDING, BreakAwayModel, PushLaw
 from analysis.study.distribution import (
     SHARES,
     NewTrialPrediction,
     normal_scores,
 )
+from analysis.study.slip_risk import BREAK_AWAY, SLIDING, BreakAwayModel, PushLaw
 from analysis.terrains.database import to_text
 from analysis.terrains.export.exported import TerrainExport
 from analysis.terrains.known import KnownTerrain, TerrainDatabase
@@ -55,7 +54,6 @@ def from_rest(name, *, seed=1):
     draws = np.array([level, slope, spread, sd]) * rng.normal(1.0, 0.05, (60, 4))
     return BreakAwayModel(
         kind=kind,
-        family=Family.WEIBULL if kind == BREAK_AWAY else Family.LOGNORMAL,
         law=PushLaw(level, slope, spread, sd),
         draws=draws,
         v_slip=0.06,

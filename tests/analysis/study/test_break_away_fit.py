@@ -1,14 +1,13 @@
 import numpy as np
 import pytest
 
-from analysis.breakaway.censored import Family
-from analysis.breakaway.fitting import BreakAwayOptions, fit_break_away
-from analysis.breakaway.model import BREAK_AWAY, SLIDING
-from analysis.breakaway.pushes import find_pushes
-from analysis.breakaway.survival import pit_distance, pit_limit
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.series import TractionSeries
-from tests.analysis.breakaway.pushed import Law, pushed_trials
+from analysis.study.break_away_fit import BreakAwayOptions, fit_break_away
+from analysis.study.pushes import find_pushes
+from analysis.study.slip_risk import BREAK_AWAY, SLIDING
+from analysis.study.survival import pit_distance, pit_limit
+from tests.analysis.study.pushed import Law, pushed_trials
 
 KINDS = {"S0": "small", "B0": "big", "TF": "flat"}
 STRONG = Law(level=2.5)
@@ -104,22 +103,6 @@ def test_a_plate_with_fifteen_slips_has_a_model_of_its_own():
 def test_a_plate_that_only_moves_fast_has_no_answer():
     fast = plate(4, slope=0.05)
     assert fit_break_away({"TF": fast}, KINDS, FEW) == {}
-
-
-class Lognormal(Law):
-    def strength(self, rng, F_n):
-        centre = self.level + self.slope * np.log(F_n / 3.5)
-        return np.exp(centre + self.spread * rng.normal(size=np.shape(F_n)))
-
-
-@pytest.mark.parametrize(
-    ("law", "family"),
-    [(Law(), Family.WEIBULL), (Lognormal(), Family.LOGNORMAL)],
-)
-def test_the_family_is_the_one_that_predicts_trials_left_out(law, family):
-    trials = {"S0": pushed_trials(9, 16, law=law, pushes=10)}
-    known = fit_break_away(trials, KINDS, BreakAwayOptions(draws=0))["S0"]
-    assert known.family is family
 
 
 def test_trials_left_out_are_predicted_with_honest_risks(stones):

@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
-from analysis.breakaway.censored import CensoredLikelihood, Family, log_prior
-from analysis.breakaway.pushes import FootPush, PushTable
-from analysis.breakaway.survival import kaplan_meier, pit_distance, pit_limit
+from analysis.study.push_likelihood import CensoredLikelihood, log_prior
+from analysis.study.pushes import FootPush, PushTable
+from analysis.study.survival import kaplan_meier, pit_distance, pit_limit
 
 NO_TRIALS = -7.0  # log su
-NAMES = {Family.WEIBULL: "gumbel_l", Family.LOGNORMAL: "norm"}
 
 
 def drawn(seed=1, *, trials=12, pushes=6, terrains=1):
@@ -37,23 +36,16 @@ def without_load(table):
     )
 
 
-@pytest.mark.parametrize(
-    ("family", "law", "parameters"),
-    [
-        (Family.WEIBULL, "weibull_min", lambda c, scale: (np.log(scale), 1 / c)),
-        (Family.LOGNORMAL, "lognorm", lambda s, scale: (np.log(scale), s)),
-    ],
-)
-def test_the_maximum_is_that_of_an_independent_censored_fit(family, law, parameters):
+def test_the_maximum_is_that_of_an_independent_censored_fit():
     from scipy import stats
 
-    law = getattr(stats, law)
+    law = stats.weibull_min
     table = without_load(drawn(trials=40))
     peak = np.exp(table.log_peak)
     data = stats.CensoredData(peak[~table.is_held], right=peak[table.is_held])
     shape, _, scale = law.fit(data, floc=0.0)
-    level, s = parameters(shape, scale)
-    likelihood = CensoredLikelihood(table, family, 1)
+    level, s = np.log(scale), 1.0 / shape
+    likelihood = CensoredLikelihood(table, 1)
 
     def value(level, s):
         p = np.array([level, 0.0, np.log(s), NO_TRIALS])
@@ -70,33 +62,31 @@ def test_the_maximum_is_that_of_an_independent_censored_fit(family, law, paramet
     assert here == pytest.approx(expected, abs=1e-3)
 
 
-@pytest.mark.parametrize("family", list(Family))
-def test_the_effect_of_a_trial_is_integrated_out(family):
+def test_the_effect_of_a_trial_is_integrated_out():
     from scipy import stats
     from scipy.integrate import quad
 
     table = drawn(trials=3)
     b0, b1, s, su = 2.1, 0.4, 0.4, 0.25
     p = np.array([b0, b1, np.log(s), np.log(su)])
-    values, _ = CensoredLikelihood(table, family, 1).by_trial(p)
-    law = getattr(stats, NAMES[family])(scale=s)
+    values, _ = CensoredLikelihood(table, 1).by_trial(p)
+    law = stats.gumbel_l(scale=s)
     for k, value in enumerate(values):
-        rows = table.take(table.trial == k)
-        centre = b0 + b1 * rows.load
+        rows = table.trial == k
+        above, is_held = table.log_peak[rows] - b0, table.is_held[rows]
+        above = above - b1 * table.load[rows]
 
-        def density(u, rows=rows, centre=centre):
-            off = rows.log_peak - centre - u
-            terms = np.where(rows.is_held, law.logsf(off), law.logpdf(off))
+        def density(u, above=above, is_held=is_held):
+            terms = np.where(is_held, law.logsf(above - u), law.logpdf(above - u))
             return np.exp(terms.sum()) * stats.norm(scale=su).pdf(u)
 
         exact, _ = quad(density, -6 * su, 6 * su, epsabs=0.0, epsrel=1e-9)
         assert value == pytest.approx(np.log(exact), abs=5e-4)  # of 15 points
 
 
-@pytest.mark.parametrize("family", list(Family))
-def test_gradients_agree_with_differences(family):
+def test_gradients_agree_with_differences():
     table = drawn(terrains=2)
-    likelihood = CensoredLikelihood(table, family, 2)
+    likelihood = CensoredLikelihood(table, 2)
     counts = np.random.default_rng(0).integers(0, 3, 12).astype(float)
     p = np.array([2.0, 2.2, 0.3, np.log(0.4), np.log(0.2)])
     _, gradient = likelihood.objective(p, counts)
@@ -111,7 +101,7 @@ def test_gradients_agree_with_differences(family):
 
 def test_a_trial_counted_twice_is_as_good_as_two():
     table = drawn(trials=3)
-    likelihood = CensoredLikelihood(table, Family.WEIBULL, 1)
+    likelihood = CensoredLikelihood(table, 1)
     p = np.array([2.0, 0.4, np.log(0.35), np.log(0.1)])
     values, _ = likelihood.by_trial(p)
     prior, _ = log_prior(p[1:])
@@ -121,20 +111,13 @@ def test_a_trial_counted_twice_is_as_good_as_two():
 
 def test_known_parameters_are_recovered_through_censoring():
     table = drawn(seed=5, trials=120, pushes=8)
-    level, slope, log_s, log_su = CensoredLikelihood(table, Family.WEIBULL, 1).fit()
+    level, slope, log_s, log_su = CensoredLikelihood(table, 1).fit()
     assert 0.1 < table.is_held.mean() < 0.6
     # 960 pushes: standard errors of .015, .03 and .01
     assert level == pytest.approx(2.0, abs=0.05)
     assert slope == pytest.approx(0.4, abs=0.09)
     assert np.exp(log_s) == pytest.approx(1.0 / 3.0, abs=0.03)
     assert np.exp(log_su) < 0.1
-
-
-def test_a_push_alone_is_scored_in_a_new_trial():
-    table = drawn(trials=2, pushes=1)
-    likelihood = CensoredLikelihood(table, Family.WEIBULL, 1)
-    p = np.array([2.0, 0.4, np.log(0.35), np.log(0.3)])
-    assert likelihood.log_scores(p) == pytest.approx(likelihood.by_trial(p)[0])
 
 
 # --- Kaplan and Meier -----------------------------------------------------------------

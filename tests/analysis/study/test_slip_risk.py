@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.errors import SettingsError
-from analysis.breakaway.censored import Family
-from analysis.breakaway.model import BREAK_AWAY, SLIDING, BreakAwayModel, PushLaw
+from analysis.study.slip_risk import BREAK_AWAY, SLIDING, BreakAwayModel, PushLaw
 
 LAW = PushLaw(2.3, 0.45, 0.3, 0.1)
 
@@ -19,7 +18,6 @@ def model(**changes):
     draws = np.array(LAW.values) * rng.normal(1.0, 0.03, (200, 4))
     usual = {
         "kind": BREAK_AWAY,
-        "family": Family.WEIBULL,
         "law": LAW,
         "draws": draws,
         "v_slip": 0.06,
@@ -33,27 +31,22 @@ def model(**changes):
     return BreakAwayModel(**(usual | changes))
 
 
-WEIBULL, LOGNORMAL = model(), model(family=Family.LOGNORMAL)
+STONES = model()
 PLATE = model(
     kind=SLIDING,
-    family=Family.LOGNORMAL,
     law=PushLaw(0.3, 0.35, 0.2, 0.15),
     draws=np.tile([0.3, 0.35, 0.2, 0.15], (3, 1)),
     slips=4,
     distance=math.nan,
 )
-MODELS = (WEIBULL, LOGNORMAL, PLATE)
+MODELS = (STONES, PLATE)
 
 
-@pytest.mark.parametrize(
-    ("known", "law"),
-    [(WEIBULL, "gumbel_l"), (LOGNORMAL, "norm")],
-)
-def test_risk_is_the_share_of_weaker_ground_over_new_trials(known, law):
+def test_risk_is_the_share_of_weaker_ground_over_new_trials():
     from scipy import stats
     from scipy.integrate import quad
 
-    weaker = getattr(stats, law)(scale=0.3).cdf
+    weaker = stats.gumbel_l(scale=0.3).cdf
     centre = 2.3 + 0.45 * math.log(5.0 / 3.5)
     exact, _ = quad(
         lambda u: weaker(math.log(7.0) - centre - u) * stats.norm.pdf(u, scale=0.1),
@@ -61,7 +54,7 @@ def test_risk_is_the_share_of_weaker_ground_over_new_trials(known, law):
         1.0,
         points=[0.0],
     )
-    assert known.slip_risk(7.0, 5.0).risk == pytest.approx(exact, abs=1e-5)
+    assert STONES.slip_risk(7.0, 5.0).risk == pytest.approx(exact, abs=1e-5)
 
 
 def test_risk_of_a_sliding_foot_is_that_of_a_normal_force():
@@ -88,8 +81,8 @@ def test_more_force_is_more_risk_and_more_load_is_less(known):
     assert known.slip_risk(2.0, 8.0).risk < known.slip_risk(2.0, 2.0).risk
 
 
-@pytest.mark.parametrize("known", [WEIBULL, LOGNORMAL])
-def test_the_interval_is_that_of_the_resampled_fits(known):
+def test_the_interval_is_that_of_the_resampled_fits():
+    known = STONES
     answer = known.slip_risk(7.0, 4.0)
     single = [
         replace(known, law=PushLaw(*row)).slip_risk(7.0, 4.0).risk
@@ -102,7 +95,7 @@ def test_the_interval_is_that_of_the_resampled_fits(known):
 
 
 def test_an_answer_says_what_it_rests_on():
-    answer = WEIBULL.slip_risk(7.0, 4.0)
+    answer = STONES.slip_risk(7.0, 4.0)
     assert (answer.kind, answer.v_slip) == ("break-away", 0.06)
     assert (answer.slips, answer.held) == (60, 12)
 
@@ -112,17 +105,11 @@ def test_an_answer_says_what_it_rests_on():
     [(7.0, 4.0, False), (7.0, 9.5, True), (7.0, 1.0, True), (25.0, 4.0, True)],
 )
 def test_an_answer_says_whether_it_is_extrapolated(required, F_n, is_outside):
-    assert WEIBULL.slip_risk(required, F_n).is_extrapolated is is_outside
-
-
-def test_several_steps_are_as_many_independent_pushes():
-    answer = replace(WEIBULL.slip_risk(7.0, 4.0), risk=0.1)
-    assert answer.of_steps(3) == pytest.approx(1.0 - 0.9**3)
-    assert replace(answer, risk=1.0).of_steps(2) == 1.0
+    assert STONES.slip_risk(required, F_n).is_extrapolated is is_outside
 
 
 def test_no_force_at_all_never_slips():
-    assert WEIBULL.slip_risk(0.0, 4.0).risk == 0.0
+    assert STONES.slip_risk(0.0, 4.0).risk == 0.0
 
 
 BAD = (math.nan, math.inf, -math.inf, -0.1, "a", None, [4.0], 10**400)
@@ -143,7 +130,7 @@ def test_a_force_that_is_none_is_refused(known, bad):
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -0.1, 0.0, 1.0, 1.5])
 def test_a_share_that_is_no_risk_is_refused(bad):
     with pytest.raises(SettingsError, match="between 0 and 1"):
-        WEIBULL.available(4.0, bad)
+        STONES.available(4.0, bad)
 
 
 @pytest.mark.parametrize("known", MODELS)
@@ -165,6 +152,8 @@ def test_a_stored_model_answers_alike(known):
     [
         {"kind": "magic"},
         {"family": "cauchy"},
+        {"family": "lognormal"},
+        {"kind": "sliding", "family": "weibull"},
         {"law": [1.0, 2.0, 0.0, 0.1]},
         {"law": [1.0, 2.0, 0.3]},
         {"law": []},
@@ -182,11 +171,11 @@ def test_a_stored_model_answers_alike(known):
 )
 def test_a_damaged_model_is_refused(change):
     with pytest.raises(ValueError, match=next(iter(change))):
-        BreakAwayModel.from_dict(WEIBULL.to_dict() | change)
+        BreakAwayModel.from_dict(STONES.to_dict() | change)
 
 
 def test_a_model_that_lacks_a_value_is_refused():
-    content = WEIBULL.to_dict()
+    content = STONES.to_dict()
     del content["law"]
     with pytest.raises(ValueError, match="law"):
         BreakAwayModel.from_dict(content)

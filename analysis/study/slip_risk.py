@@ -1,8 +1,8 @@
 """A terrain's break-away force as a model that answers: risk, and force at a risk.
 
 Two kinds of answer. "break-away": the distribution of the peak of a push, see
-`censored`. "sliding", where too few pushes slip for that: F_t while the foot moves at
-0.005 to 0.02 m/s, F_t = a + b F_n + u_trial + s e with normal u and e.
+`push_likelihood`. "sliding", where too few pushes slip for that: F_t while the foot
+moves at 0.005 to 0.02 m/s, F_t = a + b F_n + u_trial + s e with normal u and e.
 """
 
 import math
@@ -11,21 +11,17 @@ from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
+from acquisition.errors import SettingsError
 from acquisition.validation import Many
-from analysis.breakaway.answers import (
-    AvailableForce,
-    BreakAwayRisk,
-    check_query,
-    check_share,
-)
-from analysis.breakaway.censored import Family, nodes, share_below
-from analysis.breakaway.pushes import log_load
 from analysis.data.series import Array
+from analysis.study.push_likelihood import nodes, share_weaker
+from analysis.study.pushes import log_load
 
 BREAK_AWAY, SLIDING = "break-away", "sliding"
 INTERVAL = (0.05, 0.95)  # of the trial bootstraps: 90 %
+_FAMILIES = {BREAK_AWAY: "weibull", SLIDING: "lognormal"}  # as they are stored
 _HALVINGS = 60  # of an interval of forces
 _WIDE = 40.0  # spreads that it begins with
 _LARGEST_LOG = 50.0  # exp of it is far beyond any force
@@ -39,6 +35,48 @@ _Spread = Annotated[_Parameter, Field(ge=_LEAST_SPREAD)]
 _Positive = Annotated[float, Field(ge=0.0)]
 _Count = Annotated[int, Field(ge=0, le=_MOST)]
 _Law = tuple[_Parameter, _Parameter, _Spread, Annotated[_Parameter, Field(ge=0.0)]]
+
+
+@dataclass(frozen=True, slots=True)
+class BreakAwayRisk:
+    """The probability that a push slips before it reaches the force that it needs.
+
+    Attributes:
+        risk: 0 to 1.
+        low: lower end of the 90 % interval, from resampled trials.
+        high: its upper end.
+        kind: "break-away", or "sliding" where too few pushes slipped.
+        v_slip: velocity that made a slip [m/s].
+        slips: pushes that slipped, of those the model was fitted to.
+        held: pushes that held.
+        is_extrapolated: F_n or the force lies outside 2 to 98 % of the pushes.
+    """
+
+    risk: float
+    low: float
+    high: float
+    kind: str
+    v_slip: float
+    slips: int
+    held: int
+    is_extrapolated: bool
+
+
+@dataclass(frozen=True, slots=True)
+class AvailableForce:
+    """The force that may be asked for at a risk.
+
+    Attributes:
+        force: F_t [N].
+        low: lower end of the 90 % interval [N], from resampled trials.
+        high: its upper end [N].
+        is_extrapolated: F_n or the force lies outside 2 to 98 % of the pushes.
+    """
+
+    force: float
+    low: float
+    high: float
+    is_extrapolated: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,8 +107,6 @@ class BreakAwayModel:
 
     Attributes:
         kind: "break-away" or "sliding".
-        family: distribution of the residual; normal on the force's own scale where
-            the kind is "sliding".
         law: the fit of all trials.
         draws: the same for resampled trials, columns as `PushLaw`, shape (n, 4).
         v_slip: velocity that made a slip [m/s].
@@ -84,7 +120,6 @@ class BreakAwayModel:
     """
 
     kind: str
-    family: Family
     law: PushLaw
     draws: Array
     v_slip: float
@@ -114,7 +149,7 @@ class BreakAwayModel:
         Raises:
             SettingsError: a value is negative or no finite number.
         """
-        check_query(required=required, F_n=F_n)
+        _check_forces(required=required, F_n=F_n)
         laws = np.vstack([self.law.values, self.draws])
         shares = self._shares(laws, np.full(len(laws), float(required)), F_n)
         low, high = _interval(shares)
@@ -140,8 +175,11 @@ class BreakAwayModel:
             SettingsError: a value is not a finite number, F_n is negative or the risk
                 not between 0 and 1.
         """
-        check_query(F_n=F_n)
-        check_share(risk)
+        _check_forces(F_n=F_n)
+        if not 0.0 < risk < 1.0:
+            raise SettingsError(
+                f"risk = {risk} is not between 0 and 1.", hint="Give e.g. 0.1."
+            )
         laws = np.vstack([self.law.values, self.draws])
         forces = self._forces(laws, F_n, risk)
         low, high = _interval(forces)
@@ -149,10 +187,6 @@ class BreakAwayModel:
             force=float(forces[0]),
             low=low,
             high=high,
-            kind=self.kind,
-            v_slip=self.v_slip,
-            slips=self.slips,
-            held=self.held,
             is_extrapolated=self._is_outside(F_n, float(forces[0])),
         )
 
@@ -176,10 +210,10 @@ class BreakAwayModel:
     def _shares(self, laws: Array, required: Array, F_n: Array | float) -> Array:
         """Return P(F < required) under every law, trial effect integrated out."""
         if self.kind == SLIDING:
-            return _mixed(self.family, laws, required - self._centre(laws, F_n))
+            return _mixed(self.kind, laws, required - self._centre(laws, F_n))
         with np.errstate(divide="ignore"):
             logs = np.log(required)
-        return _mixed(self.family, laws, logs - self._centre(laws, F_n))
+        return _mixed(self.kind, laws, logs - self._centre(laws, F_n))
 
     def _forces(self, laws: Array, F_n: Array | float, risk: float) -> Array:
         """Return the force [N] at which each law's share below it is `risk`."""
@@ -187,7 +221,7 @@ class BreakAwayModel:
         low, high = -reach, reach
         for _ in range(_HALVINGS):
             middle = 0.5 * (low + high)
-            is_under = _mixed(self.family, laws, middle) < risk
+            is_under = _mixed(self.kind, laws, middle) < risk
             low, high = (
                 np.where(is_under, middle, low),
                 np.where(is_under, high, middle),
@@ -209,6 +243,7 @@ class BreakAwayModel:
             "loads": _rounded(self.loads),
             "forces": _rounded(self.forces),
             "distance": None if math.isnan(self.distance) else self.distance,
+            "family": _FAMILIES[self.kind],
         }
         return _BreakAwayFile.model_construct(**values).model_dump(mode="json")
 
@@ -220,7 +255,7 @@ class BreakAwayModel:
             ValueError: a value is missing or not what it should be.
         """
         file = _BreakAwayFile.model_validate(content)
-        values = dict(file) | {
+        values = file.model_dump(exclude={"family"}) | {
             "law": PushLaw(*file.law),
             "draws": np.array(file.draws).reshape(-1, 4),
             "distance": math.nan if file.distance is None else file.distance,
@@ -234,7 +269,7 @@ class _BreakAwayFile(BaseModel):
     model_config = ConfigDict(allow_inf_nan=False)
 
     kind: Literal["break-away", "sliding"]
-    family: Family
+    family: Literal["weibull", "lognormal"]
     law: _Law
     draws: Many[_Law] = Field(max_length=_MOST_DRAWS)
     v_slip: _Positive
@@ -253,21 +288,32 @@ class _BreakAwayFile(BaseModel):
             raise ValueError("a range is not two increasing numbers")
         return ends
 
+    @model_validator(mode="after")
+    def _is_known_family(self) -> "_BreakAwayFile":
+        if self.family != _FAMILIES[self.kind]:
+            raise ValueError(
+                f"family: {self.kind} has {_FAMILIES[self.kind]}, not {self.family}; "
+                "make the database again"
+            )
+        return self
 
-def _mixed(family: Family, laws: Array, above: Array) -> Array:
+
+def _mixed(kind: str, laws: Array, above: Array) -> Array:
     """Return P(u + s e < above) under every law, shape (n,).
 
     Args:
-        family: distribution of e.
+        kind: "break-away" or "sliding".
         laws: parameters, shape (n, 4).
         above: distances from the centre, shape (n,).
     """
     spread, trial_sd = laws[:, 2], laws[:, 3]
-    if family is Family.LOGNORMAL:
-        return share_below(family, above / np.hypot(spread, trial_sd))
+    if kind == SLIDING:
+        from scipy.special import ndtr
+
+        return np.asarray(ndtr(above / np.hypot(spread, trial_sd)), dtype=np.float64)
     points, weights = nodes()
     z = (above[:, None] - trial_sd[:, None] * points) / spread[:, None]
-    return share_below(family, z) @ weights
+    return share_weaker(z) @ weights
 
 
 def _interval(values: Array) -> tuple[float, float]:
@@ -279,3 +325,28 @@ def _interval(values: Array) -> tuple[float, float]:
 
 def _rounded(values: Sequence[float]) -> tuple[float, ...]:
     return tuple(float(f"{value:.{_DIGITS}g}") for value in values)
+
+
+def check_finite(**values: float) -> None:
+    """Refuse a value that nothing can be asked for.
+
+    Raises:
+        SettingsError: one is not a finite number.
+    """
+    for name, value in values.items():
+        try:
+            is_finite = math.isfinite(value)
+        except (TypeError, OverflowError):  # a word, a column, a number without end
+            is_finite = False
+        if not is_finite:
+            raise SettingsError(f"{name} = {value!r:.40} is not a finite number.")
+
+
+def _check_forces(**forces: float) -> None:
+    """Refuse forces that no push can have; raises SettingsError."""
+    check_finite(**forces)
+    for name, force in forces.items():
+        if force < 0.0:
+            raise SettingsError(
+                f"{name} = {force:g} N is negative.", hint="Give a force of 0 or more."
+            )

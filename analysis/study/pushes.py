@@ -102,16 +102,6 @@ class PushTable:
         """Number of rows of every trial, shape (trials,)."""
         return np.diff(np.append(self.starts, self.count))
 
-    def take(self, chosen: np.ndarray) -> "PushTable":
-        """Return the rows of `chosen`, indices or a mask; trials keep their numbers."""
-        return PushTable(
-            self.log_peak[chosen],
-            self.load[chosen],
-            self.is_held[chosen],
-            self.terrain[chosen],
-            self.trial[chosen],
-        )
-
 
 def log_load(F_n: Array) -> Array:
     """Return log(max(F_n, 1 N) / 3.5 N), shape of `F_n` [N]."""

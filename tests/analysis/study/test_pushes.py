@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from analysis.breakaway.pushes import FootPush, PushTable, find_pushes
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.series import TractionSeries
-from tests.analysis.breakaway.pushed import DT, RUNNING, one_push
+from analysis.study.pushes import FootPush, PushTable, find_pushes
+from tests.analysis.study.pushed import DT, RUNNING, one_push
 
 
 def trial(F_t, v_t, F_n=None, *, is_prepared=False):

@@ -1,4 +1,4 @@
-"""From trials to break-away models: pushes, a family, a fit, resampled trials.
+"""From trials to break-away models: pushes, a censored fit, resampled trials.
 
 Stones share slope and spread, every terrain has its level: they give alike, and ten
 trials of one terrain hold too few slips for a model of its own. Any other terrain has
@@ -8,31 +8,109 @@ in slow motion. A terrain of fewer than three trials has no answer.
 
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 
-from analysis.breakaway.censored import CensoredLikelihood, Family
-from analysis.breakaway.model import BREAK_AWAY, SLIDING, BreakAwayModel, PushLaw
-from analysis.breakaway.pushes import PushTable
-from analysis.breakaway.recorded import (
-    BreakAwayOptions,
-    BreakAwayTask,
-    TerrainPushes,
-    plan_break_away,
-)
-from analysis.breakaway.survival import pit_distance
 from analysis.data.prepare import PreparedTrial
 from analysis.data.series import Array
 from analysis.data.terrain_kinds import groups_of
+from analysis.study.push_likelihood import CensoredLikelihood
+from analysis.study.pushes import V_SLIP, FootPush, PushTable, find_pushes
+from analysis.study.slip_risk import BREAK_AWAY, SLIDING, BreakAwayModel, PushLaw
+from analysis.study.survival import pit_distance
 
 ROCKY = "rocky"
 LEAST_TRIALS = 3
 LEAST_SLIPS, LEAST_OF_STONES = 15, 5  # alone, and of each that shares its spread
+_SLOW, _FAST = 0.005, 0.02  # m/s of sliding
 _SEEN = 1.4  # gain in log likelihood of a trial effect: 5 % on the boundary
 _LEAST_VARIANCE = 1e-9  # N^2
 _RANGE = (0.02, 0.98)  # quantiles between which nothing is extrapolated
 _STREAM = 3_000_000  # apart from other draws of the same seed
+
+
+@dataclass(frozen=True, slots=True)
+class BreakAwayOptions:
+    """How break-away models are fitted.
+
+    Attributes:
+        v_slip: velocity that makes a slip [m/s].
+        draws: number of times that the trials are resampled for intervals.
+        seed: of the resampling.
+    """
+
+    v_slip: float = V_SLIP
+    draws: int = 200
+    seed: int = 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TerrainPushes:
+    """The pushes of a terrain's trials, and what its foot met in slow motion.
+
+    Attributes:
+        name: of the terrain.
+        pushes: of every trial.
+        slow: F_n and F_t [N] of every trial at 0.005 to 0.02 m/s; empty = not known.
+    """
+
+    name: str
+    pushes: tuple[tuple[FootPush, ...], ...]
+    slow: tuple[tuple[Array, Array], ...] = ()
+
+    @property
+    def every(self) -> list[FootPush]:
+        """All pushes, trial by trial."""
+        return list(chain(*self.pushes))
+
+    @property
+    def slips(self) -> int:
+        """Number of pushes that slipped."""
+        return sum(not push.is_held for push in self.every)
+
+
+@dataclass(frozen=True, slots=True)
+class BreakAwayTask:
+    """Everything that the fit of all terrains needs.
+
+    Attributes:
+        terrains: their pushes.
+        kinds: kind by terrain: "small" and "big" are stones.
+        options: what a slip is, and how many times trials are resampled.
+    """
+
+    terrains: tuple[TerrainPushes, ...]
+    kinds: Mapping[str, str]
+    options: BreakAwayOptions
+
+
+def plan_break_away(
+    trials: Mapping[str, Sequence[PreparedTrial]],
+    kinds: Mapping[str, str],
+    options: BreakAwayOptions,
+) -> BreakAwayTask:
+    """Return the task of fitting prepared trials by terrain; empty ones do not count.
+
+    Args:
+        trials: prepared trials by terrain.
+        kinds: kind by terrain: "small" and "big" are stones.
+        options: what a slip is, and how many times trials are resampled.
+    """
+    terrains: list[TerrainPushes] = []
+    for name, group in trials.items():
+        usable = [trial for trial in group if trial.kept]
+        pushes = tuple(find_pushes(trial, options.v_slip) for trial in usable)
+        slow = tuple(_slow_rows(trial) for trial in usable)
+        terrains.append(TerrainPushes(name, pushes, slow))
+    return BreakAwayTask(tuple(terrains), dict(kinds), options)
+
+
+def _slow_rows(trial: PreparedTrial) -> tuple[Array, Array]:
+    """Return F_n and F_t [N] of the kept samples in slow motion."""
+    is_slow = (trial.v_t >= _SLOW) & (trial.v_t <= _FAST)
+    return trial.F_n[is_slow], trial.F_t[is_slow]
 
 
 def fit_break_away(
@@ -87,8 +165,7 @@ def _fit_group(
 ) -> dict[str, BreakAwayModel]:
     """Return the models of terrains that share slope and spread."""
     table = PushTable.of([(k, p) for k, r in enumerate(group) for p in r.pushes])
-    family = _family(group, table)
-    likelihood = CensoredLikelihood(table, family, len(group))
+    likelihood = CensoredLikelihood(table, len(group))
     best = likelihood.fit()
     rng = _random([r.name for r in group], options)
     draws = np.array(
@@ -99,7 +176,7 @@ def _fit_group(
     ).reshape(-1, best.size)
     is_trial_seen = _trial_gain(likelihood, best) >= _SEEN
     return {
-        r.name: _model(r, k, family, best, draws, options, is_trial_seen)
+        r.name: _model(r, k, best, draws, options, is_trial_seen)
         for k, r in enumerate(group)
     }
 
@@ -114,34 +191,6 @@ def _resampled(group: Sequence[TerrainPushes], rng: np.random.Generator) -> Arra
     )
 
 
-def _family(group: Sequence[TerrainPushes], table: PushTable) -> Family:
-    """Return the family that scores better on trials that its fit has not seen.
-
-    A fold leaves out the trial of one number of every terrain.
-    """
-    number = np.concatenate([np.arange(len(r.pushes)) for r in group])[table.trial]
-    scores = {
-        family: _inner_score(table, family, len(group), number) for family in Family
-    }
-    return max(scores, key=lambda family: scores[family])
-
-
-def _inner_score(
-    table: PushTable, family: Family, levels: int, number: np.ndarray
-) -> float:
-    whole = CensoredLikelihood(table, family, levels).fit()
-    total = 0.0
-    for k in np.unique(number):
-        rest, left = table.take(number != k), table.take(number == k)
-        if not rest.count:
-            continue
-        fitted = CensoredLikelihood(rest, family, levels).fit(start=whole)
-        total += float(
-            CensoredLikelihood(left, family, levels).log_scores(fitted).sum()
-        )
-    return total
-
-
 def _trial_gain(likelihood: CensoredLikelihood, best: Array) -> float:
     """Return what the effect of the trial gains in log likelihood."""
     without = likelihood.fit(start=best, has_trials=False)
@@ -152,7 +201,6 @@ def _trial_gain(likelihood: CensoredLikelihood, best: Array) -> float:
 def _model(
     recorded: TerrainPushes,
     number: int,
-    family: Family,
     best: Array,
     draws: Array,
     options: BreakAwayOptions,
@@ -167,7 +215,6 @@ def _model(
     is_held = np.array([push.is_held for push in pushes])
     model = BreakAwayModel(
         kind=BREAK_AWAY,
-        family=family,
         law=PushLaw(*laws[0].tolist()),
         draws=laws[1:],
         v_slip=options.v_slip,
@@ -201,7 +248,6 @@ def _fit_sliding(
     draws = np.array([_line(sums[pick]) for pick in picks]).reshape(-1, 4)
     return BreakAwayModel(
         kind=SLIDING,
-        family=Family.LOGNORMAL,
         law=law,
         draws=draws,
         v_slip=options.v_slip,

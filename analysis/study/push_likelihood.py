@@ -2,12 +2,9 @@
 
     log P = b_terrain + b1 log(max(F_n, 1)/3.5) + u_trial + s e,   u ~ N(0, su^2)
 
-(accelerated failure). e is of the smallest extreme value distribution, then P is
-Weibull with shape 1/s, or standard normal, then P is lognormal. With
-z = (log P - mu - u)/s a slip adds log f(z) - log s, a push that held log S(z):
-
-    Weibull     log f = z - exp(z)             log S = -exp(z)
-    lognormal   log f = -(z^2 + log 2 pi)/2    log S = log Phi(-z)
+(accelerated failure) with e of the smallest extreme value distribution: P is Weibull
+with shape 1/s. With z = (log P - mu - u)/s a slip adds z - exp(z) - log s, a push that
+held the logarithm of its survival, -exp(z).
 
 u is integrated out trial by trial with 15 points of Gauss and Hermite. Slope and spread
 are shared by all terrains, each has its level. Priors hold what few pushes leave open:
@@ -15,13 +12,12 @@ log s ~ N(log 0.35, 0.5), b1 ~ N(0.5, 0.5), su half-normal 0.3.
 """
 
 from dataclasses import dataclass
-from enum import Enum
 from functools import cache
 
 import numpy as np
 
-from analysis.breakaway.pushes import PushTable
 from analysis.data.series import Array
+from analysis.study.pushes import PushTable
 
 NODES = 15
 _LOG_SPREAD = (float(np.log(0.35)), 0.5)  # prior of log s: mean, sd
@@ -38,13 +34,6 @@ _BOX = (
 _START = (0.5, float(np.log(0.35)), float(np.log(0.1)))
 
 
-class Family(Enum):
-    """Distribution of the scaled residual e."""
-
-    WEIBULL = "weibull"
-    LOGNORMAL = "lognormal"
-
-
 @cache
 def nodes() -> tuple[Array, Array]:
     """Return points and weights for a mean over a standard normal, shape (15,)."""
@@ -55,32 +44,9 @@ def nodes() -> tuple[Array, Array]:
     return points, weights
 
 
-def share_below(family: Family, z: Array) -> Array:
-    """Return P(e < z), shape of `z`."""
-    if family is Family.WEIBULL:
-        return -np.expm1(-np.exp(np.minimum(z, _LARGEST_Z)))
-    from scipy.special import ndtr
-
-    return np.asarray(ndtr(z), dtype=np.float64)
-
-
-def log_terms(family: Family, z: Array, is_held: np.ndarray) -> tuple[Array, Array]:
-    """Return log f (slips) or log S (held) at z, and its derivative by z.
-
-    Args:
-        family: distribution of e.
-        z: scaled residuals, shape (n, ...).
-        is_held: which rows are censored, of a shape that goes with `z`.
-    """
-    if family is Family.WEIBULL:
-        hazard = np.exp(np.minimum(z, _LARGEST_Z))
-        return np.where(is_held, 0.0, z) - hazard, np.where(is_held, 0.0, 1.0) - hazard
-    from scipy.special import log_ndtr
-
-    log_density = -0.5 * (z**2 + np.log(2.0 * np.pi))
-    log_survival = log_ndtr(-z)
-    slope = np.where(is_held, -np.exp(log_density - log_survival), -z)
-    return np.where(is_held, log_survival, log_density), slope
+def share_weaker(z: Array) -> Array:
+    """Return P(e < z) of the smallest extreme value distribution, shape of `z`."""
+    return -np.expm1(-np.exp(np.minimum(z, _LARGEST_Z)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,12 +57,10 @@ class CensoredLikelihood:
 
     Attributes:
         table: the pushes.
-        family: distribution of e.
-        levels: number of terrains.
+        levels: number of terrains, each with a push at least.
     """
 
     table: PushTable
-    family: Family
     levels: int
 
     def fit(
@@ -147,8 +111,10 @@ class CensoredLikelihood:
         points, weights = nodes()
         centre = p[table.terrain] + p[m] * table.load
         z = (table.log_peak - centre)[:, None] / s - su / s * points
-        terms, slope = log_terms(self.family, z, table.is_held[:, None])
-        terms = terms - np.where(table.is_held, 0.0, p[m + 1])[:, None]
+        hazard = np.exp(np.minimum(z, _LARGEST_Z))
+        slipped = ~table.is_held[:, None]
+        terms = np.where(slipped, z, 0.0) - hazard - slipped * p[m + 1]
+        slope = slipped - hazard
         at_node = np.add.reduceat(terms, table.starts) + np.log(weights)
         top = at_node.max(axis=1, keepdims=True)
         share = np.exp(at_node - top)
@@ -163,28 +129,11 @@ class CensoredLikelihood:
         rows[:, m + 2] = -(posterior * slope * points).sum(axis=1) * su / s
         return value, np.add.reduceat(rows, table.starts)
 
-    def log_scores(self, p: Array) -> Array:
-        """Return the log density of every push alone in a new trial, shape (n,).
-
-        Of log P; of a push that held, the log probability of more than its peak.
-        """
-        alone = PushTable(
-            self.table.log_peak,
-            self.table.load,
-            self.table.is_held,
-            self.table.terrain,
-            np.arange(self.table.count),
-        )
-        value, _ = CensoredLikelihood(alone, self.family, self.levels).by_trial(p)
-        return value
-
     def _start(self) -> Array:
         table = self.table
-        everywhere = float(table.log_peak.mean())
         sums = np.bincount(table.terrain, table.log_peak, self.levels)
         counts = np.bincount(table.terrain, minlength=self.levels)
-        means = np.where(counts > 0, sums / np.maximum(counts, 1), everywhere)
-        return np.concatenate([means, _START])
+        return np.concatenate([sums / counts, _START])
 
     def _box(self) -> list[tuple[float, float]]:
         middle = float(self.table.log_peak.mean())
