@@ -6,7 +6,8 @@ import math
 from collections.abc import Sequence
 
 from analysis.logs.record import ImportedFigure, ImportedTopic, ImportRecord
-from analysis.report.section import ReportSection, ReportTable, Section
+from analysis.report.page_model import Section
+from analysis.report.section import ReportSection, ReportTable
 
 _ESTIMATED = "The wrench was estimated by the robot, not measured at the foot."
 _NOTHING = "–"
