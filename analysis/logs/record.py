@@ -51,8 +51,6 @@ class ImportedTopic(_Part):
         what: "joints" or "wrench".
         name: of the topic.
         type: of its messages.
-        field: path of the wrench in them.
-        definition_sha256: digest of the definition in the log; "" where it has none.
         frame_id: that its header names.
         times: "stamp" or "receipt".
         read: messages of the topic.
@@ -69,8 +67,6 @@ class ImportedTopic(_Part):
     what: _Text
     name: _Text
     type: _Text
-    field: _Text = ""
-    definition_sha256: str = Field(default="", max_length=64)
     frame_id: _Text = ""
     times: Literal["stamp", "receipt"]
     read: int
@@ -85,19 +81,21 @@ class ImportedTopic(_Part):
 
 
 class ImportedFigure(_Part):
-    """One thing that was given, found or checked.
+    """One thing that was stated, or that the log shows.
 
     Attributes:
         name: what it is.
-        value: in `unit`.
-        unit: of value and spread.
-        spread: how well it is known; empty where it was given.
-        how: given, how it was found, or the limit of a check.
+        value: as stated, in `unit`; empty for what was not stated.
+        unit: of the numbers.
+        shown: by the log, in `unit`; empty where it shows nothing.
+        spread: how well it is shown; `how` names its unit.
+        how: by what it is shown, why it is not, or the limit of a check.
     """
 
     name: _Text
     value: Many[_Number] = Field(max_length=20)
     unit: _Text = ""
+    shown: Many[_Number] = Field(default=(), max_length=20)
     spread: Many[_Number] = Field(default=(), max_length=20)
     how: _Text = ""
 
@@ -115,8 +113,7 @@ class ImportRecord(_Part):
         files: that were read.
         topics: that were read.
         arguments: of the command, by option.
-        estimates: what was given or found.
-        checks: of the signs.
+        checks: what was stated beside what the log shows.
         trials: seconds of the log, by name of the trial.
         warnings: word for word.
         losses: what of the log could not be read.
@@ -132,7 +129,6 @@ class ImportRecord(_Part):
     files: Many[ImportedFile] = Field(max_length=500)
     topics: Many[ImportedTopic] = Field(max_length=10)
     arguments: Entries[str, _Text]
-    estimates: Many[ImportedFigure] = Field(max_length=50)
     checks: Many[ImportedFigure] = Field(max_length=50)
     trials: Annotated[dict[str, tuple[float, float]], Field(max_length=2000)]
     warnings: Many[_Text] = Field(max_length=5000)

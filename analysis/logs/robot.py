@@ -9,6 +9,7 @@ that. The file is taken as hostile: no entities, bounded, a tree of finite numbe
 from __future__ import annotations
 
 import math
+import re
 import xml.etree.ElementTree as ET  # entities are refused before it sees a text
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -30,9 +31,11 @@ _DEEPEST = 64  # elements within elements
 _MOST_ELEMENTS = 100_000
 _FARTHEST = 1_000.0  # m between two joints
 _LONGEST_NAME = 200
-_MOVING = ("revolute", "prismatic")
+_MOVING = ("revolute", "prismatic", "continuous")
 _FIXED = "fixed"
 _NEAREST = 10  # names in a refusal
+_ENCODING = re.compile(rb"<\?xml[^>]{0,200}?\sencoding\s*=\s*[\"']([\w.-]{1,40})[\"']")
+_ENCODINGS = ("utf-8", "utf8", "us-ascii", "ascii", "iso-8859-1", "latin-1", "latin1")
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +130,8 @@ def parse_urdf(path: Path, data: bytes) -> Urdf:
     links = tuple(_name(path, each) for each in root.findall("link"))
     elements = root.findall("joint")
     if not 0 < len(links) <= MOST_LINKS or len(elements) > MOST_LINKS:
-        raise _refused(path, f"{len(links)} links, 1 to {MOST_LINKS} can be used")
+        counts = f"{len(links)} links and {len(elements)} joints"
+        raise _refused(path, f"{counts}, 1 to {MOST_LINKS} links can be used")
     joints: dict[str, UrdfJoint] = {}
     for element in elements:
         joint = _joint(path, element)
@@ -143,12 +147,20 @@ def parse_urdf(path: Path, data: bytes) -> Urdf:
 
 def _parsed(path: Path, data: bytes) -> ET.Element:
     if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
-        raise _refused(path, "it declares a document type or entities")
-    if not data.isascii():
-        try:
-            data.decode()
-        except UnicodeDecodeError as error:
-            raise _refused(path, "it is not UTF-8") from error
+        raise _refused(path, "it holds <!DOCTYPE or <!ENTITY")
+    data = data.lstrip()  # an empty line before the declaration is common
+    declared = _ENCODING.match(data)
+    encoding = "utf-8" if declared is None else declared[1].decode().lower()
+    if encoding not in _ENCODINGS:  # others could hide a document type
+        raise _refused(path, f"its encoding is {encoding[:40]}, not UTF-8 or Latin-1")
+    try:
+        data.decode(encoding)
+    except UnicodeDecodeError as error:
+        raise _refused(
+            path,
+            f"byte {error.start} is not {encoding}",
+            'Save it as UTF-8, or declare encoding="ISO-8859-1".',
+        ) from error
     depth = count = 0
     root: Any = None
     parser: Any = ET.XMLPullParser(("start", "end"))
@@ -159,15 +171,24 @@ def _parsed(path: Path, data: bytes) -> ET.Element:
                 root = element if root is None else root
                 depth += 1 if event == "start" else -1
                 count += event == "start"
-                if depth > _DEEPEST or count > _MOST_ELEMENTS:
-                    raise _refused(path, "too many elements, or too deep")
+                if count > _MOST_ELEMENTS:
+                    raise _refused(path, f"over {_MOST_ELEMENTS} elements")
+                if depth > _DEEPEST:
+                    raise _refused(path, f"elements over {_DEEPEST} deep")
         parser.close()
     except (ET.ParseError, ValueError, LookupError) as error:
         raise _refused(path, f"it is no XML ({error})") from error
-    if root is None or root.tag != "robot":
-        raise _refused(path, "it has no robot")
-    if b"xacro:" in data:
-        raise _refused(path, "it is a xacro, not a URDF", "Expand it: xacro FILE.")
+    if root is None:
+        raise _refused(path, "it has no element")
+    for element in root.iter():
+        space, _, name = element.tag.rpartition("}")
+        if "xacro" in space:
+            raise _refused(
+                path, f"it holds xacro:{name[:40]}", "Expand it: xacro FILE."
+            )
+        element.tag = name  # a URDF may declare a default namespace
+    if root.tag != "robot":
+        raise _refused(path, f"its element is {root.tag[:40]!r}, not robot")
     return root
 
 
@@ -235,7 +256,11 @@ def _check_tree(path: Path, links: Sequence[str], joints: dict[str, UrdfJoint]) 
 
 def _check_use(path: Path, joint: UrdfJoint) -> None:
     if joint.mimics:
-        raise _refused(path, f"joint {joint.name} mimics {joint.mimics}", _OTHER_JOINTS)
+        raise _refused(
+            path,
+            f"joint {joint.name} mimics {joint.mimics}",
+            "A joint between the base and the foot has to have a position of its own.",
+        )
     if joint.kind not in (*_MOVING, _FIXED):
         what = joint.kind[:20] or "of no type"
         raise _refused(path, f"joint {joint.name} is {what}", _OTHER_JOINTS)
@@ -244,8 +269,8 @@ def _check_use(path: Path, joint: UrdfJoint) -> None:
 
 
 _OTHER_JOINTS = (
-    "Only fixed, revolute and prismatic joints may lie between the base and the foot: "
-    "a body that floats or rolls has no known velocity."
+    "Fixed, revolute, continuous and prismatic joints may lie between the base and the "
+    "foot: one number of a JointState places each."
 )
 
 
@@ -314,6 +339,7 @@ class RobotLeg:
             sensor[k] = data.oMf[self._sensor].rotation
             lever[k] = data.oMf[self._sensor].actInv(data.oMf[self._foot]).translation
             jacobian = pin.getFrameJacobian(model, data, self._foot, axes)
+            jacobian = np.reshape(jacobian, (6, -1))  # a single joint has a vector
             velocity[k] = jacobian[:3] @ qd[k]
         return FramePath(foot, velocity, sensor, lever)
 
@@ -326,9 +352,11 @@ def _plain_urdf(base: str, joints: Iterable[UrdfJoint]) -> str:
             " ".join(map(repr, numbers))
             for numbers in (joint.xyz, joint.rpy, joint.axis)
         )
+        # one number places a continuous joint, too: Pinocchio would take two
+        kind = "revolute" if joint.kind == "continuous" else joint.kind
         lines.append(
             f"<link name={quoteattr(joint.child)}/>"
-            f'<joint name={quoteattr(joint.name)} type="{joint.kind}">'
+            f'<joint name={quoteattr(joint.name)} type="{kind}">'
             f"<parent link={quoteattr(joint.parent)}/>"
             f"<child link={quoteattr(joint.child)}/>"
             f'<origin xyz="{xyz}" rpy="{rpy}"/><axis xyz="{axis}"/>'

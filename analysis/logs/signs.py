@@ -17,7 +17,7 @@ from analysis.data.plausibility import (
 )
 from analysis.data.series import Array
 
-_PRESSED = 2.0  # N
+PRESSED_FORCE = 2.0  # N; below it a foot is in the air
 LEAST_PRESSING = 0.95  # share of pressed samples with F_n > 0
 LEAST_BRAKING = 0.80  # share of sliding samples with F_t v_t > 0
 USUAL_ASIDE = 0.3  # of the force along the way; more is named
@@ -27,8 +27,8 @@ MOST_ASIDE = 1.0  # of the force along the way
 
 
 @dataclass(frozen=True, slots=True)
-class Check:
-    """One check of the signs.
+class SignFigure:
+    """One figure that the signs of the forces are judged by.
 
     Attributes:
         name: what was looked at.
@@ -49,7 +49,7 @@ def side_warnings(values: Array, lateral: Array) -> list[str]:
         lateral: force across the way [N], shape (n,).
     """
     v_t, F_t, F_n = values.T
-    sliding = (F_n > _PRESSED) & (v_t > SLOWEST)
+    sliding = (F_n > PRESSED_FORCE) & (v_t > SLOWEST)
     if not sliding.any():
         return []
     aside, along = float(np.median(lateral[sliding])), float(np.median(F_t[sliding]))
@@ -76,7 +76,7 @@ def moment_warnings(moment: Array, lever: Array, force: Array) -> list[str]:
     """
     expected = np.cross(lever, force)
     sound = np.isfinite(expected).all(axis=1) & np.isfinite(moment).all(axis=1)
-    sound &= np.linalg.norm(force, axis=1) > _PRESSED
+    sound &= np.linalg.norm(force, axis=1) > PRESSED_FORCE
     power = float(np.sum(expected[sound] ** 2))
     if not sound.any() or power < np.count_nonzero(sound) * _LEAST_MOMENT**2:
         return []
@@ -116,25 +116,28 @@ def way_warnings(way: Array, axes: Array) -> list[str]:
     return found
 
 
-def sign_checks(values: Array, lateral: Array) -> list[Check]:
-    """Return what the signs of the forces are.
+def sign_figures(values: Array, lateral: Array) -> list[SignFigure]:
+    """What the signs of the forces in the trials are.
 
     Args:
         values: v_t [m/s], F_t [N], F_n [N], shape (n, 3).
         lateral: force across the way [N], shape (n,).
 
     Raises:
-        SettingsError: the force cannot be that of the ground on the foot.
+        SettingsError: no ground that carries and slows a foot has these forces.
     """
     v_t, F_t, F_n = values.T
     size = np.sqrt(F_t**2 + F_n**2 + lateral**2)
-    pressed = size > _PRESSED
+    pressed = size > PRESSED_FORCE
     sliding = pressed & (np.abs(v_t) > SLOWEST)
     if np.count_nonzero(sliding) < FEWEST:
+        most = float(np.nanmax(size)) if np.isfinite(size).any() else 0.0
+        fastest = float(np.abs(v_t).max())
         raise SettingsError(
-            f"The pressed foot slides in {np.count_nonzero(sliding)} rows only (limit "
-            f"{FEWEST}).",
-            hint="Check the log: is the foot pushed over the ground in it?",
+            f"In {np.count_nonzero(sliding)} rows of the trials the force is over "
+            f"{PRESSED_FORCE:g} N while the foot moves (limit {FEWEST}): the largest "
+            f"force is {most:.1f} N, the fastest motion {fastest * 1e3:.1f} mm/s.",
+            hint="Check --trials, --wrench and --foot.",
         )
     pressing = float(np.mean(F_n[pressed] > 0.0))
     braking = float(np.mean((F_t * v_t)[sliding] > 0.0))
@@ -144,25 +147,24 @@ def sign_checks(values: Array, lateral: Array) -> list[Check]:
         f"F_t against the motion in {braking:.0%} of the sliding ones (limit "
         f"{LEAST_BRAKING:.0%})"
     )
-    is_pressing, is_braking = pressing >= LEAST_PRESSING, braking >= LEAST_BRAKING
     if pressing < 1.0 - LEAST_PRESSING and braking < 1.0 - LEAST_BRAKING:
         raise SettingsError(
-            f"The wrench has the other sign: {said}.",
+            f"Normal and traction force have the other sign: {said}.",
             hint="Give the other --acts; or is --sensor another frame?",
         )
-    if not (is_pressing and is_braking):
+    if not (pressing >= LEAST_PRESSING and braking >= LEAST_BRAKING):
         raise SettingsError(
-            f"The axes of the wrench are not those of the sensor's frame: {said}.",
-            hint="Check --sensor, the URDF, --normal and --along, and the tare.",
+            f"No ground carries and slows a foot so: {said}.",
+            hint="Check the axes of the wrench: --sensor, the URDF, --normal, --along; "
+            "then --acts and --tare.",
         )
     if aside > MOST_ASIDE * along:
         raise SettingsError(
-            f"The axes of the wrench are not those of the sensor's frame: "
-            f"{aside:.1f} N across the way, {along:.1f} N along it.",
-            hint="Check --sensor, the URDF and --along.",
+            f"The force across the way is {aside:.1f} N, along it {along:.1f} N.",
+            hint="Check the axes of the wrench: --sensor, the URDF and --along.",
         )
     return [
-        Check("F_n > 0 while pressed", pressing, f">= {LEAST_PRESSING:g}"),
-        Check("F_t against the motion", braking, f">= {LEAST_BRAKING:g}"),
-        Check("force across over along", aside / along, f"<= {MOST_ASIDE:g}"),
+        SignFigure("F_n > 0 while pressed", pressing, f">= {LEAST_PRESSING:g}"),
+        SignFigure("F_t against the motion", braking, f">= {LEAST_BRAKING:g}"),
+        SignFigure("force across over along", aside / along, f"<= {MOST_ASIDE:g}"),
     ]

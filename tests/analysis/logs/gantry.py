@@ -10,6 +10,8 @@ import numpy as np
 from rosbags import rosbag1, rosbag2
 from rosbags.typesys import Stores, get_typestore
 
+from analysis.logs.request import ImportRequest
+
 NAMES = ("slide_y", "wrist", "slide_x", "slide_z")  # another order than the robot's
 START_NS = 1_790_000_000_000_000_000
 URDF = """<?xml version="1.0"?>
@@ -74,8 +76,11 @@ class Rubbing:
     velocity_late: float = 0.0
     stamps: bool = True
     clock_offset: float = 0.0  # of the stamps of the wrench [s]
+    clock_rate: float = 1.0  # of its stamps against the true time
+    stamp_rate: float = 1.0  # of all stamps against the true time
     lost: float = 0.0
     q_step: float = 2e-5
+    changes: tuple = ()  # of the list of (topic, receipt, message)
     end: float = field(init=False)
 
     def __post_init__(self):
@@ -150,6 +155,24 @@ class Rubbing:
         return load[:, order]
 
 
+def stated(rubbing: Rubbing, log: Path, urdf: Path, **options) -> ImportRequest:
+    """Return a request that states the truth of a log, but for `options`."""
+    x_T, _, z_T = rubbing.axes_of_ground()
+    starts = [3.0 + 9.0 * k for k in range(rubbing.strokes)]
+    values = {
+        "foot": "foot",
+        "sensor": "gauge",
+        "acts": "ground-on-foot",
+        "tare": (0.1, 0.6),
+        "mass": rubbing.mass,
+        "along": x_T,
+        "normal": z_T,
+        "lag": rubbing.lag,
+        "trials": [(start, start + 8.0) for start in starts],
+    }
+    return ImportRequest(log, urdf, **(values | options))
+
+
 def write_urdf(folder: Path) -> Path:
     path = folder / "gantry.urdf"
     path.write_text(URDF)
@@ -162,8 +185,9 @@ def messages(rubbing: Rubbing, store, types):
     Header, Time, JointState, WrenchStamped, Wrench, Vector3 = types
     is_ros1 = "seq" in Header.__dataclass_fields__
 
-    def header(t, frame, offset=0.0):
-        ns = START_NS + round((t + offset) * 1e9) if rubbing.stamps else 0
+    def header(t, frame, offset=0.0, rate=1.0):
+        at = (t * rate + offset) * rubbing.stamp_rate
+        ns = START_NS + round(at * 1e9) if rubbing.stamps else 0
         stamp = Time(sec=ns // 10**9, nanosec=ns % 10**9)
         more = {"seq": 0} if is_ros1 else {}
         return Header(stamp=stamp, frame_id=frame, **more)
@@ -192,11 +216,19 @@ def messages(rubbing: Rubbing, store, types):
     for at, row in zip(t[kept], wrench[kept], strict=True):
         received = np.ceil(at / 0.02) * 0.02 if rubbing.stamps else at + rubbing.lag
         message = WrenchStamped(
-            header=header(at + rubbing.lag, rubbing.frame_id, rubbing.clock_offset),
+            header=header(
+                at + rubbing.lag,
+                rubbing.frame_id,
+                rubbing.clock_offset,
+                rubbing.clock_rate,
+            ),
             wrench=Wrench(Vector3(*row[:3]), Vector3(*row[3:])),
         )
         out.append(("/ft/wrench", START_NS + round(received * 1e9) + 900_000, message))
-    return sorted(out, key=lambda row: row[1])
+    out = sorted(out, key=lambda row: row[1])
+    for change in rubbing.changes:
+        out = change(out)
+    return out
 
 
 def types_of(store):

@@ -42,12 +42,18 @@ def test_the_arm_by_its_urdf_is_where_its_own_model_says():
 @pytest.mark.parametrize(
     ("data", "why"),
     [
-        (b"<!DOCTYPE x><robot/>", "document type"),
+        (b"<!DOCTYPE x><robot/>", "it holds <!DOCTYPE"),
         (b"<robot", "no XML"),
         (b"<robot></robot>", "0 links"),
-        (b"\xff\xfe", "not UTF-8"),
-        (b"<robot>" + b"<a>" * 100 + b"</a>" * 100 + b"</robot>", "too deep"),
-        (b"<sdf/>", "no robot"),
+        (b"\xff\xfe", "byte 0 is not utf-8"),
+        (b'<?xml version="1.0" encoding="UTF-16"?><robot/>', "encoding is utf-16"),
+        (b'<?xml version="1.0" encoding="cp037"?><robot/>', "encoding is cp037"),
+        (
+            b'<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:macro/></robot>',
+            "it holds xacro:macro",
+        ),
+        (b"<robot>" + b"<a>" * 100 + b"</a>" * 100 + b"</robot>", "over 64 deep"),
+        (b"<sdf/>", "its element is 'sdf', not robot"),
         (chain(("j", "fixed", "a", "b", ""), ("k", "fixed", "c", "b", "")), "no tree"),
         (
             chain(("j", "fixed", "a", "b", ""), ("k", "fixed", "b", "a", "")),
@@ -69,7 +75,6 @@ def test_a_hostile_urdf_is_refused(data, why):
 @pytest.mark.parametrize(
     ("kind", "more", "why"),
     [
-        ("continuous", "", "j is continuous"),
         ("floating", "", "j is floating"),
         ("revolute", '<mimic joint="other"/>', "j mimics other"),
         ("revolute", '<axis xyz="0 0 0"/>', "j has no axis"),
@@ -89,3 +94,51 @@ def test_a_missing_frame_is_refused_with_the_nearest_names():
     )
     with pytest.raises(SettingsError, match="nearest links are foot"):
         RobotLeg(robot, "fot", "foot")
+
+
+SHAPES = {
+    "plain": chain(("j", "revolute", "a", "b", ""), links="ab"),
+    "one continuous joint": chain(("j", "continuous", "a", "b", ""), links="ab"),
+    "leading blank line": b'\n\n<?xml version="1.0"?>\n'
+    + chain(("j", "revolute", "a", "b", ""), links="ab"),
+    "default namespace": chain(("j", "revolute", "a", "b", ""), links="ab").replace(
+        b"<robot ", b'<robot xmlns="http://www.ros.org" '
+    ),
+    "latin-1": b'<?xml version="1.0" encoding="ISO-8859-1"?>'
+    + chain(("j", "revolute", "a", "b", ""), links="ab").replace(
+        b"</robot>", b"<!-- Gelenk f\xfcr den Fu\xdf --></robot>"
+    ),
+    "a comment with xacro": chain(
+        ("j", "revolute", "a", "b", "<!-- made by xacro: xacro:macro leg -->"),
+        links="ab",
+    ),
+    "unused xacro namespace": chain(
+        ("j", "revolute", "a", "b", ""), links="ab"
+    ).replace(b"<robot ", b'<robot xmlns:xacro="http://www.ros.org/wiki/xacro" '),
+    "a mimic joint elsewhere": chain(
+        ("j", "revolute", "a", "b", ""),
+        ("k", "revolute", "a", "c", '<mimic joint="j"/>'),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_urdfs_as_they_are_met_have_a_foot(name):
+    """A URDF of one joint was a traceback, a comment a xacro."""
+    leg = RobotLeg(parse_urdf(NOWHERE, SHAPES[name]), "b", "b")
+    assert leg.joints == ["j"]
+    path = leg.along(np.array([[0.1], [4.0]]), np.array([[0.5], [0.5]]))
+    assert path.foot.shape == path.velocity.shape == (2, 3)
+
+
+def test_a_continuous_joint_turns_as_often_as_it_likes():
+    data = chain(
+        ("j", "continuous", "a", "b", '<axis xyz="0 0 1"/>'),
+        ("k", "fixed", "b", "c", '<origin xyz="1 0 0"/>'),
+    )
+    leg = RobotLeg(parse_urdf(NOWHERE, data), "c", "c")
+    q = np.array([[0.3], [0.3 + 14 * np.pi]])
+    path = leg.along(q, np.ones((2, 1)))
+    assert path.foot[1] == pytest.approx(path.foot[0], abs=1e-9)
+    expected = [-np.sin(0.3), np.cos(0.3), 0]
+    assert path.velocity == pytest.approx(np.array([expected] * 2), abs=1e-9)
