@@ -96,14 +96,14 @@ def fit_clock(stamps: Nanoseconds, received: Nanoseconds) -> ClockLine | None:
     rows = np.array([row for row in fastest if row is not None])
     if len(rows) < 3:
         return None
-    slope, offset, low, high = theilslopes(late[rows], t[rows])
+    slope, offset, low, high = np.asarray(theilslopes(late[rows], t[rows])).tolist()
     if 1.0 - slope < _SLOWEST:
         return None
     step, row = _largest_step(late[rows] - slope * t[rows])
     return ClockLine(
-        offset=float(offset),
-        drift=-float(slope),
-        sure=(-float(high), -float(low)),
+        offset=offset,
+        drift=-slope,
+        sure=(-high, -low),
         span=span,
         step=-step,
         step_at=float(t[rows[row]]),
