@@ -19,10 +19,10 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.exports.folder import target_files
-from analysis.exports.source import TerrainExport
 from analysis.terrains.database import load, to_text
-from tests.analysis.exports.databases import database
+from analysis.terrains.export.exported import TerrainExport
+from analysis.terrains.export.folder import target_files
+from tests.analysis.terrains.export.databases import database
 
 _PROGRAM = """
 #include <stdio.h>

@@ -11,11 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from acquisition.errors import SettingsError
-from analysis.breakaway.fitting import fit_break_away as fit_of_terrains
-from analysis.breakaway.model import BreakAwayModel
-from analysis.breakaway.recorded import BreakAwayOptions
 from analysis.data.samples import TrainingSet
 from analysis.data.terrain_kinds import terrain_kind
+from analysis.study.break_away_fit import BreakAwayOptions
+from analysis.study.break_away_fit import fit_break_away as fit_of_terrains
 from analysis.study.crossval import FoldResult, plan_folds, run_fold
 from analysis.study.distribution import Distribution
 from analysis.study.jobs import run_tasks
@@ -29,6 +28,7 @@ from analysis.study.models import (
     FittedModel,
     ModelFitter,
 )
+from analysis.study.slip_risk import BreakAwayModel
 from analysis.study.terrain_fit import mean_of
 from analysis.terrains.database import load
 from analysis.terrains.known import TerrainDatabase

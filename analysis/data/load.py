@@ -227,7 +227,7 @@ def load_trial(path: Path | str) -> RecordedTrial:
         constants=at_hand.model.constants,
         sole_point=at_hand.sole_point,
         bracket=read_bracket(path, metadata["trial"], payload.bias, start_ns),
-        sensor_height=_sensor_height(attachments.get("config.toml", b"")),
+        sensor_height=sensor_height_of(attachments.get("config.toml", b"")),
         friction_text=attachments.get("friction.toml", b"").decode(errors="ignore"),
     )
     try:
@@ -273,7 +273,8 @@ def _arm(constants: str, sole: tuple[float, ...]) -> ArmModel:
 
 
 @lru_cache(maxsize=16)
-def _sensor_height(config: bytes) -> float | None:
+def sensor_height_of(config: bytes) -> float | None:
+    """Return the height of the sensor's origin by recorded settings [m], if told."""
     try:
         height = parse_toml(config.decode())["ft_sensor"]["height"]
     except (ValueError, KeyError, TypeError):

@@ -1,6 +1,5 @@
-"""Logs of other robots: MCAP, rosbag2 (SQLite, MCAP) and ROS 1 bags, read with bounds.
+"""Logs of other robots: the containers that hold them, and trials made from them.
 
-`opening.open_log` gives a `LogFile` of any format, `definitions` takes the definition
-of a message apart, `decoding` reads messages by it. Definitions are interpreted, never
-executed; every size and count is checked before anything is allocated for it.
+Begin with `opening`, which reads MCAP, rosbag2 and ROS 1 bags alike, and `importing`,
+which makes v_t, F_n and F_t of joint states, wrenches and a URDF.
 """

@@ -19,7 +19,6 @@ from analysis.logs.log_file import (
     LogMessage,
     LogTopic,
     OneFile,
-    checked_definition,
     checked_name,
     damaged,
     short_type,
@@ -41,7 +40,7 @@ class BagLog(OneFile):
         """Look at the file once for its topics.
 
         Raises:
-            SettingsError: a name or a definition is too long, or there are too many.
+            SettingsError: a name is too long, or there are too many.
         """
         super().__init__(path)
         self._connections: dict[int, str] = {}
@@ -101,13 +100,10 @@ class BagLog(OneFile):
         fields = _fields(data)
         topic = checked_name(self.path, header[b"topic"], "the name of a topic")
         kind = checked_name(self.path, fields[b"type"], "the name of a type")
-        text = checked_definition(
-            self.path, fields.get(b"message_definition", b""), kind
-        )
         if len(self._connections) >= MOST_TOPICS:
             raise damaged(self.path, f"over {MOST_TOPICS} topics")
         self._connections[number] = topic
-        self.topics[topic] = LogTopic(topic, short_type(kind), "ros1", text)
+        self.topics[topic] = LogTopic(topic, short_type(kind), "ros1")
 
 
 def _record_of_file(file: BinaryIO) -> tuple[_Header, bytes] | None:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, NamedTuple, Protocol
 
 from acquisition.errors import SettingsError
+from acquisition.files import UnfitFileError, open_regular
 from acquisition.trial_file.unpacking import Unpacker
 
 LARGEST_LOG = 2 * 10**9  # bytes on the disk
@@ -15,8 +16,8 @@ LARGEST_PART = 64 * 2**20  # bytes of a record, and of a chunk unpacked
 LARGEST_RATIO = 100  # of a part unpacked to the same part packed
 MOST_MESSAGES = 10**7  # of the topics that are read
 LONGEST_NAME = 4096  # bytes of a topic, a type, a frame or a joint
-LARGEST_DEFINITION = 100_000  # bytes
 MOST_TOPICS = 5_000
+_BLOCK = 2**20  # bytes copied at a time
 
 Serialization = Literal["cdr", "ros1"]
 
@@ -29,13 +30,11 @@ class LogTopic:
         name: e.g. /joint_states.
         type_name: package and type, e.g. sensor_msgs/JointState.
         serialization: how its messages are written.
-        definition: of the message, with what it uses; "" where the log has none.
     """
 
     name: str
     type_name: str
     serialization: Serialization
-    definition: str
 
 
 class LogMessage(NamedTuple):
@@ -121,12 +120,43 @@ def checked_name(path: Path, name: bytes | str, what: str) -> str:
     return name.decode(errors="replace") if isinstance(name, bytes) else name
 
 
-def checked_definition(path: Path, text: bytes | str, type_name: str) -> str:
-    """Return a definition as text; raises SettingsError where it is too long."""
-    if len(text) > LARGEST_DEFINITION:
-        raise damaged(
-            path,
-            f"the definition of {type_name[:60]} has {len(text)} bytes, the limit is "
-            f"{LARGEST_DEFINITION}",
-        )
-    return text.decode(errors="replace") if isinstance(text, bytes) else text
+def first_byte(path: Path) -> bytes:
+    """First byte of a file beside a log; b"" where there is none, or nothing in it."""
+    try:
+        with open_regular(path, is_link_followed=True) as file:
+            return file.read(1)
+    except FileNotFoundError:
+        return b""
+    except (UnfitFileError, OSError) as error:
+        raise damaged(path, f"cannot be read ({error})") from error
+
+
+def copy_bounded(sources: Sequence[Path], copies: Sequence[Path]) -> None:
+    """Copy files whose size together is within the limit of a log.
+
+    Raises:
+        SettingsError: they are too large, or one cannot be read or written.
+    """
+    left = LARGEST_LOG
+    for source, copy in zip(sources, copies, strict=True):
+        try:
+            with (
+                open_regular(source, is_link_followed=True) as old,
+                copy.open("wb") as new,
+            ):
+                while block := old.read(_BLOCK):
+                    left -= len(block)
+                    if left < 0:
+                        raise too_large(source, LARGEST_LOG - left)
+                    new.write(block)
+        except (UnfitFileError, OSError) as error:
+            raise damaged(source, f"cannot be copied ({error})") from error
+
+
+def too_large(path: Path, size: int) -> SettingsError:
+    """Return the refusal of a log of over 2 GB."""
+    return damaged(
+        path,
+        f"{size / 1e9:.1f} GB, the limit is {LARGEST_LOG / 1e9:.0f} GB",
+        "Cut it: ros2 bag convert, or mcap filter, with the two topics only.",
+    )

@@ -32,7 +32,6 @@ from analysis.logs.log_file import (
     LogTopic,
     OneFile,
     Serialization,
-    checked_definition,
     checked_name,
     damaged,
     short_type,
@@ -40,7 +39,6 @@ from analysis.logs.log_file import (
 
 _MESSAGE = Opcode.MESSAGE.value  # most records are: a plain number compares faster
 _SERIALIZATIONS: dict[str, Serialization] = {"cdr": "cdr", "ros1": "ros1"}
-_ENCODINGS = ("ros2msg", "ros1msg")
 _SIMULATED = ("simulated", "true")  # in metadata
 
 
@@ -53,7 +51,7 @@ class McapLog(OneFile):
         """Look at the file once for its topics.
 
         Raises:
-            SettingsError: a name or a definition is too long, or there are too many.
+            SettingsError: a name is too long, or there are too many.
         """
         super().__init__(path)
         for _ in self.messages(()):
@@ -101,7 +99,7 @@ class _Definitions:
     def __init__(self, log: McapLog) -> None:
         self.topics: dict[int, str] = {}
         self._log = log
-        self._schemas: dict[int, tuple[str, str]] = {}  # type, definition
+        self._types: dict[int, str] = {}  # by the number of their schema
 
     def take(self, opcode: int, body: memoryview) -> None:
         if opcode == Opcode.SCHEMA:
@@ -115,18 +113,15 @@ class _Definitions:
 
     def _take_schema(self, schema: Schema) -> None:
         path = self._log.path
-        if len(self._schemas) >= MOST_TOPICS:
+        if len(self._types) >= MOST_TOPICS:
             raise damaged(path, f"over {MOST_TOPICS} types")
-        text = schema.data if schema.encoding in _ENCODINGS else b""
-        self._schemas[schema.id] = (
-            short_type(checked_name(path, schema.name, "the name of a type")),
-            checked_definition(path, text, schema.name),
-        )
+        name = checked_name(path, schema.name, "the name of a type")
+        self._types[schema.id] = short_type(name)
 
     def _take_channel(self, channel: Channel) -> None:
         log, topic = self._log, channel.topic
         checked_name(log.path, topic, "the name of a topic")
-        type_name, definition = self._schemas.get(channel.schema_id, ("", ""))
+        type_name = self._types.get(channel.schema_id, "")
         serialization = _SERIALIZATIONS.get(channel.message_encoding)
         if serialization is None:
             encoding = channel.message_encoding[:40]
@@ -135,4 +130,4 @@ class _Definitions:
             raise damaged(log.path, f"over {MOST_TOPICS} topics")
         if serialization is not None:
             self.topics[channel.id] = topic
-            log.topics[topic] = LogTopic(topic, type_name, serialization, definition)
+            log.topics[topic] = LogTopic(topic, type_name, serialization)

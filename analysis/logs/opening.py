@@ -7,6 +7,7 @@ import tempfile
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from zlib import crc32
 
 from acquisition.errors import SettingsError
 from acquisition.files import UnfitFileError, open_regular
@@ -22,6 +23,7 @@ from analysis.logs.log_file import (
     LogMessage,
     LogTopic,
     damaged,
+    too_large,
 )
 from analysis.logs.mcap_log import McapLog
 from analysis.logs.sqlite_log import SqliteLog
@@ -29,10 +31,6 @@ from analysis.logs.sqlite_log import SqliteLog
 _SUFFIXES = (".mcap", ".db3", ".bag", ".mcap.zstd", ".db3.zstd")
 _MOST_FILES = 200
 _FORMATS = "Give an .mcap, a folder or .db3 of rosbag2, or a ROS 1 .bag."
-_NO_TRACTION = (
-    "it holds states of joints and no force of the ground, so no traction can follow "
-    "from it"
-)
 
 
 @contextmanager
@@ -45,14 +43,15 @@ def open_log(path: Path) -> Iterator[LogFile]:
     files = _files(path)
     with tempfile.TemporaryDirectory(prefix="traction-import-") as scratch:
         logs = [_opened(file, Path(scratch) / f"{k}") for k, file in enumerate(files)]
-        yield logs[0] if len(logs) == 1 else LogOfParts(path, logs)
+        yield logs[0] if len(logs) == 1 else LogOfParts(path, files, logs)
 
 
 class LogOfParts:
     """The files of one log one behind another; implements `LogFile`."""
 
-    def __init__(self, path: Path, parts: list[LogFile]) -> None:
+    def __init__(self, path: Path, files: list[Path], parts: list[LogFile]) -> None:
         self.path = path
+        self._names = [file.name for file in files]  # a packed part lies elsewhere
         self.format = f"{parts[0].format}, {len(parts)} files"
         self.losses: list[str] = []
         self.topics: dict[str, LogTopic] = {}
@@ -64,11 +63,28 @@ class LogOfParts:
         self._parts = parts
 
     def messages(self, topics: Collection[str]) -> Iterator[LogMessage]:
-        """Give every message of `topics`, in the order of the files."""
+        """Give every message of `topics`, in the order of the files.
+
+        Raises:
+            SettingsError: two files hold the same messages.
+        """
         self.losses.clear()
-        for part in self._parts:
-            yield from part.messages(topics)
-            self.losses += [f"{part.path.name}: {loss}" for loss in part.losses]
+        seen: dict[tuple[int, int], str] = {}
+        for name, part in zip(self._names, self._parts, strict=True):
+            digest = count = 0
+            for message in part.messages(topics):
+                digest = crc32(message.data, digest ^ message.received_ns & 0xFFFFFFFF)
+                count += 1
+                yield message
+            self.losses += [f"{name}: {loss}" for loss in part.losses]
+            first = seen.setdefault((digest, count), name)
+            if count and first != name:
+                raise damaged(
+                    self.path,
+                    f"{first} and {name} hold the same {count} messages: the "
+                    "recording is there twice",
+                    "Give one of the two files.",
+                )
 
 
 def log_files(path: Path) -> list[Path]:
@@ -79,11 +95,6 @@ def log_files(path: Path) -> list[Path]:
 def _files(path: Path) -> list[Path]:
     if not path.is_dir():
         return [path]
-    if (path / "meta" / "info.json").is_file():
-        raise SettingsError(
-            f"{path}: a data set of LeRobot: {_NO_TRACTION}.",
-            hint="Record the wrench of a sensor beside it.",
-        )
     try:
         names = sorted(p for p in path.iterdir() if p.name.endswith(_SUFFIXES))
     except OSError as error:
@@ -103,17 +114,11 @@ def _opened(path: Path, scratch: Path) -> LogFile:
     if start.startswith(MCAP_MAGIC):
         return McapLog(path)
     if start.startswith(sqlite_log.MAGIC):
-        return SqliteLog(path)
+        return SqliteLog(path, scratch.with_suffix(".wal"))
     if start.startswith(bag_log.MAGIC):
         return BagLog(path)
-    if start.startswith(b"PAR1"):
-        raise SettingsError(
-            f"{path}: a table in Parquet, no log.",
-            hint="Where it has t, v_t, F_n and F_t: traction fit FILE. States of "
-            "joints alone hold no force of the ground: no traction follows from them.",
-        )
     if start.startswith(b"#ROSBAG V1"):
-        raise damaged(path, "a bag of ROS before 2010", "Convert it: rosbag migrate.")
+        raise damaged(path, "a bag of format 1", "Convert it: rosbag migrate.")
     raise damaged(path, "no log that is known", _FORMATS)
 
 
@@ -129,11 +134,7 @@ def _first_bytes(path: Path) -> bytes:
             path, f"cannot be read ({error.strerror})", "Check the name."
         ) from error
     if size > LARGEST_LOG:
-        raise damaged(
-            path,
-            f"{size / 1e9:.1f} GB, the limit is {LARGEST_LOG / 1e9:.0f} GB",
-            "Cut it: ros2 bag convert, or mcap filter, with the two topics only.",
-        )
+        raise too_large(path, size)
     return start
 
 

@@ -1,4 +1,4 @@
-"""rosbag2 logs in SQLite (.db3), opened for reading only; no view or trigger runs."""
+"""rosbag2 logs in SQLite (.db3), never written to; no view or trigger runs."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from analysis.logs.log_file import (
     LogMessage,
     LogTopic,
     OneFile,
-    checked_definition,
     checked_name,
+    copy_bounded,
     damaged,
+    first_byte,
     short_type,
 )
 
 MAGIC = b"SQLite format 3\0"
-_DEFINITIONS = "message_definitions"
 _CACHE_KB = 16_000
 
 
@@ -33,13 +33,19 @@ class SqliteLog(OneFile):
 
     format = "rosbag2, SQLite"
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, scratch: Path) -> None:
         """Read which topics there are.
 
+        Args:
+            path: the database.
+            scratch: for a copy with its write-ahead log, where it has one.
+
         Raises:
-            SettingsError: it is no log of rosbag2, or damaged.
+            SettingsError: it is no log of rosbag2, damaged, or a transaction in it was
+                cut off.
         """
         super().__init__(path)
+        self._uri = _uri_of(path, scratch)
         self._numbers: dict[int, str] = {}
         with self._opened() as database:
             tables = {
@@ -55,9 +61,7 @@ class SqliteLog(OneFile):
                     "no log of rosbag2: the tables topics and messages are missing",
                     "Give a bag folder, an .mcap, a .db3 or a .bag.",
                 )
-            has_definitions = _DEFINITIONS in tables
-            definitions = self._definitions(database) if has_definitions else {}
-            self._take_topics(database, definitions)
+            self._take_topics(database)
 
     def messages(self, topics: Collection[str]) -> Iterator[LogMessage]:
         """Give every message of `topics`, in the order of the file."""
@@ -85,20 +89,7 @@ class SqliteLog(OneFile):
     def _topic(self, number: object) -> str:
         return self._numbers.get(number, "") if isinstance(number, int) else ""
 
-    def _definitions(self, database: sqlite3.Connection) -> dict[str, str]:
-        rows = database.execute(
-            "SELECT topic_type, encoding, encoded_message_definition FROM "
-            f"message_definitions LIMIT {MOST_TOPICS}"
-        )
-        return {
-            short_type(kind): checked_definition(self.path, text, kind)
-            for kind, encoding, text in map(_as_texts, rows)
-            if encoding == "ros2msg"
-        }
-
-    def _take_topics(
-        self, database: sqlite3.Connection, definitions: dict[str, str]
-    ) -> None:
+    def _take_topics(self, database: sqlite3.Connection) -> None:
         rows = database.execute(
             "SELECT id, name, type, serialization_format FROM topics "
             f"LIMIT {MOST_TOPICS}"
@@ -111,16 +102,13 @@ class SqliteLog(OneFile):
             name = checked_name(self.path, name, "the name of a topic")
             kind = short_type(checked_name(self.path, kind, "the name of a type"))
             self._numbers[number] = name
-            self.topics[name] = LogTopic(name, kind, "cdr", definitions.get(kind, ""))
+            self.topics[name] = LogTopic(name, kind, "cdr")
 
     @contextmanager
     def _opened(self) -> Iterator[sqlite3.Connection]:
         """Give the database; what SQLite refuses becomes a SettingsError."""
-        name = quote(str(self.path.absolute()))
         try:
-            with closing(
-                sqlite3.connect(f"file:{name}?mode=ro&immutable=1", uri=True)
-            ) as database:
+            with closing(sqlite3.connect(self._uri, uri=True)) as database:
                 database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST_PART)
                 database.execute("PRAGMA trusted_schema=OFF")
                 database.execute("PRAGMA mmap_size=0")
@@ -133,6 +121,27 @@ class SqliteLog(OneFile):
             raise damaged(
                 self.path, f"cannot be read as a database ({error})"
             ) from error
+
+
+def _uri_of(path: Path, scratch: Path) -> str:
+    """What SQLite opens: the database itself, or a copy with its write-ahead log.
+
+    A hot journal is never rolled back: it may name files that SQLite would delete.
+    """
+    journal, wal = (path.with_name(f"{path.name}-{end}") for end in ("journal", "wal"))
+    if first_byte(journal) not in (b"", b"\0"):
+        raise damaged(
+            path,
+            f"beside it stands {journal.name}, of a transaction that has not ended: "
+            "its messages may be half written",
+            f"Roll it back in a copy of the folder: sqlite3 {path.name} .schema",
+        )
+    if not first_byte(wal):
+        return f"file:{quote(str(path.absolute()))}?mode=ro&immutable=1"
+    scratch.mkdir()
+    copy = scratch / "log.db3"
+    copy_bounded((path, wal), (copy, scratch / "log.db3-wal"))
+    return f"file:{quote(str(copy))}?mode=rw"
 
 
 def _as_texts(row: Any) -> list[str]:  # noqa: ANN401

@@ -12,6 +12,7 @@ from typing import Any
 
 from acquisition.errors import MissingLibraryError
 from analysis.report.drawing import kept_figures
+from analysis.report.findings import findings_rows, plain_findings
 from analysis.report.page_model import (
     PageSection,
     ReportContext,
@@ -20,12 +21,7 @@ from analysis.report.page_model import (
     cell_text,
     number_columns,
 )
-from analysis.report.results import (
-    StudyResults,
-    compute_results,
-    findings_rows,
-    plain_findings,
-)
+from analysis.report.results import StudyResults, compute_results
 from analysis.report.section import ReportTable
 from analysis.report.sections.order import FIGURES, SECTIONS
 from analysis.study.fits import to_csv, to_fits, to_plain

@@ -1,19 +1,15 @@
 """What stands on the page of a report: tables and figures, each in its section."""
 
-from __future__ import annotations
-
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from analysis.report.pictures import Picture
-from analysis.report.section import ReportSection, ReportTable
+from analysis.report.results import StudyResults
+from analysis.report.section import FigureSpec, ReportSection, ReportTable
 from analysis.report.sections.rig_health.health import RigTrial
 from analysis.study.jobs import Store
-
-if TYPE_CHECKING:
-    from analysis.report.results import StudyResults
 
 _MINUS = re.compile(r"(?<![\w.\u2212-])-(?=\.?\d)")
 _NUMBER = re.compile(r"[<>≤≥~]? ?[-+\u2212]?\.?\d[\d.,]*( ?(%|±.*|\(.*\)|×.*))?")
@@ -122,3 +118,24 @@ class ReportContext:
         if self.is_simulated:
             return "SIMULATED"
         return "FOREIGN" if self.is_foreign else "LIVE"
+
+
+def _nothing(*_: object) -> Sequence[Any]:
+    return ()
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A section of the report.
+
+    Attributes:
+        heading: which one.
+        tables: its tables, of the results and of what else the page shows.
+        figures: its figures, in their order.
+        sentences: what stands first.
+    """
+
+    heading: ReportSection
+    tables: Callable[[StudyResults, ReportContext], Sequence[ReportTable]] = _nothing
+    figures: Sequence[FigureSpec] = ()
+    sentences: Callable[[StudyResults], Sequence[str]] = _nothing

@@ -1,21 +1,15 @@
-"""What a section of the report is: one value with its heading, tables and figures.
+"""What the sections of a report are made of: their headings, tables and figures.
 
-A table or a figure is drawn from `StudyResults`; what else a page holds, as tables of
-sessions, joins the section that it names.
+A figure is drawn from `StudyResults`; what else a page holds, as tables of sessions,
+joins the section that it names.
 """
-
-from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING, Any
 
+from analysis.report.results import StudyResults
 from analysis.report.style import Figure
-
-if TYPE_CHECKING:
-    from analysis.report.page_model import ReportContext
-    from analysis.report.results import StudyResults
 
 
 class ReportSection(Enum):
@@ -74,24 +68,3 @@ class FigureSpec:
     draw: Callable[[StudyResults], Figure | None]
     caption: Callable[[StudyResults], str]
     is_vector: bool = False
-
-
-def _nothing(*_: object) -> Sequence[Any]:
-    return ()
-
-
-@dataclass(frozen=True, slots=True)
-class Section:
-    """A section of the report.
-
-    Attributes:
-        heading: which one.
-        tables: its tables, of the results and of what else the page shows.
-        figures: its figures, in their order.
-        sentences: what stands first.
-    """
-
-    heading: ReportSection
-    tables: Callable[[StudyResults, ReportContext], Sequence[ReportTable]] = _nothing
-    figures: Sequence[FigureSpec] = ()
-    sentences: Callable[[StudyResults], Sequence[str]] = _nothing

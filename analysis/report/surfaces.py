@@ -1,10 +1,8 @@
 """Mean and variance of a model over velocity and load, and where samples lie there."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,9 +10,6 @@ from analysis.data.samples import SampleTable
 from analysis.data.series import Array
 from analysis.study.study import Study
 from analysis.study.terrain_fit import TerrainResult
-
-if TYPE_CHECKING:
-    from analysis.report.results import StudyResults
 
 _POINTS = 41  # along each axis of a surface
 _CELLS = 20  # along each axis of a coverage map
@@ -136,26 +131,26 @@ def _axes(study: Study, count: int) -> SurfaceAxes:
 _DIGITS = 5  # of the surfaces in fits.json
 
 
-def plain_surfaces(results: StudyResults) -> dict[str, Any]:
+def plain_surfaces(shown: Sequence[Surface], axes: SurfaceAxes) -> dict[str, Any]:
     """Return the surfaces as plain values, for fits.json."""
     return {
-        "F_n": _short(results.axes.F_n),
-        "v_t": _short(results.axes.v_t),
+        "F_n": _short(axes.F_n),
+        "v_t": _short(axes.v_t),
         "terrains": {
             s.terrain: {"mean": _short(s.mean), "variance": _short(s.variance)}
-            for s in results.surfaces
+            for s in shown
         },
     }
 
 
-def plain_coverage(results: StudyResults) -> dict[str, Any]:
+def plain_coverage(shown: Sequence[CoverageMap], edges: SurfaceAxes) -> dict[str, Any]:
     """Return the coverage maps as plain values, for fits.json."""
     return {
-        "F_n_edges": _short(results.edges.F_n),
-        "v_t_edges": _short(results.edges.v_t),
+        "F_n_edges": _short(edges.F_n),
+        "v_t_edges": _short(edges.v_t),
         "terrains": {
             c.terrain: {"counts": c.counts.astype(int).tolist(), "beyond": c.outside}
-            for c in results.coverage
+            for c in shown
         },
     }
 

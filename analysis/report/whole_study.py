@@ -2,18 +2,18 @@
 
 from collections.abc import Callable, Mapping, Sequence
 
-from analysis.breakaway.model import BreakAwayModel
 from analysis.data.series import TractionSeries
 from analysis.data.terrain_kinds import terrain_kind
 from analysis.study.crossval import Prepared
 from analysis.study.jobs import Batch, Progress, Shard, Store
+from analysis.study.slip_risk import BreakAwayModel
 from analysis.study.study import (
     Study,
     StudyOptions,
     run_study_beside,
     run_study_shard,
 )
-from analysis.terrains.export import break_away_batch
+from analysis.terrains.tabulation import break_away_batch
 
 Recorded = Mapping[str, Sequence[TractionSeries]]
 

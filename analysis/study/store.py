@@ -29,8 +29,6 @@ import numpy as np
 
 from acquisition.errors import SettingsError
 from acquisition.files import open_directory, read_regular, replace_file
-from analysis.breakaway.censored import Family
-from analysis.breakaway.model import BreakAwayModel, PushLaw
 from analysis.data.samples import SampleTable
 from analysis.gp import noise, trial_noise
 from analysis.gp.kernels import KERNELS
@@ -42,6 +40,7 @@ from analysis.study.metrics import Score
 from analysis.study.models import GpModel, TustinModel
 from analysis.study.new_trial import NewTrialModel
 from analysis.study.noise_selection import NoiseChoice, TailedNoise
+from analysis.study.slip_risk import BreakAwayModel, PushLaw
 from analysis.study.terrain_fit import PooledTustinFit
 from analysis.study.trial_components import TrialComponents
 from analysis.tustin import model as tustin
@@ -59,7 +58,6 @@ TYPES = KERNELS | {
     kind.__name__: kind
     for kind in (
         BreakAwayModel,
-        Family,
         FoldResult,
         GaussianProcess,
         GpModel,

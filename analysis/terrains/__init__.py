@@ -1,6 +1,6 @@
 """Which terrain is it, and what traction does it give.
 
-`identify` tells terrains apart by the models of a study, `verdict` says which one a
-trial is from, `database` is what a locomotion controller queries, `path_copula` joins
-its forces along a path.
+Begin with `tabulation`, which makes the terrain database of a study; `database` is what
+a locomotion controller queries, `identify` and `verdict` tell terrains apart, and
+`export` writes the database for other programs.
 """

@@ -18,9 +18,9 @@ from pydantic import AfterValidator, BaseModel, Field, field_validator
 from acquisition.errors import SettingsError
 from acquisition.files import UnfitFileError, read_regular
 from acquisition.validation import Entries, Many, first_problem
-from analysis.breakaway.model import BreakAwayModel
 from analysis.data.recorded_factors import checked_factors
 from analysis.data.series import Array
+from analysis.study.slip_risk import BreakAwayModel
 from analysis.terrains.classifier import SurfaceClassifier
 from analysis.terrains.known import KnownTerrain, TerrainDatabase
 from analysis.terrains.path_copula import PathCopula

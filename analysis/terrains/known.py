@@ -14,11 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from acquisition.errors import SettingsError
-from analysis.breakaway.answers import BreakAwayRisk, check_finite
-from analysis.breakaway.model import BreakAwayModel
 from analysis.data.series import Array
 from analysis.data.terrain_kinds import Value
 from analysis.study.metrics import Prediction
+from analysis.study.slip_risk import BreakAwayModel, BreakAwayRisk, check_finite
 from analysis.terrains.classifier import SurfaceClassifier
 from analysis.terrains.path_copula import PathCopula
 from analysis.terrains.points import points_of

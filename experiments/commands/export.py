@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_targets(parser: argparse.ArgumentParser) -> None:
-    from analysis.exports.names import target_names
+    from analysis.terrains.export.names import target_names
 
     group = parser.add_argument_group(
         "terrains for other programs: --terrain-db FILE --for NAME,.. --to DIR"
@@ -148,7 +148,7 @@ def _is_given(args: argparse.Namespace, name: str) -> bool:
 
 def _export_for(args: argparse.Namespace, console: Console) -> int:
     from acquisition.errors import SettingsError
-    from analysis.exports.folder import parse_targets
+    from analysis.terrains.export.folder import parse_targets
     from experiments.export.terrain_targets import TargetRequest, export_for
 
     targets, names = parse_targets(args.targets), _names(args.terrain)

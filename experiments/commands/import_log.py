@@ -16,14 +16,25 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from analysis.data.terrain_kinds import Value
-    from analysis.imported.estimates import Estimate
-    from analysis.imported.importing import ImportRequest, Tare
+    from analysis.logs.request import ImportRequest, Tare
 
 EXAMPLES = """\
-  traction import log.mcap --urdf robot.urdf --list     topics, rates, links
+  traction import log.mcap --urdf robot.urdf --list         topics, rates, links
   traction import log.mcap --urdf robot.urdf --foot foot --sensor ft_frame
-      --acts ground-on-foot --tool-mass 0.21 --to gravel    then: traction fit gravel"""
-_NEEDED = ("to", "urdf", "foot", "sensor", "acts")
+      --acts ground-on-foot --list          a command line to be read and edited"""
+_NEEDED = (
+    "to",
+    "urdf",
+    "foot",
+    "sensor",
+    "acts",
+    "tare",
+    "tool-mass",
+    "along",
+    "normal",
+    "lag",
+    "trials",
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -37,7 +48,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--list",
         action="store_true",
-        help="only say what the log and the URDF hold: the first thing to try",
+        help="only say what log and URDF hold; with --foot, --sensor and --acts also "
+        "the command line, with every value that the log shows",
     )
     parser.add_argument("--to", type=Path, metavar="DIR", help="tables, a new folder")
     parser.add_argument("--urdf", type=Path, metavar="FILE", help="of the robot")
@@ -45,21 +57,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     _add_ground(parser)
     parser.add_argument("--joints", metavar="TOPIC", help="of several JointStates")
     parser.add_argument(
-        "--lag",
-        default="auto",
-        metavar="MS|auto",
-        help="how late the wrench is stamped (auto)",
-    )
-    parser.add_argument(
         "--clock",
         choices=("stamp", "receipt"),
-        help="times of the messages (stamps, where they can be used)",
+        help="whose times count where stamps and receipts disagree",
     )
     parser.add_argument(
-        "--trials",
-        default="auto",
-        metavar="T0:T1,..|auto",
-        help="seconds of the log, a trial each (every stroke)",
+        "--trials", metavar="T0:T1,..", help="seconds of the log, a trial each"
     )
     parser.add_argument(
         "--slow", action="store_true", help="take rates below 50 Hz, for means only"
@@ -74,10 +77,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _add_wrench(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("wrench")
-    group.add_argument(
-        "--wrench", metavar="TOPIC[:FIELD]", help="of several; a field with points"
-    )
-    group.add_argument("--sensor", metavar="FRAME", help="link whose axes it has")
+    group.add_argument("--wrench", metavar="TOPIC", help="of several WrenchStampeds")
+    group.add_argument("--sensor", metavar="LINK", help="link of the URDF it reads in")
     group.add_argument(
         "--acts",
         choices=("ground-on-foot", "foot-on-ground"),
@@ -85,15 +86,20 @@ def _add_wrench(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument(
         "--tare",
-        metavar="T0:T1|FILE|..",
-        help="unloaded seconds of the log, a log of the free foot, six numbers with "
-        "commas, or none for a sensor that is tared (found)",
+        metavar="T0:T1|..",
+        help="seconds of the log with the foot free, six numbers with commas, or "
+        "none for a sensor that is tared",
     )
     group.add_argument(
         "--tool-mass",
         type=number_within(0, 20, "a mass of 0 to 20 kg, e.g. 0.21"),
         metavar="KG",
-        help="of all below the gauges (found, where the free sensor turns)",
+        help="of everything below the gauges",
+    )
+    group.add_argument(
+        "--lag",
+        metavar="MS",
+        help="how late the wrench is stamped against the joints; 0 where it is not",
     )
     group.add_argument(
         "--estimated",
@@ -103,21 +109,10 @@ def _add_wrench(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_ground(parser: argparse.ArgumentParser) -> None:
-    degrees = number_within(-360, 360, "degrees, e.g. 10")
     group = parser.add_argument_group("foot and ground, in axes of the base")
-    group.add_argument("--foot", metavar="FRAME", help="link of the URDF: the sole")
-    group.add_argument(
-        "--along", metavar="X,Y,Z", help="direction of the slip (chord of the way)"
-    )
-    group.add_argument(
-        "--normal", metavar="X,Y,Z", help="of the ground (plane of the way)"
-    )
-    group.add_argument(
-        "--heading", type=degrees, metavar="DEG", help="of the slip about z, from x"
-    )
-    group.add_argument(
-        "--incline", type=degrees, metavar="DEG", help="along the slip, > 0 uphill"
-    )
+    group.add_argument("--foot", metavar="LINK", help="of the URDF: the sole")
+    group.add_argument("--along", metavar="X,Y,Z", help="direction of the slip")
+    group.add_argument("--normal", metavar="X,Y,Z", help="of the ground")
     group.add_argument("--terrain", default="table", metavar="NAME", help="its name")
     group.add_argument(
         "--factor",
@@ -131,44 +126,41 @@ def _add_ground(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Import a log, or say what it holds, and return the exit code."""
     from acquisition.errors import SettingsError
-    from experiments.operator.console import Console
+    from experiments.operator.console import WARNING, Console
 
     console = Console(color=not args.no_color)
     if args.list:
-        from analysis.imported.log_listing import listing
+        from analysis.logs.suggestions import ListRequest, listing
 
-        for line in listing(args.log, args.urdf):
+        names = ("urdf", "foot", "sensor", "acts", "joints", "wrench", "clock")
+        asked = {name: getattr(args, name) for name in names}
+        for line in listing(ListRequest(args.log, **asked)):
             console.say(line)
         return 0
-    missing = [f"--{name}" for name in _NEEDED if getattr(args, name) is None]
+    given = vars(args)
+    missing = [name for name in _NEEDED if given[name.replace("-", "_")] is None]
     if missing:
         raise SettingsError(
-            f"An import needs {', '.join(missing)}.",
-            hint="--list shows the topics of the log and the links of the URDF.",
+            f"An import needs {', '.join(f'--{name}' for name in missing)}.",
+            hint="--list shows what the log holds, and with --urdf, --foot, --sensor "
+            "and --acts the whole command line.",
         )
     if args.format == "parquet":
         from acquisition.extras import require_extra
 
         require_extra("parquet")
-    from analysis.imported.importing import import_log
+    from analysis.logs.importing import import_log
     from experiments.export.imported_tables import write_imported
 
     imported = import_log(request_of(args))
-    for estimate in imported.estimates:
-        console.say(_said(estimate))
+    for channel in (imported.joints, imported.wrench):
+        console.say(f"{channel.topic.name}: {channel.clock.text}")
+    for check in imported.checks:
+        mark = f"{WARNING} " if check.warning else ""
+        console.say(f"{mark}{check.text}")
     write_imported(imported, _plain(args), args.to, args.format, console)
     console.say(f"{args.to}: traction fit {args.to} --to REPORT")
     return 0
-
-
-def _said(estimate: Estimate) -> str:
-    """Return an estimate with its spread in one line."""
-    value, spread = (
-        ", ".join("not known" if math.isnan(x) else f"{x:.4g}" for x in numbers)
-        for numbers in (estimate.value, estimate.spread)
-    )
-    about = f"{estimate.how}: {spread}" if spread else estimate.how
-    return f"{estimate.name}: {value} {estimate.unit}".rstrip() + f" ({about})"
 
 
 def _plain(args: argparse.Namespace) -> dict[str, str]:
@@ -182,30 +174,24 @@ def _plain(args: argparse.Namespace) -> dict[str, str]:
 
 
 def request_of(args: argparse.Namespace) -> ImportRequest:
-    """Return what is asked for; raises SettingsError."""
-    from analysis.imported.importing import ImportRequest
+    """Return what is stated; raises SettingsError."""
+    from analysis.logs.request import ImportRequest
 
-    _refuse_both(args, "along", "heading")
-    _refuse_both(args, "normal", "incline")
-    lag = None if args.lag == "auto" else _numbers("--lag", args.lag, 1, ",")[0] * 1e-3
-    spans = None if args.trials == "auto" else _trials(args.trials)
     return ImportRequest(
         log=args.log,
         urdf=args.urdf,
         foot=args.foot,
         sensor=args.sensor,
         acts=args.acts,
-        wrench=args.wrench,
-        joints=args.joints,
         tare=_tare(args.tare),
         mass=args.tool_mass,
         along=_vector("--along", args.along),
         normal=_vector("--normal", args.normal),
-        incline_deg=args.incline,
-        heading_deg=args.heading,
-        lag=lag,
+        lag=_numbers("--lag", args.lag, 1, ",")[0] * 1e-3,
+        trials=_trials(args.trials),
+        joints=args.joints,
+        wrench=args.wrench,
         clock=args.clock,
-        trials=spans,
         terrain=args.terrain,
         factors=_factors(args.factor),
         is_slow=args.slow,
@@ -213,25 +199,9 @@ def request_of(args: argparse.Namespace) -> ImportRequest:
     )
 
 
-def _refuse_both(args: argparse.Namespace, vector: str, angle: str) -> None:
-    """Refuse two options that say the same thing."""
-    from acquisition.errors import SettingsError
-
-    if None not in (getattr(args, vector), getattr(args, angle)):
-        raise SettingsError(
-            f"--{vector} and --{angle} give the same direction.",
-            hint="Give one of them. Nothing was read.",
-        )
-
-
-def _tare(text: str | None) -> Tare:
-    if text is None:
-        return None
+def _tare(text: str) -> Tare:
     if text == "none":
         return "none"
-    path = Path(text)
-    if path.exists():
-        return path
     if text.count(",") == 5:
         import numpy as np
 
@@ -267,12 +237,10 @@ def _trials(text: str) -> list[tuple[float, float]]:
     return spans
 
 
-def _vector(option: str, text: str | None) -> NDArray[np.float64] | None:
-    from acquisition.errors import SettingsError
-
-    if text is None:
-        return None
+def _vector(option: str, text: str) -> NDArray[np.float64]:
     import numpy as np
+
+    from acquisition.errors import SettingsError
 
     vector = np.array(_numbers(option, text, 3, ","))
     if not 1e-6 < float(np.linalg.norm(vector)) < 1e6:

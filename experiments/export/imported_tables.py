@@ -9,17 +9,17 @@ from pathlib import Path
 from acquisition.files import open_regular
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.recorded_factors import value_text
-from analysis.imported.channels import Clocked, JointChannel, WrenchChannel
-from analysis.imported.importing import ImportedLog, ImportedTrial
-from analysis.imported.record import (
+from analysis.logs.channels import Clocked, JointChannel, WrenchChannel
+from analysis.logs.importing import ImportedLog, ImportedTrial
+from analysis.logs.log_file import LogTopic
+from analysis.logs.opening import log_files
+from analysis.logs.record import (
     RECORD,
     ImportedFigure,
     ImportedFile,
     ImportedTopic,
     ImportRecord,
 )
-from analysis.logs.log_file import LogTopic
-from analysis.logs.opening import log_files
 from analysis.tables.data_package import TableOrigin
 from experiments import provenance
 from experiments.export.quantities import KEPT, QUANTITIES, kept_rule
@@ -184,8 +184,6 @@ def record_of(imported: ImportedLog, arguments: Mapping[str, str]) -> ImportReco
     request = imported.request
     files = [("log", path) for path in log_files(request.log)]
     files.append(("urdf", request.urdf))
-    if isinstance(request.tare, Path):
-        files += [("tare", path) for path in log_files(request.tare)]
     joints, wrench = imported.joints, imported.wrench
     return ImportRecord(
         log_format=imported.format,
@@ -194,21 +192,20 @@ def record_of(imported: ImportedLog, arguments: Mapping[str, str]) -> ImportReco
         is_estimated=request.is_estimated,
         files=tuple(_file(what, path) for what, path in files),
         topics=(
-            _topic("joints", joints, "", "", joints.incomplete),
-            _topic(
-                "wrench", wrench, wrench.field, wrench.frame_id, wrench.lost_numbers
-            ),
+            _topic("joints", joints, ""),
+            _topic("wrench", wrench, wrench.frame_id),
         ),
         arguments=dict(arguments),
-        estimates=tuple(
-            ImportedFigure(
-                name=e.name, value=e.value, unit=e.unit, spread=e.spread, how=e.how
-            )
-            for e in imported.estimates
-        ),
         checks=tuple(
-            ImportedFigure(name=c.name, value=(c.value,), how=f"limit {c.limit}")
-            for c in imported.checks
+            ImportedFigure(
+                name=check.name,
+                value=check.stated,
+                unit=check.unit,
+                shown=check.shown,
+                spread=check.spread,
+                how=check.how,
+            )
+            for check in imported.checks
         ),
         trials={
             trial.name: (trial.start, trial.start + float(trial.t[-1]))
@@ -229,25 +226,20 @@ def _file(what: str, path: Path) -> ImportedFile:
 def _topic(
     what: str,
     channel: JointChannel | WrenchChannel,
-    field: str,
     frame_id: str,
-    dropped: int,
 ) -> ImportedTopic:
     topic: LogTopic = channel.topic
     clock: Clocked = channel.clock
-    text = topic.definition.encode()
     median, most = clock.late
     return ImportedTopic(
         what=what,
         name=topic.name,
         type=topic.type_name,
-        field=field,
-        definition_sha256=hashlib.sha256(text).hexdigest() if text else "",
         frame_id=frame_id,
-        times="stamp" if clock.by == "stamp" else "receipt",
+        times=clock.by,
         read=clock.read,
         used=len(clock.times_ns),
-        dropped=dropped,
+        dropped=sum(clock.left_out.values()),
         repeated=clock.repeated,
         overtaken=clock.overtaken,
         rate_by_stamp=clock.rate_by_stamp,

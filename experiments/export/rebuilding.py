@@ -12,7 +12,8 @@ from typing import cast
 from acquisition.errors import SettingsError
 from acquisition.files import read_regular
 from acquisition.formats import format_problem
-from analysis.report.results import compute_results, findings_rows
+from analysis.report.findings import findings_rows
+from analysis.report.results import compute_results
 from analysis.report.sections.rig_health.health import with_tares
 from analysis.study.fits import to_csv
 from analysis.study.models import REPORTED, FitOptions

@@ -4,23 +4,27 @@ A recording has them as views at 50 Hz beside `/cycle`, which says all of it at 
 they are made again from there, so that a recording need not hold everything twice.
 """
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
+from math import atan2, hypot
 from pathlib import Path
 
 import numpy as np
 
 from acquisition.cdr import encode_string
-from acquisition.errors import SessionError
+from acquisition.errors import SessionError, SettingsError
 from acquisition.trial_file.bag import BagMessage, bag_bytes
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.views import VIEW_TOPICS, encode_views
+from analysis.data.load import sensor_height_of
 from experiments.export.checksums import SUMS, digest_of, write_sums
 from experiments.export.trial_tables import make_empty
 from experiments.operator.console import WARNING, Console
 from experiments.session.data_files import write_new
 from experiments.session.store import SessionFolder
+from ft_sensor.calibration.files import payload_from_toml
 
 _DESCRIPTION, _URDF = "/robot_description", "robot.urdf"
+_CALIBRATION = "ft_calibration.toml"
 STANDARD_TOPICS = {_DESCRIPTION: "std_msgs/msg/String", **VIEW_TOPICS}
 RECORDING = "recording"  # metadata record: that of the trial, and its SHA-256
 
@@ -67,6 +71,38 @@ def standard_topics(trial: TrialReader) -> bytes:
     return bag_bytes(STANDARD_TOPICS, _messages(trial), metadata, trial.attachments)
 
 
+def description(attachments: Mapping[str, bytes]) -> str:
+    """Return the arm's URDF with the frames `ft_sensor` and `sole` of a recording.
+
+    Without them where the calibration or the sensor's height is not recorded.
+    """
+    urdf = attachments[_URDF].decode(errors="replace")
+    height = sensor_height_of(attachments.get("config.toml", b""))
+    calibration = attachments.get(_CALIBRATION, b"").decode(errors="replace")
+    try:
+        payload, sole = payload_from_toml(calibration)
+    except SettingsError:
+        return urdf
+    if height is None:
+        return urdf
+    (r00, _, _), (r10, _, _), (r20, r21, r22) = payload.rotation.tolist()
+    turn = atan2(r21, r22), atan2(-r20, hypot(r21, r22)), atan2(r10, r00)  # rpy
+    frames = _fixed("ft_sensor", (0.0, 0.0, height), turn)
+    frames += _fixed("sole", sole.tolist(), (0.0, 0.0, 0.0))
+    return urdf.replace("</robot>", f"{frames}</robot>")
+
+
+def _fixed(link: str, xyz: Sequence[float], rpy: Sequence[float]) -> str:
+    at, turn = (" ".join(map(repr, numbers)) for numbers in (xyz, rpy))
+    return (
+        f'  <link name="{link}"/>\n'
+        f'  <joint name="{link}_mount" type="fixed">\n'
+        f'    <parent link="wam_tool"/><child link="{link}"/>\n'
+        f'    <origin xyz="{at}" rpy="{turn}"/>\n'
+        "  </joint>\n"
+    )
+
+
 def _messages(trial: TrialReader) -> Generator[BagMessage]:
     rows = trial.cycles()
     if not len(rows.data):
@@ -76,8 +112,8 @@ def _messages(trial: TrialReader) -> Generator[BagMessage]:
     offset = times - rows.data["host_ns"].astype(np.int64)
     published = np.where(arm > 0, arm + offset, times)
     if _URDF in trial.attachments:
-        urdf = trial.attachments[_URDF].decode(errors="replace")
-        yield BagMessage(_DESCRIPTION, int(times[0]), encode_string(urdf))
+        urdf = encode_string(description(trial.attachments))
+        yield BagMessage(_DESCRIPTION, int(times[0]), urdf)
     columns = (times.tolist(), published.tolist(), rows.sequence.tolist())
     for record, time, sent, number in zip(rows.data, *columns, strict=True):
         for topic, data in encode_views(record, time).items():

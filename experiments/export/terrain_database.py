@@ -6,8 +6,8 @@ from pathlib import Path
 
 from acquisition.clock import SystemClock
 from analysis.study.models import GP_SE, GP_SE_TRIAL, PAPER_MODELS, FitOptions
-from analysis.terrains.export import database_of
 from analysis.terrains.identify import identify_study
+from analysis.terrains.tabulation import database_of
 from experiments.operator.console import Console
 from experiments.report.choices import ReportRequest
 from experiments.report.sessions import results_below, study_sessions

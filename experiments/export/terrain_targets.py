@@ -6,9 +6,9 @@ from importlib.metadata import version
 from pathlib import Path
 
 from acquisition.files import read_regular
-from analysis.exports.folder import require_target, target_files
-from analysis.exports.source import TerrainExport
 from analysis.terrains.database import LARGEST, load
+from analysis.terrains.export.exported import TerrainExport
+from analysis.terrains.export.folder import require_target, target_files
 from experiments.export.trial_tables import make_empty
 from experiments.operator.console import WARNING, Console
 from experiments.session.data_files import write_new

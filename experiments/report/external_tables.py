@@ -7,7 +7,7 @@ import numpy as np
 
 from acquisition.errors import SettingsError
 from analysis.data.series import TractionSeries
-from analysis.imported.record import read_record
+from analysis.logs.record import read_record
 from analysis.report.section import ReportTable
 from analysis.report.sections.imported import import_tables
 from analysis.report.whole_study import run_whole_study

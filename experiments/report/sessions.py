@@ -6,7 +6,6 @@ from pathlib import Path
 from shutil import disk_usage
 
 from acquisition.errors import SessionError, TrialFileError
-from analysis.breakaway.model import BreakAwayModel
 from analysis.data.load import load_trial
 from analysis.data.plausibility import summed_up
 from analysis.data.recorded_factors import stated_factors
@@ -18,6 +17,7 @@ from analysis.report.whole_study import run_whole_study, run_whole_study_shard
 from analysis.study.covariates import COVARIATE_TYPES
 from analysis.study.jobs import Shard
 from analysis.study.models import FitOptions
+from analysis.study.slip_risk import BreakAwayModel
 from analysis.study.store import MOST_BYTES, TYPES, ResultStore
 from analysis.study.study import Study, StudyOptions
 from experiments.operator.console import Console

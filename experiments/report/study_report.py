@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from acquisition.clock import SystemClock
-from analysis.breakaway.model import BreakAwayModel
 from analysis.data.load import RecordedTrial
 from analysis.data.series import TractionSeries
 from analysis.report.page_model import ReportContext
@@ -15,6 +14,7 @@ from analysis.report.section import ReportTable
 from analysis.report.sections.beyond_paper.further_columns import covariate_tables
 from analysis.report.sections.rig_health.health import RigTrial
 from analysis.report.sections.sensitivity import plain_choice, side_by_side
+from analysis.study.slip_risk import BreakAwayModel
 from analysis.study.store import ResultStore
 from analysis.study.study import Study
 from experiments.operator.console import Console

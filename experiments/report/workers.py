@@ -3,10 +3,10 @@
 from acquisition.worker_processes import available_cores, prepare_workers
 
 _WORK = (  # what fits and figures need, the first needed first
-    "analysis.breakaway.fitting",
+    "analysis.study.break_away_fit",
     "analysis.study.study",
     "analysis.study.store",
-    "analysis.terrains.export",
+    "analysis.terrains.tabulation",
     "analysis.report.page",
     "scipy.signal",
     "matplotlib.figure",

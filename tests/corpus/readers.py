@@ -38,9 +38,9 @@ from ft_sensor.serial_line.timestamps import SampleTimestamper
 from ft_sensor.vendors import ati, bota, optoforce, robotous
 from tests.corpus.copied_session import use_lines, use_names
 from tests.corpus.logs import (
-    read_definition,
     read_import_record,
     read_log,
+    read_message,
     read_urdf_bytes,
 )
 from tests.corpus.used_session import use
@@ -278,7 +278,7 @@ READERS: dict[str, Callable[[bytes, Path], None]] = {
     "log-mcap": read_log("log.mcap"),
     "log-db3": read_log("log.db3"),
     "urdf": read_urdf_bytes,
-    "definition": read_definition,
+    "message": read_message,
     "import-record": read_import_record,
 }
 RESULTS = """\

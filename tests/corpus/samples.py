@@ -9,8 +9,7 @@ from importlib import resources
 import numpy as np
 
 from acquisition import formats
-from analysis.breakaway.censored import Family
-from analysis.breakaway.model import BREAK_AWAY, BreakAwayModel, PushLaw
+from analysis.study.slip_risk import BREAK_AWAY, BreakAwayModel, PushLaw
 from analysis.tables.data_package import TableOrigin
 from analysis.tables.parquet import to_parquet
 from analysis.terrains.database import FORMAT, VERSION
@@ -137,7 +136,6 @@ def _database() -> dict[str, object]:
     law = PushLaw(2.2, 0.5, 0.3, 0.1)
     rest = BreakAwayModel(
         kind=BREAK_AWAY,
-        family=Family.WEIBULL,
         law=law,
         draws=np.array([law.values]),
         v_slip=0.06,

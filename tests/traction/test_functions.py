@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import traction as tr
-from analysis.breakaway.recorded import BreakAwayOptions
+from analysis.study.break_away_fit import BreakAwayOptions
 from analysis.study.models import FitOptions
 
 ROOT = Path(__file__).parents[2]

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from analysis.imported.record import ImportedFigure, ImportedTopic, ImportRecord
-from analysis.report.section import ReportSection, ReportTable, Section
+from analysis.logs.record import ImportedFigure, ImportedTopic, ImportRecord
+from analysis.report.page_model import Section
+from analysis.report.section import ReportSection, ReportTable
 
 _ESTIMATED = "The wrench was estimated by the robot, not measured at the foot."
 _NOTHING = "–"
@@ -18,8 +19,8 @@ def import_tables(record: ImportRecord) -> list[ReportTable]:
     return [
         _table(
             f"Imported from {name}",
-            ("what", "value", "spread", "how"),
-            [_figure_row(each) for each in (*record.estimates, *record.checks)],
+            ("what", "stated", "shown by the log", "spread", "how"),
+            [_figure_row(each) for each in record.checks],
             _ESTIMATED if record.is_estimated else "",
         ),
         _table(
@@ -69,9 +70,12 @@ def _table(
     return ReportTable(name, header, rows, note, ReportSection.IMPORTED)
 
 
-def _figure_row(figure: ImportedFigure) -> tuple[str, str, str, str]:
-    value = f"{_numbers(figure.value)} {figure.unit}".strip()
-    return figure.name, value, _numbers(figure.spread), figure.how
+def _figure_row(figure: ImportedFigure) -> tuple[str, ...]:
+    stated, shown = (
+        f"{_numbers(values)} {figure.unit}".strip() if values else _NOTHING
+        for values in (figure.value, figure.shown)
+    )
+    return figure.name, stated, shown, _numbers(figure.spread), figure.how
 
 
 def _numbers(values: Sequence[float]) -> str:
@@ -84,10 +88,9 @@ def _number(value: float) -> str:
 
 def _topic_row(topic: ImportedTopic) -> tuple[str, ...]:
     median, most = topic.late_ms
-    where = f"{topic.type}, {topic.field}" if topic.field else topic.type
     return (
         topic.name,
-        where,
+        topic.type,
         str(topic.read),
         str(topic.used),
         str(topic.dropped),

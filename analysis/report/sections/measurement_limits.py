@@ -1,19 +1,14 @@
 """Measurement limits: what the rig could have seen, beside the errors."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from analysis.report.cell_texts import number_text
-from analysis.report.section import ReportSection, ReportTable, Section
+from analysis.report.page_model import ReportContext, Section
+from analysis.report.results import StudyResults
+from analysis.report.section import ReportSection, ReportTable
 from analysis.report.sections.rig_health.health import RigTrial
-
-if TYPE_CHECKING:
-    from analysis.report.page_model import ReportContext
-    from analysis.report.results import StudyResults
 
 _SATURATED = 1e-9  # share of cycles
 _REACH_NOTE = (

@@ -2,7 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 
-from analysis.report.section import FigureSpec, Section
+from analysis.report.page_model import Section
+from analysis.report.section import FigureSpec
 from analysis.report.sections import (
     imported,
     measurement_limits,

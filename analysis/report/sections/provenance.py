@@ -1,20 +1,14 @@
 """Analysis settings and provenance: every choice of the analysis."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from acquisition.clock import RATE_HZ
-from analysis.report.section import ReportSection, ReportTable, Section
+from analysis.report.page_model import ReportContext, Section
+from analysis.report.results import StudyResults
+from analysis.report.section import ReportSection, ReportTable
 from analysis.study.crossval import MOST_FOLDS
 from analysis.study.study import Study
 from analysis.tustin.model import SYMBOLS
-
-if TYPE_CHECKING:
-    from analysis.report.page_model import ReportContext
-    from analysis.report.results import StudyResults
 
 
 def choices(study: Study, *, is_foreign: bool) -> ReportTable:

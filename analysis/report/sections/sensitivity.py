@@ -15,7 +15,8 @@ from analysis.data.load import Frame, RecordedTrial
 from analysis.data.prepare import PrepareOptions
 from analysis.data.series import TractionSeries
 from analysis.report.cell_texts import paired_cell
-from analysis.report.section import ReportSection, ReportTable, Section
+from analysis.report.page_model import Section
+from analysis.report.section import ReportSection, ReportTable
 from analysis.study.metrics import PairedComparison, compare
 from analysis.study.models import (
     GP_NN,

@@ -7,7 +7,8 @@ import json
 import numpy as np
 import pytest
 
-from analysis.report.results import compute_results, findings_rows, plain_findings
+from analysis.report.findings import findings_rows, plain_findings
+from analysis.report.results import compute_results
 from analysis.report.sections.beyond_paper.classification import shares_of
 from analysis.report.sections.beyond_paper.noise import noise_summaries
 from analysis.report.sections.beyond_paper.residuals import residual_band
@@ -101,7 +102,7 @@ def test_chosen_noise_is_counted_and_compared(make_series, moving):
     fit = FitOptions(gp_points=40, models=(GP_SE, GP_SE_NOISE), draws=0)
     options = StudyOptions(fit=fit, n_jobs=1)
     study = run_study({"S0": trials}, options, simulated=False)
-    (summary,) = noise_summaries(study)
+    (summary,) = noise_summaries(compute_results(study))
     assert sum(summary.counts.values()) == 3
     difference = summary.after - summary.before
     assert summary.paired.difference == pytest.approx(difference)

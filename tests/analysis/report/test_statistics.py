@@ -10,7 +10,10 @@ from analysis.report.cell_texts import interval_text, paired_cells
 from analysis.report.results import compute_results
 from analysis.report.sections.beyond_paper.paired_comparisons import paired_table
 from analysis.report.sections.beyond_paper.predicted_uncertainty import uncertainty
-from analysis.report.sections.beyond_paper.residuals import independent_samples
+from analysis.report.sections.beyond_paper.residuals import (
+    independent_samples,
+    residual_bands,
+)
 from analysis.report.sections.summary.section import parameters
 from analysis.study.metrics import PairedComparison, standard_error
 from analysis.study.models import GP_SE, TITLES
@@ -51,7 +54,7 @@ def test_coverage_carries_its_standard_error_over_the_trials(small_study):
 @pytest.mark.slow
 def test_independent_samples_are_samples_over_the_correlation_time(small_study):
     results = compute_results(small_study)
-    band = results.residuals["S0"][GP_SE]
+    band = results.of(residual_bands)["S0"][GP_SE]
     assert band.samples == small_study.terrains["S0"].kept
     assert band.independent == pytest.approx(band.samples / band.time)
     assert band.independent < 0.1 * band.samples

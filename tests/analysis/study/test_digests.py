@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from analysis.breakaway.fitting import fit_planned
 from analysis.report.drawing import report_figures
+from analysis.study.break_away_fit import fit_planned
 from analysis.study.crossval import run_fold
 from analysis.study.digests import ROOT, code_digest, source_files
 from analysis.study.terrain_fit import fit_terrain
 from analysis.study.trial_components import fit_components
-from analysis.terrains.export import tabulate
+from analysis.terrains.tabulation import tabulate
 
 FOLDS = "analysis.study.crossval"
 
@@ -55,7 +55,7 @@ def test_what_a_fold_does_not_use_leaves_its_digest(copy):
         (run_fold, "analysis.gp.regression"),
         (fit_terrain, "analysis.tustin.model"),
         (fit_components, "analysis.data.series"),
-        (fit_planned, "analysis.breakaway.censored"),
+        (fit_planned, "analysis.study.push_likelihood"),
         (tabulate, "analysis.study.models"),
         (
             report_figures,

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analysis.breakaway.censored import Family
 from analysis.data.prepare import PrepareOptions, prepare_trial
+from analysis.gp.kernels import Role
 from analysis.study.crossval import plan_folds, run_fold
 from analysis.study.jobs import run_tasks
 from analysis.study.models import MODELS, FitOptions
@@ -71,18 +71,18 @@ def test_arrays_come_back_bit_by_bit():
         {"bytes": "AAA"},
         {"bytes": "!AAA"},
         {"type": "FitOptions", "value": "weibull"},
-        {"type": "Family", "value": "normal"},
+        {"type": "Role", "value": "normal"},
         {"items": 5},
         {},
     ],
 )
 def test_what_is_no_plain_form_is_refused(plain):
     with pytest.raises(ValueError, match=r".+"):
-        decode(plain, {"FitOptions": FitOptions, "Family": Family})
+        decode(plain, {"FitOptions": FitOptions, "Role": Role})
 
 
 def test_a_member_of_an_enumeration_comes_back_as_itself():
-    assert decode(encode(Family.LOGNORMAL), {"Family": Family}) is Family.LOGNORMAL
+    assert decode(encode(Role.BIAS), {"Role": Role}) is Role.BIAS
 
 
 def test_what_has_no_plain_form_is_not_written():

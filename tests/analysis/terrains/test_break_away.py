@@ -8,7 +8,7 @@ import pytest
 from acquisition.errors import SettingsError
 from analysis.study.models import TUSTIN
 from analysis.terrains.database import load
-from analysis.terrains.export import break_away_of, database_of
+from analysis.terrains.tabulation import break_away_of, database_of
 
 
 @pytest.fixture(scope="module")

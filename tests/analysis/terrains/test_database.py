@@ -14,13 +14,13 @@ from acquisition.errors import SettingsError
 from analysis.study.distribution import SHARES
 from analysis.terrains.classifier import SurfaceClassifier
 from analysis.terrains.database import load, to_text
-from analysis.terrains.export import database_of
 from analysis.terrains.known import KnownTerrain, TerrainDatabase
 from analysis.terrains.logistic import RidgeLogistic
 from analysis.terrains.path_copula import PathCopula
 from analysis.terrains.table import Table, rows_of
+from analysis.terrains.tabulation import database_of
 from analysis.terrains.windows import FEATURES
-from tests.analysis.exports.databases import from_rest
+from tests.analysis.terrains.export.databases import from_rest
 from tests.analysis.terrains.tables import normal_table
 
 UTC = "2027-01-15T08:00:00Z"

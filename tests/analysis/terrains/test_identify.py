@@ -16,7 +16,6 @@ from analysis.study.models import GP_SE, TUSTIN, FitOptions, ModelFitter
 from analysis.study.study import StudyOptions, run_study
 from analysis.tables.loading import load_tables
 from analysis.terrains.database import load
-from analysis.terrains.export import TableTask, database_of, training_set
 from analysis.terrains.identify import Confusion, identify_study
 from analysis.terrains.recognition import (
     Expert,
@@ -26,6 +25,7 @@ from analysis.terrains.recognition import (
     score_trial,
 )
 from analysis.terrains.table import Table
+from analysis.terrains.tabulation import TableTask, database_of, training_set
 from analysis.terrains.verdict import recognise
 
 LEVELS = {"S0": (1.5, 1.2), "TF": (0.8, 0.15), "Tf": (0.3, 0.15)}  # ratio, spread [N]

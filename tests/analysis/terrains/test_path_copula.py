@@ -14,7 +14,7 @@ from analysis.terrains.path_copula import (
     lag_correlation,
 )
 from analysis.terrains.table import TractionEstimates
-from tests.analysis.exports.databases import database
+from tests.analysis.terrains.export.databases import database
 
 DT = 0.01
 TRUE = PathCopula(level=0.3, tau_stick=0.05, tau_slide=0.25)

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from tests.analysis.exports.databases import database_file
+from tests.analysis.terrains.export.databases import database_file
 from tests.experiments.program import traction
 
 FOR = ("--for", "c,onnx")

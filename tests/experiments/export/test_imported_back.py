@@ -1,6 +1,7 @@
 """The program's own trials, written as ROS 2 topics at 500 Hz and imported back."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,8 +13,9 @@ from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.views import VIEW_TOPICS, encode_views
 from analysis.data.load import load_trial
 from analysis.data.prepare import PrepareOptions, moving_average, prepare_trial
-from analysis.imported.importing import ImportRequest, import_log
+from analysis.logs.importing import import_log
 from analysis.logs.opening import open_log
+from analysis.logs.request import ImportRequest
 from analysis.tables.loading import load_tables
 from experiments.export.standard_topics import standard_topics
 from tests.disturbances.measure import recorded_trial
@@ -71,7 +73,7 @@ def own(first_trial, tmp_path_factory):
         rows = reader.cycles()
         write_topics(log, rows.data, rows.log_time.tolist())
         x_T, _, z_T = trial.frame.axes()
-        asked = {"along": x_T, "normal": z_T, "lag": 0.0, "tare": "none"}
+        asked = {"along": x_T, "normal": z_T, "lag": 0.0, "tare": "none", "mass": 0.0}
         asked |= {"trials": [(0.0, float(trial.t[-1]))], **options}
         request = ImportRequest(
             log, urdf, "sole", "ft_sensor", "ground-on-foot", **asked
@@ -177,11 +179,7 @@ def test_an_own_recording_itself_is_refused_with_who_reads_it(own, first_trial):
     _, imported = own
     request = imported().request
     with pytest.raises(SettingsError, match="this is a trial of Traction"):
-        import_log(
-            ImportRequest(
-                first_trial, request.urdf, "sole", "ft_sensor", "ground-on-foot"
-            )
-        )
+        import_log(replace(request, log=first_trial))
 
 
 def test_what_a_log_says_of_its_devices_goes_along(first_trial, tmp_path):
@@ -200,6 +198,7 @@ def test_what_a_log_says_of_its_devices_goes_along(first_trial, tmp_path):
     done = traction(
         *("import", log, "--urdf", urdf, "--foot", "sole", "--sensor", "ft_sensor"),
         *("--acts", "ground-on-foot", "--tare", "none", "--lag", "0"),
+        *("--tool-mass", "0", "--trials", f"0:{trial.t[-1]}"),
         *(f"--along={','.join(map(str, x_T))}", f"--normal={','.join(map(str, z_T))}"),
         *("--to", tmp_path / "out"),
     )

@@ -9,6 +9,8 @@ from rosbags.typesys import Stores, get_typestore
 
 from acquisition.errors import TrialFileError
 from acquisition.trial_file.reader import TrialReader
+from analysis.data.load import load_trial
+from analysis.logs.robot import RobotLeg, parse_urdf
 from tests.experiments.program import traction
 
 TOPICS = {"/joint_states", "/wrench", "/foot/pose", "/foot/twist"}
@@ -55,6 +57,22 @@ def test_numbers_are_those_of_the_cycles(standard, first_trial):
     twists = [message.twist for _, message in messages(standard, "/foot/twist")]
     turns = [(t.angular.x, t.angular.y, t.angular.z) for t in twists]
     assert np.array_equal(turns, cycles["foot_velocity"][:, 3:])
+
+
+def test_the_robot_has_every_frame_that_a_message_names(standard, first_trial):
+    ((_, told),) = messages(standard, "/robot_description")
+    robot = parse_urdf(standard, told.data.encode())
+    names = {
+        m.header.frame_id for topic in TOPICS for _, m in messages(standard, topic)
+    }
+    assert names <= {*robot.links}
+    trial = load_trial(first_trial)
+    leg = RobotLeg(robot, "sole", "ft_sensor")
+    q = np.array(trial.cycles["position"][::100])
+    path = leg.along(q, np.zeros_like(q))
+    assert path.foot == pytest.approx(trial.sole[::100], abs=1e-9)
+    turned = trial.rotation[::100] @ trial.payload.rotation
+    assert path.sensor == pytest.approx(turned, abs=1e-9)
 
 
 def test_nothing_but_standard_types_is_inside(standard):

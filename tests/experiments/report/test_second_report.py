@@ -9,13 +9,13 @@ import pytest
 import analysis.report.drawing
 import analysis.study.jobs
 import analysis.study.study
-import analysis.terrains.export
+import analysis.terrains.tabulation
 from tests.experiments.program import only_session, traction
 
 COMPUTED = (  # two trials have no components, and nothing is nothing to keep
     (analysis.study.study, "run_fold"),
     (analysis.study.study, "fit_terrain"),
-    (analysis.terrains.export, "fit_planned"),
+    (analysis.terrains.tabulation, "fit_planned"),
     (analysis.report.drawing, "report_figures"),
 )
 

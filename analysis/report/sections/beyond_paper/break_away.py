@@ -1,26 +1,20 @@
 """What the ground gives before it goes: models of break-away beside the pushes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from analysis.breakaway.model import BREAK_AWAY, SLIDING, BreakAwayModel
-from analysis.breakaway.pushes import FootPush, find_pushes
-from analysis.breakaway.survival import SurvivalCurve, kaplan_meier, pit_limit
 from analysis.data.series import Array
+from analysis.report.results import StudyResults
 from analysis.report.section import FigureSpec, ReportSection, ReportTable
 from analysis.report.style import LOAD_LABEL, Axes, Figure, panel_grid, plain
 from analysis.study.models import GP_SE
-from analysis.study.study import Study
+from analysis.study.pushes import FootPush, find_pushes
+from analysis.study.slip_risk import BREAK_AWAY, SLIDING, BreakAwayModel
+from analysis.study.survival import SurvivalCurve, kaplan_meier, pit_limit
 from analysis.study.terrain_fit import TerrainResult
-from analysis.terrains.export import break_away_of
-
-if TYPE_CHECKING:
-    from analysis.report.results import StudyResults
 
 RISKS = (0.05, 0.1, 0.5)  # at which forces are stated
 BREAK_AWAY_UNITS = {
@@ -136,19 +130,12 @@ class TerrainBreakAway:
         }
 
 
-def break_away_findings(
-    study: Study, models: Mapping[str, BreakAwayModel] | None = None
-) -> Mapping[str, TerrainBreakAway]:
-    """Return what every terrain gives before it slips, where that is known.
-
-    Args:
-        study: the trials.
-        models: fitted to them by terrain; None = they are fitted here.
-    """
-    models = break_away_of(study) if models is None else models
+def break_away_findings(results: StudyResults) -> Mapping[str, TerrainBreakAway]:
+    """Return what every terrain gives before it slips, where that is known."""
+    study = results.study
     return {
         name: _of_terrain(study.terrains[name], model, study.options.prepare.slowest)
-        for name, model in models.items()
+        for name, model in results.break_away.items()
     }
 
 
@@ -172,7 +159,8 @@ def _of_terrain(
 
 def break_away_table(results: StudyResults) -> ReportTable:
     """Return the force available from rest and in motion, and what it rests on."""
-    speeds = sorted({f.model.v_slip for f in results.break_away.values()})
+    terrains = results.of(break_away_findings)
+    speeds = sorted({f.model.v_slip for f in terrains.values()})
     return ReportTable(
         name="Force available from rest and in motion",
         header=(
@@ -186,7 +174,7 @@ def break_away_table(results: StudyResults) -> ReportTable:
             "distance (limit)",
             "effect of the trial",
         ),
-        rows=[_break_away_row(found) for found in results.break_away.values()],
+        rows=[_break_away_row(found) for found in terrains.values()],
         note="From rest: a push at a new place in a new trial slips with that "
         f"probability (v_slip {', '.join(f'{v:g}' for v in speeds)} m/s) before F_t "
         "reaches the force; brackets: 90 % interval by resampled trials. "
@@ -223,7 +211,7 @@ def _break_away_row(found: TerrainBreakAway) -> list[str]:
 
 def draw_available(results: StudyResults) -> Figure | None:
     """Return the force available over F_n, a panel per terrain, with the peaks."""
-    shown = list(results.break_away.values())
+    shown = list(results.of(break_away_findings).values())
     if not shown:
         return None
     figure, axes = panel_grid(len(shown), 2.1)
@@ -246,8 +234,9 @@ def draw_available(results: StudyResults) -> Figure | None:
 
 def caption_available(results: StudyResults) -> str:
     """State the forces at the median load and what is in motion beside them."""
+    terrains = results.of(break_away_findings)
     parts = []
-    for name, found in results.break_away.items():
+    for name, found in terrains.items():
         answer = found.model.available(found.load, _MIDDLE)
         motion = found.motion_quantile(_MIDDLE)
         parts.append(
@@ -255,7 +244,7 @@ def caption_available(results: StudyResults) -> str:
             f"{found.load:.1f} N"
             + ("" if motion is None else f", in motion {motion:.1f} N")
         )
-    speeds = {found.model.v_slip for found in results.break_away.values()}
+    speeds = {found.model.v_slip for found in terrains.values()}
     limits = ", ".join(f"{speed:g}" for speed in sorted(speeds))
     return (
         f"Peaks of pushes from rest; a slip is faster than {limits} m/s. A push that "
@@ -268,7 +257,9 @@ def caption_available(results: StudyResults) -> str:
 
 def draw_risk(results: StudyResults) -> Figure | None:
     """Return the risk over the force asked for, with Kaplan and Meier's steps."""
-    shown = [f for f in results.break_away.values() if f.survival is not None]
+    shown = [
+        f for f in results.of(break_away_findings).values() if f.survival is not None
+    ]
     if not shown:
         return None
     figure, axes = panel_grid(len(shown), 1.8)
@@ -295,7 +286,7 @@ def caption_risk(results: StudyResults) -> str:
     """State how far the models are from Kaplan and Meier's curves."""
     parts = [
         f"{name} {found.model.distance:.2f} ({found.limit:.2f})"
-        for name, found in results.break_away.items()
+        for name, found in results.of(break_away_findings).items()
         if found.limit is not None
     ]
     return (

@@ -1,12 +1,10 @@
 """Terrain classification: which terrain windows of motion were taken for."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from analysis.report.results import StudyResults
 from analysis.report.section import FigureSpec, ReportSection, ReportTable
 from analysis.report.style import (
     Axes,
@@ -18,9 +16,6 @@ from analysis.report.style import (
 )
 from analysis.terrains.evidence import REFUSED, Exclusion
 from analysis.terrains.identify import KEPT_PER_SECOND, Confusion, Identification
-
-if TYPE_CHECKING:
-    from analysis.report.results import StudyResults
 
 _LEVELS = {  # in words; a factor has its own name
     "terrain": "each terrain",

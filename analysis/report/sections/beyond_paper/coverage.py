@@ -1,12 +1,9 @@
 """Coverage of velocity and load by the samples."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from analysis.data.quality import ENOUGH, coverage, thinnest
+from analysis.report.results import StudyResults
 from analysis.report.section import FigureSpec
 from analysis.report.style import (
     COLOUR_MAP,
@@ -17,9 +14,6 @@ from analysis.report.style import (
     panel_grid,
     plain,
 )
-
-if TYPE_CHECKING:
-    from analysis.report.results import StudyResults
 
 
 def draw_coverage(results: StudyResults) -> Figure | None:

@@ -1,11 +1,8 @@
 """A trial that nobody has recorded yet: its distribution, and how trials differ."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from analysis.report.results import StudyResults
 from analysis.report.section import FigureSpec, ReportSection, ReportTable
 from analysis.report.sections.beyond_paper.new_trial_bands import oracle_table
 from analysis.report.style import Figure
@@ -22,9 +19,6 @@ from analysis.study.new_trial import NewTrialModel
 from analysis.study.study import Study
 from analysis.study.terrain_fit import mean_of
 from analysis.study.trial_components import TrialComponents
-
-if TYPE_CHECKING:
-    from analysis.report.results import StudyResults
 
 _LEAST = (
     0.01  # of the residual within a trial: smaller noise is not distinguishable from 0

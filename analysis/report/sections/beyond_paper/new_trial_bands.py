@@ -8,23 +8,18 @@ over groups; Lee, Barber and Willett 2023). Rows of one trial repeat each other,
 trial counts as one in both, and an error is that over trials.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from analysis.data.series import Array
+from analysis.report.results import StudyResults
 from analysis.report.section import FigureSpec, ReportSection, ReportTable
 from analysis.report.style import FIRST_COLOUR, Figure, panel_grid, plain
 from analysis.study.models import GP_SE_TRIAL
-from analysis.study.study import Study
 from analysis.study.terrain_fit import TerrainResult
-
-if TYPE_CHECKING:
-    from analysis.report.results import StudyResults
 
 BINS = 10  # of the shares
 ORACLE = (0.5, 0.8)  # bands that ten trials can show; 95 % would need nineteen
@@ -68,9 +63,9 @@ class HeldOutShares:
     oracle: tuple[OracleBand, ...]
 
 
-def held_out_shares(study: Study) -> list[HeldOutShares]:
+def held_out_shares(results: StudyResults) -> list[HeldOutShares]:
     """Return the shares of every terrain with three folds of `GP_SE_TRIAL` or more."""
-    found = map(_of_terrain, study.terrains.values())
+    found = map(_of_terrain, results.study.terrains.values())
     return [shares for shares in found if shares is not None]
 
 
@@ -158,7 +153,7 @@ def oracle_table(results: StudyResults) -> ReportTable:
             f"{band.coverage:.1%} ± {band.coverage_error:.1%}",
             f"{band.width:.2f}",
         ]
-        for shares in results.shares
+        for shares in results.of(held_out_shares)
         for band in shares.oracle
     ]
     return ReportTable(
@@ -175,12 +170,13 @@ def oracle_table(results: StudyResults) -> ReportTable:
 
 def draw_shares(results: StudyResults) -> Figure | None:
     """Return where held-out samples lie in what is predicted for a new trial."""
-    if not results.shares:
+    shown = results.of(held_out_shares)
+    if not shown:
         return None
-    figure, axes = panel_grid(len(results.shares), 1.4)
+    figure, axes = panel_grid(len(shown), 1.4)
     edges = np.linspace(0.0, 1.0, BINS + 1)
     middles = 0.5 * (edges[1:] + edges[:-1])
-    for ax, shares in zip(axes, results.shares, strict=True):
+    for ax, shares in zip(axes, shown, strict=True):
         ax.axhline(1.0, color="black", lw=1.0, ls=(0, (4, 2)))
         ax.stairs(shares.density, edges, fill=True, color="#56B4E9", alpha=0.6)
         ax.errorbar(
@@ -204,7 +200,7 @@ def caption_shares(results: StudyResults) -> str:
     """State how far the shares are from even, in standard errors."""
     values = [
         f"{shares.terrain} {np.abs(shares.density - 1.0).max():.2f}"
-        for shares in results.shares
+        for shares in results.of(held_out_shares)
     ]
     return (
         "Probability integral transform: the share of the distribution predicted for a "

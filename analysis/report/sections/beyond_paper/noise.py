@@ -1,21 +1,16 @@
 """Constant noise of the Gaussian process against noise that is chosen."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from analysis.report.cell_texts import holm_note, paired_cells
+from analysis.report.results import StudyResults
 from analysis.report.section import FigureSpec, ReportSection, ReportTable
 from analysis.report.style import FIRST_COLOUR, ONE_COLUMN, Figure, new_figure, plain
 from analysis.study.metrics import PairedComparison, compare
 from analysis.study.models import GP_SE, GP_SE_NOISE, GpModel
 from analysis.study.noise_selection import NAMES
-from analysis.study.study import Study
 from analysis.study.terrain_fit import TerrainResult, mean_of
-
-if TYPE_CHECKING:
-    from analysis.report.results import StudyResults
 
 _ROW = 0.32  # inches of one terrain's gain
 
@@ -48,9 +43,9 @@ class NoiseSummary:
         }
 
 
-def noise_summaries(study: Study) -> list[NoiseSummary]:
+def noise_summaries(results: StudyResults) -> list[NoiseSummary]:
     """Return one summary per terrain that has both models; none if not fitted."""
-    summaries = (_summary(result) for result in study.terrains.values())
+    summaries = (_summary(result) for result in results.study.terrains.values())
     return [summary for summary in summaries if summary is not None]
 
 
@@ -71,6 +66,7 @@ def _summary(result: TerrainResult) -> NoiseSummary | None:
 
 def noise_table(results: StudyResults) -> ReportTable:
     """Return which noise was chosen per terrain, and NLPD before and after."""
+    summaries = results.of(noise_summaries)
     rows = [
         [
             s.terrain,
@@ -80,10 +76,10 @@ def noise_table(results: StudyResults) -> ReportTable:
             cell,
         ]
         for s, cell in zip(
-            results.noise, paired_cells([s.paired for s in results.noise]), strict=True
+            summaries, paired_cells([s.paired for s in summaries]), strict=True
         )
     ]
-    pairs = [s.paired for s in results.noise]
+    pairs = [s.paired for s in summaries]
     return ReportTable(
         name="Noise chosen",
         header=("terrain", "folds", "NLPD constant", "NLPD chosen", "difference"),
@@ -95,18 +91,19 @@ def noise_table(results: StudyResults) -> ReportTable:
 
 def draw_noise(results: StudyResults) -> Figure | None:
     """Return what the chosen noise gains in log density, and what was chosen."""
-    if not results.noise:
+    summaries = results.of(noise_summaries)
+    if not summaries:
         return None
-    count = len(results.noise)
+    count = len(summaries)
     figure = new_figure(_ROW * count + 0.7, ONE_COLUMN)
     ax = figure.subplots()
     ax.axvline(0.0, color="#808080", lw=0.8)
-    gains = [-summary.paired.difference for summary in results.noise]
-    errors = [summary.paired.standard_error or 0.0 for summary in results.noise]
+    gains = [-summary.paired.difference for summary in summaries]
+    errors = [summary.paired.standard_error or 0.0 for summary in summaries]
     ax.errorbar(
         gains, range(count), xerr=errors, fmt="o", ms=4, capsize=2.5, color=FIRST_COLOUR
     )
-    for k, summary in enumerate(results.noise):
+    for k, summary in enumerate(summaries):
         chosen = [f"{name} {n}" for name, n in summary.counts.items() if n]
         numbers = f"{summary.before:.3f} to {summary.after:.3f} nat"
         ax.annotate(
@@ -119,7 +116,7 @@ def draw_noise(results: StudyResults) -> Figure | None:
             fontsize=6.5,
         )
     ax.set_ylim(count - 0.5, -0.5)
-    ax.set_yticks(range(count), [plain(summary.terrain) for summary in results.noise])
+    ax.set_yticks(range(count), [plain(summary.terrain) for summary in summaries])
     ax.set_xlabel("gain in log density by chosen noise [nat]")
     ax.grid(visible=False, axis="y")
     return figure
@@ -129,7 +126,7 @@ def caption_noise(results: StudyResults) -> str:
     """State where input-dependent noise helps."""
     better = [
         f"{s.terrain} {-s.paired.difference:.3f} (p = {s.paired.p:.2g})"
-        for s in results.noise
+        for s in results.of(noise_summaries)
         if s.paired.difference < 0
     ]
     return (

@@ -1,12 +1,9 @@
 """How honest the predicted uncertainties are: scores, and coverage of the bands."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from analysis.report.cell_texts import with_error
+from analysis.report.results import StudyResults
 from analysis.report.section import FigureSpec, ReportSection, ReportTable
 from analysis.report.style import (
     MODEL_COLOURS,
@@ -19,9 +16,6 @@ from analysis.study.metrics import standard_error
 from analysis.study.models import TITLES
 from analysis.study.study import Study
 from analysis.study.terrain_fit import TerrainResult, mean_of
-
-if TYPE_CHECKING:
-    from analysis.report.results import StudyResults
 
 _SHOWN = ("rmse", "nlpd", "crps", "coverage50", "coverage90", "coverage95", "variance")
 _HEADS = (

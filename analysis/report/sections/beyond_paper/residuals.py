@@ -1,15 +1,14 @@
 """Residuals, measured minus predicted F_t, of trials left out."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from analysis.data.prepare import PreparedTrial
 from analysis.data.samples import SampleTable
 from analysis.data.series import Array
+from analysis.report.results import StudyResults
 from analysis.report.section import FigureSpec, ReportSection, ReportTable
 from analysis.report.style import (
     FIRST_COLOUR,
@@ -22,9 +21,6 @@ from analysis.report.style import (
 from analysis.study.models import GP_SE, TITLES, TUSTIN
 from analysis.study.terrain_fit import TerrainResult
 from analysis.tustin.identifiability import correlation_samples
-
-if TYPE_CHECKING:
-    from analysis.report.results import StudyResults
 
 RESIDUAL_MODELS = (TUSTIN, GP_SE)
 SHARES = (0.05, 0.5, 0.95)  # quantiles of the residual that are shown
@@ -71,6 +67,18 @@ class ResidualBand:
             "autocorrelation_samples": self.time,
             "independent_samples": self.independent,
         }
+
+
+def residual_bands(results: StudyResults) -> dict[str, dict[str, ResidualBand]]:
+    """Return the held-out residuals by terrain and model, of models with a fold."""
+    return {
+        name: {
+            model: band
+            for model in RESIDUAL_MODELS
+            if (band := residual_band(result, model)) is not None
+        }
+        for name, result in results.study.terrains.items()
+    }
 
 
 def residual_band(result: TerrainResult, model: str) -> ResidualBand | None:
@@ -138,7 +146,7 @@ def independent_samples(results: StudyResults) -> ReportTable:
             f"{band.time:.0f}",
             f"{band.independent:.0f}",
         )
-        for name, bands in results.residuals.items()
+        for name, bands in results.of(residual_bands).items()
         for model, band in bands.items()
     ]
     return ReportTable(
@@ -162,7 +170,7 @@ def independent_samples(results: StudyResults) -> ReportTable:
 
 def draw_residuals(results: StudyResults) -> Figure | None:
     """Return quantiles of measured minus predicted F_t over velocity."""
-    shown = {name: bands for name, bands in results.residuals.items() if bands}
+    shown = {name: bands for name, bands in results.of(residual_bands).items() if bands}
     if not shown:
         return None
     figure, axes = panel_grid(len(shown), 1.6)
@@ -189,7 +197,7 @@ def caption_residuals(results: StudyResults) -> str:
     """State bias and spread of the residuals."""
     values = [
         f"{name} {bands[GP_SE].bias:+z.2f} ± {bands[GP_SE].sd:.2f} N"
-        for name, bands in results.residuals.items()
+        for name, bands in results.of(residual_bands).items()
         if GP_SE in bands
     ]
     return (

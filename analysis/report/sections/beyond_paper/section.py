@@ -1,10 +1,8 @@
 """Beyond the paper: its tables and figures in the order of the page."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
-from analysis.report.section import ReportSection, ReportTable, Section
+from analysis.report.page_model import ReportContext, Section
+from analysis.report.results import StudyResults
+from analysis.report.section import ReportSection, ReportTable
 from analysis.report.sections.beyond_paper.break_away import (
     BREAK_AWAY_FIGURE,
     BREAK_AWAY_RISK_FIGURE,
@@ -36,10 +34,6 @@ from analysis.report.sections.beyond_paper.sample_distribution import velocity_s
 from analysis.report.sections.beyond_paper.stick_slip import STICK_SLIP_FIGURE
 from analysis.report.sections.beyond_paper.trends import TRENDS_FIGURE, trend_table
 from analysis.report.sections.beyond_paper.trials import TRIALS_FIGURE
-
-if TYPE_CHECKING:
-    from analysis.report.page_model import ReportContext
-    from analysis.report.results import StudyResults
 
 
 def beyond_tables(results: StudyResults) -> list[ReportTable]:

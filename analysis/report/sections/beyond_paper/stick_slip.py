@@ -1,13 +1,10 @@
 """Stick-slip: force over the displacement of the sole."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from analysis.data.prepare import Smoothed
 from analysis.data.series import Array
+from analysis.report.results import StudyResults
 from analysis.report.section import FigureSpec
 from analysis.report.selection import representatives
 from analysis.report.style import (
@@ -20,9 +17,6 @@ from analysis.report.style import (
     shade_slip,
 )
 from analysis.study.terrain_fit import TerrainResult
-
-if TYPE_CHECKING:
-    from analysis.report.results import StudyResults
 
 
 def draw_stick_slip(results: StudyResults) -> Figure | None:

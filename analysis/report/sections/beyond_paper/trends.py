@@ -1,22 +1,18 @@
 """Repeatability of the trials of a terrain, and how they change from first to last."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from analysis.data.prepare import PreparedTrial
 from analysis.data.series import Array
+from analysis.report.results import StudyResults
 from analysis.report.section import FigureSpec, ReportSection, ReportTable
 from analysis.report.style import Axes, Figure, panel_grid, plain
 from analysis.report.traction_ratio import trial_ratio
 from analysis.study.terrain_fit import TerrainResult
-
-if TYPE_CHECKING:
-    from analysis.report.results import StudyResults
 
 MEAN_FORCE, TRACTION_RATIO, MEAN_LOAD = "F_t", "F_t/F_n", "F_n"
 TREND_UNITS = {MEAN_FORCE: "N", TRACTION_RATIO: "1", MEAN_LOAD: "N"}
@@ -64,6 +60,12 @@ class Trend:
         }
 
 
+def study_trends(results: StudyResults) -> dict[str, dict[str, Trend]]:
+    """Return the trends of the trial means, by terrain and measure."""
+    terrains = results.study.terrains
+    return {name: trends_of(result) for name, result in terrains.items()}
+
+
 def trends_of(result: TerrainResult) -> dict[str, Trend]:
     """Return the trends of mean F_t, mean F_n and their ratio over the trials."""
     kept = [(k + 1, trial) for k, trial in enumerate(result.trials) if trial.kept]
@@ -105,7 +107,7 @@ _MEASURES: Mapping[str, Callable[[PreparedTrial], float]] = {
 def trend_table(results: StudyResults) -> ReportTable:
     """Return repeatability and first-to-last trend of every terrain."""
     rows = []
-    for name, trends in results.trends.items():
+    for name, trends in results.of(study_trends).items():
         force, load, ratio = (
             trends[key] for key in (MEAN_FORCE, MEAN_LOAD, TRACTION_RATIO)
         )
@@ -151,7 +153,7 @@ def draw_trends(results: StudyResults) -> Figure | None:
     """Return the mean F_t of every trial with its line: wear of the terrain."""
     shown = {
         name: trends[MEAN_FORCE]
-        for name, trends in results.trends.items()
+        for name, trends in results.of(study_trends).items()
         if trends[MEAN_FORCE].means.size
     }
     if not shown:
@@ -175,7 +177,7 @@ def caption_trends(results: StudyResults) -> str:
     """State which terrains change from the first trial to the last."""
     changing = [
         f"{name} ({trend.slope:+z.3f} ± {trend.slope_error:.3f} N per trial)"
-        for name, trends in results.trends.items()
+        for name, trends in results.of(study_trends).items()
         if (trend := trends[MEAN_FORCE]).is_significant
     ]
     return (

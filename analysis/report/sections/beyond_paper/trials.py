@@ -1,15 +1,13 @@
 """All trials: force over the way of each, one row per terrain."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from analysis.data.prepare import PreparedTrial, Smoothed
 from analysis.data.series import Array
 from analysis.data.terrain_kinds import kind_title
+from analysis.report.results import StudyResults
 from analysis.report.section import FigureSpec
 from analysis.report.sections.beyond_paper.stick_slip import way_of
 from analysis.report.style import (
@@ -21,9 +19,6 @@ from analysis.report.style import (
     styled,
     terrain_colours,
 )
-
-if TYPE_CHECKING:
-    from analysis.report.results import StudyResults
 
 _MOST_TRIALS = 20  # side by side
 _MOST_POINTS = 400  # of a curve

@@ -11,9 +11,11 @@ from enum import Enum
 from typing import Any
 
 from analysis.data.quality import SENSOR_ERROR
+from analysis.report.results import StudyResults
+from analysis.report.sections.beyond_paper.noise import noise_summaries
 from analysis.report.sections.paper import model_quantities as models
 from analysis.report.sections.paper import trial_quantities as trials
-from analysis.report.sections.paper.evidence import PaperEvidence
+from analysis.report.sections.paper.evidence import PaperEvidence, gather_evidence
 from analysis.report.sections.paper.quantities import ClaimResult
 
 
@@ -101,6 +103,12 @@ class PaperClaim:
             "agrees": self.agreement.value,
             "numbers": dict(self.numbers),
         }
+
+
+def study_claims(results: StudyResults) -> list[PaperClaim]:
+    """Return the paper's statements held against a study; see `paper_claims`."""
+    noise = results.of(noise_summaries)
+    return paper_claims(gather_evidence(results.study, results.identification, noise))
 
 
 def paper_claims(evidence: PaperEvidence) -> list[PaperClaim]:

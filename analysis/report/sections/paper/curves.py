@@ -1,12 +1,10 @@
 """Fig. 5 and 6: Tustin and Gaussian process models over velocity."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from analysis.report.results import StudyResults
 from analysis.report.section import FigureSpec
 from analysis.report.style import Figure
 from analysis.report.velocity_panels import (
@@ -19,9 +17,6 @@ from analysis.report.velocity_panels import (
     panels,
 )
 from analysis.study.models import GP_SE, TUSTIN
-
-if TYPE_CHECKING:
-    from analysis.report.results import StudyResults
 
 
 def draw_tustin(results: StudyResults) -> Figure | None:

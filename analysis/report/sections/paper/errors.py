@@ -1,12 +1,9 @@
 """Fig. 9 and 10: errors of every model on its own terrain and on the others."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from analysis.data.terrain_kinds import FLAT
+from analysis.report.results import StudyResults
 from analysis.report.section import FigureSpec
 from analysis.report.style import (
     ERROR_LABEL,
@@ -25,9 +22,6 @@ from analysis.report.style import (
 from analysis.study.models import GP_SE, TITLES, TUSTIN, compared
 from analysis.study.study import Study
 from analysis.study.terrain_fit import TerrainResult
-
-if TYPE_CHECKING:
-    from analysis.report.results import StudyResults
 
 _MOST_NARROW = 10  # terrains whose bars one column of a paper holds
 _MOST_BARS = 12  # terrains beyond which grouped bars cannot be told apart

@@ -1,16 +1,14 @@
 """Fig. 4: traction force and velocity over time."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from analysis.data.events import Slip, find_slips
 from analysis.data.prepare import PreparedTrial, Smoothed
 from analysis.data.series import Array
+from analysis.report.results import StudyResults
 from analysis.report.section import FigureSpec
 from analysis.report.selection import representatives
 from analysis.report.style import (
@@ -25,9 +23,6 @@ from analysis.report.style import (
 )
 from analysis.study.study import Study
 from analysis.study.terrain_fit import TerrainResult
-
-if TYPE_CHECKING:
-    from analysis.report.results import StudyResults
 
 WINDOW = 3.5  # s shown of a trial
 _STEP = 0.1  # s between the windows compared

@@ -1,10 +1,8 @@
 """The paper's table and figures in the order of the page."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
-from analysis.report.section import ReportSection, ReportTable, Section
+from analysis.report.page_model import ReportContext, Section
+from analysis.report.results import StudyResults
+from analysis.report.section import ReportSection, ReportTable
 from analysis.report.sections.paper.curves import FIG5, FIG6
 from analysis.report.sections.paper.errors import FIG9, FIG10_BARS, FIG10_MAP
 from analysis.report.sections.paper.excerpts import FIG4
@@ -12,10 +10,6 @@ from analysis.report.sections.paper.statements import statements
 from analysis.report.sections.paper.surfaces import FIG7, FIG8
 from analysis.report.sections.paper.table_one import table_one
 from analysis.report.sections.paper.tustin_model import FIG2
-
-if TYPE_CHECKING:
-    from analysis.report.page_model import ReportContext
-    from analysis.report.results import StudyResults
 
 
 def _tables(results: StudyResults, _: ReportContext) -> list[ReportTable]:

@@ -1,15 +1,10 @@
 """The paper's statements beside what the study shows."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
+from analysis.report.results import StudyResults
 from analysis.report.section import ReportSection, ReportTable
-from analysis.report.sections.paper.claims import PaperClaim
-
-if TYPE_CHECKING:
-    from analysis.report.results import StudyResults
+from analysis.report.sections.paper.claims import PaperClaim, study_claims
 
 
 def statements(results: StudyResults) -> list[ReportTable]:
@@ -34,7 +29,7 @@ def statements(results: StudyResults) -> list[ReportTable]:
         ReportTable(
             name="Findings of the paper",
             header=("in", "paper", "this study", "agrees?"),
-            rows=[_statement_row(claim) for claim in results.claims],
+            rows=[_statement_row(claim) for claim in results.of(study_claims)],
             note=note,
             section=ReportSection.PAPER,
         )

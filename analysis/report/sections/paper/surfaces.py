@@ -3,15 +3,13 @@
 All panels share their axes and their colours.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.data.series import Array
+from analysis.report.results import StudyResults
 from analysis.report.section import FigureSpec
 from analysis.report.selection import representatives
 from analysis.report.style import (
@@ -26,9 +24,6 @@ from analysis.report.style import (
     plain,
 )
 from analysis.report.surfaces import Surface, common_range
-
-if TYPE_CHECKING:
-    from analysis.report.results import StudyResults
 
 _WIDE = 0.7  # decades from which a logarithmic scale has logarithmic ticks
 _MOST_DIGITS = 15

@@ -1,13 +1,10 @@
 """Fig. 2: the Tustin model with its fitted parameters."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from analysis.data.prepare import PrepareOptions
 from analysis.data.samples import SampleTable
+from analysis.report.results import StudyResults
 from analysis.report.section import FigureSpec
 from analysis.report.selection import representatives
 from analysis.report.style import (
@@ -19,9 +16,6 @@ from analysis.report.style import (
     plain,
 )
 from analysis.study.terrain_fit import TerrainResult
-
-if TYPE_CHECKING:
-    from analysis.report.results import StudyResults
 
 
 def draw_tustin_model(results: StudyResults) -> Figure | None:

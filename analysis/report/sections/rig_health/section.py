@@ -1,26 +1,21 @@
 """Rig health: a line per trial, timing, tare, joint 7, temperatures and drift."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from analysis.data.quality import JOINT7_WARNING
 from analysis.data.series import Array
 from analysis.report.cell_texts import number_text
-from analysis.report.section import FigureSpec, ReportSection, ReportTable, Section
+from analysis.report.page_model import ReportContext, Section
+from analysis.report.results import StudyResults
+from analysis.report.section import FigureSpec, ReportSection, ReportTable
 from analysis.report.sections.rig_health.health import (
     PERIOD_EDGES,
     SKEW_EDGES,
     RigTrial,
 )
 from analysis.report.style import Axes, Figure, name_ticks, new_figure, terrain_colours
-
-if TYPE_CHECKING:
-    from analysis.report.page_model import ReportContext
-    from analysis.report.results import StudyResults
 
 _NAMED = 8  # sessions that have their name below a figure
 

@@ -1,13 +1,12 @@
 """Summary: one line per terrain, the Tustin parameters, what a model is worth."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
 
 from analysis.data.quality import PULLED, PULLED_WARNING
 from analysis.report.cell_texts import bounded_text, interval_text, with_error
-from analysis.report.section import ReportSection, ReportTable, Section
+from analysis.report.page_model import ReportContext, Section
+from analysis.report.results import StudyResults
+from analysis.report.section import ReportSection, ReportTable
 from analysis.report.sections.summary.look_first import look_first_tables
 from analysis.report.traction_ratio import traction_ratio
 from analysis.study.models import TITLES, compared
@@ -15,10 +14,6 @@ from analysis.study.study import Study
 from analysis.study.terrain_fit import PooledTustinFit, TerrainResult
 from analysis.tustin.identifiability import Interval
 from analysis.tustin.model import SYMBOLS, UNITS, TustinBounds
-
-if TYPE_CHECKING:
-    from analysis.report.page_model import ReportContext
-    from analysis.report.results import StudyResults
 
 _DECADE = 10.0  # ratio of a profile's ends that says nothing about the value
 WORTHWHILE = 0.9  # error over the constant's below which a model says something

@@ -5,8 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from analysis.report.results import compute_results, plain_findings
+from analysis.report.findings import plain_findings
+from analysis.report.results import compute_results
 from analysis.report.sections.beyond_paper.break_away import (
+    break_away_findings,
     break_away_table,
     caption_available,
     draw_available,
@@ -44,14 +46,14 @@ def test_the_table_says_what_kind_of_answer_it_is(results):
 
 
 def test_counts_are_those_of_the_pushes(results):
-    for found in results.break_away.values():
+    for found in results.of(break_away_findings).values():
         assert int((~found.is_held).sum()) == found.model.slips
         assert int(found.is_held.sum()) == found.model.held
 
 
 def test_the_step_curve_and_the_model_agree_on_stones(results):
     for name in ("S0", "B0"):
-        found = results.break_away[name]
+        found = results.of(break_away_findings)[name]
         seen = found.survival.share_below(found.forces)
         # about 17 slips: a standard error of .12
         assert np.abs(seen - found.mean_risk).max() < 0.3
@@ -60,7 +62,7 @@ def test_the_step_curve_and_the_model_agree_on_stones(results):
 
 def test_numbers_of_the_report_stand_in_its_file(results):
     numbers = json.loads(json.dumps(plain_findings(results)["break_away"]))
-    known = results.break_away["S0"]
+    known = results.of(break_away_findings)["S0"]
     answer = known.model.available(known.load, 0.1)
     stored = next(a for a in numbers["S0"]["available"] if a["risk"] == 0.1)
     assert stored["force"] == pytest.approx(answer.force)

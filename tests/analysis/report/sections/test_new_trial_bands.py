@@ -3,7 +3,8 @@ import json
 import numpy as np
 import pytest
 
-from analysis.report.results import compute_results, plain_findings
+from analysis.report.findings import plain_findings
+from analysis.report.results import compute_results
 from analysis.report.sections.beyond_paper.new_trial import (
     caption_new_trial,
     draw_new_trial,
@@ -13,6 +14,7 @@ from analysis.report.sections.beyond_paper.new_trial_bands import (
     caption_shares,
     conformal_reaches,
     draw_shares,
+    held_out_shares,
     oracle_band,
 )
 from analysis.study.fits import to_plain
@@ -83,8 +85,8 @@ def results(make_series, moving):
 
 
 def test_shares_of_a_terrain_add_up(results):
-    assert [share.terrain for share in results.shares] == ["S0", "TF"]
-    for share in results.shares:
+    assert [share.terrain for share in results.of(held_out_shares)] == ["S0", "TF"]
+    for share in results.of(held_out_shares):
         assert share.trials == 4
         assert share.density.sum() == pytest.approx(10.0)
 
@@ -124,7 +126,7 @@ def test_shares_are_valid_json(results):
 
 def test_without_the_model_of_a_new_trial_there_is_nothing_of_it(small_study):
     results = compute_results(small_study)
-    assert results.shares == []
+    assert results.of(held_out_shares) == []
     assert new_trial_tables(results) == []
     assert draw_shares(results) is None
     assert draw_new_trial(results) is None

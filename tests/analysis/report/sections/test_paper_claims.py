@@ -8,8 +8,14 @@ import pytest
 
 from analysis.data.samples import SampleTable
 from analysis.gp.regression import fit_gp
-from analysis.report.results import compute_results, plain_findings
-from analysis.report.sections.paper.claims import CLAIMS, Agreement, paper_claims
+from analysis.report.findings import plain_findings
+from analysis.report.results import compute_results
+from analysis.report.sections.paper.claims import (
+    CLAIMS,
+    Agreement,
+    paper_claims,
+    study_claims,
+)
 from analysis.report.sections.paper.evidence import (
     MoreRows,
     MoreRowsTask,
@@ -133,7 +139,7 @@ def test_terrains_that_are_not_the_papers_are_not_compared(small_study):
     steeper = replace(small_study.terrains["S0"], incline_deg=8.0)
     other = {**small_study.terrains, "S0": steeper}
     results = compute_results(replace(small_study, terrains=other))
-    assert results.claims == []
+    assert results.of(study_claims) == []
     (table,) = statements(results)
     assert table.rows == []
     assert table.note.endswith("These are others: S0.")

@@ -1,5 +1,0 @@
-"""Terrains of a database for other programs: a C99 header, ONNX graphs.
-
-Begin with `source`: what is exported. `targets` has a module for every format,
-`folder` puts what a target writes together with its README and where it comes from.
-"""

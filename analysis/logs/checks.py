@@ -1,0 +1,327 @@
+"""What was stated beside what the log shows; a check never changes a number."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from acquisition.errors import SettingsError
+from analysis.data.frozen_channels import frozen_channels
+from analysis.data.plausibility import SLOWEST, doubts_of, free_moment
+from analysis.data.prepare import PrepareOptions, prepare_trial
+from analysis.data.series import Array, TractionSeries
+from analysis.logs.clocks import lag_by_receipts
+from analysis.logs.estimates import (
+    SURE,
+    Bools,
+    Estimate,
+    find_direction,
+    find_lag,
+    find_mass,
+    find_normal,
+    find_quiet,
+    turn_deg,
+)
+from analysis.logs.leg_record import LegRecord, rows_within
+from analysis.logs.request import ImportRequest
+from analysis.logs.signs import (
+    PRESSED_FORCE,
+    moment_warnings,
+    side_warnings,
+    sign_figures,
+    way_warnings,
+)
+from ft_sensor.payload import Payload
+from wam.model.constants import GRAVITY
+
+FREE_FORCE = 0.5  # N that a free foot may read, and a tare may drift
+LARGEST_MASS_ERROR = 0.02  # kg
+_ON_GROUND = 0.001  # m above its lowest place at which a foot is not free
+_TURN_TOLD = 2.0  # degrees of turn under load from which a mass of 0 is named
+_LITTLE = 0.1  # kg
+_OPTIONS = "check --sensor, --acts, --tare, --along, --normal and the URDF"
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One thing that was stated beside what the log shows of it.
+
+    Attributes:
+        name: what it is.
+        stated: numbers in `unit`; empty where nothing was stated.
+        unit: of the numbers; "" where there is none.
+        shown: by the log, the same; empty where it shows nothing.
+        spread: how well it is shown; `how` names its unit.
+        how: by what it is shown, or why it is not.
+        warning: what to say where the two disagree; "" where they do not.
+    """
+
+    name: str
+    stated: tuple[float, ...]
+    unit: str
+    shown: tuple[float, ...]
+    spread: tuple[float, ...]
+    how: str
+    warning: str = ""
+
+    @property
+    def text(self) -> str:
+        """The check in one line, for people."""
+        stated = f"{_numbers(self.stated)} {self.unit} stated; " if self.stated else ""
+        if not self.shown:
+            return f"{self.name}: {stated}not shown: {self.how}"
+        spread = f": {_numbers(self.spread)}" if self.spread else ""
+        shown = f"{_numbers(self.shown)} {self.unit}".rstrip()
+        return f"{self.name}: {stated}{shown} shown ({self.how}{spread})"
+
+
+def _numbers(values: Sequence[float]) -> str:
+    return ", ".join("not known" if math.isnan(x) else f"{x:.4g}" for x in values)
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """An import of which everything stated was applied, to be held against the log.
+
+    Attributes:
+        record: what was read.
+        spans: (first, end) of every trial.
+        axes: rows x_T, y_T, z_T in the base, shape (3, 3).
+        payload: tare and mass.
+        raw: readings at the times of the joints [N, N m], shape (n, 6).
+        force: of the ground on the foot in the base [N], shape (n, 3).
+        values: v_t [m/s], F_t [N], F_n [N], shape (n, 3).
+    """
+
+    record: LegRecord
+    spans: Sequence[tuple[int, int]]
+    axes: Array
+    payload: Payload
+    raw: Array
+    force: Array
+    values: Array
+
+    @property
+    def in_trials(self) -> Bools:
+        """Whether a row lies in a trial, shape (n,)."""
+        rows = np.zeros(len(self.values), bool)
+        for first, end in self.spans:
+            rows[first:end] = True
+        return rows
+
+    @property
+    def height(self) -> Array:
+        """Place of the foot along the normal [m], shape (n,)."""
+        return self.record.path.foot @ self.axes[2]
+
+
+def checks_of(judged: Judged, request: ImportRequest) -> list[Check]:
+    """Every check of what was stated, in the order of the options."""
+    quiet = find_quiet(judged.record.t, judged.raw, judged.height)
+    return [
+        tare_check(judged, quiet),
+        mass_check(judged, request, quiet),
+        lag_check(judged, request),
+        clock_check(judged.record),
+        normal_check(judged),
+        direction_check(judged),
+    ]
+
+
+def sign_checks(judged: Judged, doubts: Sequence[str]) -> list[Check]:
+    """The signs of the forces in the trials.
+
+    Args:
+        judged: the import.
+        doubts: of what was stated; they lead where to look.
+
+    Raises:
+        SettingsError: no ground has these forces.
+    """
+    rows = judged.in_trials
+    lateral = judged.force @ judged.axes[1]
+    try:
+        figures = sign_figures(judged.values[rows], lateral[rows])
+    except SettingsError as error:
+        seen = "".join(f"{doubt}. " for doubt in doubts)
+        raise SettingsError(error.message, hint=f"{seen}{error.hint}") from error
+    return [
+        Check(figure.name, (), "", (figure.value,), (), f"limit {figure.limit}")
+        for figure in figures
+    ]
+
+
+def tare_check(judged: Judged, quiet: Bools) -> Check:
+    """The force that the quiet free foot reads with the tare as stated."""
+    stated = tuple(judged.payload.bias[:3].tolist())
+    if not quiet.any():
+        how = "the foot is nowhere quiet 10 mm above its lowest place"
+        return Check("tare", stated, "N", (), (), how)
+    rest = judged.force[quiet]
+    mean = float(np.linalg.norm(rest.mean(axis=0)))
+    spread = (float(np.mean(rest.std(axis=0))),)
+    how = f"force of the free foot in {np.count_nonzero(quiet)} quiet rows; noise"
+    warning = (
+        f"the free foot reads {mean:.1f} N (limit {FREE_FORCE:g}): a forgotten tare or "
+        "weight? Check --tare and --tool-mass"
+        if mean > FREE_FORCE
+        else ""
+    )
+    return Check("tare", stated, "N", (mean,), spread, how, warning)
+
+
+def mass_check(judged: Judged, request: ImportRequest, quiet: Bools) -> Check:
+    """The mass that readings of the turning free foot show."""
+    sensor = judged.record.path.sensor
+    found = find_mass(judged.raw[quiet, :3], sensor[quiet], request.sign)
+    warning = ""
+    if found.value:
+        (mass,), (error,) = found.value, found.spread
+        if abs(mass - request.mass) > max(LARGEST_MASS_ERROR, 3.0 * error):
+            warning = (
+                f"--tool-mass {request.mass:g} kg, the free foot shows {mass:.2f} kg"
+            )
+    return _check("mass", (request.mass,), "kg", found, warning)
+
+
+def lag_check(judged: Judged, request: ImportRequest) -> Check:
+    """The lag that starts and stops of the foot show beside the one stated."""
+    motion = judged.record.motion
+    left = find_lag(motion.t, motion.step, judged.values)  # beyond the stated lag
+    found = Estimate(
+        tuple((request.lag + x) * 1e3 for x in left.value),
+        tuple((request.lag + x) * 1e3 for x in left.spread),
+        left.how,
+    )
+    warning, stated = "", request.lag * 1e3
+    if found.value:
+        low, high = found.spread
+        if not low - SURE * 1e3 <= stated <= high + SURE * 1e3:
+            warning = (
+                f"--lag {stated:.0f} ms; starts and stops show {low:.0f} to "
+                f"{high:.0f} ms"
+            )
+    return _check("lag", (stated,), "ms", found, warning)
+
+
+def clock_check(record: LegRecord) -> Check:
+    """How far the clocks of both topics are apart; delays are a part of it."""
+    fits = [each.clock.fit for each in (record.joints, record.wrench)]
+    shown = lag_by_receipts(fits[0], fits[1])
+    how = "; ".join(
+        f"{each.topic.name}: {'no stamps' if fit is None else fit.text}"
+        for each, fit in zip((record.joints, record.wrench), fits, strict=True)
+    )
+    value = () if shown is None else (shown * 1e3,)
+    return Check("clocks apart", (), "ms", value, (), how)
+
+
+def normal_check(judged: Judged) -> Check:
+    """The normal that the way of the pressed foot shows."""
+    pressed = judged.in_trials & (judged.values[:, 2] > PRESSED_FORCE)
+    found = find_normal(judged.record.path.foot[pressed])
+    return _check("normal", tuple(judged.axes[2].tolist()), "", found)
+
+
+def direction_check(judged: Judged) -> Check:
+    """The direction that the way of the foot in the trials shows."""
+    foot = judged.record.path.foot
+    found = find_direction(foot, judged.spans, judged.axes[2])
+    return _check("direction", tuple(judged.axes[0].tolist()), "", found)
+
+
+def _check(
+    name: str,
+    stated: tuple[float, ...],
+    unit: str,
+    found: Estimate,
+    warning: str = "",
+) -> Check:
+    return Check(name, stated, unit, found.value, found.spread, found.how, warning)
+
+
+def warnings_of(judged: Judged) -> list[str]:
+    """What a person should look at in forces, moments and ways of the trials."""
+    rows = judged.in_trials
+    values, lateral = judged.values[rows], (judged.force @ judged.axes[1])[rows]
+    foot = judged.record.path.foot
+    return [
+        *_of_weight(judged),
+        *side_warnings(values, lateral),
+        *_of_moments(judged),
+        *_of_channels(judged),
+        *(
+            text
+            for first, end in judged.spans
+            for text in way_warnings(foot[first:end], judged.axes)
+        ),
+    ]
+
+
+def tare_warnings(judged: Judged, request: ImportRequest) -> list[str]:
+    """What speaks against the window of a tare."""
+    if not isinstance(request.tare, tuple):
+        return []
+    rows = rows_within(judged.record.t, judged.raw, request.tare)
+    found: list[str] = []
+    above = float(judged.height[rows].min() - np.nanmin(judged.height))
+    if above < _ON_GROUND:
+        found.append(
+            "within the window of --tare the foot is at its lowest place of the log: "
+            "where it stands on the ground, the tare takes its load away"
+        )
+    raw = judged.raw[rows, :3]
+    half = len(raw) // 2
+    drift = float(np.linalg.norm(raw[:half].mean(axis=0) - raw[half:].mean(axis=0)))
+    if half and drift > FREE_FORCE:
+        found.append(
+            f"the halves of the window of --tare differ by {drift:.1f} N (limit "
+            f"{FREE_FORCE:g})"
+        )
+    return found
+
+
+def _of_weight(judged: Judged) -> list[str]:
+    """Name a mass of 0 where the sensor turns under load."""
+    turned = turn_deg(judged.record.path.sensor[judged.in_trials])
+    if judged.payload.mass or turned <= _TURN_TOLD:
+        return []
+    most = 2.0 * math.sin(math.radians(min(turned, 180.0)) / 2.0) * GRAVITY * _LITTLE
+    return [
+        f"--tool-mass 0, and the sensor turns by {turned:.0f} degrees in the trials: "
+        f"every {_LITTLE:g} kg of weight that is not stated is {most:.2f} N"
+    ]
+
+
+def _of_moments(judged: Judged) -> list[str]:
+    """Hold the moments against the lever of the foot, in the sensor's axes."""
+    path = judged.record.path
+    wrench = judged.payload.contact(judged.raw, path.sensor)
+    force, moment = wrench[:, :3], wrench[:, 3:]
+    sliding = judged.in_trials & (judged.values[:, 0] > SLOWEST)
+    sliding &= judged.values[:, 2] > PRESSED_FORCE
+    doubts = free_moment(force[sliding], moment[sliding])
+    found = [replace(doubt, remedy=_OPTIONS).text for doubt in doubts]
+    return [*found, *moment_warnings(moment, path.lever, force)]
+
+
+def _of_channels(judged: Judged) -> list[str]:
+    """Judge each channel of the sensor while the foot slides."""
+    t, record, found = judged.record.t, judged.record, list[str]()
+    for first, end in judged.spans:
+        is_in = (record.wrench_t >= t[first]) & (record.wrench_t < t[end - 1])
+        channels = frozen_channels(record.wrench_t[is_in], record.wrench.wrench[is_in])
+        found += [f"{channel.text} while the foot slides" for channel in channels]
+    return found
+
+
+def series_warnings(series: TractionSeries) -> list[str]:
+    """Why velocity and forces of a trial cannot be right."""
+    found: list[str] = []
+    for doubt in doubts_of(prepare_trial(series, PrepareOptions())):
+        remedy = "check --lag" if doubt.name == "lag" else _OPTIONS
+        found.append(f"{series.name}: {replace(doubt, remedy=remedy).text}")
+    return found

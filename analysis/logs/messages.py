@@ -1,0 +1,141 @@
+"""The two messages that an import reads: JointState and WrenchStamped.
+
+Their layout is that of the ROS packages; a definition inside a file is neither read nor
+executed. CDR aligns every number to its own size, counted from behind the four bytes
+that state the byte order (plain CDR of DDS-XTypes 1.3, 7.4.3); ROS 1 aligns nothing, is
+little-endian, and its header begins with a counter.
+"""
+
+import struct
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.data.series import Array
+from analysis.logs.log_file import LONGEST_NAME, Serialization
+
+JOINT_STATE = "sensor_msgs/JointState"
+WRENCH_STAMPED = "geometry_msgs/WrenchStamped"
+STAMPED = (JOINT_STATE, WRENCH_STAMPED)
+MOST_JOINTS = 10_000
+_NS = 10**9
+
+
+class MessageError(ValueError):
+    """A message is not what its type says; the text says where."""
+
+
+@dataclass(frozen=True, slots=True)
+class Header:
+    """When and in which frame.
+
+    Attributes:
+        stamp_ns: [UTC ns]; 0 where the sender set none.
+        frame_id: as stated; may be empty.
+    """
+
+    stamp_ns: int
+    frame_id: str
+
+
+@dataclass(frozen=True, slots=True)
+class JointMessage:
+    """A sensor_msgs/JointState.
+
+    Attributes:
+        header: its header.
+        names: of the joints.
+        position: [rad, m], shape (joints,); empty where the message has none.
+        velocity: [rad/s, m/s], shape (joints,); empty where the message has none.
+    """
+
+    header: Header
+    names: tuple[str, ...]
+    position: Array
+    velocity: Array
+
+
+def read_header(data: bytes, serialization: Serialization) -> Header:
+    """Header of a message that begins with one; raises MessageError."""
+    return _Cursor(data, serialization).header()
+
+
+def read_joints(data: bytes, serialization: Serialization) -> JointMessage:
+    """A JointState from its bytes.
+
+    Raises:
+        MessageError: it is too short, or states an absurd count.
+    """
+    cursor = _Cursor(data, serialization)
+    header, count = cursor.header(), cursor.count(4)
+    names = tuple(cursor.text() for _ in range(count))
+    return JointMessage(header, names, cursor.numbers(), cursor.numbers())
+
+
+def read_wrench(data: bytes, serialization: Serialization) -> tuple[Header, Array]:
+    """Header, and force [N] and torque [N m], shape (6,), of a WrenchStamped.
+
+    Raises:
+        MessageError: it is too short.
+    """
+    cursor = _Cursor(data, serialization)
+    return cursor.header(), cursor.doubles(6)
+
+
+class _Cursor:
+    """Reads the fields of a message from its begin on."""
+
+    def __init__(self, data: bytes, serialization: Serialization) -> None:
+        self._data, self._is_cdr = data, serialization == "cdr"
+        self._order, self._at = "<", 0
+        if self._is_cdr:
+            if len(data) < 4 or data[0] != 0 or data[1] not in (0, 1):
+                raise MessageError(f"it begins with {data[:2].hex()}, not as plain CDR")
+            self._order = "<" if data[1] else ">"
+            self._at = 4
+
+    def header(self) -> Header:
+        if not self._is_cdr:
+            self._integer()  # the counter of ROS 1
+        seconds, nanoseconds = self._integer(), self._integer()
+        return Header(seconds * _NS + nanoseconds, self.text())
+
+    def count(self, size: int) -> int:
+        """How many elements of at least `size` bytes follow; never more than fit."""
+        count = self._integer()
+        if count > MOST_JOINTS or count * size > len(self._data) - self._at:
+            raise MessageError(f"it states {count} elements")
+        return count
+
+    def text(self) -> str:
+        size = self._integer()
+        if size > LONGEST_NAME or size > len(self._data) - self._at:
+            raise MessageError(f"it states a text of {size} bytes")
+        text = self._data[self._at : self._at + size]
+        self._at += size
+        return text.rstrip(b"\0").decode(errors="replace")
+
+    def numbers(self) -> Array:
+        count = self.count(8)
+        return self.doubles(count) if count else np.zeros(0)
+
+    def doubles(self, count: int) -> Array:
+        self._align(8)
+        if count * 8 > len(self._data) - self._at:
+            raise MessageError("it is shorter than its type")
+        found = np.frombuffer(self._data, f"{self._order}f8", count, self._at)
+        self._at += 8 * count
+        return found.astype(np.float64)
+
+    def _integer(self) -> int:
+        self._align(4)
+        try:
+            (value,) = struct.unpack_from(f"{self._order}I", self._data, self._at)
+        except struct.error as error:
+            raise MessageError("it is shorter than its type") from error
+        self._at += 4
+        return value
+
+    def _align(self, size: int) -> None:
+        if self._is_cdr:
+            self._at += -(self._at - 4) % size

@@ -1,0 +1,278 @@
+"""What a log and a URDF hold, and a command line to be read and edited.
+
+Each value of the command line is what `checks` will show; none of them is applied
+before a person states it.
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from shlex import quote
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.errors import SettingsError
+from analysis.data.prepare import moving_average
+from analysis.data.series import Array
+from analysis.logs.channels import By
+from analysis.logs.clocks import lag_by_receipts
+from analysis.logs.estimates import (
+    Bools,
+    Estimate,
+    find_direction,
+    find_lag,
+    find_mass,
+    find_normal,
+    find_quiet,
+    pressed_stretches,
+    runs,
+)
+from analysis.logs.leg_record import LegRecord, record_of_leg
+from analysis.logs.messages import STAMPED, MessageError, read_header
+from analysis.logs.motion import rows_averaged
+from analysis.logs.opening import open_log
+from analysis.logs.robot import RobotLeg, Urdf, read_urdf
+from analysis.logs.signs import PRESSED_FORCE
+from ft_sensor.payload import Payload, traction
+
+_NS = 1e-9
+_MOST = 200  # topics and names that are shown
+_JOIN = 0.3  # s; a shorter lift parts no stroke
+_LEAST_WAY = 0.02  # m forward that make a stroke a trial
+_INSIDE = 0.05  # s from the ends of a quiet span
+_UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True, slots=True)
+class ListRequest:
+    """What is known before the first import.
+
+    Attributes:
+        log: file or folder.
+        urdf: of the robot; None = only the topics are listed.
+        foot: link of the sole; None = no values are suggested.
+        sensor: link of the wrench; None = no values are suggested.
+        acts: what the numbers of the wrench are; None = no values are suggested.
+        joints: topic; None = the only one.
+        wrench: topic; None = the only one.
+        clock: as stated.
+    """
+
+    log: Path
+    urdf: Path | None = None
+    foot: str | None = None
+    sensor: str | None = None
+    acts: str | None = None
+    joints: str | None = None
+    wrench: str | None = None
+    clock: By | None = None
+
+
+def listing(request: ListRequest) -> Iterator[str]:
+    """Give topics, types, counts, rates and frames, the robot's links, a command line.
+
+    Raises:
+        SettingsError: a file is missing, or no log or URDF.
+    """
+    yield from _topics(request.log)
+    urdf = None if request.urdf is None else read_urdf(request.urdf)
+    if urdf is not None:
+        yield f"{request.urdf}: {urdf.name or 'a robot'}"
+        yield f"  links: {', '.join(urdf.links[:_MOST])}"
+        moving = urdf.joint_names[:_MOST]
+        yield f"  joints that move: {', '.join(moving) or 'none'}"
+    if urdf is None or None in (request.foot, request.sensor, request.acts):
+        yield "State --urdf, --foot, --sensor and --acts to see what the log shows."
+        yield from _command(request, {})
+        return
+    try:
+        shown = dict(_shown(request, urdf))
+    except SettingsError as error:
+        yield f"▲ no values: {error.message} {error.hint}"
+        yield from _command(request, {})
+        return
+    for option, (_, estimate) in shown.items():
+        spread = ", ".join(f"{x:.4g}" for x in estimate.spread)
+        yield f"  --{option}: {estimate.how}{': ' if spread else ''}{spread}"
+    yield from _command(request, {option: text for option, (text, _) in shown.items()})
+
+
+def _command(request: ListRequest, shown: dict[str, str]) -> Iterator[str]:
+    """Give the command line with every option that has to be stated."""
+    known = {
+        name: str(value)
+        for name in ("urdf", "joints", "wrench", "foot", "sensor", "acts", "clock")
+        if (value := getattr(request, name)) is not None
+    }
+    blanks = {
+        "urdf": "FILE",
+        "foot": "LINK",
+        "sensor": "LINK",
+        "acts": "ground-on-foot|foot-on-ground",
+        "tare": "T0:T1",
+        "tool-mass": "KG",
+        "normal": "X,Y,Z",
+        "along": "X,Y,Z",
+        "lag": "MS",
+        "trials": "T0:T1,..",
+    }
+    options = blanks | known | {name: text for name, text in shown.items() if text}
+    yield f"traction import {quote(str(request.log))} --to DIR \\"
+    lines = [
+        # a value that begins with a minus would be taken for an option
+        f"    --{name}{'=' if text.startswith('-') else ' '}"
+        f"{text if text == blanks.get(name) else quote(text)}"
+        for name, text in options.items()
+    ]
+    yield from (f"{line} \\" for line in lines[:-1])
+    yield lines[-1]
+
+
+def _shown(
+    request: ListRequest, urdf: Urdf
+) -> Iterator[tuple[str, tuple[str, Estimate]]]:
+    """Give (option, its value as text, what shows it); raises SettingsError."""
+    leg = RobotLeg(urdf, str(request.foot), str(request.sensor))
+    with open_log(request.log) as log:
+        record = record_of_leg(
+            log, leg, request.joints, request.wrench, request.clock or "stamp"
+        )
+    sign = 1.0 if request.acts == "ground-on-foot" else -1.0
+    raw, sensor = record.raw(0.0), record.path.sensor
+    quiet = find_quiet(record.t, raw, record.path.foot @ _UP)
+    yield "tare", _tare(record.t, quiet)
+    mass = find_mass(raw[quiet, :3], sensor[quiet], sign)
+    yield "tool-mass", (_numbers(mass.value, 3), mass)
+    kilograms = mass.value[0] if mass.value else 0.0
+    payload = _payload(record, raw, quiet, kilograms, sign)
+    force = payload.to_base(payload.contact(raw, sensor), sensor)
+    strokes = _strokes(record, np.linalg.norm(force, axis=1))
+    foot = record.path.foot
+    pressed = [foot[first:end] for first, end in strokes]
+    normal = find_normal(np.concatenate(pressed) if pressed else np.zeros((0, 3)))
+    yield "normal", (_numbers(normal.value, 4), normal)
+    z_T = np.array(normal.value or tuple(_UP))
+    along = find_direction(foot, strokes, z_T)
+    yield "along", (_numbers(along.value, 4), along)
+    if not along.value:
+        return
+    x_T = np.array(along.value)
+    axes = np.stack([x_T, np.cross(z_T, x_T), z_T])
+    values = traction(axes, record.path.velocity, force)
+    yield "lag", _lag(record, values)
+    yield "trials", _trials(record, values)
+
+
+def _tare(t: Array, quiet: Bools) -> tuple[str, Estimate]:
+    spans = [(float(t[a]), float(t[b - 1])) for a, b in runs(quiet)]
+    if not spans:
+        why = "the foot is nowhere quiet 10 mm above its lowest place"
+        return "", Estimate((), (), why)
+    first, last = max(spans, key=lambda span: span[1] - span[0])
+    text = f"{first + _INSIDE:.2f}:{last - _INSIDE:.2f}"
+    return text, Estimate((first, last), (), "longest quiet span of the lifted foot")
+
+
+def _payload(
+    record: LegRecord, raw: Array, quiet: Bools, mass: float, sign: float
+) -> Payload:
+    free = Payload(mass, np.zeros(3), np.eye(3), sign, np.zeros(6))
+    if not quiet.any():
+        return free
+    rest = free.contact(raw[quiet], record.path.sensor[quiet])
+    return Payload(mass, np.zeros(3), np.eye(3), sign, sign * rest.mean(axis=0))
+
+
+def _strokes(record: LegRecord, load: Array) -> Sequence[tuple[int, int]]:
+    """(first, end) of the stretches in which something presses the foot."""
+    width = rows_averaged(record.motion.step)
+    filled = moving_average(np.where(np.isfinite(load), load, 0.0), width)
+    found = pressed_stretches(record.t, filled, PRESSED_FORCE, _JOIN)
+    return [(first, end) for first, end in found if end - first > max(width, 3)]
+
+
+def _lag(record: LegRecord, values: Array) -> tuple[str, Estimate]:
+    """By starts and stops, else by the receipts."""
+    found = find_lag(record.t, record.motion.step, values)
+    milliseconds = Estimate(
+        tuple(x * 1e3 for x in found.value),
+        tuple(x * 1e3 for x in found.spread),
+        found.how,
+    )
+    if milliseconds.value:
+        return f"{milliseconds.value[0]:.0f}", milliseconds
+    late = lag_by_receipts(record.joints.clock.fit, record.wrench.clock.fit)
+    if late is None:
+        return "", milliseconds
+    how = f"{found.how}; receipt less stamp of both topics, delays included"
+    return f"{late * 1e3:.0f}", Estimate((late * 1e3,), (), how)
+
+
+def _trials(record: LegRecord, values: Array) -> tuple[str, Estimate]:
+    spans: list[str] = []
+    strokes = _strokes(record, values[:, 2])
+    for first, end in strokes:
+        v_t = values[first:end, 0]
+        if float(np.clip(v_t, 0.0, None).sum()) * record.motion.step >= _LEAST_WAY:
+            spans.append(f"{record.t[first]:.2f}:{record.t[end - 1]:.2f}")
+    how = f"{len(spans)} of {len(strokes)} pressed stretches go forward by 20 mm"
+    return ",".join(spans), Estimate((), (), how)
+
+
+def _numbers(values: Sequence[float], digits: int) -> str:
+    return ",".join(f"{round(value, digits) + 0.0:.{digits}f}" for value in values)
+
+
+class _Times(NamedTuple):
+    stamps: array[int]
+    received: array[int]
+
+
+def _topics(path: Path) -> Iterator[str]:
+    """Give a line for every topic of a log."""
+    with open_log(path) as log:
+        times = {name: _Times(array("q"), array("q")) for name in log.topics}
+        frames: dict[str, str] = {}
+        for message in log.messages(log.topics):
+            topic, each = log.topics[message.topic], times[message.topic]
+            stamp_ns = 0
+            if topic.type_name in STAMPED:
+                try:
+                    header = read_header(message.data, topic.serialization)
+                except MessageError:
+                    continue
+                stamp_ns = header.stamp_ns
+                frames.setdefault(message.topic, header.frame_id)
+            each.stamps.append(stamp_ns)
+            each.received.append(message.received_ns)
+        yield f"{path}: {log.format}, {len(log.topics)} topics"
+        for name, topic in list(log.topics.items())[:_MOST]:
+            parts = [f"  {name}  {topic.type_name}", *_rates(times[name])]
+            if frame := frames.get(name):
+                parts.append(f"frame {frame[:60]}")
+            yield ", ".join(parts)
+        for name, about in list(log.unread.items())[:_MOST]:
+            yield f"  {name}  {about}: not read"
+        yield from (f"▲ {loss}" for loss in log.losses)
+
+
+def _rates(times: _Times) -> Iterator[str]:
+    yield f"{len(times.received)} messages"
+    stamps = np.array(times.stamps, np.int64)
+    by_stamp, by_receipt = _rate(stamps), _rate(np.array(times.received, np.int64))
+    if by_stamp is not None and stamps.min() > 0:
+        yield f"{by_stamp:.1f} Hz by stamp"
+    if by_receipt is not None:
+        yield f"{by_receipt:.1f} Hz by receipt"
+
+
+def _rate(times: NDArray[np.int64]) -> float | None:
+    """Messages a second by the median step of sorted times [Hz]."""
+    steps = np.diff(np.sort(times))
+    steps = steps[steps > 0]
+    return None if not steps.size else 1.0 / (float(np.median(steps)) * _NS)

@@ -1,0 +1,213 @@
+"""Messages that cannot be used are counted and named, and nothing is repaired."""
+
+import sqlite3
+
+import numpy as np
+import pytest
+
+from acquisition.errors import SettingsError
+from analysis.logs.importing import import_log
+from analysis.logs.opening import open_log
+from tests.analysis.logs.gantry import Rubbing, stated, write_bag2, write_urdf
+
+WRENCH = "/ft/wrench"
+
+
+@pytest.fixture
+def imported(tmp_path):
+    urdf = write_urdf(tmp_path)
+
+    def make(rubbing, **options):
+        log = tmp_path / "log"
+        if not log.exists():
+            write_bag2(log, rubbing)
+        return import_log(stated(rubbing, log, urdf, **options))
+
+    return make
+
+
+def changing(topic, change):
+    """Return a change of the messages of a topic: change(number, message)."""
+
+    def changed(rows):
+        count = 0
+        for name, _, message in rows:
+            if name == topic:
+                change(count, message)
+                count += 1
+        return rows
+
+    return (changed,)
+
+
+def worst_F_n(found, rubbing):
+    (trial,) = found.trials
+    v_t, _, F_n = rubbing.truth(trial.t + trial.start)
+    sound = np.isfinite(trial.traction[:, 2]) & (v_t > 0.03)
+    return float(np.abs(trial.traction[:, 2] - F_n)[sound].max())
+
+
+def test_velocities_that_are_no_numbers_leave_their_positions_usable(imported):
+    """It was "0 usable messages of 6000"."""
+
+    def change(_, message):
+        message.velocity[:] = np.nan
+
+    rubbing = Rubbing(with_velocity=True, changes=changing("/joint_states", change))
+    found = imported(rubbing)
+    assert len(found.joints.q) == 6000
+    assert any("6000 messages with velocities that are no" in w for w in found.warnings)
+    assert found.trials[0].traction[:, 0].max() == pytest.approx(0.06, abs=1e-3)
+
+
+@pytest.mark.parametrize("rows", [(3100,), (3100, 3101, 4000)])
+def test_joint_states_of_zeros_are_named_and_left_out(imported, rows):
+    """One of 6000 was "a wall. Check the tare"."""
+
+    def change(count, message):
+        if count in rows:
+            message.position[:] = 0.0
+
+    rubbing = Rubbing(changes=changing("/joint_states", change))
+    found = imported(rubbing)
+    assert any(
+        f"{len(rows)} messages with all joints at zero" in w and "6.200" in w
+        for w in found.warnings
+    )
+    assert found.trials[0].traction[:, 0].max() == pytest.approx(0.06, abs=1e-3)
+    assert worst_F_n(found, rubbing) < 0.3
+
+
+def test_joints_that_rest_at_zero_are_joints(imported):
+    rubbing = Rubbing()
+    real = rubbing.joints
+
+    def at_zero(t):
+        q = real(t)
+        return q - q[0]
+
+    rubbing.joints = at_zero
+    found = imported(rubbing)
+    assert not any("at zero" in w for w in found.warnings)
+
+
+def test_a_jump_of_a_joint_is_refused_with_its_time(imported):
+    def change(count, message):
+        if count >= 3100:
+            message.position[0] += 0.5
+
+    rubbing = Rubbing(changes=changing("/joint_states", change))
+    with pytest.raises(SettingsError, match=r"jumps 6\.198 s after its first message"):
+        imported(rubbing)
+
+
+def test_a_reading_that_never_changes_is_left_out_and_named(imported):
+    """2.5 s of it moved F_t by 1.7 N without a word."""
+    held = []
+
+    def change(count, message):
+        if 4000 <= count < 6000:
+            held.append(message.wrench)
+            message.wrench.force = held[0].force
+            message.wrench.torque = held[0].torque
+
+    rubbing = Rubbing(changes=changing(WRENCH, change))
+    found = imported(rubbing)
+    assert any(
+        "one and the same reading for 2.50 s from 5.01" in w for w in found.warnings
+    )
+    assert worst_F_n(found, rubbing) < 0.3
+    (trial,) = found.trials
+    at = trial.t + trial.start
+    assert np.isnan(trial.traction[(at > 5.05) & (at < 7.4), 1]).all()
+
+
+def test_readings_that_are_no_numbers_are_counted(imported):
+    def change(count, message):
+        if count % 7 == 3:
+            message.wrench.force.x = np.nan
+
+    rubbing = Rubbing(changes=changing(WRENCH, change))
+    found = imported(rubbing)
+    text = "9600 messages, 8229 used; left out: 1371 with readings that are no numbers"
+    assert found.wrench.clock.text == text
+    assert any(text in w for w in found.warnings)
+    assert worst_F_n(found, rubbing) < 0.3
+
+
+def test_where_nothing_is_usable_the_cause_is_counted(imported):
+    def change(_, message):
+        message.position[:] = np.nan
+
+    rubbing = Rubbing(changes=changing("/joint_states", change))
+    with pytest.raises(
+        SettingsError,
+        match=r"0 usable messages of 6000 .* \(6000 with positions that are no numbers",
+    ):
+        imported(rubbing)
+
+
+# --- the same recording twice, and databases with companions --------------------------
+
+
+@pytest.mark.parametrize("clock", [None, "receipt"])
+def test_a_recording_that_is_there_twice_is_named_as_that(imported, tmp_path, clock):
+    """It was "times do not increase. Record it again"."""
+    imported(Rubbing())
+    (file,) = (tmp_path / "log").glob("*.mcap")
+    file.with_name("copy.mcap").write_bytes(file.read_bytes())
+    with pytest.raises(SettingsError, match=r"copy.mcap and log.mcap hold the same"):
+        imported(Rubbing(), clock=clock)
+
+
+def database(tmp_path):
+    """Return the file of a recording as rosbag2 writes it."""
+    write_bag2(
+        tmp_path / "db3", Rubbing(joint_rate=100.0, wrench_rate=100.0), "SQLITE3"
+    )
+    return next((tmp_path / "db3").glob("*.db3"))
+
+
+def counted(path):
+    with open_log(path) as log:
+        return sum(1 for _ in log.messages(log.topics)), log.losses
+
+
+def test_messages_in_a_write_ahead_log_are_read(tmp_path):
+    path = database(tmp_path)
+    connection = sqlite3.connect(path)
+    connection.execute("PRAGMA journal_mode=WAL")
+    connection.execute("PRAGMA wal_autocheckpoint=0")
+    with connection:
+        connection.execute(
+            "INSERT INTO messages (topic_id, timestamp, data) "
+            "SELECT topic_id, timestamp + 1, data FROM messages LIMIT 100"
+        )
+    crashed = tmp_path / "crashed"
+    crashed.mkdir()
+    names = (path.name, f"{path.name}-wal")
+    for name in names:
+        (crashed / name).write_bytes(path.with_name(name).read_bytes())
+    connection.close()
+    before = {name: (crashed / name).read_bytes() for name in names}
+    assert counted(crashed / path.name) == (2500, [])
+    assert {p.name: p.read_bytes() for p in crashed.iterdir()} == before
+
+
+def test_a_hot_journal_is_refused_by_its_name(tmp_path):
+    path = database(tmp_path)
+    journal = path.with_name(f"{path.name}-journal")
+    journal.write_bytes(b"\xd9\xd5\x05\xf9\x20\xa1\x63\xd7" + bytes(504))
+    with pytest.raises(SettingsError, match=rf"beside it stands {journal.name}"):
+        counted(path)
+    assert journal.exists()
+    journal.write_bytes(bytes(512))  # as SQLite leaves it where it keeps journals
+    assert counted(path) == (2400, [])
+    journal.write_bytes(b"")
+    assert counted(path) == (2400, [])
+
+
+def test_a_damaged_write_ahead_log_loses_no_more_than_its_own(tmp_path):
+    path = database(tmp_path)
+    path.with_name(f"{path.name}-wal").write_bytes(b"\x37\x7f\x06\x82" + bytes(5000))
+    assert counted(path) == (2400, [])

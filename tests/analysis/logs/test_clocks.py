@@ -1,0 +1,140 @@
+"""Two clocks in a log: named, refused without a statement, and right with one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from acquisition.errors import SettingsError
+from analysis.logs.clocks import doubts_of_clock, fit_clock
+from analysis.logs.importing import import_log
+from tests.analysis.logs.gantry import Rubbing, stated, write_bag2, write_urdf
+
+
+@pytest.fixture
+def imported(tmp_path):
+    urdf = write_urdf(tmp_path)
+
+    def make(rubbing, **options):
+        log = tmp_path / "log"
+        if not log.exists():
+            write_bag2(log, rubbing)
+        return import_log(stated(rubbing, log, urdf, **options))
+
+    return make
+
+
+def fastest(found):
+    return float(np.quantile(found.trials[0].traction[:, 0], 0.999))
+
+
+@pytest.mark.parametrize("rate", [0.5, 0.8, 2.0])
+def test_stamps_of_another_pace_are_refused_until_a_clock_is_stated(imported, rate):
+    """v_t of 0.060 m/s was 0.030, 0.048 and 0.120 without a word."""
+    rubbing = Rubbing(stamp_rate=rate)
+    with pytest.raises(SettingsError, match=rf"run at {rate:g} times") as error:
+        imported(rubbing)
+    assert "--clock receipt" in error.value.hint
+    assert fastest(imported(rubbing, clock="receipt")) == pytest.approx(0.06, abs=2e-3)
+
+
+@pytest.mark.slow
+def test_the_clock_that_is_stated_is_taken_and_the_doubt_is_named(imported):
+    rubbing = Rubbing(stamp_rate=0.8)
+    spans = [(3.0 * 0.8, 11.0 * 0.8)]
+    found = imported(rubbing, clock="stamp", trials=spans, tare=(0.1, 0.45))
+    assert fastest(found) == pytest.approx(0.06 / 0.8, abs=2e-3)
+    assert any("run at 0.8 times" in text for text in found.warnings)
+
+
+@pytest.mark.slow
+def test_a_sensor_clock_that_runs_fast_is_named_with_its_drift(imported):
+    rubbing = Rubbing(clock_rate=1.001)
+    with pytest.raises(SettingsError, match=r"drift \+1000 ppm, 12 ms over the log"):
+        imported(rubbing)
+    found = imported(rubbing, clock="receipt", lag=0.0)
+    v_t, F_t, F_n = rubbing.truth(found.trials[0].t + found.trials[0].start)
+    calm = v_t > 0.03
+    rest = found.trials[0].traction[calm] - np.column_stack([v_t, F_t, F_n])[calm]
+    assert np.sqrt(np.mean(rest[:, 2] ** 2)) < 0.15
+
+
+def test_clocks_that_are_apart_are_refused_with_both_ways_out(imported):
+    rubbing = Rubbing(clock_offset=0.3)
+    with pytest.raises(SettingsError, match="stamped 309 ms later") as error:
+        imported(rubbing)
+    assert "Or state --lag 309." in error.value.hint
+    by_lag = imported(rubbing, lag=0.31)
+    assert not any("two clocks" in text for text in by_lag.warnings)
+    v_t, _, F_n = rubbing.truth(by_lag.trials[0].t + by_lag.trials[0].start)
+    rest = (by_lag.trials[0].traction[:, 2] - F_n)[v_t > 0.03]
+    assert np.sqrt(np.mean(rest**2)) < 0.1
+
+
+def test_hours_between_two_clocks_are_named(imported):
+    with pytest.raises(SettingsError, match=r"stamped -18000\.0 s later"):
+        imported(Rubbing(clock_offset=-18_000.0))
+
+
+def test_without_stamps_the_clock_has_to_be_stated(imported):
+    rubbing = Rubbing(stamps=False)
+    with pytest.raises(SettingsError, match="stamps of /joint_states are not set"):
+        imported(rubbing)
+    found = imported(rubbing, clock="receipt")
+    assert found.wrench.clock.by == "receipt"
+    assert any("times of receipt, without its stamps" in w for w in found.warnings)
+
+
+def test_topics_that_share_no_time_are_refused_with_both_spans(imported):
+    rubbing = Rubbing(clock_offset=-18_000.0)
+    with pytest.raises(SettingsError, match=r"share no time: the joints go from 0 to"):
+        imported(rubbing, clock="stamp")
+
+
+@pytest.mark.parametrize("clock", [None, "receipt"])
+def test_a_few_messages_without_a_stamp_are_left_out_by_stamps_alone(imported, clock):
+    """A simulation begins at 0 s."""
+
+    def change(rows):
+        for _, _, message in rows[:3]:
+            message.header.stamp.sec = message.header.stamp.nanosec = 0
+        return rows
+
+    found = imported(Rubbing(changes=(change,)), clock=clock)
+    left_out = [each.clock.left_out for each in (found.joints, found.wrench)]
+    counted = sum(each.get("without a stamp", 0) for each in left_out)
+    assert counted == (3 if clock is None else 0)
+
+
+def times(*, drift=0.0, step=0.0, stall=0.0, seed=1):
+    """Return stamps and receipts [ns] of 20 s at 500 Hz with delays of 0 to 5 ms."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(0.0, 20.0, 0.002)
+    stamps = t * (1.0 + drift) + np.where(t > 12.0, step, 0.0)
+    late = rng.exponential(0.001, t.size) + np.where((t > 5) & (t < 5.2), stall, 0.0)
+    received = t + late
+    return (np.rint(x * 1e9).astype(np.int64) + 10**18 for x in (stamps, received))
+
+
+def test_delays_alone_raise_no_doubt():
+    for seed in range(5):
+        fit = fit_clock(*times(seed=seed, stall=0.1, drift=20e-6))
+        assert doubts_of_clock("/a", fit) == []
+        assert fit.drift == pytest.approx(20e-6, abs=15e-6)
+        assert fit.offset == pytest.approx(0.0, abs=5e-4)
+
+
+def test_a_step_is_named_with_its_time():
+    fit = fit_clock(*times(step=0.05))
+    (doubt, *_) = doubts_of_clock("/a", fit)
+    assert "jump by 50 ms" in doubt
+    assert fit.step_at == pytest.approx(12.0, abs=0.8)
+
+
+def test_recorder_times_are_free_of_delay_and_drift():
+    stamps, received = times(drift=1e-3)
+    fit = fit_clock(stamps, received)
+    found = fit.recorder_times(stamps, received)
+    true = stamps[0] + np.rint((stamps - stamps[0]) / 1.001).astype(np.int64)
+    assert np.abs(found - true).max() < 1e6
+    assert replace(fit, sure=(-1.0, 1.0)).is_drifting is False

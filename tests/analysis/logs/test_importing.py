@@ -1,0 +1,216 @@
+"""A log of a robot whose truth is known: what is stated, checked and refused."""
+
+import numpy as np
+import pytest
+
+from acquisition.errors import SettingsError
+from analysis.data.prepare import moving_average
+from analysis.logs.importing import import_log
+from tests.analysis.logs.gantry import Rubbing, stated, write_bag2, write_urdf
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """Return a function that writes a log once for all tests of it."""
+    folder = tmp_path_factory.mktemp("logs")
+    logs = {}
+
+    def write(rubbing, writer):
+        key = f"{rubbing} {vars(rubbing).keys()}"
+        if key not in logs:
+            logs[key] = writer(folder / f"{len(logs)}", rubbing)
+        return logs[key]
+
+    return write
+
+
+@pytest.fixture
+def imported(tmp_path, written):
+    """Return a function that writes a log and imports it, its truth stated."""
+    urdf = write_urdf(tmp_path)
+
+    def make(rubbing, write=write_bag2, **options):
+        log = written(rubbing, write)
+        return import_log(stated(rubbing, log, urdf, **options))
+
+    return make
+
+
+def check(found, name):
+    (one,) = (each for each in found.checks if each.name == name)
+    return one
+
+
+def errors(trial, rubbing):
+    """Return rms of v_t [m/s], F_t and F_n [N], away from starts, stops, touch-down."""
+    v_t, F_t, F_n = rubbing.truth(trial.t + trial.start)
+    sliding = (v_t > 0.01) & np.isfinite(trial.traction).all(axis=1)
+    calm = moving_average(sliding.astype(float), 31) > 0.999
+    assert calm.sum() > 500
+    found = np.column_stack([moving_average(x, 11) for x in trial.traction.T])
+    rest = (found - np.column_stack([v_t, F_t, F_n]))[calm]
+    return np.sqrt(np.mean(rest**2, axis=0))
+
+
+def is_right(trial, rubbing):
+    return bool((errors(trial, rubbing) < [1e-3, 0.05, 0.05]).all())
+
+
+@pytest.mark.slow
+def test_velocity_and_forces_are_those_of_the_truth(imported):
+    rubbing = Rubbing(strokes=2, turn=1.0, tilt=0.3, slope=0.1, heading=0.7, lost=0.003)
+    found = imported(rubbing)
+    assert [trial.name for trial in found.trials] == ["T01", "T02"]
+    assert all(is_right(trial, rubbing) for trial in found.trials)
+    assert found.trials[0].series.incline_deg == pytest.approx(
+        -np.degrees(0.1), abs=0.1
+    )
+    assert found.warnings == []
+
+
+def test_checks_show_what_was_stated_rightly(imported):
+    rubbing = Rubbing(turn=1.0, slope=0.1, heading=0.7)
+    found = imported(rubbing)
+    assert check(found, "tare").shown[0] < 0.02  # N that the free foot reads
+    assert check(found, "mass").shown == pytest.approx([0.3], abs=0.005)
+    assert check(found, "lag").shown == pytest.approx([10.0], abs=5.0)
+    low, high = check(found, "lag").spread
+    assert low <= 10.0 <= high
+    x_T, _, z_T = rubbing.axes_of_ground()
+    assert check(found, "normal").shown == pytest.approx(z_T, abs=2e-3)
+    assert check(found, "direction").shown == pytest.approx(x_T, abs=2e-3)
+    assert check(found, "clocks apart").shown == pytest.approx([9.4], abs=0.5)
+    assert not any(each.warning for each in found.checks)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"mass": 0.5}, "--tool-mass 0.5 kg, the free foot shows 0.30 kg"),
+        ({"lag": 0.09}, "--lag 90 ms; starts and stops show"),
+        ({"tare": (1.5, 5.0)}, "halves of the window of --tare differ by"),
+        ({"tare": np.array([3.0, -7.0, 9.0, 0, 0, 0])}, "the free foot reads 2.7 N"),
+        ({"along": np.array([1.0, 0.2, 0.0])}, "degrees off --along"),
+        ({"normal": np.array([0.2, 0.0, 1.0])}, "degrees off --normal"),
+    ],
+)
+def test_a_check_that_disagrees_is_named_and_not_applied(imported, options, words):
+    rubbing = Rubbing(turn=1.0)
+    found = imported(rubbing, **options)
+    assert any(words in text for text in found.warnings), found.warnings
+    again = imported(rubbing, **options)
+    assert np.array_equal(again.trials[0].traction, found.trials[0].traction, True)
+    right = imported(rubbing)
+    assert not np.array_equal(right.trials[0].traction, found.trials[0].traction, True)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"tare": (5.0, 6.0)}, "at its lowest place of the log"),
+        ({"tare": "none"}, r"the free foot reads 14\.2 N"),
+    ],
+)
+def test_forces_of_no_ground_are_refused_with_the_check_that_disagrees(
+    imported, options, words
+):
+    with pytest.raises(SettingsError, match=words):
+        imported(Rubbing(), **options)
+
+
+def smooth():
+    """Return a recording without starts and stops that show a lag."""
+    rubbing = Rubbing()
+    rubbing.speed = lambda t: 0.03 * np.sin(np.pi * np.clip(t - 3.5, 0, 7) / 7) ** 2
+    return rubbing
+
+
+@pytest.mark.slow
+def test_a_lag_of_a_smooth_push_is_not_claimed(imported):
+    shown = check(imported(smooth()), "lag")
+    assert shown.shown == ()
+    assert "starts and stops of the pressed foot do not show it" in shown.how
+
+
+@pytest.mark.slow
+def test_many_starts_that_explain_nothing_are_counted_as_they_are(imported):
+    """They used to be "too few starts and stops"."""
+    rubbing = Rubbing(strokes=3)
+    rubbing.truth = lambda t: (
+        rubbing.speed(t),
+        np.where(rubbing.lifted(t) <= 0, 3.0 + np.sin(7.3 * t), 0.0),
+        np.where(rubbing.lifted(t) <= 0, 10.0, 0.0),
+    )
+    how = check(imported(rubbing), "lag").how
+    assert "of F_t/F_n at" in how
+    assert "% would show it" in how
+
+
+def test_the_other_sign_is_refused_with_the_remedy(imported):
+    with pytest.raises(SettingsError, match="have the other sign") as error:
+        imported(Rubbing(), acts="foot-on-ground")
+    assert "Give the other --acts" in error.value.hint
+    with pytest.raises(SettingsError, match="No ground carries and slows a foot so"):
+        imported(Rubbing(), sensor="upright")
+
+
+@pytest.mark.slow
+def test_a_sensor_that_reads_the_reaction_is_read_with_the_other_word(imported):
+    rubbing = Rubbing(sign=-1.0)
+    assert is_right(imported(rubbing, acts="foot-on-ground").trials[0], rubbing)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("axes", "said"),
+    [((1, 0, 2), "moments are -1.0 times"), ((2, 1, 0), "F_t exceeds F_n")],
+)
+def test_exchanged_axes_are_named(imported, axes, said):
+    found = imported(Rubbing(axes=axes))
+    assert any(said in text for text in found.warnings)
+
+
+def test_a_forgotten_weight_is_named_with_what_it_costs(imported):
+    found = imported(Rubbing(tilt=0.3), mass=0.0)
+    assert any("every 0.1 kg of weight" in text for text in found.warnings)
+
+
+@pytest.mark.slow
+def test_a_tare_may_be_six_numbers(imported):
+    rubbing = Rubbing()
+    found = imported(rubbing, tare=np.array(rubbing.bias))
+    assert is_right(found.trials[0], rubbing)
+
+
+def test_slow_joints_are_refused_unless_means_are_wanted(imported):
+    rubbing = Rubbing(joint_rate=40.0)
+    with pytest.raises(SettingsError, match=r"has 40\.0 Hz, slips need"):
+        imported(rubbing)
+    assert any(
+        "slips are not seen" in w for w in imported(rubbing, is_slow=True).warnings
+    )
+
+
+def test_another_frame_in_the_header_is_named(imported):
+    found = imported(Rubbing(frame_id="tool0"))
+    assert any("frame 'tool0'; 'gauge' is used" in text for text in found.warnings)
+
+
+@pytest.mark.parametrize(
+    ("options", "why"),
+    [
+        ({"wrench": "/nothing"}, "--wrench /nothing is not in the log"),
+        ({"wrench": "/joint_states"}, "is a sensor_msgs/JointState"),
+        ({"joints": "/ft/wrench"}, "is a geometry_msgs/WrenchStamped"),
+        ({"lag": 20.0}, "--lag 20000 ms is beyond 10000 ms"),
+        ({"tare": (50.0, 60.0)}, "holds 0 readings"),
+        ({"trials": [(0.0, 1.5)]}, "In 0 rows of the trials the force is over 2 N"),
+        ({"trials": [(50.0, 51.0)]}, "--trials 50:51 holds 0 rows"),
+        ({"along": np.array([0, 0, 1.0])}, "are the same direction"),
+        ({"foot": "fut"}, "nearest links are foot"),
+    ],
+)
+def test_what_cannot_be_is_refused_with_a_way_out(imported, options, why):
+    with pytest.raises(SettingsError, match=why) as error:
+        imported(Rubbing(), **options)
+    assert error.value.hint or "nearest" in str(error.value)
