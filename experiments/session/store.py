@@ -36,7 +36,7 @@ JOURNAL_FILE = "events.jsonl"
 SUMMARY_FILE = "session.json"  # written after each line of the journal
 FOLDS = ".folds"  # below the data: finished folds, so that a study resumes
 _FOLDER = re.compile(
-    r"^(?P<date>\d{4}-\d\d-\d\d)_(?P<id>S\d{3,})_(?P<terrain>[A-Za-z0-9+-]+)"
+    r"^(?P<date>\d{4}-\d\d-\d\d)_(?P<id>S\d{3,})_(?P<terrain>(?:[A-Za-z0-9+-]|\.\d)+)"
     r"(?P<fake>\.fake)?$"
 )
 LONGEST_NAME = 64

@@ -252,6 +252,17 @@ class _Resolver:
                     table, f"name cannot write {key} = {value!r} as {form!r}"
                 ) from error
 
+        texts = {match.start(): one(match) for match in _FIELD.finditer(template)}
+        ends = {
+            match.end(): texts[match.start()] for match in _FIELD.finditer(template)
+        }
+        for start in ends.keys() & texts.keys():
+            if ends[start][-1:].isdigit() and texts[start][:1].isdigit():
+                raise self._error(
+                    table,
+                    f"name {template!r} joins two numbers without a mark between, so "
+                    "that 1 and 11 look like 11 and 1",
+                )
         name = _FIELD.sub(one, template)
         if "{" in name or "}" in name:
             raise self._error(table, f"name {template!r} has an odd brace")

@@ -32,7 +32,10 @@ Incline = Annotated[Number, Field(ge=-30, le=30), Usual(-20.0, 20.0, "degrees")]
 Trials = Annotated[Whole, Field(ge=1, le=99), Usual(1, 30)]
 PlaceName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]{0,23}$")]
 FootName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,15}$")]
-CellName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9+-]{0,23}$")]
+CellName = Annotated[  # a point stands before a digit only
+    str,
+    Field(max_length=24, pattern=r"^[A-Za-z0-9](?:[A-Za-z0-9+-]|\.[0-9])*$"),
+]
 GroundWord = Literal["stones", "plate", "fine"]
 Push = Literal[0, 180]
 _Text = Annotated[str, Field(min_length=1, max_length=60, pattern=r"^[^\x00-\x1f]+$")]

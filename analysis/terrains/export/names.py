@@ -5,6 +5,8 @@ import pkgutil
 import re
 from collections.abc import Iterable
 
+from acquisition.errors import SettingsError
+
 TARGETS = "analysis.terrains.export.targets"  # package, a module for each
 _LONGEST, _LONGEST_SHOWN = 40, 60  # characters
 
@@ -24,17 +26,30 @@ def shown(text: str) -> str:
 
 
 def identifiers(names: Iterable[str]) -> dict[str, str]:
-    """Return letters, digits and underscores for every name, each once.
+    """Letters, digits and underscores for every name, whatever other names there are.
 
-    They differ in more than capitals, since they become names of files too.
+    A sign or a point beside a digit keeps its meaning: +10 is p10, -10 is m10 and 12.5
+    is 12p5. They differ in more than capitals, since they become names of files too.
+
+    Raises:
+        SettingsError: two names have one identifier.
     """
     found: dict[str, str] = {}
-    taken: set[str] = set()
+    name_of: dict[str, str] = {}
     for name in names:
-        word = re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_")[:_LONGEST] or "terrain"
-        unique, number = word, 2
-        while unique.lower() in taken:
-            unique, number = f"{word}_{number}", number + 1
-        taken.add(unique.lower())
-        found[name] = unique
+        word = _identifier(name)
+        other = name_of.setdefault(word.lower(), name)
+        if other != name:
+            raise SettingsError(
+                f"{other!r:.60} and {name!r:.60} are both {word} where only letters, "
+                "digits and underscores are allowed.",
+                hint="Export them apart, or rename one of the terrains.",
+            )
+        found[name] = word
     return found
+
+
+def _identifier(name: str) -> str:
+    word = re.sub(r"\+(?=\d)|(?<=\d)\.(?=\d)", "p", name)
+    word = re.sub(r"-(?=\d)", "m", word)
+    return re.sub(r"[^A-Za-z0-9]+", "_", word).strip("_")[:_LONGEST] or "terrain"

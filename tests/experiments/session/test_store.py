@@ -223,3 +223,14 @@ def test_a_file_that_is_given_for_a_session_is_told_what_reads_it(tmp_path):
         with pytest.raises(SessionError, match="is a file, and no session") as caught:
             find_session(tmp_path, str(path))
         assert hint in caught.value.hint
+
+
+@pytest.mark.parametrize("terrain", ["G12.5dt", "G12dt+10", "B.0"])
+@pytest.mark.parametrize("is_simulated", [True, False])
+def test_a_session_is_found_by_a_terrain_with_signs_and_points(
+    tmp_path, terrain, is_simulated
+):
+    made = create_session(tmp_path, terrain, is_simulated=is_simulated, utc_ns=0)
+    (found,) = list_sessions(tmp_path)
+    assert (found.path, found.terrain) == (made.path, terrain)
+    assert found.is_simulated is is_simulated

@@ -82,6 +82,11 @@ def test_a_cross_is_every_combination(load):
     assert matrix.terrains[-1].incline_deg == 2.0
 
 
+def test_a_name_may_hold_a_decimal_number(load):
+    text = changed("{d50:02.0f}", "{d50:g}", CROSS).replace("[12, 37]", "[12.5, 37]")
+    assert load(FACTORS + text).matrix.terrains[0].name == "G12.5dt-2"
+
+
 def test_words_multiply_what_is_simulated(load):
     effects = "[simulate.moisture.wet]\ns_inf = 0.8\nk_w = 1.2\n"
     wet = CELL.replace("dry", "wet").replace("G19", "W19")
@@ -108,6 +113,11 @@ REFUSED = {
     "misspelt key": (
         changed("moisture =", "moistur =", CELL).join([FACTORS, ""]),
         "moistur is neither a setting of a cell nor a factor - did you mean moisture?",
+    ),
+    "two numbers joined": (
+        FACTORS
+        + changed("{moisture:.1}{foot:.1}{incline_deg:+d}", "{incline_deg:d}", CROSS),
+        "joins two numbers without a mark between",
     ),
     "name twice": (FACTORS + CELL + CELL, "name 'G19' occurs twice (line 17)"),
     "factor twice": (

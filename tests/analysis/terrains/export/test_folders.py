@@ -92,11 +92,24 @@ def test_hostile_names_keep_their_own_in_data(target):
     assert tuple(source["terrains"]) == HOSTILE
 
 
-def test_identifiers_are_words_and_differ():
-    names = ["S0", "s0", "S 0", "", "0", "é", "ä", *HOSTILE, "x" * 500, "x" * 501]
-    words = list(identifiers(names).values())
-    assert all(re.fullmatch(r"[A-Za-z0-9_]{1,44}", word) for word in words)
-    assert len({word.lower() for word in words}) == len(names)
+@pytest.mark.parametrize("name", ["S0", "S 0", "", "0", "é", *HOSTILE, "x" * 500])
+def test_an_identifier_is_a_word(name):
+    assert re.fullmatch(r"[A-Za-z0-9_]{1,40}", identifiers([name])[name])
+
+
+def test_signs_and_points_of_numbers_are_kept_in_identifiers():
+    names = ("G12dt+10", "G12dt-10", "G12.5", "dry-10", "a-b")
+    words = dict(
+        zip(names, ("G12dtp10", "G12dtm10", "G12p5", "drym10", "a_b"), strict=True)
+    )
+    assert identifiers(names) == words
+    assert all(identifiers([name]) == {name: word} for name, word in words.items())
+
+
+@pytest.mark.parametrize("pair", [("S0", "s0"), ("a b", "a_b"), ("é", "ä")])
+def test_two_names_of_one_identifier_are_refused(pair):
+    with pytest.raises(SettingsError, match="are both"):
+        identifiers(pair)
 
 
 @pytest.mark.parametrize("text", [*HOSTILE, "", "\n", "é" * 300])
