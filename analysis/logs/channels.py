@@ -28,6 +28,7 @@ FASTEST_JOINT = 30.0  # rad/s, m/s; faster is a jump of the numbers
 _ABSURD = 1e9  # N, N m, rad: what is beyond was never measured
 _DISTINCT = 0.9  # share of the messages whose times differ
 _AWAY = 0.02  # rad, m from both neighbours of a row of zeros
+_FEW = 0.01  # of the messages may lack a stamp: they are left out
 _STUCK = 0.2  # s of one and the same reading
 _TIMES = 20.0  # the usual time of one reading, that no chance exceeds
 _NS = 1e-9
@@ -224,6 +225,12 @@ class _Rows:
             )
         stamps = np.frombuffer(self.stamps, np.int64)
         received = np.frombuffer(self.received, np.int64)
+        values = np.frombuffer(self.values).reshape(-1, self.width)
+        is_unset = stamps <= 0
+        if 0 < np.count_nonzero(is_unset) <= _FEW * count:
+            self.left_out["without a stamp"] = int(np.count_nonzero(is_unset))
+            stamps, received = stamps[~is_unset], received[~is_unset]
+            values, count = values[~is_unset], len(stamps)
         unset = int(np.count_nonzero(stamps <= 0))
         is_clock = not unset and _share_distinct(stamps) >= _DISTINCT
         fit = fit_clock(stamps, received) if is_clock else None
@@ -241,8 +248,7 @@ class _Rows:
         order = np.argsort(times, kind="stable")
         in_order = times[order]
         is_new = np.concatenate([[True], np.diff(in_order) > 0])
-        values = np.frombuffer(self.values).reshape(-1, self.width)[order][is_new]
-        return values, Clocked(
+        return values[order][is_new], Clocked(
             in_order[is_new],
             clock or "stamp",
             self.read,

@@ -11,7 +11,7 @@ import numpy as np
 from acquisition.errors import SettingsError
 from analysis.data.frozen_channels import frozen_channels
 from analysis.data.plausibility import SLOWEST, doubts_of, free_moment
-from analysis.data.prepare import PrepareOptions, moving_average, prepare_trial
+from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.series import Array, TractionSeries
 from analysis.logs.clocks import lag_by_receipts
 from analysis.logs.estimates import (
@@ -26,7 +26,6 @@ from analysis.logs.estimates import (
     turn_deg,
 )
 from analysis.logs.leg_record import LegRecord, rows_within
-from analysis.logs.motion import rows_averaged
 from analysis.logs.request import ImportRequest
 from analysis.logs.signs import (
     PRESSED_FORCE,
@@ -190,13 +189,8 @@ def mass_check(judged: Judged, request: ImportRequest, quiet: Bools) -> Check:
 
 def lag_check(judged: Judged, request: ImportRequest) -> Check:
     """The lag that starts and stops of the foot show beside the one stated."""
-    t, sound = judged.record.t, np.isfinite(judged.force).all(axis=1)
-    width = rows_averaged(judged.record.motion.step)
-    v_t, F_t, F_n = judged.values.T
-    F_t, F_n = (
-        moving_average(np.interp(t, t[sound], F[sound]), width) for F in (F_t, F_n)
-    )
-    left = find_lag(t, v_t, F_n, F_t)  # of what the stated lag leaves
+    motion = judged.record.motion
+    left = find_lag(motion.t, motion.step, judged.values)  # beyond the stated lag
     found = Estimate(
         tuple((request.lag + x) * 1e3 for x in left.value),
         tuple((request.lag + x) * 1e3 for x in left.spread),

@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 
 from analysis.data.lag import force_lag
 from analysis.data.plausibility import PRESSED, SLOWEST
+from analysis.data.prepare import moving_average
 from analysis.data.series import Array
+from analysis.logs.motion import rows_averaged
 from wam.model.constants import GRAVITY
 
 Bools = NDArray[np.bool_]
@@ -144,7 +146,7 @@ def turn_deg(rotation: Array) -> float:
     return float(np.degrees(np.arccos(np.clip(cosines.min(), -1.0, 1.0))))
 
 
-def find_lag(t: Array, v_t: Array, F_n: Array, F_t: Array) -> Estimate:
+def find_lag(t: Array, step: float, values: Array) -> Estimate:
     """How late the forces are [s] by starts and stops of the foot; spread: from, to.
 
     F_t / F_n = a + b tanh(v_t / v_0), v_0 = 1 mm/s: friction turns round with the
@@ -154,11 +156,15 @@ def find_lag(t: Array, v_t: Array, F_n: Array, F_t: Array) -> Estimate:
 
     Args:
         t: time, even [s], shape (n,).
-        v_t: velocity along the way [m/s], shape (n,).
-        F_n: normal force by its stamps, smoothed as the velocity is [N], shape (n,).
-        F_t: traction, the same [N], shape (n,).
+        step: between two rows [s].
+        values: v_t, smoothed [m/s], F_t and F_n by their stamps [N], shape (n, 3).
     """
-    step = float(np.median(np.diff(t)))
+    sound = np.isfinite(values).all(axis=1)
+    width = rows_averaged(step)
+    v_t, F_t, F_n = values.T
+    F_t, F_n = (
+        moving_average(np.interp(t, t[sound], F[sound]), width) for F in (F_t, F_n)
+    )
     sure = max(SURE, 2.0 * step)
     by_events = _lag_by_events(t, v_t, F_n, F_t, step, sure)
     if by_events.value:

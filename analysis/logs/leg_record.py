@@ -53,9 +53,21 @@ class LegRecord:
         return self.motion.t
 
     def raw(self, lag: float) -> Array:
-        """Readings at the times of the joints [N, N m], shape (n, 6); NaN in gaps."""
+        """Readings at the times of the joints [N, N m], shape (n, 6); NaN in gaps.
+
+        Raises:
+            SettingsError: joints and wrench share no time.
+        """
         at, step = self.motion.t + lag, self.motion.step
-        return mean_around(self.wrench_t, self.wrench.wrench, at, step)
+        raw = mean_around(self.wrench_t, self.wrench.wrench, at, step)
+        if not np.isfinite(raw).any():
+            first, last = self.wrench_t[[0, -1]] - lag
+            raise SettingsError(
+                f"Joints and wrench share no time: the joints go from 0 to "
+                f"{self.t[-1]:.1f} s, the wrench from {first:.1f} to {last:.1f} s.",
+                hint="State --clock receipt where the clocks differ, or another --lag.",
+            )
+        return raw
 
 
 def record_of_leg(

@@ -198,13 +198,7 @@ def _strokes(record: LegRecord, load: Array) -> Sequence[tuple[int, int]]:
 
 def _lag(record: LegRecord, values: Array) -> tuple[str, Estimate]:
     """By starts and stops, else by the receipts."""
-    sound = np.isfinite(values).all(axis=1)
-    t, width = record.t, rows_averaged(record.motion.step)
-    v_t, F_t, F_n = values.T
-    F_t, F_n = (
-        moving_average(np.interp(t, t[sound], F[sound]), width) for F in (F_t, F_n)
-    )
-    found = find_lag(t, v_t, F_n, F_t)
+    found = find_lag(record.t, record.motion.step, values)
     milliseconds = Estimate(
         tuple(x * 1e3 for x in found.value),
         tuple(x * 1e3 for x in found.spread),

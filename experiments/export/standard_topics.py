@@ -5,6 +5,7 @@ they are made again from there, so that a recording need not hold everything twi
 """
 
 from collections.abc import Generator, Mapping, Sequence
+from math import atan2, hypot
 from pathlib import Path
 
 import numpy as np
@@ -84,10 +85,9 @@ def description(attachments: Mapping[str, bytes]) -> str:
         return urdf
     if height is None:
         return urdf
-    from scipy.spatial.transform import Rotation
-
-    turn = Rotation.from_matrix(payload.rotation).as_euler("xyz")
-    frames = _fixed("ft_sensor", (0.0, 0.0, height), turn.tolist())
+    (r00, _, _), (r10, _, _), (r20, r21, r22) = payload.rotation.tolist()
+    turn = atan2(r21, r22), atan2(-r20, hypot(r21, r22)), atan2(r10, r00)  # rpy
+    frames = _fixed("ft_sensor", (0.0, 0.0, height), turn)
     frames += _fixed("sole", sole.tolist(), (0.0, 0.0, 0.0))
     return urdf.replace("</robot>", f"{frames}</robot>")
 

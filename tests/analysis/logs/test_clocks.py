@@ -85,6 +85,26 @@ def test_without_stamps_the_clock_has_to_be_stated(imported):
     assert any("times of receipt, without its stamps" in w for w in found.warnings)
 
 
+def test_topics_that_share_no_time_are_refused_with_both_spans(imported):
+    rubbing = Rubbing(clock_offset=-18_000.0)
+    with pytest.raises(SettingsError, match=r"share no time: the joints go from 0 to"):
+        imported(rubbing, clock="stamp")
+
+
+@pytest.mark.parametrize("clock", [None, "receipt"])
+def test_a_few_messages_without_a_stamp_are_left_out(imported, clock):
+    """A simulation begins at 0 s."""
+
+    def change(rows):
+        for _, _, message in rows[:3]:
+            message.header.stamp.sec = message.header.stamp.nanosec = 0
+        return rows
+
+    found = imported(Rubbing(changes=(change,)), clock=clock)
+    left_out = [each.clock.left_out for each in (found.joints, found.wrench)]
+    assert sum(each.get("without a stamp", 0) for each in left_out) == 3
+
+
 def times(*, drift=0.0, step=0.0, stall=0.0, seed=1):
     """Return stamps and receipts [ns] of 20 s at 500 Hz with delays of 0 to 5 ms."""
     rng = np.random.default_rng(seed)

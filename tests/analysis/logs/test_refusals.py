@@ -41,7 +41,9 @@ ESTABLISHED_BY = {
     },
     "leg_record": {
         "this is a trial of Traction: report, fit and export read it.": "a topic of "
-        "traction_msgs/Cycle"
+        "traction_msgs/Cycle",
+        "Joints and wrench share no time: the joints go from 0 to {} s, the wrench "
+        "from {} to {} s.": "no row of the joints has a reading; both spans",
     },
     "log_file": {
         "cannot be copied ({})": "what the system says",
