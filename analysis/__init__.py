@@ -1,6 +1,6 @@
-"""From trial files to models, figures and the report; touches no device.
+"""From trial files to models, terrains and the report; touches no device.
 
-`data` loads and prepares samples, `tustin` and `gp` are the two families of models,
-`study` fits and cross-validates them, `findings` computes what the report shows,
-`figures` and `report` draw and print it. Begin with `data`, then `study`.
+Begin with `data`, which loads and prepares samples, then `study`, which fits and
+cross-validates the models of `tustin` and `gp`; `tables` and `logs` read what other
+programs recorded, `terrains` and `report` are what comes out.
 """

@@ -1,5 +1,5 @@
-"""Recorded trials as samples ready for a model.
+"""Recorded trials as samples ready for a model: smoothed, thinned, windowed, graded.
 
-`load` reads a trial file as a `TractionSeries`, `prepare` smooths, thins and windows
-it, `events` finds slips, `quality` grades coverage. Begin with `series`.
+Begin with `series`, then `load`, which reads a trial file, and `prepare`; `events`
+finds slips, `quality` grades coverage.
 """

@@ -227,7 +227,7 @@ class _Rows:
         received = np.frombuffer(self.received, np.int64)
         values = np.frombuffer(self.values).reshape(-1, self.width)
         is_unset = stamps <= 0
-        if clock != "receipt" and 0 < np.count_nonzero(is_unset) <= _FEW * count:
+        if 0 < np.count_nonzero(is_unset) <= _FEW * count:
             self.left_out["without a stamp"] = int(np.count_nonzero(is_unset))
             stamps, received = stamps[~is_unset], received[~is_unset]
             values, count = values[~is_unset], len(stamps)
@@ -235,7 +235,8 @@ class _Rows:
         is_clock = not unset and _share_distinct(stamps) >= _DISTINCT
         fit = fit_clock(stamps, received) if is_clock else None
         if clock == "receipt":
-            times = received if fit is None else fit.recorder_times(stamps, received)
+            is_line = fit is not None and not fit.has_step
+            times = fit.recorder_times(stamps, received) if is_line else received
         else:
             _require_stamps(log, name, stamps, unset)
             times = stamps
@@ -332,7 +333,6 @@ class _JointRows(_Rows):
             clocked.left_out["with all joints at zero"] = len(at)
             clocked = replace(clocked, times_ns=times[~is_zero])
             q = q[~is_zero]
-        _refuse_jumps(log, name, clocked.times_ns, q)
         return JointChannel(self.topic, clocked, q, warnings)
 
 
@@ -353,7 +353,13 @@ def _lone_zeros(q: Array) -> NDArray[np.bool_]:
     return found
 
 
-def _refuse_jumps(log: LogFile, name: str, times: Nanoseconds, q: Array) -> None:
+def require_no_jump(channel: JointChannel) -> None:
+    """Refuse joints that move faster than any does.
+
+    Raises:
+        SettingsError: they jump; the sentence says when, and from where to where.
+    """
+    times, q, name = channel.clock.times_ns, channel.q, channel.topic.name
     steps = np.diff(times).astype(np.float64)[:, None] * _NS
     ways = np.abs(np.diff(q, axis=0))
     speed = np.where(ways > _AWAY, ways / steps, 0.0)
@@ -361,7 +367,7 @@ def _refuse_jumps(log: LogFile, name: str, times: Nanoseconds, q: Array) -> None
         row, joint = np.unravel_index(int(speed.argmax()), speed.shape)
         at = float(times[row] - times[0]) * _NS
         raise SettingsError(
-            f"{log.path}: {name} jumps {at:.3f} s after its first message: joint "
+            f"{name} jumps {at:.3f} s after its first message: joint "
             f"{int(joint) + 1} of the leg goes from {q[row, joint]:.3f} to "
             f"{q[row + 1, joint]:.3f} in {float(steps[row, 0]) * 1e3:.2f} ms.",
             hint=f"No joint moves faster than {FASTEST_JOINT:g} rad/s or m/s: cut the "

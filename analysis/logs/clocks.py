@@ -99,7 +99,9 @@ def fit_clock(stamps: Nanoseconds, received: Nanoseconds) -> ClockLine | None:
     slope, offset, low, high = np.asarray(theilslopes(late[rows], t[rows])).tolist()
     if 1.0 - slope < _SLOWEST:
         return None
-    step, row = _largest_step(late[rows] - slope * t[rows])
+    # a step tilts the line, but not the middle one of the slopes from bin to bin
+    pace = float(np.median(np.diff(late[rows]) / np.diff(t[rows])))
+    step, row = _largest_step(late[rows] - pace * t[rows])
     return ClockLine(
         offset=offset,
         drift=-slope,

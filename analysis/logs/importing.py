@@ -21,6 +21,7 @@ from analysis.data.series import Array, TractionSeries
 from analysis.logs.channels import (
     JointChannel,
     WrenchChannel,
+    require_no_jump,
 )
 from analysis.logs.checks import (
     Check,
@@ -130,8 +131,9 @@ def import_log(request: ImportRequest) -> ImportedLog:
     axes = _axes(request.along, request.normal)
     with open_log(request.log) as log:
         record = record_of_leg(log, leg, request.joints, request.wrench, request.clock)
-        warnings = [
-            *_clock_warnings(record, request),
+        warnings = _clock_warnings(record, request)
+        require_no_jump(record.joints)
+        warnings += [
             *_rate_warnings(record, request),
             *_channel_warnings(record, request, log),
         ]

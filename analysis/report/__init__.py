@@ -1,5 +1,6 @@
-"""The report: the results of a study, the sections that show them, and the page.
+"""The report: what the sections show of a study, and the page that they stand on.
 
-`results` has every number, `sections` a module or package for each heading, `drawing`
-makes the figures, `page` writes the folder. Begin with `sections`.
+Begin with `results`, which is what sections share, then `sections`, a module or package
+for each heading with its own numbers; `findings` puts them into fits.json, `drawing`
+makes the figures, `page` writes the folder.
 """
