@@ -6,12 +6,11 @@ from analysis.breakaway.model import BreakAwayModel
 from analysis.data.series import TractionSeries
 from analysis.data.terrain_kinds import terrain_kind
 from analysis.study.crossval import Prepared
-from analysis.study.jobs import Batch, Progress, Shard, Store
+from analysis.study.jobs import Batch, Progress, Store
 from analysis.study.study import (
     Study,
     StudyOptions,
     run_study_beside,
-    run_study_shard,
 )
 from analysis.terrains.export import break_away_batch
 
@@ -34,22 +33,6 @@ def run_whole_study(
         _break_away(trials, options), trials, options, simulated, progress, store
     )
     return study, break_away
-
-
-def run_whole_study_shard(
-    trials: Recorded,
-    options: StudyOptions,
-    shard: Shard,
-    store: Store,
-    progress: Progress | None = None,
-) -> int:
-    """Keep one run's share of what `run_whole_study` needs; return its tasks' number.
-
-    Raises:
-        SettingsError: there is no trial at all.
-    """
-    beside = _break_away(trials, options)
-    return run_study_shard(trials, options, shard, store, progress, beside)
 
 
 def _break_away(

@@ -83,29 +83,6 @@ class Batch:
 TaskIndex = tuple[int, int]  # of a task: number of its batch, and in it
 
 
-@dataclass(frozen=True, slots=True)
-class Shard:
-    """One of several runs that share the tasks of a study by a store on one folder.
-
-    Attributes:
-        number: of this run, from 1.
-        of: number of runs.
-
-    Raises:
-        SettingsError: there is no such run.
-    """
-
-    number: int
-    of: int
-
-    def __post_init__(self) -> None:
-        if not 1 <= self.number <= self.of:
-            raise SettingsError(
-                f"There is no shard {self.number} of {self.of}.",
-                hint="Write e.g. --shard 1/8 to 8/8.",
-            )
-
-
 class Store(Protocol):
     """Keeps results, so that an interrupted study resumes."""
 
@@ -180,48 +157,8 @@ def run_batches(
     ]
 
 
-def run_shard(
-    batches: Sequence[Batch],
-    shard: Shard,
-    store: Store,
-    workers: Workers | int | None = None,
-    progress: Progress | None = None,
-) -> int:
-    """Keep the results of one run's share of the tasks and return its number of tasks.
-
-    Every n-th task is its own; what the store has already is not done again. The runs
-    know nothing of each other: one that was killed is started again as it was.
-
-    Raises:
-        SettingsError: the scheduler does not answer, or is reached without TLS.
-    """
-    numbered = enumerate((b, k) for b in batches for k in range(len(b.tasks)))
-    own = [task for n, task in numbered if n % shard.of == shard.number - 1]
-    parts = [
-        Batch(batch.function, _Some(batch.tasks, [k for b, k in own if b is batch]))
-        for batch in batches
-    ]
-    run_batches(parts, workers, progress, store)
-    return len(own)
-
-
-class _Some(Sequence[Any]):
-    """Some of the tasks of a batch, known to a store by the same keys."""
-
-    def __init__(self, tasks: Sequence[Any], numbers: Sequence[int]) -> None:
-        self.tasks, self.numbers = tasks, numbers
-
-    def __len__(self) -> int:
-        return len(self.numbers)
-
-    def __getitem__(self, index: Any) -> Any:  # noqa: ANN401
-        return self.tasks[self.numbers[index]]
-
-
 def _key(tasks: Sequence[Any], number: int) -> object:
     """Return what a store knows a task by."""
-    if isinstance(tasks, _Some):
-        return _key(tasks.tasks, tasks.numbers[number])
     return tasks.outline(number) if isinstance(tasks, SharedTasks) else tasks[number]
 
 

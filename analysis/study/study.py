@@ -29,11 +29,9 @@ from analysis.study.crossval import (
 from analysis.study.jobs import (
     Batch,
     Progress,
-    Shard,
     Store,
     Workers,
     run_batches,
-    run_shard,
 )
 from analysis.study.metrics import standard_error
 from analysis.study.models import NEW_TRIAL, FitOptions
@@ -210,35 +208,6 @@ def run_study_beside(
     doubtful = (*_contradictions(trials), *notes_of_tables(trials))
     warnings = (*doubtful, *_all_warnings(results, options))
     return Study(simulated, options, results, tuple(notes), warnings), found
-
-
-def run_study_shard(
-    trials: Mapping[str, Sequence[TractionSeries]],
-    options: StudyOptions,
-    shard: Shard,
-    store: Store,
-    progress: Progress | None = None,
-    beside: TasksBeside = _none_beside,
-) -> int:
-    """Keep one run's share of what a study is made of; return its number of tasks.
-
-    After all of them `run_study` finds everything in the store, bit for bit as one run
-    would have made it.
-
-    Args:
-        trials: recorded trials by terrain.
-        options: every choice.
-        shard: which share.
-        store: on a folder that all runs see.
-        progress: called with (fits done, fits in all).
-        beside: as for `run_study_beside`.
-
-    Raises:
-        SettingsError: there is no trial at all.
-    """
-    plan = _Plan.of(trials, options, beside)
-    workers = Workers(options.n_jobs, options.scheduler)
-    return run_shard(plan.batches, shard, store, workers, progress)
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,6 @@ from experiments.arguments import (
     add_pdf,
     add_scheduler,
     add_seed,
-    add_shard,
 )
 
 EXAMPLES = """\
@@ -27,7 +26,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--all", action="store_true", help="every session with trials")
     add_scheduler(parser)
-    add_shard(parser)
     add_covariate(
         parser, "height (of the sole), way (since the last drop), lateral, tilt, moment"
     )
@@ -49,7 +47,6 @@ def run(args: argparse.Namespace) -> int:
 
     if not _is_kept(Path(args.data)):
         start_workers(args.scheduler)
-    from analysis.study.jobs import Shard
     from analysis.tables.columns import parse_covariates
     from experiments.operator.console import Console, PageRecorder
     from experiments.report.choices import (
@@ -59,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
         tell_missing,
     )
     from experiments.report.covariates import KNOWN
-    from experiments.report.sessions import fit_shard, report_sessions
+    from experiments.report.sessions import report_sessions
     from experiments.settings.load import load_settings
 
     choices = analysis_choices(args)
@@ -79,9 +76,6 @@ def run(args: argparse.Namespace) -> int:
         else parse_covariates(args.covariate, KNOWN),
         with_pdf=args.pdf,
     )
-    if args.shard:
-        fit_shard(sessions, data, wanted, console, Shard(*args.shard))
-        return 0
     page = report_sessions(sessions, data, wanted, console)
     if args.json:
         names = [session.id for session in sessions]
