@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from analysis.breakaway.model import BreakAwayModel
 from analysis.report.sections.beyond_paper.break_away import (
     BREAK_AWAY_UNITS,
     TerrainBreakAway,
@@ -79,35 +78,26 @@ class StudyResults:
     claims: Sequence[PaperClaim]
 
 
-def compute_results(
-    study: Study,
-    rig: Sequence[RigTrial] = (),
-    break_away: Mapping[str, BreakAwayModel] | None = None,
-) -> StudyResults:
-    """Return what follows from a study; of models only those of break-away are fit.
+def compute_results(study: Study, rig: Sequence[RigTrial] = ()) -> StudyResults:
+    """Return what follows from a study; no model is fitted.
 
     Args:
         study: the study.
         rig: health of the rig by trial.
-        break_away: models of break-away by terrain; None = they are fitted here.
     """
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1):  # small matrices: more threads lose time
-        return _compute(study, rig, break_away)
+        return _compute(study, rig)
 
 
-def _compute(
-    study: Study,
-    rig: Sequence[RigTrial],
-    break_away: Mapping[str, BreakAwayModel] | None,
-) -> StudyResults:
+def _compute(study: Study, rig: Sequence[RigTrial]) -> StudyResults:
     results, axes, edges = study.terrains, surface_axes(study), cell_edges(study)
     identification, noise = identify_study(study), noise_summaries(study)
     return StudyResults(
         study=study,
         identification=identification,
-        break_away=break_away_findings(study, break_away),
+        break_away=break_away_findings(study),
         noise=noise,
         shares=held_out_shares(study),
         trends={name: trends_of(result) for name, result in results.items()},

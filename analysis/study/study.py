@@ -1,12 +1,18 @@
 """A study: all terrains prepared, folded, fitted and compared."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from acquisition.errors import SettingsError
+from analysis.breakaway.fitting import fit_planned
+from analysis.breakaway.model import BreakAwayModel
+from analysis.breakaway.recorded import (
+    BreakAwayOptions,
+    BreakAwayTask,
+    plan_break_away,
+)
 from analysis.data.events import find_slips
 from analysis.data.plausibility import FEWEST, doubts_of, summed_up
 from analysis.data.prepare import (
@@ -54,14 +60,6 @@ _LOADED = 5.0  # N: below it F_t/F_n says little, whatever the ground
 _PLOUGHING = 1.5  # of F_t/F_n in the upper quarter; stones of one layer stay below
 
 
-# prepared trials -> tasks that are done beside the fits
-TasksBeside = Callable[[Prepared], Sequence[Batch]]
-
-
-def _none_beside(prepared: Prepared) -> Sequence[Batch]:
-    return ()
-
-
 @dataclass(frozen=True, slots=True)
 class StudyOptions:
     """Every choice of a study.
@@ -94,6 +92,8 @@ class Study:
         terrains: results by terrain, in the order given.
         notes: what could not be done, and why.
         warnings: what a reader should doubt.
+        break_away: what a foot at rest meets, by terrain where it is known; empty where
+            it was not asked for.
     """
 
     simulated: bool
@@ -101,6 +101,9 @@ class Study:
     terrains: Mapping[str, TerrainResult]
     notes: tuple[str, ...]
     warnings: tuple[str, ...]
+    break_away: Mapping[str, BreakAwayModel] = field(
+        default_factory=dict[str, BreakAwayModel]
+    )
 
     @property
     def kinds(self) -> dict[str, str]:
@@ -152,6 +155,8 @@ def run_study(
     simulated: bool,
     progress: Progress | None = None,
     store: Store | None = None,
+    *,
+    with_break_away: bool = False,
 ) -> Study:
     """Return the analysis of all trials.
 
@@ -161,92 +166,55 @@ def run_study(
         simulated: the trials were simulated; marks every product.
         progress: called with (fits done, fits in all).
         store: results of earlier runs, so that an interrupted study resumes.
+        with_break_away: fit the models of break-away, too.
 
     Raises:
         SettingsError: there is no trial at all.
     """
-    study, _ = run_study_beside(
-        _none_beside, trials, options, simulated, progress, store
+    _require_trials(trials)
+    prepared = _prepared(trials, options.prepare)
+    targets = _prepared(trials, options.target) if options.target else prepared
+    planned, notes = plan_folds(prepared, options.fit, targets)
+    further = _further(trials)
+    notes += _notes_on_inputs(further)
+    components = [] if further else _components(prepared, options.fit)
+    rest = [_break_away(trials, prepared, options)] if with_break_away else []
+    batches = (
+        Batch(fit_planned, rest),  # first: it takes longer than any other
+        Batch(run_fold, planned),
+        Batch(fit_components, components),
+        Batch(fit_terrain, _wholes(prepared, options)),
     )
-    return study
-
-
-def run_study_beside(
-    beside: TasksBeside,
-    trials: Mapping[str, Sequence[TractionSeries]],
-    options: StudyOptions,
-    simulated: bool,
-    progress: Progress | None = None,
-    store: Store | None = None,
-) -> tuple[Study, list[list[Any]]]:
-    """Return the analysis of all trials, and what came of the tasks beside it.
-
-    Args:
-        beside: gives batches of tasks from the prepared trials; they are done with the
-            fits, so that no core waits for the last of either.
-        trials: recorded trials by terrain.
-        options: every choice.
-        simulated: the trials were simulated.
-        progress: called with (tasks done, tasks in all).
-        store: results of earlier runs.
-
-    Raises:
-        SettingsError: there is no trial at all.
-    """
-    plan = _Plan.of(trials, options, beside)
-    prepared, notes = plan.prepared, list(plan.notes)
-    *found, folds, fitted, wholes = run_batches(
-        plan.batches, Workers(options.n_jobs, options.scheduler), progress, store
-    )
-    done = zip(plan.apart, fitted, strict=True)
-    components = {task.terrain: fit for task, fit in done}
+    workers = Workers(options.n_jobs, options.scheduler)
+    break_away, folds, fitted, wholes = run_batches(batches, workers, progress, store)
+    apart = {task.terrain: fit for task, fit in zip(components, fitted, strict=True)}
     notes += [note for fold in folds for note in fold.notes]
     results = {
-        name: _result(trials[name], prepared[name], folds, whole, components.get(name))
+        name: _result(trials[name], prepared[name], folds, whole, apart.get(name))
         for name, whole in zip(prepared, wholes, strict=True)
     }
     doubtful = (*_contradictions(trials), *notes_of_tables(trials))
-    warnings = (*doubtful, *_all_warnings(results, options))
-    return Study(simulated, options, results, tuple(notes), warnings), found
+    return Study(
+        simulated,
+        options,
+        results,
+        notes=tuple(notes),
+        warnings=(*doubtful, *_all_warnings(results, options)),
+        break_away=break_away[0] if break_away else {},
+    )
 
 
-@dataclass(frozen=True, slots=True)
-class _Plan:
-    """What a study has to do.
+def _break_away(
+    trials: Mapping[str, Sequence[TractionSeries]],
+    prepared: Prepared,
+    options: StudyOptions,
+) -> BreakAwayTask:
+    kinds = {name: _kind(name, recorded) for name, recorded in trials.items()}
+    return plan_break_away(prepared, kinds, BreakAwayOptions(seed=options.fit.seed))
 
-    Attributes:
-        prepared: the trials.
-        batches: of tasks, the folds and what follows them last.
-        apart: tasks of the variance components.
-        notes: what cannot be done, and why.
-    """
 
-    prepared: dict[str, tuple[PreparedTrial, ...]]
-    batches: tuple[Batch, ...]
-    apart: list[ComponentsTask]
-    notes: list[str]
-
-    @classmethod
-    def of(
-        cls,
-        trials: Mapping[str, Sequence[TractionSeries]],
-        options: StudyOptions,
-        beside: TasksBeside,
-    ) -> "_Plan":
-        _require_trials(trials)
-        prepared = _prepared(trials, options.prepare)
-        targets = _prepared(trials, options.target) if options.target else prepared
-        tasks, notes = plan_folds(prepared, options.fit, targets)
-        further = _further(trials)
-        notes += _notes_on_inputs(further)
-        apart = [] if further else _apart(prepared, options.fit)
-        batches = (
-            *beside(prepared),  # first: they are longer than a fit
-            Batch(run_fold, tasks),
-            Batch(fit_components, apart),
-            Batch(fit_terrain, _wholes(prepared, options)),
-        )
-        return cls(prepared, batches, apart, notes)
+def _kind(terrain: str, recorded: Sequence[TractionSeries]) -> str:
+    return terrain_kind(terrain, [series.stones for series in recorded])
 
 
 def _result(
@@ -260,7 +228,7 @@ def _result(
     terrain = whole.terrain
     return TerrainResult(
         terrain=terrain,
-        kind=terrain_kind(terrain, [series.stones for series in recorded]),
+        kind=_kind(terrain, recorded),
         trials=kept,
         slips=tuple(find_slips(trial.smooth) for trial in kept),
         folds=tuple(fold for fold in folds if fold.terrain == terrain),
@@ -329,7 +297,7 @@ def _prepared(
         }
 
 
-def _apart(
+def _components(
     prepared: Mapping[str, Sequence[PreparedTrial]], fit: FitOptions
 ) -> list[ComponentsTask]:
     """Return a task per terrain, none where no model of a new trial is asked for."""

@@ -1,23 +1,21 @@
 """From sessions to a report: the trials that are loaded, and their study."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from shutil import disk_usage
 
 from acquisition.errors import SessionError, TrialFileError
-from analysis.breakaway.model import BreakAwayModel
 from analysis.data.load import load_trial
 from analysis.data.plausibility import summed_up
 from analysis.data.recorded_factors import stated_factors
 from analysis.report.drawing import DRAWN_TYPES
 from analysis.report.held_trial import HeldTrial, TrialFiles
 from analysis.report.sections.rig_health.health import with_tares
-from analysis.report.whole_study import run_whole_study
 from analysis.study.covariates import COVARIATE_TYPES
 from analysis.study.models import FitOptions
 from analysis.study.store import MOST_BYTES, TYPES, ResultStore
-from analysis.study.study import Study, StudyOptions
+from analysis.study.study import Study, StudyOptions, run_study
 from experiments.operator.console import Console
 from experiments.report.choices import ReportRequest
 from experiments.report.commissioned import uncommissioned
@@ -76,14 +74,12 @@ class StudySession:
 
     Attributes:
         study: the result.
-        break_away: models of break-away, by terrain that has one.
         trials: the kept trials by terrain, in the matrix's order.
         left_out: recordings that are not in it, and why.
         truths: how far trials are from their truth files, by path of the trial.
     """
 
     study: Study
-    break_away: Mapping[str, BreakAwayModel]
     trials: dict[str, list[HeldTrial]]
     left_out: list[str]
     truths: dict[Path, TruthErrors]
@@ -137,10 +133,15 @@ def study_sessions(
     )
     series = {name: [t.series for t in group] for name, group in trials.items()}
     with fitting(console) as progress:
-        study, break_away = run_whole_study(
-            series, options, sessions[0].is_simulated, progress, results_below(data)
+        study = run_study(
+            series,
+            options,
+            sessions[0].is_simulated,
+            progress,
+            results_below(data),
+            with_break_away=True,
         )
-    return StudySession(study, break_away, trials, left_out, truths)
+    return StudySession(study, trials, left_out, truths)
 
 
 def report_sessions(
@@ -182,7 +183,6 @@ def _reported(
     }
     return ReportedStudy(
         study,
-        analysed.break_away,
         title="Traction " + (sessions[0].id if len(sessions) == 1 else "study"),
         subtitle=f"{len(every)} trials on {', '.join(trials)}",
         is_foreign=False,

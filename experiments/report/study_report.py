@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from acquisition.clock import SystemClock
-from analysis.breakaway.model import BreakAwayModel
 from analysis.data.load import RecordedTrial
 from analysis.data.series import TractionSeries
 from analysis.report.page_model import ReportContext
@@ -29,7 +28,6 @@ class ReportedStudy:
 
     Attributes:
         study: the study.
-        break_away: models of break-away, by terrain that has one.
         title: heading of the page.
         subtitle: line below it.
         is_foreign: the trials come from elsewhere, not from this rig.
@@ -43,7 +41,6 @@ class ReportedStudy:
     """
 
     study: Study
-    break_away: Mapping[str, BreakAwayModel]
     title: str
     subtitle: str
     is_foreign: bool
@@ -104,7 +101,7 @@ def report_study(
             **reported.numbers,
         },
         with_pdf=order.with_pdf,
-        results=compute_results(study, reported.rig, reported.break_away),
+        results=compute_results(study, reported.rig),
         store=store,
     )
     return write_report(study, out, context)

@@ -9,13 +9,12 @@ import pytest
 import analysis.report.drawing
 import analysis.study.jobs
 import analysis.study.study
-import analysis.terrains.export
 from tests.experiments.program import only_session, traction
 
 COMPUTED = (  # two trials have no components, and nothing is nothing to keep
     (analysis.study.study, "run_fold"),
     (analysis.study.study, "fit_terrain"),
-    (analysis.terrains.export, "fit_planned"),
+    (analysis.study.study, "fit_planned"),
     (analysis.report.drawing, "report_figures"),
 )
 

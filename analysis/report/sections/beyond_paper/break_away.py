@@ -17,7 +17,6 @@ from analysis.report.style import LOAD_LABEL, Axes, Figure, panel_grid, plain
 from analysis.study.models import GP_SE
 from analysis.study.study import Study
 from analysis.study.terrain_fit import TerrainResult
-from analysis.terrains.export import break_away_of
 
 if TYPE_CHECKING:
     from analysis.report.results import StudyResults
@@ -136,19 +135,11 @@ class TerrainBreakAway:
         }
 
 
-def break_away_findings(
-    study: Study, models: Mapping[str, BreakAwayModel] | None = None
-) -> Mapping[str, TerrainBreakAway]:
-    """Return what every terrain gives before it slips, where that is known.
-
-    Args:
-        study: the trials.
-        models: fitted to them by terrain; None = they are fitted here.
-    """
-    models = break_away_of(study) if models is None else models
+def break_away_findings(study: Study) -> Mapping[str, TerrainBreakAway]:
+    """Return what every terrain gives before it slips, where that is known."""
     return {
         name: _of_terrain(study.terrains[name], model, study.options.prepare.slowest)
-        for name, model in models.items()
+        for name, model in study.break_away.items()
     }
 
 
