@@ -6,14 +6,12 @@ be kept, too. They are known by all that they show and by the code that draws th
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import overload
 
 from acquisition.worker_processes import available_cores
 from analysis.report.page_model import ReportFigure, ShownNumbers
-from analysis.report.pictures import Picture
-from analysis.report.section import ReportSection
 from analysis.report.sections.order import FIGURES, SECTION_OF
 from analysis.study.jobs import Store, run_tasks
 from analysis.study.study import Study
@@ -21,9 +19,6 @@ from analysis.study.study import Study
 _MOST_DRAWING = 4  # processes
 _SLOWEST_FIRST = tuple(FIGURES)[::-1]
 _MANY_TERRAINS = 2  # from which on they pay: the workers are there, of the fits
-DRAWN_TYPES: Mapping[str, type] = {
-    kind.__name__: kind for kind in (Picture, ReportFigure, ReportSection)
-}
 
 
 def report_figures(shown: ShownNumbers) -> list[ReportFigure]:

@@ -119,9 +119,6 @@ class CovariateFold(NamedTuple):
     gains: Mapping[str, tuple[float, ...]]
 
 
-COVARIATE_TYPES: Mapping[str, type] = {"CovariateFold": CovariateFold}
-
-
 class CovariateResult(NamedTuple):
     """What a column tells of F_t on a terrain.
 

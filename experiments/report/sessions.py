@@ -9,12 +9,10 @@ from acquisition.errors import SessionError, TrialFileError
 from analysis.data.load import load_trial
 from analysis.data.plausibility import summed_up
 from analysis.data.recorded_factors import stated_factors
-from analysis.report.drawing import DRAWN_TYPES
 from analysis.report.held_trial import HeldTrial, TrialFiles
 from analysis.report.sections.rig_health.health import with_tares
-from analysis.study.covariates import COVARIATE_TYPES
 from analysis.study.models import FitOptions
-from analysis.study.store import MOST_BYTES, TYPES, ResultStore
+from analysis.study.store import MOST_BYTES, ResultStore
 from analysis.study.study import Study, StudyOptions, run_study
 from experiments.operator.console import Console
 from experiments.report.choices import ReportRequest
@@ -97,13 +95,8 @@ class StudySession:
 
 def results_below(data: Path) -> ResultStore:
     """Return the store of results below a folder of data; it grows with the disk."""
-    types = {
-        **TYPES,
-        **DRAWN_TYPES,
-        **COVARIATE_TYPES,
-    }
     free = disk_usage(data).free if data.is_dir() else 0
-    return ResultStore(data / FOLDS, max(MOST_BYTES, free // _SHARE_OF_DISK), types)
+    return ResultStore(data / FOLDS, max(MOST_BYTES, free // _SHARE_OF_DISK))
 
 
 def study_sessions(
