@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from analysis.report.pictures import Picture
 from analysis.report.section import ReportSection, ReportTable
 from analysis.report.sections.rig_health.health import RigTrial
-from analysis.study.jobs import Store
+from analysis.study.store import ResultStore
 
 if TYPE_CHECKING:
     from analysis.report.results import StudyResults
@@ -114,7 +114,7 @@ class ReportContext:
     further_numbers: Mapping[str, Any] = field(default_factory=dict)
     with_pdf: bool = False
     results: StudyResults | None = None
-    store: Store | None = None
+    store: ResultStore | None = None
 
     @property
     def kind(self) -> str:

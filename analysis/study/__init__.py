@@ -1,5 +1,5 @@
-"""Models of a study: fitted by name, cross-validated, scored, resumed.
+"""Models of a study: fitted by name, cross-validated, scored, compared, kept on disk.
 
-`models` names the fitters, `crossval` is ten-fold cross-validation trial by trial,
-`jobs` runs tasks on processes or a cluster, `study` joins them. Begin with `study`.
+Begin with `study`: it makes independent tasks of terrain, fold and model (`crossval`,
+`models`), which `tasks` runs on processes or a cluster and `store` keeps.
 """

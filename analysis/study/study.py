@@ -32,15 +32,10 @@ from analysis.study.crossval import (
     plan_folds,
     run_fold,
 )
-from analysis.study.jobs import (
-    Batch,
-    Progress,
-    Store,
-    Workers,
-    run_batches,
-)
 from analysis.study.metrics import standard_error
 from analysis.study.models import NEW_TRIAL, FitOptions
+from analysis.study.store import ResultStore
+from analysis.study.tasks import Batch, Progress, Workers, run_batches
 from analysis.study.terrain_fit import (
     PooledTustinFit,
     TerrainResult,
@@ -154,7 +149,7 @@ def run_study(
     options: StudyOptions,
     simulated: bool,
     progress: Progress | None = None,
-    store: Store | None = None,
+    store: ResultStore | None = None,
     *,
     with_break_away: bool = False,
 ) -> Study:

@@ -12,9 +12,10 @@ from analysis.data.prepare import PreparedTrial, PrepareOptions
 from analysis.data.samples import SampleTable, TrainingSet
 from analysis.data.series import Array
 from analysis.study.distribution import SHARES
-from analysis.study.jobs import Store, Workers, run_tasks
 from analysis.study.models import GP_SE, GP_SE_TRIAL, TITLES, FitOptions, ModelFitter
+from analysis.study.store import ResultStore
 from analysis.study.study import Study
+from analysis.study.tasks import Workers, run_tasks
 from analysis.study.terrain_fit import TerrainResult
 from analysis.terrains.database import to_text
 from analysis.terrains.identify import Identification
@@ -82,7 +83,7 @@ def database_of(
     identification: Identification | None,
     made_utc: str,
     workers: Workers | int | None = None,
-    store: Store | None = None,
+    store: ResultStore | None = None,
 ) -> str:
     """Return the text of a terrain database of every terrain of a study.
 

@@ -43,10 +43,14 @@ def run(args: argparse.Namespace) -> int:
     require_extra("report")
     if args.scheduler:
         require_extra("cluster")
-    from experiments.report.workers import start_workers
+    from experiments.report.workers import workers_of_report
 
-    if not _is_kept(Path(args.data)):
-        start_workers(args.scheduler)
+    is_new = not args.scheduler and not _is_kept(Path(args.data))
+    with workers_of_report(are_needed=is_new):
+        return _report(args)
+
+
+def _report(args: argparse.Namespace) -> int:
     from analysis.tables.columns import parse_covariates
     from experiments.operator.console import Console, PageRecorder
     from experiments.report.choices import (

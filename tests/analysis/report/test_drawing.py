@@ -4,16 +4,17 @@ import pytest
 
 from analysis.report import drawing
 from analysis.report.drawing import (
-    FigureTasks,
-    draw_figure,
+    FigureTask,
+    draw_figures,
     kept_figures,
 )
 from analysis.report.page_model import ReportFigure, ShownNumbers
 from analysis.report.pictures import Picture
 from analysis.report.results import compute_results
 from analysis.report.section import ReportSection
-from analysis.study.jobs import run_tasks
+from analysis.report.sections.order import FIGURES
 from analysis.study.store import ResultStore
+from analysis.study.tasks import run_tasks
 
 PICTURE = Picture("rig", b"\x89PNG\x00\xff", b"%PDF", 1146, "<svg></svg>")
 FIGURE = ReportFigure(ReportSection.HEALTH, "Rig", "bars", "It is well.", PICTURE)
@@ -73,8 +74,8 @@ def test_what_is_no_figure_is_drawn_anew(store, drawings):
 @pytest.mark.slow
 @pytest.mark.timeout(300)  # two processes beside others on a busy machine
 def test_pictures_are_the_same_from_two_processes(small_study):
-    shown = ShownNumbers(compute_results(small_study))
-    tasks = list(FigureTasks(shown))[::4]
-    here = [draw_figure(task) for task in tasks]
-    assert any(here)
-    assert run_tasks(draw_figure, tasks, 2) == here
+    shown, keys = ShownNumbers(compute_results(small_study)), tuple(FIGURES)[::4]
+    shares = [FigureTask(shown, keys[k::2]) for k in range(2)]
+    here = [draw_figures(share) for share in shares]
+    assert all(here)
+    assert run_tasks(draw_figures, shares, 2) == here

@@ -91,7 +91,7 @@ from pathlib import Path
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.tables.loading import load_tables
 from analysis.study.crossval import plan_folds, run_fold
-from analysis.study.jobs import run_tasks
+from analysis.study.tasks import run_tasks
 from analysis.study.models import FitOptions
 from analysis.study.store import ResultStore
 

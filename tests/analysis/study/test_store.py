@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from analysis.breakaway.censored import Family
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.study.crossval import plan_folds, run_fold
-from analysis.study.jobs import run_tasks
 from analysis.study.models import MODELS, FitOptions
 from analysis.study.store import (
     LARGEST,
@@ -104,7 +103,7 @@ def test_a_fold_comes_back_from_disk_as_it_was(tmp_path, task, result):
     store.put(run_fold, task, result)
     found = store.get(run_fold, task)
     assert encode(found) == encode(result)
-    own = task.own
+    (own,) = task.test_trials
     for name, fold in result.models.items():
         again = found.models[name].model.predict(own.F_n, own.v_t)
         before = fold.model.predict(own.F_n, own.v_t)
@@ -125,9 +124,10 @@ def test_a_result_that_could_not_be_read_again_is_refused(tmp_path, task):
 
 def test_a_changed_option_or_sample_is_another_task(task):
     options = replace(task.options, seed=1)
-    rows = replace(task.own, F_t=task.own.F_t + 1e-12)
+    (own,) = task.test_trials
+    moved = (replace(own, F_t=own.F_t + 1e-12),)
     keys = {task_key(run_fold, t) for t in (task, replace(task, options=options))}
-    assert len(keys | {task_key(run_fold, replace(task, own=rows))}) == 3
+    assert len(keys | {task_key(run_fold, replace(task, test_trials=moved))}) == 3
     assert task_key(run_fold, replace(task)) in keys
 
 
@@ -290,37 +290,6 @@ def test_a_name_that_holds_no_result_is_no_error(tmp_path, task, result, what):
     store.put(run_fold, task, result)
     assert (store.get(run_fold, task) is None) is (what == "folder")
     assert elsewhere.read_bytes() == whole
-
-
-@dataclass
-class Memory:
-    kept: dict
-
-    def get(self, function, task):
-        return self.kept.get((function, task))
-
-    def put(self, function, task, result):
-        self.kept[function, task] = result
-
-
-def stop_at_three(number):
-    if number == 3:
-        raise KeyboardInterrupt
-    return number + 10
-
-
-def test_an_interrupted_run_resumes_where_it_stopped():
-    memory, seen = Memory({}), []
-    with pytest.raises(KeyboardInterrupt):
-        run_tasks(stop_at_three, [1, 2, 3, 4], 1, store=memory)
-    assert memory.kept == {(stop_at_three, 1): 11, (stop_at_three, 2): 12}
-
-    memory.put(stop_at_three, 3, 13)
-    found = run_tasks(
-        stop_at_three, [1, 2, 3, 4], 1, lambda *done: seen.append(done), memory
-    )
-    assert found == [11, 12, 13, 14]
-    assert seen == [(3, 4), (4, 4)]
 
 
 @pytest.mark.parametrize("model", list(MODELS))
