@@ -21,7 +21,7 @@ from contextlib import ExitStack
 from datetime import datetime
 from pathlib import Path
 
-from acquisition.worker_processes import available_cores
+from acquisition.cores import available_cores
 
 BUSY = "while True: pass"
 PROGRAM = (sys.executable, "-m", "experiments")

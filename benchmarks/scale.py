@@ -17,6 +17,7 @@ import tempfile
 import time
 import tracemalloc
 from pathlib import Path
+from pickle import dumps
 from types import SimpleNamespace
 from typing import Any
 
@@ -48,23 +49,27 @@ def made_trials(count: int) -> dict[str, list[Any]]:
 
 
 def folds_of(count: int) -> dict[str, float]:
-    """Return what planning so many folds takes, and what a task ships."""
+    """Return what planning so many folds takes, and what is shipped with one."""
     trials, times = made_trials(count), []
     for _ in range(_REPEATS):
         start = time.process_time()
-        plan, _ = plan_folds(trials, FitOptions())
-        for k in range(len(plan)):
-            task_key(run_fold, plan.outline(k))
+        tasks, _ = plan_folds(trials, FitOptions())
+        for task in tasks:
+            task_key(run_fold, task)
         times.append(time.process_time() - start)
     tracemalloc.start()
-    plan, _ = plan_folds(trials, FitOptions())
-    for k in range(len(plan)):
-        task_key(run_fold, plan.outline(k))
-    for k in range(0, len(plan), max(1, len(plan) // 10)):
-        _ = plan[k].training
+    tasks, _ = plan_folds(trials, FitOptions())
+    for task in tasks:
+        task_key(run_fold, task)
+    shipped = max(len(dumps(task)) for task in tasks)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    return {"count": count, "seconds": min(times), "megabytes": peak / 1e6}
+    return {
+        "count": count,
+        "seconds": min(times),
+        "megabytes": peak / 1e6,
+        "shipped": shipped / 1e6,
+    }
 
 
 def status_of(count: int) -> dict[str, float]:
@@ -100,18 +105,6 @@ def _status(data: Path, home: Path) -> float:
     )
 
 
-def shipped_bytes() -> int:
-    """Return the pickled call of a task: a function's name, a number, a future's key.
-
-    The samples are scattered once. Dask's own envelope is not counted.
-    """
-    from distributed.protocol.pickle import dumps
-
-    from analysis.study.crossval import run_fold
-
-    return len(dumps((run_fold, 799, "future")))
-
-
 def exponent(points: list[dict[str, float]], key: str) -> float:
     """Return p of cost ~ size^p between the two largest sizes."""
     *_, small, large = points
@@ -140,12 +133,13 @@ def rows_of(found: dict[str, Any]) -> list[BenchRow]:
     grown = {
         "planning grows as trials to the power of": exponent(folds, "seconds"),
         "its memory grows to the power of": exponent(folds, "megabytes"),
+        "what is shipped with a fold, to the power of": exponent(folds, "shipped"),
         "`status` grows as sessions to the power of": exponent(statuses, "seconds"),
     }
     return [
         BenchRow("folds of 800 trials: memory", last["megabytes"], "MB", 300),
         BenchRow("folds of 800 trials: planned and known", last["seconds"], "s", 1),
-        BenchRow("shipped per Dask task", shipped_bytes() / 1e3, "kB", 40),
+        BenchRow("folds of 800 trials: shipped with one", last["shipped"], "MB", 2),
         BenchRow("`status`, an empty folder", 1e3 * found["empty"], "ms", 150),
         BenchRow(unchanged, status["seconds"], "s", 1.0),
         *(BenchRow(what, power, "", _LINEAR) for what, power in grown.items()),

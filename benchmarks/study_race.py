@@ -197,7 +197,7 @@ def run_theirs(
     rows = given(task)
     foreign = [trial for trials in task.others.values() for trial in trials]
     tested = rows.standardised(SampleTable.joined([task.training, *foreign]))
-    own = rows.standardised(task.own)
+    own = rows.standardised(SampleTable.joined(task.test_trials))
     found = {}
     for name, (part, _) in FITS.items():
         model = fit_theirs(part, rows.X, rows.outputs[name], starts[name])
@@ -215,6 +215,7 @@ def where_time_goes(task: FoldTask) -> list[str]:
     parts = [f"Tustin of {task.training.count} rows {1e3 * spent:.0f} ms"]
     foreign = [rows for trials in task.others.values() for rows in trials]
     tested = SampleTable.joined([task.training, *foreign])
+    own = SampleTable.joined(task.test_trials)
     predicting = 0.0
     for name in FITS:
         spent, model = timed(lambda name=name: fitter.fit(name))
@@ -222,7 +223,7 @@ def where_time_goes(task: FoldTask) -> list[str]:
         count = sum(start.evaluations for start in starts)
         parts.append(f"{name} {1e3 * spent:.0f} ms ({count} evaluations)")
         predicting += timed(lambda m=model: m.mean(tested.F_n, tested.v_t))[0]
-        predicting += timed(lambda m=model: m.predict(task.own.F_n, task.own.v_t))[0]
+        predicting += timed(lambda m=model: m.predict(own.F_n, own.v_t))[0]
     parts.append(f"predictions of {tested.count} rows {1e3 * predicting:.0f} ms")
     return ["one of our folds: " + ", ".join(parts)]
 

@@ -10,7 +10,6 @@ from typing import Literal
 DEFAULT_DATA = Path("data")
 FRICTION = 0.4  # of the simulated joints, as a share of another arm's; ASSUMED
 CABLES = (8.0, 25.0)  # Hz, resonance of joints on cables; ASSUMED
-_SHARDS = 10_000  # of one study, at most
 PACES = ("steady", "slow", "fast", "clumsy")  # of the simulated person
 # How time passes in a simulation: as on the wall, as fast as can be, in processes.
 TimeMode = Literal["paced", "fast", "processes"]
@@ -234,24 +233,6 @@ def add_scheduler(parser: ArgumentParser) -> None:
         help="fit on the Dask cluster there: tls://HOST:PORT, or tcp://127.0.0.1:8786; "
         "needs traction[cluster]",
     )
-
-
-def add_shard(parser: ArgumentParser) -> None:
-    """Declare that only a share of the fits is wanted."""
-    parser.add_argument(
-        "--shard",
-        type=_shard,
-        metavar="I/N",
-        help="do every N-th fit, the I-th of them, and keep it: N jobs on one folder; "
-        "the report without it finds all",
-    )
-
-
-def _shard(text: str) -> tuple[int, int]:
-    number, _, of = text.partition("/")
-    if number.isdecimal() and of.isdecimal() and 1 <= int(number) <= int(of) <= _SHARDS:
-        return int(number), int(of)
-    raise ArgumentTypeError(f"{text!r} is no share, write e.g. 1/8")
 
 
 def add_pdf(parser: ArgumentParser) -> None:

@@ -17,9 +17,9 @@ from acquisition.control_loop.faults import (
     ReplySilence,
 )
 from acquisition.control_loop.states import ArmState
+from acquisition.cores import available_cores
 from acquisition.devices import BusCondition, SafetyMode
 from acquisition.errors import IDLE_ARM, PreflightError, UnfitDeviceError
-from acquisition.worker_processes import available_cores
 from experiments.operator.keys import AFTER_FAULT
 from experiments.operator.prompts import Prompt
 from ft_sensor.weighing import WeightCause

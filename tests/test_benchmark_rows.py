@@ -44,7 +44,8 @@ def test_folds_of_made_trials_are_planned_and_known():
 def test_growth_beyond_linear_is_not_met():
     def costs(power):
         return [
-            {"count": n, "seconds": n**power, "megabytes": n * 1e-3} for n in (80, 800)
+            {"count": n, "seconds": n**power, "megabytes": n, "shipped": n}
+            for n in (80, 800)
         ]
 
     found = {"folds": costs(2.0), "boards": costs(0.9), "empty": 0.1}

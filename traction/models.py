@@ -17,7 +17,6 @@ from analysis.study.break_away_fit import BreakAwayOptions
 from analysis.study.break_away_fit import fit_break_away as fit_of_terrains
 from analysis.study.crossval import FoldResult, plan_folds, run_fold
 from analysis.study.distribution import Distribution
-from analysis.study.jobs import run_tasks
 from analysis.study.metrics import standard_error
 from analysis.study.models import (
     GP_SE,
@@ -29,6 +28,7 @@ from analysis.study.models import (
     ModelFitter,
 )
 from analysis.study.slip_risk import BreakAwayModel
+from analysis.study.tasks import run_tasks
 from analysis.study.terrain_fit import mean_of
 from analysis.terrains.database import load
 from analysis.terrains.known import TerrainDatabase

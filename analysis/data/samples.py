@@ -1,10 +1,7 @@
 """Samples as models take them: columns, and where one trial ends."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from hashlib import blake2b
-from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 
@@ -61,15 +58,6 @@ class SampleTable:
         """Number of rows."""
         return int(self.F_t.size)
 
-    def part(self, start: int, end: int) -> "SampleTable":
-        """Return the rows from `start` to before `end`, without a copy of them."""
-        return SampleTable(  # of a mapped file, in a worker
-            np.asarray(self.F_n[start:end]),
-            np.asarray(self.v_t[start:end]),
-            np.asarray(self.F_t[start:end]),
-            None if self.further is None else np.asarray(self.further[start:end]),
-        )
-
     def take(self, indices: Indices) -> "SampleTable":
         """Return the rows at `indices`."""
         further = None if self.further is None else self.further[indices]
@@ -81,51 +69,6 @@ class SampleTable:
     def inputs(self) -> Array:
         """Return (F_n, v_t) and further inputs side by side, shape (n, 2 + k)."""
         return inputs_of(self.F_n, self.v_t, self.further)
-
-
-class PooledSamples(NamedTuple):
-    """Kept samples of all trials, one trial after the other.
-
-    Attributes:
-        table: the samples.
-        spans: first row and end of every trial, by terrain and number.
-    """
-
-    table: SampleTable
-    spans: Mapping[str, Mapping[int, tuple[int, int]]]
-
-    @classmethod
-    def of(
-        cls,
-        trials: Mapping[str, Sequence[PreparedTrial]],
-        chosen: Mapping[str, Sequence[int]],
-    ) -> "PooledSamples":
-        """Return the samples of the trials with the numbers `chosen`, by terrain."""
-        names = [(name, k) for name, numbers in chosen.items() for k in numbers]
-        ends = np.cumsum([0, *(trials[name][k].kept for name, k in names)]).tolist()
-        spans: dict[str, dict[int, tuple[int, int]]] = {name: {} for name in chosen}
-        for (name, k), span in zip(names, pairwise(ends), strict=True):
-            spans[name][k] = span
-        return cls(SampleTable.of([trials[name][k] for name, k in names]), spans)
-
-    def trial(self, terrain: str, number: int) -> SampleTable:
-        """Return the samples of one trial, without a copy of them."""
-        return self.table.part(*self.spans[terrain][number])
-
-    def digests(self) -> dict[str, dict[int, str]]:
-        """Return a hash of the samples of every trial, by terrain and number."""
-        return {
-            name: {k: _digest(self.trial(name, k)) for k in spans}
-            for name, spans in self.spans.items()
-        }
-
-
-def _digest(rows: SampleTable) -> str:
-    digest = blake2b(digest_size=16)
-    further = [] if rows.further is None else [rows.further]
-    for column in (rows.F_n, rows.v_t, rows.F_t, *further):
-        digest.update(np.ascontiguousarray(column, dtype="<f8").tobytes())
-    return digest.hexdigest()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

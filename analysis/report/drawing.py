@@ -6,24 +6,19 @@ be kept, too. They are known by all that they show and by the code that draws th
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import overload
 
-from acquisition.worker_processes import available_cores
+from acquisition.cores import available_cores
 from analysis.report.page_model import ReportFigure, ShownNumbers
-from analysis.report.pictures import Picture
-from analysis.report.section import ReportSection
 from analysis.report.sections.order import FIGURES, SECTION_OF
-from analysis.study.jobs import Store, run_tasks
+from analysis.study.store import ResultStore
 from analysis.study.study import Study
+from analysis.study.tasks import run_tasks
 
 _MOST_DRAWING = 4  # processes
 _SLOWEST_FIRST = tuple(FIGURES)[::-1]
 _MANY_TERRAINS = 2  # from which on they pay: the workers are there, of the fits
-DRAWN_TYPES: Mapping[str, type] = {
-    kind.__name__: kind for kind in (Picture, ReportFigure, ReportSection)
-}
 
 
 def report_figures(shown: ShownNumbers) -> list[ReportFigure]:
@@ -31,57 +26,33 @@ def report_figures(shown: ShownNumbers) -> list[ReportFigure]:
 
     Processes that draw share no figure, so pictures are the same by any number of them.
     """
-    n_jobs = _processes(shown.results.study)
+    count = _processes(shown.results.study)
+    shares = [FigureTask(shown, _SLOWEST_FIRST[k::count]) for k in range(count)]
     drawn = {
         figure.picture.key: figure
-        for figure in run_tasks(draw_figure, FigureTasks(shown), n_jobs)
-        if figure is not None
+        for figures in run_tasks(draw_figures, shares, count)
+        for figure in figures
     }
     return [drawn[key] for key in FIGURES if key in drawn]
 
 
 @dataclass(frozen=True, slots=True)
 class FigureTask:
-    """A figure to draw.
+    """Figures to draw.
 
     Attributes:
-        shown: what it shows.
-        key: which.
+        shown: what they show.
+        keys: which.
     """
 
     shown: ShownNumbers
-    key: str
+    keys: Sequence[str]
 
 
-class FigureTasks(Sequence[FigureTask]):
-    """Every figure, those first that take longest."""
-
-    def __init__(self, shown: ShownNumbers) -> None:
-        self._shown = shown
-
-    def __len__(self) -> int:
-        """Return the number of figures."""
-        return len(FIGURES)
-
-    @overload
-    def __getitem__(self, index: int) -> FigureTask: ...
-    @overload
-    def __getitem__(self, index: slice) -> list[FigureTask]: ...
-    def __getitem__(self, index: int | slice) -> FigureTask | list[FigureTask]:
-        """Return a figure with what it shows."""
-        keys = _SLOWEST_FIRST[index]
-        if isinstance(keys, str):
-            return FigureTask(self._shown, keys)
-        return [FigureTask(self._shown, key) for key in keys]
-
-    def outline(self, index: int) -> object:
-        """Return the key of the figure."""
-        return _SLOWEST_FIRST[index]
-
-
-def draw_figure(task: FigureTask) -> ReportFigure | None:
-    """Return a figure; None where there are no numbers for it."""
-    return _draw(task.key, task.shown)
+def draw_figures(task: FigureTask) -> list[ReportFigure]:
+    """Return those of the figures that there are numbers for."""
+    drawn = (_draw(key, task.shown) for key in task.keys)
+    return [figure for figure in drawn if figure is not None]
 
 
 def _draw(key: str, shown: ShownNumbers) -> ReportFigure | None:
@@ -101,7 +72,7 @@ def _draw(key: str, shown: ShownNumbers) -> ReportFigure | None:
     )
 
 
-def kept_figures(shown: ShownNumbers, store: Store | None) -> list[ReportFigure]:
+def kept_figures(shown: ShownNumbers, store: ResultStore | None) -> list[ReportFigure]:
     """Return every figure that there are numbers for, from the store or drawn anew.
 
     Args:

@@ -9,7 +9,7 @@ from analysis.report.pictures import Picture
 from analysis.report.results import StudyResults
 from analysis.report.section import FigureSpec, ReportSection, ReportTable
 from analysis.report.sections.rig_health.health import RigTrial
-from analysis.study.jobs import Store
+from analysis.study.store import ResultStore
 
 _MINUS = re.compile(r"(?<![\w.\u2212-])-(?=\.?\d)")
 _NUMBER = re.compile(r"[<>≤≥~]? ?[-+\u2212]?\.?\d[\d.,]*( ?(%|±.*|\(.*\)|×.*))?")
@@ -110,7 +110,7 @@ class ReportContext:
     further_numbers: Mapping[str, Any] = field(default_factory=dict)
     with_pdf: bool = False
     results: StudyResults | None = None
-    store: Store | None = None
+    store: ResultStore | None = None
 
     @property
     def kind(self) -> str:

@@ -4,7 +4,7 @@ A section computes its own numbers from `StudyResults`; `of` keeps them, so that
 figure, caption and fits.json state the same.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, TypeVar
@@ -20,10 +20,8 @@ from analysis.report.surfaces import (
     surfaces,
 )
 from analysis.study.models import GP_SE
-from analysis.study.slip_risk import BreakAwayModel
 from analysis.study.study import Study
 from analysis.terrains.identify import Identification, identify_study
-from analysis.terrains.tabulation import break_away_of
 
 Numbers = TypeVar("Numbers")
 
@@ -35,7 +33,6 @@ class StudyResults:
     Attributes:
         study: the study.
         identification: how well the terrains can be told apart; None for one terrain.
-        break_away: models of what a terrain gives before it slips from rest.
         axes: of the surfaces.
         surfaces: of the Gaussian process.
         edges: of the cells of `coverage`.
@@ -45,7 +42,6 @@ class StudyResults:
 
     study: Study
     identification: Identification | None
-    break_away: Mapping[str, BreakAwayModel]
     axes: SurfaceAxes
     surfaces: Sequence[Surface]
     edges: SurfaceAxes
@@ -66,17 +62,12 @@ class StudyResults:
         return {}
 
 
-def compute_results(
-    study: Study,
-    rig: Sequence[RigTrial] = (),
-    break_away: Mapping[str, BreakAwayModel] | None = None,
-) -> StudyResults:
-    """Return what follows from a study; of models only those of break-away are fit.
+def compute_results(study: Study, rig: Sequence[RigTrial] = ()) -> StudyResults:
+    """Return what follows from a study; no model is fitted.
 
     Args:
         study: the study.
         rig: health of the rig by trial.
-        break_away: models of break-away by terrain; None = they are fitted here.
     """
     from threadpoolctl import threadpool_limits
 
@@ -85,7 +76,6 @@ def compute_results(
         return StudyResults(
             study=study,
             identification=identify_study(study),
-            break_away=break_away_of(study) if break_away is None else break_away,
             axes=axes,
             surfaces=surfaces(study, GP_SE, axes),
             edges=edges,

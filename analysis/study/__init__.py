@@ -1,6 +1,6 @@
-"""Models of a study: fitted by name, cross-validated, scored, resumed.
+"""Models of a study: fitted by name, cross-validated, scored, compared, kept on disk.
 
-Begin with `study`, which joins them; `models` names the fitters, `crossval` is ten-fold
-cross-validation trial by trial, `jobs` runs tasks on processes or a cluster,
+Begin with `study`: it makes independent tasks of terrain, fold and model (`crossval`,
+`models`), which `tasks` runs on processes or a cluster and `store` keeps.
 `break_away_fit` and `slip_risk` say what the ground gives before a foot at rest slips.
 """

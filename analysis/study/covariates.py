@@ -25,9 +25,10 @@ from analysis.data.series import Array, Indices
 from analysis.data.terrain_kinds import FLAT
 from analysis.gp.kernels import SquaredExponential
 from analysis.study.crossval import fold_groups
-from analysis.study.jobs import Store, Workers, run_tasks
 from analysis.study.models import FitOptions
 from analysis.study.new_trial import NewTrialFit
+from analysis.study.store import ResultStore
+from analysis.study.tasks import Workers, run_tasks
 
 WAY = "way"  # since the last drop: from F_t and v_t of any trial
 SPAN = 0.2  # s over which changes are held against those of F_t
@@ -119,9 +120,6 @@ class CovariateFold(NamedTuple):
     gains: Mapping[str, tuple[float, ...]]
 
 
-COVARIATE_TYPES: Mapping[str, type] = {"CovariateFold": CovariateFold}
-
-
 class CovariateResult(NamedTuple):
     """What a column tells of F_t on a terrain.
 
@@ -175,7 +173,7 @@ def covariate_results(
     columns: Sequence[str],
     options: FitOptions,
     workers: Workers | int | None = None,
-    store: Store | None = None,
+    store: ResultStore | None = None,
 ) -> list[CovariateResult]:
     """Return what every column tells on every terrain with three trials or more.
 

@@ -9,51 +9,43 @@ other terrain.
 """
 
 import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from hashlib import blake2b
-from itertools import accumulate
-from typing import TypeVar, overload
 
 import numpy as np
 
 from acquisition.errors import TractionError
 from analysis.data.prepare import PreparedTrial
-from analysis.data.samples import PooledSamples, SampleTable, TrainingSet
-from analysis.data.series import Array, Indices
+from analysis.data.samples import SampleTable, TrainingSet
+from analysis.data.series import Indices
 from analysis.study.metrics import Score, score
 from analysis.study.models import TITLES, FitOptions, FittedModel, ModelFitter
 
-T = TypeVar("T")
-Digests = Mapping[str, Mapping[int, str]]
 MOST_FOLDS = 50  # of a terrain
 _MOST_ROWS = 50_000  # of the training that its error is told of, at most twice as many
-_DERIVED = ("_digests", "_wholes")  # of a plan
 Prepared = Mapping[str, Sequence[PreparedTrial]]
+Tables = Mapping[str, Mapping[int, SampleTable]]  # by terrain and number of the trial
 
 
 @dataclass(frozen=True, slots=True)
 class FoldTask:
     """Everything one fold needs; `run_fold` is a pure function of it.
 
+    Tasks share the tables of the trials, so that all of them grow with the trials.
+
     Attributes:
         terrain: terrain of the models.
         left_out: numbers of the trials left out, from 0.
-        training: kept samples of the other trials.
-        lengths: number of samples of each of them.
-        own: kept samples of the trials left out, one after the other.
-        own_lengths: number of samples of each of these.
+        training_trials: kept samples of every other trial.
+        test_trials: kept samples of every trial left out.
         others: for every other terrain the trials this fold is tested on.
         options: how to fit.
     """
 
     terrain: str
     left_out: tuple[int, ...]
-    training: SampleTable
-    lengths: tuple[int, ...]
-    own: SampleTable
-    own_lengths: tuple[int, ...]
+    training_trials: tuple[SampleTable, ...]
+    test_trials: tuple[SampleTable, ...]
     others: Mapping[str, tuple[SampleTable, ...]]
     options: FitOptions
 
@@ -62,9 +54,15 @@ class FoldTask:
         """Number of the fold: that of the first trial left out."""
         return self.left_out[0]
 
-    def per_trial(self, values: Array) -> list[Array]:
-        """Return what belongs to the rows of `own`, shape (n,), trial by trial."""
-        return np.split(values, np.cumsum(self.own_lengths)[:-1])
+    @property
+    def training(self) -> SampleTable:
+        """What models are fitted to, trial by trial."""
+        return SampleTable.joined(self.training_trials)
+
+    @property
+    def lengths(self) -> tuple[int, ...]:
+        """Number of samples of every trial of `training`."""
+        return tuple(rows.count for rows in self.training_trials)
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,110 +115,9 @@ class FoldResult:
         return self.left_out[0]
 
 
-class FoldPlan(Sequence[FoldTask]):
-    """The folds of a study, each made from the samples of all when it is asked for.
-
-    A plan grows with the trials, and a worker that has it needs no more than a number.
-
-    Args:
-        trials: what models are fitted to.
-        targets: the same trials as models are tested on them.
-        usable: numbers of the trials that can be folded, by terrain.
-        options: how to fit.
-    """
-
-    def __init__(
-        self,
-        trials: Prepared,
-        targets: Prepared,
-        usable: Mapping[str, Sequence[int]],
-        options: FitOptions,
-    ) -> None:
-        self._usable, self._options = usable, options
-        self._fitted = PooledSamples.of(trials, usable)
-        self._tested = (
-            self._fitted if targets is trials else PooledSamples.of(targets, usable)
-        )
-        self._folds = [
-            (name, group)
-            for name, numbers in usable.items()
-            if len(numbers) > 1
-            for group in fold_groups(numbers)
-        ]
-
-    def __len__(self) -> int:
-        """Return the number of folds."""
-        return len(self._folds)
-
-    @overload
-    def __getitem__(self, index: int) -> FoldTask: ...
-    @overload
-    def __getitem__(self, index: slice) -> list[FoldTask]: ...
-    def __getitem__(self, index: int | slice) -> FoldTask | list[FoldTask]:
-        """Return everything that one fold needs."""
-        if isinstance(index, slice):
-            return [self[k] for k in range(len(self))[index]]
-        terrain, group = self._folds[index]
-        rest = [
-            self._fitted.trial(terrain, k)
-            for k in self._usable[terrain]
-            if k not in group
-        ]
-        own = [self._tested.trial(terrain, k) for k in group]
-        return FoldTask(
-            terrain=terrain,
-            left_out=group,
-            training=SampleTable.joined(rest),
-            lengths=tuple(rows.count for rows in rest),
-            own=SampleTable.joined(own),
-            own_lengths=tuple(rows.count for rows in own),
-            others=self._paired(terrain, group, self._tested.trial),
-            options=self._options,
-        )
-
-    def outline(self, index: int) -> tuple[object, ...]:
-        """Return what tells a fold from others, digests in the place of samples."""
-        (terrain, group), (_, tested) = self._folds[index], self._digests
-        paired = self._paired(terrain, group, lambda name, k: tested[name][k])
-        own = [tested[terrain][k] for k in group]
-        whole, options = self._wholes[terrain], self._options
-        return ("fold", terrain, group, whole, own, paired, options)
-
-    def __getstate__(self) -> dict[str, object]:
-        """Return what a worker needs."""
-        return {k: v for k, v in vars(self).items() if k not in _DERIVED}
-
-    @cached_property
-    def _digests(self) -> tuple[Digests, Digests]:
-        return self._fitted.digests(), self._tested.digests()
-
-    @cached_property
-    def _wholes(self) -> dict[str, str]:
-        """Digests of all trials of every terrain: with a fold's number its training."""
-        return {
-            terrain: blake2b(repr(sorted(digests.items())).encode()).hexdigest()
-            for terrain, digests in self._digests[0].items()
-        }
-
-    def _paired(
-        self, terrain: str, group: Sequence[int], value_of: Callable[[str, int], T]
-    ) -> dict[str, tuple[T, ...]]:
-        """Return `value_of` every trial of another terrain that a fold is tested on."""
-        own = self._usable[terrain]
-        met = {
-            other: {k for fold in group for k in paired_trials(fold, own, tests)}
-            for other, tests in self._usable.items()
-            if other != terrain
-        }
-        return {
-            other: tuple(value_of(other, k) for k in sorted(numbers))
-            for other, numbers in met.items()
-        }
-
-
 def plan_folds(
     trials: Prepared, options: FitOptions, targets: Prepared | None = None
-) -> tuple[FoldPlan, list[str]]:
+) -> tuple[list[FoldTask], list[str]]:
     """Return the folds of a study and notes on what cannot be folded.
 
     Args:
@@ -239,15 +136,56 @@ def plan_folds(
         ]
         for terrain, prepared in trials.items()
     }
+    training = _tables(trials, usable)
+    test = training if targets is trials else _tables(targets, usable)
+    folds = [
+        FoldTask(
+            terrain=terrain,
+            left_out=group,
+            training_trials=tuple(
+                training[terrain][k] for k in numbers if k not in group
+            ),
+            test_trials=tuple(test[terrain][k] for k in group),
+            others=_paired(terrain, group, test),
+            options=options,
+        )
+        for terrain, numbers in usable.items()
+        if len(numbers) > 1
+        for group in fold_groups(numbers)
+    ]
     notes = _notes_on_gaps(trials, usable)
     notes += [
-        f"{terrain}: {len(folds)} trial with kept samples; leaving one out "
+        f"{terrain}: {len(numbers)} trial with kept samples; leaving one out "
         "needs two, so no model was fitted."
-        for terrain, folds in usable.items()
-        if len(folds) < 2
+        for terrain, numbers in usable.items()
+        if len(numbers) < 2
     ]
     notes += notes_on_groups(usable)
-    return FoldPlan(trials, targets, usable, options), notes
+    return folds, notes
+
+
+def _tables(trials: Prepared, usable: Mapping[str, Sequence[int]]) -> Tables:
+    """Return the samples of the usable trials by terrain and number."""
+    return {
+        terrain: {k: SampleTable.of([trials[terrain][k]]) for k in numbers}
+        for terrain, numbers in usable.items()
+    }
+
+
+def _paired(
+    terrain: str, group: Sequence[int], test: Tables
+) -> dict[str, tuple[SampleTable, ...]]:
+    """Return the trials of every other terrain that a fold is tested on."""
+    own = list(test[terrain])
+    met = {
+        other: {k for fold in group for k in paired_trials(fold, own, list(trials))}
+        for other, trials in test.items()
+        if other != terrain
+    }
+    return {
+        other: tuple(test[other][k] for k in sorted(numbers))
+        for other, numbers in met.items()
+    }
 
 
 def fold_groups(trials: Sequence[int], most: int = MOST_FOLDS) -> list[tuple[int, ...]]:
@@ -278,9 +216,8 @@ def notes_on_groups(trials: Mapping[str, Sequence[int]]) -> list[str]:
 
 def run_fold(task: FoldTask) -> FoldResult:
     """Return the models of one fold and their errors."""
-    chosen = choose_rows(task)
-    training = TrainingSet(task.training, task.lengths, chosen)
-    fitter = ModelFitter(training, task.options)
+    training, chosen = task.training, choose_rows(task)
+    fitter = ModelFitter(TrainingSet(training, task.lengths, chosen), task.options)
     models: dict[str, ModelFold] = {}
     notes: list[str] = []
     for name in task.options.models:
@@ -292,13 +229,14 @@ def run_fold(task: FoldTask) -> FoldResult:
             )
         else:
             models[name] = _examine(model, task)
-    error = task.per_trial(np.abs(task.own.F_t - np.median(task.training.F_t)))
+    median = np.median(training.F_t)
+    errors = [float(np.abs(rows.F_t - median).mean()) for rows in task.test_trials]
     return FoldResult(
         terrain=task.terrain,
         left_out=task.left_out,
         models=models,
         gp_rows=tuple(int(k) for k in chosen),
-        constant_mae=float(np.mean([part.mean() for part in error])),
+        constant_mae=float(np.mean(errors)),
         notes=tuple(notes),
     )
 
@@ -345,7 +283,6 @@ def _notes_on_gaps(trials: Prepared, usable: Mapping[str, list[int]]) -> list[st
 
 
 def _examine(model: FittedModel, task: FoldTask) -> ModelFold:
-    own = task.own
     foreign = [rows for trials in task.others.values() for rows in trials]
     training = task.training
     if (step := training.count // _MOST_ROWS) > 1:
@@ -356,17 +293,11 @@ def _examine(model: FittedModel, task: FoldTask) -> ModelFold:
     ends = np.cumsum([training.count, *(rows.count for rows in foreign)])
     on_training, *on_foreign = np.split(error, ends[:-1])
     maes = iter(float(part.mean()) for part in on_foreign)
-    left_out = [
-        own.part(end - count, end)
-        for count, end in zip(
-            task.own_lengths, accumulate(task.own_lengths), strict=True
-        )
-    ]
     return ModelFold(
         model=model,
         scores=tuple(
             score(one.F_t, model.predict(one.F_n, one.v_t, one.further))
-            for one in left_out
+            for one in task.test_trials
         ),
         train_rmse=float(np.sqrt(np.mean(on_training**2))),
         cross={

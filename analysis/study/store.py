@@ -2,26 +2,26 @@
 
 An interrupted study resumes where it stopped, and a study repeated with one choice
 changed repeats only what that choice touches. A result is known by its task and by the
-code that computes it, so a corrected formula never shows an old number. A file that is
-damaged or foreign counts as not there. Files are written whole or not at all.
+code that computed it, so a corrected formula never shows an old number. Beyond its size
+the folder loses what was used longest ago.
 
-Values become JSON and come back exactly: dataclasses, named tuples, enumerations,
-arrays, numbers. Nothing is ever unpickled: a type is found by name in a table of the
-types that may appear, and its fields must be exactly its own.
-
-The folder has a size: beyond `MOST_BYTES` the results that were used longest ago go,
-down to nine tenths of it. A result that is read counts as used.
+Values become JSON and come back bit by bit. Nothing is ever unpickled: a file can name
+nothing but dataclasses, named tuples and enumerations of `analysis`, with exactly their
+fields. A file that is damaged or foreign counts as not there.
 """
 
 import base64
-import contextlib
 import hashlib
 import json
 import math
 import os
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import fields, is_dataclass
 from enum import Enum
+from functools import cache
+from importlib import import_module
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -29,61 +29,15 @@ import numpy as np
 
 from acquisition.errors import SettingsError
 from acquisition.files import open_directory, read_regular, replace_file
-from analysis.data.samples import SampleTable
-from analysis.gp import noise, trial_noise
-from analysis.gp.kernels import KERNELS
-from analysis.gp.regression import GaussianProcess
-from analysis.gp.search import Start
-from analysis.study.crossval import FoldResult, ModelFold
-from analysis.study.digests import code_digest, value_digest
-from analysis.study.metrics import Score
-from analysis.study.models import GpModel, TustinModel
-from analysis.study.new_trial import NewTrialModel
-from analysis.study.noise_selection import NoiseChoice, TailedNoise
-from analysis.study.slip_risk import BreakAwayModel, PushLaw
-from analysis.study.terrain_fit import PooledTustinFit
-from analysis.study.trial_components import TrialComponents
-from analysis.tustin import model as tustin
-from analysis.tustin.identifiability import Interval, Profiles
 
-Types = Mapping[str, type]
 Function = Callable[..., Any]
 
-_DTYPES = {"float64": "<f8", "int64": "<i8", "bool": "|b1"}
 MOST_BYTES = 256 * 1024**2  # of all results, at least; a fold has about 60 kB
 LARGEST = 16 * 1024**2  # bytes of one result; a larger file is none
 _KEPT = 0.9  # share of the size that is left when results go
-
-TYPES = KERNELS | {
-    kind.__name__: kind
-    for kind in (
-        BreakAwayModel,
-        FoldResult,
-        GaussianProcess,
-        GpModel,
-        Interval,
-        ModelFold,
-        NewTrialModel,
-        NoiseChoice,
-        PooledTustinFit,
-        Profiles,
-        PushLaw,
-        SampleTable,
-        Score,
-        Start,
-        TailedNoise,
-        TrialComponents,
-        TustinModel,
-        noise.ConstantNoise,
-        noise.LogLinearNoise,
-        trial_noise.TrialNoise,
-        trial_noise.TrialRows,
-        tustin.TustinBounds,
-        tustin.TustinFit,
-        tustin.TustinForm,
-        tustin.TustinParameters,
-    )
-}
+_ROOT = Path(__file__).parents[2]  # of the sources, or of the installation
+_FIGURES = "analysis.report"  # draws what the other packages compute
+_DTYPES = {"float64": "<f8", "int64": "<i8", "bool": "|b1"}
 
 
 class ResultStore:
@@ -92,15 +46,11 @@ class ResultStore:
     Args:
         folder: made when the first result is kept; may be deleted at any time.
         most: bytes that its results may have together.
-        types: every type that may appear in a result, by name.
     """
 
-    def __init__(
-        self, folder: Path, most: int = MOST_BYTES, types: Types = TYPES
-    ) -> None:
+    def __init__(self, folder: Path, most: int = MOST_BYTES) -> None:
         self._folder = folder
         self._most = most
-        self._types = types
         self._bytes: int | None = None  # of the folder, as far as it is known
 
     def get(self, function: Function, task: Any) -> Any | None:  # noqa: ANN401
@@ -109,10 +59,10 @@ class ResultStore:
         try:
             content = json.loads(read_regular(path, LARGEST))
             is_whole = content["digest"] == _digest(content["result"])
-            result = decode(content["result"], self._types) if is_whole else None
-        except (OSError, ValueError, KeyError, TypeError, RecursionError):
+            result = decode(content["result"]) if is_whole else None
+        except Exception:  # whatever a foreign file makes of it, too
             return None
-        with contextlib.suppress(OSError):  # a folder that is only read from
+        with suppress(OSError):  # a folder that is only read from
             os.utime(path)
         return result
 
@@ -121,11 +71,11 @@ class ResultStore:
 
         Raises:
             SettingsError: the folder cannot be written.
-            TypeError: a type in it is not in the table, so it could never be read.
+            TypeError: a value in it has no plain form.
+            ValueError: it could never be read again.
         """
         plain = encode(result)
-        if unknown := sorted(_type_names(plain) - set(self._types)):
-            raise TypeError(f"results with {', '.join(unknown)} cannot be read again")
+        decode(plain)
         content = {"digest": _digest(plain), "result": plain}
         path, data = self._path(function, task), json.dumps(content).encode()
         if path.is_dir():  # nobody's result; it is made again every time
@@ -147,7 +97,7 @@ def remove_oldest(folder: Path, most: int) -> int:
     """
     files: list[tuple[int, int, Path]] = []
     for path in (*folder.glob("*.json"), *folder.glob(".*.json.*")):
-        with contextlib.suppress(OSError):
+        with suppress(OSError):
             found = path.lstat()
             files.append((found.st_mtime_ns, found.st_size, path))
     total = sum(size for _, size, _ in files)
@@ -156,26 +106,49 @@ def remove_oldest(folder: Path, most: int) -> int:
     for _, size, path in sorted(files):
         if total <= _KEPT * most:
             break
-        with contextlib.suppress(OSError):
+        with suppress(OSError):
             path.unlink()
             total -= size
     return total
 
 
 def task_key(function: Function, task: Any) -> str:  # noqa: ANN401
-    """Return the hash of a task: its data, its options, and the code it is done by."""
-    name, code = function.__qualname__, code_digest(function.__module__)
-    return _digest({"function": name, "code": code, "task": value_digest(task)})
+    """Return the hash of a task: its data, its options, and the code it is done by.
+
+    Equal values have equal keys, whether or not they share objects, which pickles of
+    them would not.
+
+    Raises:
+        TypeError: a value in the task has no plain form.
+    """
+    name = f"{function.__module__}.{function.__qualname__}"
+    code = code_digest(is_drawn=name.startswith(_FIGURES))
+    return _digest([name, code, encode(task, _array_digest)])
 
 
-def _type_names(plain: Any) -> set[str]:  # noqa: ANN401
-    """Return the names of all types in what `encode` made."""
-    if isinstance(plain, list):
-        return set().union(*map(_type_names, plain))
-    if not isinstance(plain, dict):
-        return set()
-    inside = set().union(*map(_type_names, plain.values()))
-    return inside | ({plain["type"]} if "type" in plain and len(plain) > 1 else set())
+@cache
+def code_digest(root: Path = _ROOT, *, is_drawn: bool = False) -> str:
+    """Return the SHA-256 of the sources that results follow from, and the libraries.
+
+    Args:
+        root: folder of the project's packages.
+        is_drawn: the results are figures, which follow from all of `analysis` and what
+            it imports; fits follow from `acquisition` and `analysis` but for what
+            draws.
+    """
+    packages = ["acquisition", "analysis"]
+    libraries = ["numpy", "scipy"]
+    if is_drawn:
+        packages += ["ft_sensor", "wam"]
+        libraries += ["matplotlib", "pillow"]
+    digest = hashlib.sha256(" ".join(map(version, libraries)).encode())
+    drawing = root.joinpath(*_FIGURES.split("."))
+    for path in sorted(p for name in packages for p in (root / name).rglob("*.py")):
+        if is_drawn or not path.is_relative_to(drawing):
+            content = path.read_bytes()
+            digest.update(f" {path.relative_to(root)} {len(content)} ".encode())
+            digest.update(content)
+    return digest.hexdigest()
 
 
 def _digest(plain: Any) -> str:  # noqa: ANN401
@@ -183,56 +156,58 @@ def _digest(plain: Any) -> str:  # noqa: ANN401
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def encode(value: Any) -> Any:  # noqa: ANN401
+def encode(value: Any, array: Callable[[np.ndarray], Any] | None = None) -> Any:  # noqa: ANN401
     """Return `value` as what JSON can hold; floats keep every bit.
+
+    Args:
+        value: dataclasses, named tuples, enumerations, arrays, mappings, sequences,
+            numbers, texts.
+        array: gives the plain form of an array; by default one that `decode` reads.
 
     Raises:
         TypeError: a value of a kind that has no plain form.
     """
     if isinstance(value, np.ndarray):
-        return _encode_array(value)
+        return (array or _encode_array)(value)
     if isinstance(value, np.generic):
         return encode(value.item())
+    if isinstance(value, Enum):
+        return {"type": _name(type(value)), "value": encode(value.value)}
     if value is None or isinstance(value, bool | int | str):
         return value
     if isinstance(value, bytes):
         return {"bytes": base64.b64encode(value).decode("ascii")}
     if isinstance(value, float):
         return value if math.isfinite(value) else {"number": repr(value)}
-    if isinstance(value, Enum):
-        return {"type": type(value).__name__, "value": encode(value.value)}
     names = _field_names(type(value))
     if names is not None:
-        inside = {name: encode(getattr(value, name)) for name in names}
-        return {"type": type(value).__name__, "fields": inside}
+        inside = {name: encode(getattr(value, name), array) for name in names}
+        return {"type": _name(type(value)), "fields": inside}
     if isinstance(value, list | tuple):
-        return [encode(item) for item in value]
+        return [encode(item, array) for item in value]
     if isinstance(value, Mapping):
-        return {"items": [[encode(k), encode(v)] for k, v in value.items()]}
+        items = value.items()
+        return {"items": [[encode(k), encode(item, array)] for k, item in items]}
     raise TypeError(f"{type(value).__name__} has no plain form")
 
 
-def decode(plain: Any, types: Types) -> Any:  # noqa: ANN401
+def decode(plain: Any) -> Any:  # noqa: ANN401
     """Return the value of `encode`, with tuples for lists.
-
-    Args:
-        plain: what `encode` made, or anything else.
-        types: every type that may appear, by name.
 
     Raises:
         ValueError: not the plain form of such a value.
     """
     if isinstance(plain, list):
-        return tuple(decode(item, types) for item in plain)
+        return tuple(decode(item) for item in plain)
     if not isinstance(plain, dict):
         return plain
     try:
-        return _decode_tagged(plain, types)
-    except (KeyError, TypeError, AttributeError) as error:
+        return _decode_tagged(plain)
+    except (KeyError, TypeError, AttributeError, ImportError) as error:
         raise ValueError(f"no plain form: {error!r}") from error
 
 
-def _decode_tagged(plain: dict[str, Any], types: Types) -> Any:  # noqa: ANN401
+def _decode_tagged(plain: dict[str, Any]) -> Any:  # noqa: ANN401
     match plain:
         case {"array": data, "dtype": kind, "shape": shape}:
             return _decode_array(data, kind, shape)
@@ -241,15 +216,44 @@ def _decode_tagged(plain: dict[str, Any], types: Types) -> Any:  # noqa: ANN401
         case {"number": "inf" | "-inf" | "nan" as text}:
             return float(text)
         case {"items": items}:
-            return {decode(k, types): decode(v, types) for k, v in items}
-        case {"type": name, "value": inside} if issubclass(types[name], Enum):
-            return types[name](decode(inside, types))
+            return {decode(key): decode(item) for key, item in items}
+        case {"type": name, "value": inside} if issubclass(_type(name), Enum):
+            return _type(name)(decode(inside))
         case {"type": name, "fields": inside}:
-            kind = types[name]
+            kind = _type(name)
             if set(inside) != set(_field_names(kind) or ()):
                 raise ValueError(f"{name} has other fields")
-            return kind(**{key: decode(item, types) for key, item in inside.items()})
+            return kind(**{key: decode(item) for key, item in inside.items()})
     raise ValueError("an object of no known form")
+
+
+def _name(kind: type) -> str:
+    return f"{kind.__module__}.{kind.__qualname__}"
+
+
+def _type(name: str) -> Any:  # noqa: ANN401
+    """Return a type that a result may hold.
+
+    Raises:
+        ValueError: not a dataclass, a named tuple or an enumeration of `analysis`.
+        ImportError, AttributeError: there is no such type.
+    """
+    module, _, own = name.rpartition(".")
+    if not module.startswith("analysis."):
+        raise ValueError(f"{name} is not of this analysis")
+    kind = getattr(import_module(module), own)
+    is_value = isinstance(kind, type) and (
+        _field_names(kind) is not None or issubclass(kind, Enum)
+    )
+    if not is_value or _name(kind) != name:  # else a name that its module imports
+        raise ValueError(f"{name} is no value of this analysis")
+    return kind
+
+
+def _field_names(kind: type) -> tuple[str, ...] | None:
+    if is_dataclass(kind):
+        return tuple(item.name for item in fields(kind))
+    return getattr(kind, "_fields", None)
 
 
 def _encode_array(array: np.ndarray) -> dict[str, Any]:
@@ -269,10 +273,11 @@ def _decode_array(data: str, kind: str, shape: list[int]) -> np.ndarray:
     return flat.astype(kind).reshape(shape)
 
 
-def _field_names(kind: type) -> tuple[str, ...] | None:
-    if is_dataclass(kind):
-        return tuple(item.name for item in fields(kind))
-    return getattr(kind, "_fields", None)
+def _array_digest(array: np.ndarray) -> list[Any]:
+    if array.dtype.hasobject:
+        raise TypeError("an array of objects has no digest")
+    content = hashlib.sha256(array.tobytes()).hexdigest()
+    return [content, array.dtype.str, list(array.shape)]
 
 
 def write_atomic(path: Path, content: bytes) -> None:

@@ -1,8 +1,7 @@
 """A study: all terrains prepared, folded, fitted and compared."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -19,6 +18,12 @@ from analysis.data.quality import PULLED, PULLED_WARNING
 from analysis.data.samples import SampleTable
 from analysis.data.series import TractionSeries
 from analysis.data.terrain_kinds import Value, terrain_incline, terrain_kind
+from analysis.study.break_away_fit import (
+    BreakAwayOptions,
+    BreakAwayTask,
+    fit_planned,
+    plan_break_away,
+)
 from analysis.study.crossval import (
     FoldResult,
     Prepared,
@@ -26,17 +31,11 @@ from analysis.study.crossval import (
     plan_folds,
     run_fold,
 )
-from analysis.study.jobs import (
-    Batch,
-    Progress,
-    Shard,
-    Store,
-    Workers,
-    run_batches,
-    run_shard,
-)
 from analysis.study.metrics import standard_error
 from analysis.study.models import NEW_TRIAL, FitOptions
+from analysis.study.slip_risk import BreakAwayModel
+from analysis.study.store import ResultStore
+from analysis.study.tasks import Batch, Progress, Workers, run_batches
 from analysis.study.terrain_fit import (
     PooledTustinFit,
     TerrainResult,
@@ -54,14 +53,6 @@ from analysis.study.trial_components import (
 _NAMED = 10  # trials in one warning
 _LOADED = 5.0  # N: below it F_t/F_n says little, whatever the ground
 _PLOUGHING = 1.5  # of F_t/F_n in the upper quarter; stones of one layer stay below
-
-
-# prepared trials -> tasks that are done beside the fits
-TasksBeside = Callable[[Prepared], Sequence[Batch]]
-
-
-def _none_beside(prepared: Prepared) -> Sequence[Batch]:
-    return ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +87,8 @@ class Study:
         terrains: results by terrain, in the order given.
         notes: what could not be done, and why.
         warnings: what a reader should doubt.
+        break_away: what a foot at rest meets, by terrain where it is known; empty where
+            it was not asked for.
     """
 
     simulated: bool
@@ -103,6 +96,9 @@ class Study:
     terrains: Mapping[str, TerrainResult]
     notes: tuple[str, ...]
     warnings: tuple[str, ...]
+    break_away: Mapping[str, BreakAwayModel] = field(
+        default_factory=dict[str, BreakAwayModel]
+    )
 
     @property
     def kinds(self) -> dict[str, str]:
@@ -153,7 +149,9 @@ def run_study(
     options: StudyOptions,
     simulated: bool,
     progress: Progress | None = None,
-    store: Store | None = None,
+    store: ResultStore | None = None,
+    *,
+    with_break_away: bool = False,
 ) -> Study:
     """Return the analysis of all trials.
 
@@ -163,121 +161,55 @@ def run_study(
         simulated: the trials were simulated; marks every product.
         progress: called with (fits done, fits in all).
         store: results of earlier runs, so that an interrupted study resumes.
+        with_break_away: fit the models of break-away, too.
 
     Raises:
         SettingsError: there is no trial at all.
     """
-    study, _ = run_study_beside(
-        _none_beside, trials, options, simulated, progress, store
+    _require_trials(trials)
+    prepared = _prepared(trials, options.prepare)
+    targets = _prepared(trials, options.target) if options.target else prepared
+    planned, notes = plan_folds(prepared, options.fit, targets)
+    further = _further(trials)
+    notes += _notes_on_inputs(further)
+    components = [] if further else _components(prepared, options.fit)
+    rest = [_break_away(trials, prepared, options)] if with_break_away else []
+    batches = (
+        Batch(fit_planned, rest),  # first: it takes longer than any other
+        Batch(run_fold, planned),
+        Batch(fit_components, components),
+        Batch(fit_terrain, _wholes(prepared, options)),
     )
-    return study
-
-
-def run_study_beside(
-    beside: TasksBeside,
-    trials: Mapping[str, Sequence[TractionSeries]],
-    options: StudyOptions,
-    simulated: bool,
-    progress: Progress | None = None,
-    store: Store | None = None,
-) -> tuple[Study, list[list[Any]]]:
-    """Return the analysis of all trials, and what came of the tasks beside it.
-
-    Args:
-        beside: gives batches of tasks from the prepared trials; they are done with the
-            fits, so that no core waits for the last of either.
-        trials: recorded trials by terrain.
-        options: every choice.
-        simulated: the trials were simulated.
-        progress: called with (tasks done, tasks in all).
-        store: results of earlier runs.
-
-    Raises:
-        SettingsError: there is no trial at all.
-    """
-    plan = _Plan.of(trials, options, beside)
-    prepared, notes = plan.prepared, list(plan.notes)
-    *found, folds, fitted, wholes = run_batches(
-        plan.batches, Workers(options.n_jobs, options.scheduler), progress, store
-    )
-    done = zip(plan.apart, fitted, strict=True)
-    components = {task.terrain: fit for task, fit in done}
+    workers = Workers(options.n_jobs, options.scheduler)
+    break_away, folds, fitted, wholes = run_batches(batches, workers, progress, store)
+    apart = {task.terrain: fit for task, fit in zip(components, fitted, strict=True)}
     notes += [note for fold in folds for note in fold.notes]
     results = {
-        name: _result(trials[name], prepared[name], folds, whole, components.get(name))
+        name: _result(trials[name], prepared[name], folds, whole, apart.get(name))
         for name, whole in zip(prepared, wholes, strict=True)
     }
     doubtful = (*_contradictions(trials), *notes_of_tables(trials))
-    warnings = (*doubtful, *_all_warnings(results, options))
-    return Study(simulated, options, results, tuple(notes), warnings), found
+    return Study(
+        simulated,
+        options,
+        results,
+        notes=tuple(notes),
+        warnings=(*doubtful, *_all_warnings(results, options)),
+        break_away=break_away[0] if break_away else {},
+    )
 
 
-def run_study_shard(
+def _break_away(
     trials: Mapping[str, Sequence[TractionSeries]],
+    prepared: Prepared,
     options: StudyOptions,
-    shard: Shard,
-    store: Store,
-    progress: Progress | None = None,
-    beside: TasksBeside = _none_beside,
-) -> int:
-    """Keep one run's share of what a study is made of; return its number of tasks.
-
-    After all of them `run_study` finds everything in the store, bit for bit as one run
-    would have made it.
-
-    Args:
-        trials: recorded trials by terrain.
-        options: every choice.
-        shard: which share.
-        store: on a folder that all runs see.
-        progress: called with (fits done, fits in all).
-        beside: as for `run_study_beside`.
-
-    Raises:
-        SettingsError: there is no trial at all.
-    """
-    plan = _Plan.of(trials, options, beside)
-    workers = Workers(options.n_jobs, options.scheduler)
-    return run_shard(plan.batches, shard, store, workers, progress)
+) -> BreakAwayTask:
+    kinds = {name: _kind(name, recorded) for name, recorded in trials.items()}
+    return plan_break_away(prepared, kinds, BreakAwayOptions(seed=options.fit.seed))
 
 
-@dataclass(frozen=True, slots=True)
-class _Plan:
-    """What a study has to do.
-
-    Attributes:
-        prepared: the trials.
-        batches: of tasks, the folds and what follows them last.
-        apart: tasks of the variance components.
-        notes: what cannot be done, and why.
-    """
-
-    prepared: dict[str, tuple[PreparedTrial, ...]]
-    batches: tuple[Batch, ...]
-    apart: list[ComponentsTask]
-    notes: list[str]
-
-    @classmethod
-    def of(
-        cls,
-        trials: Mapping[str, Sequence[TractionSeries]],
-        options: StudyOptions,
-        beside: TasksBeside,
-    ) -> "_Plan":
-        _require_trials(trials)
-        prepared = _prepared(trials, options.prepare)
-        targets = _prepared(trials, options.target) if options.target else prepared
-        tasks, notes = plan_folds(prepared, options.fit, targets)
-        further = _further(trials)
-        notes += _notes_on_inputs(further)
-        apart = [] if further else _apart(prepared, options.fit)
-        batches = (
-            *beside(prepared),  # first: they are longer than a fit
-            Batch(run_fold, tasks),
-            Batch(fit_components, apart),
-            Batch(fit_terrain, _wholes(prepared, options)),
-        )
-        return cls(prepared, batches, apart, notes)
+def _kind(terrain: str, recorded: Sequence[TractionSeries]) -> str:
+    return terrain_kind(terrain, [series.stones for series in recorded])
 
 
 def _result(
@@ -291,7 +223,7 @@ def _result(
     terrain = whole.terrain
     return TerrainResult(
         terrain=terrain,
-        kind=terrain_kind(terrain, [series.stones for series in recorded]),
+        kind=_kind(terrain, recorded),
         trials=kept,
         slips=tuple(find_slips(trial.smooth) for trial in kept),
         folds=tuple(fold for fold in folds if fold.terrain == terrain),
@@ -360,7 +292,7 @@ def _prepared(
         }
 
 
-def _apart(
+def _components(
     prepared: Mapping[str, Sequence[PreparedTrial]], fit: FitOptions
 ) -> list[ComponentsTask]:
     """Return a task per terrain, none where no model of a new trial is asked for."""

@@ -14,10 +14,11 @@ import numpy as np
 from analysis.data.prepare import PreparedTrial
 from analysis.data.recorded_factors import FOOT
 from analysis.data.terrain_kinds import groups_of
-from analysis.study.jobs import run_tasks, running_workers
 from analysis.study.models import GP_SE
 from analysis.study.study import Study
+from analysis.study.tasks import run_tasks
 from analysis.study.terrain_fit import TerrainResult
+from analysis.study.worker_processes import running_workers
 from analysis.terrains.classifier import (
     ROCKY_GROUND,
     SurfaceClassifier,

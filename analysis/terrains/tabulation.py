@@ -11,12 +11,11 @@ from acquisition.errors import SettingsError, TractionError
 from analysis.data.prepare import PreparedTrial, PrepareOptions
 from analysis.data.samples import SampleTable, TrainingSet
 from analysis.data.series import Array
-from analysis.study.break_away_fit import BreakAwayOptions, fit_planned, plan_break_away
 from analysis.study.distribution import SHARES
-from analysis.study.jobs import Batch, Store, Workers, run_batches, run_tasks
 from analysis.study.models import GP_SE, GP_SE_TRIAL, TITLES, FitOptions, ModelFitter
-from analysis.study.slip_risk import BreakAwayModel
+from analysis.study.store import ResultStore
 from analysis.study.study import Study
+from analysis.study.tasks import Workers, run_tasks
 from analysis.study.terrain_fit import TerrainResult
 from analysis.terrains.database import to_text
 from analysis.terrains.identify import Identification
@@ -84,7 +83,7 @@ def database_of(
     identification: Identification | None,
     made_utc: str,
     workers: Workers | int | None = None,
-    store: Store | None = None,
+    store: ResultStore | None = None,
 ) -> str:
     """Return the text of a terrain database of every terrain of a study.
 
@@ -100,7 +99,7 @@ def database_of(
     """
     axes, tasks = _tasks(study)
     tables = run_tasks(tabulate, tasks, workers, store=store)
-    models, from_rest = study.options.fit.models, break_away_of(study, store)
+    models = study.options.fit.models
     default = next((m for m in (GP_SE_TRIAL, GP_SE) if m in models), models[0])
     recogniser = GP_SE if GP_SE in models else default
     known = {
@@ -119,7 +118,7 @@ def database_of(
             titles={name: TITLES[name] for name in fitted},
             recogniser=recogniser,
             roughness=_roughness(identification, task.terrain),
-            break_away=from_rest.get(task.terrain),
+            break_away=study.break_away.get(task.terrain),
             copula=copula_of(
                 study.terrains[task.terrain], default, study.options.prepare.slowest
             ),
@@ -152,35 +151,6 @@ def copula_of(result: TerrainResult, model: str, slowest: float) -> PathCopula |
 def _table(forces: Array, axes: tuple[Array, Array]) -> Table:
     F_n, v_t = (tuple(axis.tolist()) for axis in axes)
     return Table(F_n, v_t, SHARES, tuple(map(rows_of, forces)))
-
-
-def break_away_of(
-    study: Study, store: Store | None = None
-) -> dict[str, BreakAwayModel]:
-    """Return the break-away model of every terrain of a study that has one.
-
-    Args:
-        study: the trials.
-        store: results of earlier runs.
-    """
-    trials = {name: result.trials for name, result in study.terrains.items()}
-    batch = break_away_batch(trials, study.kinds, study.options.fit.seed)
-    ((models,),) = run_batches([batch], store=store)
-    return models
-
-
-def break_away_batch(
-    trials: Mapping[str, Sequence[PreparedTrial]], kinds: Mapping[str, str], seed: int
-) -> Batch:
-    """Return the one task whose result is that of `break_away_of`.
-
-    Args:
-        trials: prepared trials by terrain.
-        kinds: kind by terrain.
-        seed: of the study.
-    """
-    task = plan_break_away(trials, kinds, BreakAwayOptions(seed=seed))
-    return Batch(fit_planned, [task])
 
 
 def _tasks(study: Study) -> tuple[tuple[Array, Array], list[TableTask]]:

@@ -56,15 +56,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Fit tables and write the report."""
-    from acquisition.errors import SettingsError
     from acquisition.extras import require_extra
 
     require_extra("report")  # before its page is imported
     if args.scheduler:
         require_extra("cluster")
-    from experiments.report.workers import start_workers
+    from experiments.report.workers import workers_of_report
 
-    start_workers(args.scheduler)
+    with workers_of_report(are_needed=not args.scheduler):
+        return _fit(args)
+
+
+def _fit(args: argparse.Namespace) -> int:
+    from acquisition.errors import SettingsError
     from analysis.study.covariates import WAY
     from analysis.tables.columns import parse_covariates, parse_inputs
     from experiments.named_tables import load_named_tables

@@ -12,7 +12,6 @@ from experiments.arguments import (
     add_pdf,
     add_scheduler,
     add_seed,
-    add_shard,
 )
 
 EXAMPLES = """\
@@ -27,7 +26,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--all", action="store_true", help="every session with trials")
     add_scheduler(parser)
-    add_shard(parser)
     add_covariate(
         parser, "height (of the sole), way (since the last drop), lateral, tilt, moment"
     )
@@ -45,11 +43,14 @@ def run(args: argparse.Namespace) -> int:
     require_extra("report")
     if args.scheduler:
         require_extra("cluster")
-    from experiments.report.workers import start_workers
+    from experiments.report.workers import workers_of_report
 
-    if not _is_kept(Path(args.data)):
-        start_workers(args.scheduler)
-    from analysis.study.jobs import Shard
+    is_new = not args.scheduler and not _is_kept(Path(args.data))
+    with workers_of_report(are_needed=is_new):
+        return _report(args)
+
+
+def _report(args: argparse.Namespace) -> int:
     from analysis.tables.columns import parse_covariates
     from experiments.operator.console import Console, PageRecorder
     from experiments.report.choices import (
@@ -59,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
         tell_missing,
     )
     from experiments.report.covariates import KNOWN
-    from experiments.report.sessions import fit_shard, report_sessions
+    from experiments.report.sessions import report_sessions
     from experiments.settings.load import load_settings
 
     choices = analysis_choices(args)
@@ -79,9 +80,6 @@ def run(args: argparse.Namespace) -> int:
         else parse_covariates(args.covariate, KNOWN),
         with_pdf=args.pdf,
     )
-    if args.shard:
-        fit_shard(sessions, data, wanted, console, Shard(*args.shard))
-        return 0
     page = report_sessions(sessions, data, wanted, console)
     if args.json:
         names = [session.id for session in sessions]

@@ -72,11 +72,8 @@ def rebuild(folder: Path, console: Console) -> TableComparison:
         sessions, data = list_sessions(folder), Path(empty)
         analysed = study_sessions(sessions, data, order, console, fit)
     trials = [trial for group in analysed.trials.values() for trial in group]
-    results = compute_results(
-        analysed.study,
-        with_tares([t.health for t in trials], trials),
-        analysed.break_away,
-    )
+    rig = with_tares([t.health for t in trials], trials)
+    results = compute_results(analysed.study, rig)
     again = to_csv(analysed.study, findings_rows(results))
     return compare_tables(_text(folder / TABLE), again)
 

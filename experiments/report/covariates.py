@@ -14,8 +14,9 @@ from analysis.study.covariates import (
     covariate_results,
     least_drop,
 )
-from analysis.study.jobs import Store, Workers
+from analysis.study.store import ResultStore
 from analysis.study.study import Study
+from analysis.study.tasks import Workers
 from experiments.operator.console import WARNING, Console
 
 KNOWN = (*RECORDED, WAY)  # of recordings
@@ -26,7 +27,7 @@ def columns_tested(
     trials: Mapping[str, Iterable[TractionSeries]],
     columns: Sequence[str],
     console: Console,
-    store: Store | None = None,
+    store: ResultStore | None = None,
 ) -> list[CovariateResult]:
     """Return what columns tell on every terrain, and say so.
 

@@ -10,8 +10,7 @@ from analysis.data.series import TractionSeries
 from analysis.logs.record import read_record
 from analysis.report.section import ReportTable
 from analysis.report.sections.imported import import_tables
-from analysis.report.whole_study import run_whole_study
-from analysis.study.study import Study, StudyOptions, notes_of_tables
+from analysis.study.study import Study, StudyOptions, notes_of_tables, run_study
 from experiments.operator.console import WARNING, Console
 from experiments.report.choices import ReportRequest
 from experiments.report.duplicates import TrialDigests
@@ -56,11 +55,10 @@ def report_tables_of_trials(
         order.choices.prepare, fit=order.fit, scheduler=order.scheduler
     )
     with fitting(console) as progress:
-        study, break_away = run_whole_study(trials, options, is_simulated, progress)
+        study = run_study(trials, options, is_simulated, progress, with_break_away=True)
     require_samples(study)
     reported = ReportedStudy(
         study,
-        break_away,
         title="Traction from external data",
         subtitle=f"{count} trials from {len(files)} files",
         is_foreign=True,

@@ -1,6 +1,6 @@
 """From sessions to a report: the trials that are loaded, and their study."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from shutil import disk_usage
@@ -9,17 +9,11 @@ from acquisition.errors import SessionError, TrialFileError
 from analysis.data.load import load_trial
 from analysis.data.plausibility import summed_up
 from analysis.data.recorded_factors import stated_factors
-from analysis.data.series import TractionSeries
-from analysis.report.drawing import DRAWN_TYPES
 from analysis.report.held_trial import HeldTrial, TrialFiles
 from analysis.report.sections.rig_health.health import with_tares
-from analysis.report.whole_study import run_whole_study, run_whole_study_shard
-from analysis.study.covariates import COVARIATE_TYPES
-from analysis.study.jobs import Shard
 from analysis.study.models import FitOptions
-from analysis.study.slip_risk import BreakAwayModel
-from analysis.study.store import MOST_BYTES, TYPES, ResultStore
-from analysis.study.study import Study, StudyOptions
+from analysis.study.store import MOST_BYTES, ResultStore
+from analysis.study.study import Study, StudyOptions, run_study
 from experiments.operator.console import Console
 from experiments.report.choices import ReportRequest
 from experiments.report.commissioned import uncommissioned
@@ -78,14 +72,12 @@ class StudySession:
 
     Attributes:
         study: the result.
-        break_away: models of break-away, by terrain that has one.
         trials: the kept trials by terrain, in the matrix's order.
         left_out: recordings that are not in it, and why.
         truths: how far trials are from their truth files, by path of the trial.
     """
 
     study: Study
-    break_away: Mapping[str, BreakAwayModel]
     trials: dict[str, list[HeldTrial]]
     left_out: list[str]
     truths: dict[Path, TruthErrors]
@@ -103,69 +95,8 @@ class StudySession:
 
 def results_below(data: Path) -> ResultStore:
     """Return the store of results below a folder of data; it grows with the disk."""
-    types = {
-        **TYPES,
-        **DRAWN_TYPES,
-        **COVARIATE_TYPES,
-    }
     free = disk_usage(data).free if data.is_dir() else 0
-    return ResultStore(data / FOLDS, max(MOST_BYTES, free // _SHARE_OF_DISK), types)
-
-
-@dataclass(frozen=True, slots=True)
-class StudyInputs:
-    """What a study of sessions begins with.
-
-    Attributes:
-        trials: the kept trials by terrain, in the matrix's order.
-        truths: how far trials are from their truth files, by path of the trial.
-        left_out: recordings that are not in it, and why.
-        options: every choice.
-        store: results of earlier runs.
-        is_simulated: the trials were simulated.
-    """
-
-    trials: dict[str, list[HeldTrial]]
-    truths: dict[Path, TruthErrors]
-    left_out: list[str]
-    options: StudyOptions
-    store: ResultStore
-    is_simulated: bool
-
-    @classmethod
-    def of(
-        cls,
-        sessions: Sequence[SessionFolder],
-        data: Path,
-        order: ReportRequest,
-        console: Console,
-        fit: FitOptions,
-    ) -> "StudyInputs":
-        """Load the kept trials.
-
-        Raises:
-            SessionError: no session has a kept trial.
-        """
-        trials, truths, left_out = _load_trials(sessions, console)
-        count = sum(len(group) for group in trials.values())
-        if not count:
-            ids = ", ".join(s.id for s in sessions)
-            raise SessionError(f"{ids}: no kept trials to report.")
-        trials = {name: trials[name] for name in order.sorted(trials)}
-        console.say(f"{count} trials on {len(trials)} terrains: fitting ...")
-        travel = min(t.frame.travel for group in trials.values() for t in group)
-        options = StudyOptions(
-            prepare=replace(order.choices.prepare, container_travel=travel),
-            fit=fit,
-            scheduler=order.scheduler,
-        )
-        simulated = sessions[0].is_simulated
-        return cls(trials, truths, left_out, options, results_below(data), simulated)
-
-    @property
-    def series(self) -> dict[str, list[TractionSeries]]:
-        """The trials as they were recorded, by terrain."""
-        return {name: [t.series for t in group] for name, group in self.trials.items()}
+    return ResultStore(data / FOLDS, max(MOST_BYTES, free // _SHARE_OF_DISK))
 
 
 def study_sessions(
@@ -180,35 +111,30 @@ def study_sessions(
     Raises:
         SessionError: no session has a kept trial.
     """
-    given = StudyInputs.of(sessions, data, order, console, fit)
-    with fitting(console) as progress:
-        study, break_away = run_whole_study(
-            given.series, given.options, given.is_simulated, progress, given.store
-        )
-    return StudySession(study, break_away, given.trials, given.left_out, given.truths)
-
-
-def fit_shard(
-    sessions: Sequence[SessionFolder],
-    data: Path,
-    order: ReportRequest,
-    console: Console,
-    shard: Shard,
-) -> None:
-    """Load the kept trials and keep one run's share of what their report needs.
-
-    Raises:
-        SessionError: no session has a kept trial.
-    """
-    given = StudyInputs.of(sessions, data, order, console, order.fit)
-    with fitting(console) as progress:
-        count = run_whole_study_shard(
-            given.series, given.options, shard, given.store, progress
-        )
-    console.say(
-        f"Shard {shard.number} of {shard.of}: {count} results are kept. When all have "
-        "ended, traction report without --shard finds them."
+    trials, truths, left_out = _load_trials(sessions, console)
+    count = sum(len(group) for group in trials.values())
+    if not count:
+        ids = ", ".join(s.id for s in sessions)
+        raise SessionError(f"{ids}: no kept trials to report.")
+    trials = {name: trials[name] for name in order.sorted(trials)}
+    console.say(f"{count} trials on {len(trials)} terrains: fitting ...")
+    travel = min(t.frame.travel for group in trials.values() for t in group)
+    options = StudyOptions(
+        prepare=replace(order.choices.prepare, container_travel=travel),
+        fit=fit,
+        scheduler=order.scheduler,
     )
+    series = {name: [t.series for t in group] for name, group in trials.items()}
+    with fitting(console) as progress:
+        study = run_study(
+            series,
+            options,
+            sessions[0].is_simulated,
+            progress,
+            results_below(data),
+            with_break_away=True,
+        )
+    return StudySession(study, trials, left_out, truths)
 
 
 def report_sessions(
@@ -250,7 +176,6 @@ def _reported(
     }
     return ReportedStudy(
         study,
-        analysed.break_away,
         title="Traction " + (sessions[0].id if len(sessions) == 1 else "study"),
         subtitle=f"{len(every)} trials on {', '.join(trials)}",
         is_foreign=False,

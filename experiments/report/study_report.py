@@ -14,7 +14,6 @@ from analysis.report.section import ReportTable
 from analysis.report.sections.beyond_paper.further_columns import covariate_tables
 from analysis.report.sections.rig_health.health import RigTrial
 from analysis.report.sections.sensitivity import plain_choice, side_by_side
-from analysis.study.slip_risk import BreakAwayModel
 from analysis.study.store import ResultStore
 from analysis.study.study import Study
 from experiments.operator.console import Console
@@ -29,7 +28,6 @@ class ReportedStudy:
 
     Attributes:
         study: the study.
-        break_away: models of break-away, by terrain that has one.
         title: heading of the page.
         subtitle: line below it.
         is_foreign: the trials come from elsewhere, not from this rig.
@@ -43,7 +41,6 @@ class ReportedStudy:
     """
 
     study: Study
-    break_away: Mapping[str, BreakAwayModel]
     title: str
     subtitle: str
     is_foreign: bool
@@ -104,7 +101,7 @@ def report_study(
             **reported.numbers,
         },
         with_pdf=order.with_pdf,
-        results=compute_results(study, reported.rig, reported.break_away),
+        results=compute_results(study, reported.rig),
         store=store,
     )
     return write_report(study, out, context)

@@ -1,12 +1,12 @@
 """Workers for fits and figures, which import while this process reads."""
 
-from acquisition.worker_processes import available_cores, prepare_workers
+from collections.abc import Generator
+from contextlib import contextmanager
 
-_WORK = (  # what fits and figures need, the first needed first
-    "analysis.study.break_away_fit",
+from analysis.study.worker_processes import end_workers, warm_workers
+
+_NEEDED = (  # by fits and figures, the first needed first
     "analysis.study.study",
-    "analysis.study.store",
-    "analysis.terrains.tabulation",
     "analysis.report.page",
     "scipy.signal",
     "matplotlib.figure",
@@ -15,11 +15,17 @@ _WORK = (  # what fits and figures need, the first needed first
 )
 
 
-def start_workers(scheduler: str | None) -> None:
-    """Start what workers are copied from: first of all that a command does.
+@contextmanager
+def workers_of_report(*, are_needed: bool) -> Generator[None]:
+    """Start workers, first of all that a command does; end them with the block.
 
     Args:
-        scheduler: address of one that has workers of its own; None = none.
+        are_needed: there is work for them for certain; else they are started when
+            there is.
     """
-    if scheduler is None and available_cores() > 1:
-        prepare_workers(_WORK)
+    try:
+        if are_needed:
+            warm_workers(_NEEDED)
+        yield
+    finally:
+        end_workers()

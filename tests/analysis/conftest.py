@@ -43,7 +43,7 @@ def slice_trials(slice_path):
 def small_study(slice_trials):
     # 60 points instead of 300: all five models in a few seconds
     options = StudyOptions(fit=SMALL_FIT, n_jobs=1)
-    return run_study(slice_trials, options, simulated=True)
+    return run_study(slice_trials, options, simulated=True, with_break_away=True)
 
 
 @pytest.fixture(scope="session")

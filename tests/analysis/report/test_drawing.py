@@ -1,23 +1,20 @@
-from dataclasses import replace
 from functools import wraps
 
-import numpy as np
 import pytest
 
 from analysis.report import drawing
 from analysis.report.drawing import (
-    DRAWN_TYPES,
-    FigureTasks,
-    draw_figure,
+    FigureTask,
+    draw_figures,
     kept_figures,
 )
 from analysis.report.page_model import ReportFigure, ShownNumbers
 from analysis.report.pictures import Picture
 from analysis.report.results import compute_results
 from analysis.report.section import ReportSection
-from analysis.study.digests import value_digest
-from analysis.study.jobs import run_tasks
-from analysis.study.store import TYPES, ResultStore
+from analysis.report.sections.order import FIGURES
+from analysis.study.store import ResultStore
+from analysis.study.tasks import run_tasks
 
 PICTURE = Picture("rig", b"\x89PNG\x00\xff", b"%PDF", 1146, "<svg></svg>")
 FIGURE = ReportFigure(ReportSection.HEALTH, "Rig", "bars", "It is well.", PICTURE)
@@ -25,7 +22,7 @@ FIGURE = ReportFigure(ReportSection.HEALTH, "Rig", "bars", "It is well.", PICTUR
 
 @pytest.fixture
 def store(tmp_path):
-    return ResultStore(tmp_path, types={**TYPES, **DRAWN_TYPES})
+    return ResultStore(tmp_path)
 
 
 @pytest.fixture
@@ -59,43 +56,6 @@ def test_other_numbers_are_drawn_anew(store, drawings):
     assert drawings == [(1.0, 2.0), (1.0, 2.5)]
 
 
-DIFFERENT = (
-    None,
-    0,
-    0.0,
-    -0.0,
-    False,
-    "0",
-    b"0",
-    (),
-    [],
-    (0.0, 1.0),
-    ((0.0,), 1.0),
-    {},
-    {"a": 1},
-    {"b": 1},
-    np.zeros(0),
-    np.zeros(2),
-    np.zeros((1, 2)),
-    np.zeros(2, dtype=np.int64),
-    np.array([0.0, 5e-324]),
-    PICTURE,
-    replace(PICTURE, png=b""),
-    ReportSection.HEALTH,
-    ReportSection.REACH,
-)
-
-
-def test_different_values_have_different_digests():
-    assert len({value_digest(value) for value in DIFFERENT}) == len(DIFFERENT)
-    assert value_digest(np.arange(6.0)[::2]) == value_digest(np.array([0.0, 2.0, 4.0]))
-
-
-def test_what_has_no_known_content_has_no_digest():
-    with pytest.raises(TypeError, match="object has no digest"):
-        value_digest([object()])
-
-
 @pytest.mark.parametrize("kept", [b"", b"{}"], ids=len)
 def test_damaged_figures_are_drawn_anew(tmp_path, store, drawings, kept):
     kept_figures(1.0, store)
@@ -111,17 +71,11 @@ def test_what_is_no_figure_is_drawn_anew(store, drawings):
     assert len(drawings) == 1
 
 
-@pytest.mark.parametrize("value", [np.float64(1.5), np.int64(3), np.bool_(True)])
-def test_a_number_shows_the_same_when_the_store_gives_it_back(value):
-    assert value_digest([value]) == value_digest([value.item()])
-    assert value_digest([value]) != value_digest([value.item() + 1])
-
-
 @pytest.mark.slow
 @pytest.mark.timeout(300)  # two processes beside others on a busy machine
 def test_pictures_are_the_same_from_two_processes(small_study):
-    shown = ShownNumbers(compute_results(small_study))
-    tasks = list(FigureTasks(shown))[::4]
-    here = [draw_figure(task) for task in tasks]
-    assert any(here)
-    assert run_tasks(draw_figure, tasks, 2) == here
+    shown, keys = ShownNumbers(compute_results(small_study)), tuple(FIGURES)[::4]
+    shares = [FigureTask(shown, keys[k::2]) for k in range(2)]
+    here = [draw_figures(share) for share in shares]
+    assert all(here)
+    assert run_tasks(draw_figures, shares, 2) == here

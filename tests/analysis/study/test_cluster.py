@@ -11,10 +11,12 @@ from pathlib import Path
 import pytest
 
 from acquisition.errors import SettingsError
+from analysis.study.cluster import is_guarded
 from analysis.study.fits import to_fits
-from analysis.study.jobs import Workers, is_guarded, run_tasks
 from analysis.study.models import FitOptions
 from analysis.study.study import StudyOptions, run_study
+from analysis.study.tasks import Workers, run_tasks
+from analysis.study.worker_processes import WorkerLostError
 
 ROOT = Path(__file__).parents[3]
 FIT = FitOptions(gp_points=60, draws=5, models=("tustin", "gp_se"))
@@ -73,6 +75,29 @@ def test_a_killed_worker_changes_nothing(cluster, slice_trials):
     assert killed.is_set()
     remote["options"] = local["options"] = None
     assert remote == local
+
+
+def end_at_three(number):
+    if number == 3:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::ResourceWarning")
+def test_a_task_that_ends_its_workers_is_told_and_not_waited_for():
+    import dask
+    from distributed import LocalCluster
+
+    quick = {"distributed.scheduler.allowed-failures": 0}
+    local = {"host": "127.0.0.1", "dashboard_address": None, "silence_logs": 50}
+    with (
+        dask.config.set(quick),
+        LocalCluster(n_workers=2, threads_per_worker=1, **local) as cluster,
+    ):
+        where = Workers(scheduler=cluster.scheduler_address)
+        with pytest.raises(WorkerLostError, match="ended unexpectedly"):
+            run_tasks(end_at_three, [1, 2, 3, 4, 5], where)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,6 @@ from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.series import TractionSeries
 from analysis.report.sections.beyond_paper.further_columns import covariate_tables
 from analysis.study.covariates import (
-    COVARIATE_TYPES,
     WAY,
     CovariateResult,
     CovariateRows,
@@ -125,7 +124,7 @@ def test_folds_come_back_from_the_store(tmp_path):
     rows = {"X": [CovariateRows.of(trial, ("idle",), 1.5) for trial in trials_of(3)]}
     options, store = (
         FitOptions(gp_points=60),
-        ResultStore(tmp_path, types=COVARIATE_TYPES),
+        ResultStore(tmp_path),
     )
     first = covariate_results(rows, ("idle",), options, 1, store)
     assert len(list(tmp_path.glob("*.json"))) == 3

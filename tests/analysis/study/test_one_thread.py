@@ -10,7 +10,7 @@ import pytest
 _FIRST_TASK = """
 import os
 os.environ.pop("OPENBLAS_NUM_THREADS", None)
-from analysis.study.jobs import run_tasks
+from analysis.study.tasks import run_tasks
 from tests.analysis.study.test_one_thread import threads
 print(run_tasks(threads, [0, 1], 1))
 """

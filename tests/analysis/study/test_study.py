@@ -10,10 +10,10 @@ import pytest
 from acquisition.errors import SettingsError
 from analysis.data.prepare import PrepareOptions
 from analysis.data.series import TractionSeries
+from analysis.study.break_away_fit import fit_planned
 from analysis.study.fits import to_csv, to_fits
-from analysis.study.jobs import Batch
 from analysis.study.models import GP_SE, TUSTIN, FitOptions
-from analysis.study.study import StudyOptions, run_study, run_study_beside
+from analysis.study.study import StudyOptions, run_study
 
 SMALL_FIT = FitOptions(gp_points=60, draws=20)  # as in the shared small study
 TWO = (TUSTIN, GP_SE)
@@ -105,25 +105,18 @@ def test_results_are_identical_bit_by_bit_for_two_workers(small_study, slice_tri
     assert one == two
 
 
-def names(trials):
-    return [trial.name for trial in trials]
-
-
-def test_what_is_done_beside_the_fits_is_given_and_kept(slice_trials):
-    kept = {}
+def test_break_away_is_fitted_and_kept_where_it_is_asked_for(slice_trials):
+    trials, kept = {"TF": slice_trials["TF"]}, []
     store = SimpleNamespace(
         get=lambda function, task: None,
-        put=lambda function, task, result: kept.update({repr(task): result}),
+        put=lambda function, task, result: kept.append((function, result)),
     )
-    _, ((found,),) = run_study_beside(
-        lambda prepared: [Batch(names, [prepared["TF"]])],
-        {"TF": slice_trials["TF"]},
-        OPTIONS,
-        simulated=True,
-        store=store,
+    study = run_study(
+        trials, OPTIONS, simulated=True, store=store, with_break_away=True
     )
-    assert found == [t.name for t in slice_trials["TF"]]
-    assert found in kept.values()
+    assert set(study.break_away) == {"TF"}
+    assert (fit_planned, study.break_away) in kept
+    assert run_study(trials, OPTIONS, simulated=True).break_away == {}
 
 
 def test_a_terrain_is_fitted_alike_alone_and_in_company(small_study, slice_trials):

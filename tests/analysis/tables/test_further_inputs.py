@@ -1,13 +1,17 @@
 """Inputs beside F_n and v_t, and tables that hold several trials in their rows."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from acquisition.errors import SettingsError
 from analysis.data.prepare import PrepareOptions, prepare_trial
-from analysis.data.samples import PooledSamples, SampleTable
+from analysis.data.samples import SampleTable
 from analysis.data.series import TractionSeries
+from analysis.study.crossval import plan_folds, run_fold
 from analysis.study.models import GP_SE, TUSTIN, FitOptions
+from analysis.study.store import task_key
 from analysis.study.study import StudyOptions, run_study
 from analysis.tables import loading as tables
 from analysis.tables.columns import parse_columns, parse_inputs
@@ -56,7 +60,7 @@ def test_a_row_without_its_input_is_dropped_and_named(tmp_path):
     assert "1 rows without a value of an input dropped" in first.notes
 
 
-def test_inputs_follow_their_rows_through_preparation_pools_and_choices():
+def test_inputs_follow_their_rows_through_preparation_folds_and_choices():
     t = np.arange(200) / 500.0
     v = np.where(np.arange(200) % 50 < 25, 0.05, 0.0)
     angle = np.arange(200.0)
@@ -65,15 +69,11 @@ def test_inputs_follow_their_rows_through_preparation_pools_and_choices():
     assert kept.further[:, 0].tolist() == angle[v > 0.0].tolist()
     table = SampleTable.of([kept, kept]).take(np.array([0, 150]))
     assert table.inputs[:, 2].tolist() == [0.0, 100.0]
-    pool = PooledSamples.of({"X": [kept, kept]}, {"X": [0, 1]})
-    assert pool.trial("X", 1).further[0, 0] == 0.0
-    other = prepare_trial(
-        TractionSeries("X", "x", t, v, v + 1.0, v, further={"angle": angle + 1.0}),
-        AS_THEY_ARE,
-    )
-    changed = PooledSamples.of({"X": [kept, other]}, {"X": [0, 1]})
-    digests = changed.digests()["X"]
-    assert digests[0] != digests[1]
+    turned = replace(series, further={"angle": angle + 1.0})
+    groups = [kept, kept], [kept, prepare_trial(turned, AS_THEY_ARE)]
+    folds = [plan_folds({"X": group}, FitOptions())[0][0] for group in groups]
+    assert folds[0].training.further[0, 0] == 0.0
+    assert task_key(run_fold, folds[0]) != task_key(run_fold, folds[1])
 
 
 def test_inputs_are_smoothed_as_the_forces_are():

@@ -8,12 +8,12 @@ import pytest
 from acquisition.errors import SettingsError
 from analysis.study.models import TUSTIN
 from analysis.terrains.database import load
-from analysis.terrains.tabulation import break_away_of, database_of
+from analysis.terrains.tabulation import database_of
 
 
 @pytest.fixture(scope="module")
 def fitted(small_study):
-    return break_away_of(small_study)
+    return small_study.break_away
 
 
 @pytest.fixture(scope="module")

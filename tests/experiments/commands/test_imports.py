@@ -30,8 +30,7 @@ def test_to_verify_loads_no_library_of_reports(tmp_path: Path):
 
 def test_a_report_prepares_workers_unless_its_results_are_kept(tmp_path, monkeypatch):
     prepared = []
-    monkeypatch.setattr("experiments.report.workers.prepare_workers", prepared.append)
-    monkeypatch.setattr("experiments.report.workers.available_cores", lambda: 2)
+    monkeypatch.setattr("experiments.report.workers.warm_workers", prepared.append)
     trials = tmp_path / "sessions" / "2026-01-01_S001_S0.fake" / "trials"
     trials.mkdir(parents=True)
     report = ["report", "--all", "--data", str(tmp_path)]

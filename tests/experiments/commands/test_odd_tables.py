@@ -68,7 +68,7 @@ def odd(tmp_path_factory):
             "analysis.report.style.render",
             lambda key, *_, **__: Picture(key, b"png", b"pdf"),
         )
-        patch.setattr("analysis.study.jobs.available_cores", lambda: 1)
+        patch.setattr("analysis.study.tasks.available_cores", lambda: 1)
         patch.setattr("analysis.report.drawing.available_cores", lambda: 1)
         yield fitted(tmp_path_factory.mktemp("odd"))
 

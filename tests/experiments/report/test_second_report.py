@@ -7,15 +7,14 @@ from functools import wraps
 import pytest
 
 import analysis.report.drawing
-import analysis.study.jobs
 import analysis.study.study
-import analysis.terrains.tabulation
+import analysis.study.tasks
 from tests.experiments.program import only_session, traction
 
 COMPUTED = (  # two trials have no components, and nothing is nothing to keep
     (analysis.study.study, "run_fold"),
     (analysis.study.study, "fit_terrain"),
-    (analysis.terrains.tabulation, "fit_planned"),
+    (analysis.study.study, "fit_planned"),
     (analysis.report.drawing, "report_figures"),
 )
 
@@ -48,7 +47,7 @@ def computed(monkeypatch):
 
         monkeypatch.setattr(module, name, seen)
     # in workers nobody would see it
-    monkeypatch.setattr(analysis.study.jobs, "available_cores", lambda: 1)
+    monkeypatch.setattr(analysis.study.tasks, "available_cores", lambda: 1)
     return names
 
 

@@ -16,8 +16,8 @@ import pytest
 from analysis.data.events import Slip, find_slips
 from analysis.data.prepare import PreparedTrial, PrepareOptions, prepare_trial
 from analysis.study.crossval import FoldResult, plan_folds, run_fold
-from analysis.study.jobs import run_tasks
 from analysis.study.models import GP_SE, TUSTIN, FitOptions
+from analysis.study.tasks import run_tasks
 from tests.fakes.point_foot import GROUNDS, PointFoot
 
 SETS = (1, 2, 3)

@@ -135,7 +135,7 @@ def break_away_findings(results: StudyResults) -> Mapping[str, TerrainBreakAway]
     study = results.study
     return {
         name: _of_terrain(study.terrains[name], model, study.options.prepare.slowest)
-        for name, model in results.break_away.items()
+        for name, model in study.break_away.items()
     }
 
 

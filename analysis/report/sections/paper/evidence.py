@@ -9,21 +9,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition.worker_processes import running_workers
 from analysis.data.prepare import PreparedTrial
 from analysis.data.samples import SampleTable
 from analysis.data.terrain_kinds import BIG, FLAT, SMALL
 from analysis.gp.regression import GaussianProcess
 from analysis.report.sections.beyond_paper.noise import NoiseSummary
 from analysis.study.crossval import FoldResult
-from analysis.study.jobs import Batch, run_batches
 from analysis.study.metrics import (
     PairedComparison,
     compare,
 )
 from analysis.study.models import GP_SE, GpModel
 from analysis.study.study import Study
+from analysis.study.tasks import Batch, run_batches
 from analysis.study.terrain_fit import TerrainResult, mean_of
+from analysis.study.worker_processes import running_workers
 from analysis.terrains.identify import Identification
 from analysis.tustin.model import bound
 

@@ -80,7 +80,7 @@ def test_other_training_samples_are_tested_on_the_same_ones(make_series, moving,
         prepared(after.prepare), after.fit, prepared(after.target or after.prepare)
     )
     for one, other in zip(plain, varied, strict=True):
-        np.testing.assert_array_equal(one.own.F_t, other.own.F_t)
+        np.testing.assert_array_equal(one.test_trials[0].F_t, other.test_trials[0].F_t)
         assert one.training.F_t.shape != other.training.F_t.shape or not np.allclose(
             one.training.F_t, other.training.F_t
         )

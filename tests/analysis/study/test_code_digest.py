@@ -7,15 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from analysis.report.drawing import report_figures
-from analysis.study.break_away_fit import fit_planned
-from analysis.study.crossval import run_fold
-from analysis.study.digests import ROOT, code_digest, source_files
-from analysis.study.terrain_fit import fit_terrain
-from analysis.study.trial_components import fit_components
-from analysis.terrains.tabulation import tabulate
+from analysis.study.store import code_digest
 
-FOLDS = "analysis.study.crossval"
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture
@@ -27,45 +21,67 @@ def copy(tmp_path):
     return tmp_path
 
 
+def digests(root):
+    """Return the digests of the code behind fits and behind figures."""
+    code_digest.cache_clear()
+    return code_digest(root), code_digest(root, is_drawn=True)
+
+
 @pytest.mark.parametrize(
     "formula",
-    ["gp/kernels.py", "gp/likelihood.py", "tustin/model.py", "data/prepare.py"],
+    ["gp/kernels.py", "tustin/model.py", "data/prepare.py", "study/push_likelihood.py"],
 )
-def test_a_changed_formula_is_in_the_digest_of_the_folds(copy, formula):
-    before = code_digest(FOLDS)
+def test_a_changed_formula_changes_the_digests_of_fits_and_figures(copy, formula):
+    before = digests(copy)
     path = copy / "analysis" / formula
     path.write_text(path.read_text() + "\n")
-    assert code_digest(FOLDS, copy) != before
-
-
-def test_equal_sources_elsewhere_have_an_equal_digest(copy):
-    assert code_digest(FOLDS, copy) == code_digest(FOLDS)
-
-
-def test_what_a_fold_does_not_use_leaves_its_digest(copy):
-    for name in ("report/style.py", "report/page.py"):
-        path = copy / "analysis" / name
-        path.write_text(path.read_text() + "\n")
-    assert code_digest(FOLDS, copy) == code_digest(FOLDS)
+    fits, figures = digests(copy)
+    assert fits != before[0]
+    assert figures != before[1]
 
 
 @pytest.mark.parametrize(
-    ("function", "used"),
+    "module",
     [
-        (run_fold, "analysis.gp.regression"),
-        (fit_terrain, "analysis.tustin.model"),
-        (fit_components, "analysis.data.series"),
-        (fit_planned, "analysis.study.push_likelihood"),
-        (tabulate, "analysis.study.models"),
-        (
-            report_figures,
-            "analysis.report.sections.paper.curves",
-        ),  # imported when drawn
-        (report_figures, "ft_sensor.payload"),  # through other modules
+        "analysis/report/style.py",
+        "analysis/report/sections/paper/curves.py",
+        "ft_sensor/payload.py",
     ],
 )
-def test_imports_are_followed_to_their_end(function, used):
-    assert {function.__module__, used} <= set(source_files(function.__module__))
+def test_what_only_figures_follow_from_leaves_the_digest_of_fits(copy, module):
+    before = digests(copy)
+    path = copy / module
+    path.write_text(path.read_text() + "\n")
+    fits, figures = digests(copy)
+    assert fits == before[0]
+    assert figures != before[1]
+
+
+def test_equal_sources_elsewhere_have_equal_digests(copy):
+    assert digests(copy) == digests(ROOT)
+
+
+def test_fits_import_nothing_that_their_digest_leaves_out():
+    modules = (
+        "analysis.study.break_away_fit, analysis.study.covariates, "
+        "analysis.study.crossval, analysis.study.terrain_fit, "
+        "analysis.study.trial_components"
+    )
+    code = f"import sys, {modules}; print(*sys.modules)"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    loaded = done.stdout.split()
+    assert "analysis.study.crossval" in loaded
+    outside = (
+        "analysis.report",
+        "experiments",
+        "fakes",
+        "ft_sensor",
+        "traction",
+        "wam",
+    )
+    assert [name for name in loaded if name.startswith(outside)] == []
 
 
 PROGRAM = """
@@ -75,7 +91,7 @@ from pathlib import Path
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.tables.loading import load_tables
 from analysis.study.crossval import plan_folds, run_fold
-from analysis.study.jobs import run_tasks
+from analysis.study.tasks import run_tasks
 from analysis.study.models import FitOptions
 from analysis.study.store import ResultStore
 

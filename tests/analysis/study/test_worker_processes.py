@@ -3,6 +3,7 @@
 A script's output ends when the last of its processes has closed it.
 """
 
+import os
 import signal
 import subprocess
 import sys
@@ -10,23 +11,28 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 WAITING = """
-import os, sys, time
-from acquisition.worker_processes import run_calls
-def work():
-    calls = run_calls([(os.getpid,), *[(time.sleep, 600)] * 4], 2)
-    print(next(calls), flush=True)
-    next(calls)
+import sys, time
+from analysis.study.tasks import run_tasks
 try:
-    work()
-except KeyboardInterrupt:  # wherever it comes, even between two results
+    run_tasks(time.sleep, [0.0, *[600.0] * 4], 2, lambda *_: print("busy", flush=True))
+except KeyboardInterrupt:
+    print("interrupted", file=sys.stderr)
+"""
+STARTING = """
+import signal, sys
+from analysis.study.worker_processes import warm_workers
+warm_workers(["scipy.stats", "matplotlib.pyplot"])
+try:
+    print("busy", flush=True)
+    signal.pause()
+except KeyboardInterrupt:
     print("interrupted", file=sys.stderr)
 """
 UNGUARDED = """
-import operator
-from acquisition.worker_processes import run_calls
-print(sorted(run_calls([(operator.mul, k, k) for k in range(5)], 2)))
+from analysis.study.tasks import run_tasks
+print(run_tasks(abs, [-1, -2, -3, -4, -5], 2))
 """
 
 
@@ -37,6 +43,7 @@ def started(script, *flags):
         stderr=subprocess.PIPE,
         env={"PYTHONPATH": str(ROOT)},
         text=True,
+        start_new_session=True,
     )
 
 
@@ -49,27 +56,39 @@ def script(tmp_path):
 def test_workers_end_with_their_parent_whatever_they_do(script, name):
     script.write_text(WAITING)
     with started(script) as parent:
-        assert int(parent.stdout.readline()) != parent.pid
+        assert parent.stdout.readline() == "busy\n"
         parent.send_signal(signal.Signals[name])
         _, errors = parent.communicate()  # until the last process is gone
     assert "Traceback" not in errors
     assert errors.count("interrupted") == (name == "SIGINT")
 
 
+@pytest.mark.parametrize("script_text", [WAITING, STARTING])
+def test_a_key_that_interrupts_reaches_the_parent_alone(script, script_text):
+    script.write_text(script_text)
+    with started(script) as parent:
+        assert parent.stdout.readline() == "busy\n"
+        os.killpg(parent.pid, signal.SIGINT)  # as a terminal does, to all of them
+        _, errors = parent.communicate()
+    assert errors == "interrupted\n"
+
+
 def test_a_script_is_not_run_again_by_workers(script):
     script.write_text(UNGUARDED)
     with started(script) as parent:
         out, errors = parent.communicate()
-    assert out == "[0, 1, 4, 9, 16]\n"
+    assert out == "[1, 2, 3, 4, 5]\n"
     assert not errors
 
 
 def test_workers_take_no_module_of_the_working_folder(script, monkeypatch):
-    (script.parent / "acquisition.py").write_text("raise SystemExit(3)")
+    for name in ("acquisition", "joblib", "multiprocessing", "numpy", "pickle"):
+        (script.parent / f"{name}.py").write_text("raise SystemExit(3)")
     (script.parent / "other").mkdir()
     script.write_text(UNGUARDED)
     script.rename(script.parent / "other" / "script.py")
     monkeypatch.chdir(script.parent)
     with started(script.parent / "other" / "script.py") as parent:
-        out, _ = parent.communicate()
-    assert out == "[0, 1, 4, 9, 16]\n"
+        out, errors = parent.communicate()
+    assert out == "[1, 2, 3, 4, 5]\n"
+    assert not errors
