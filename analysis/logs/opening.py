@@ -23,10 +23,11 @@ from analysis.logs.log_file import (
     LogMessage,
     LogTopic,
     damaged,
+    first_byte,
     too_large,
 )
 from analysis.logs.mcap_log import McapLog
-from analysis.logs.sqlite_log import SqliteLog
+from analysis.logs.sqlite_log import SqliteLog, wal_of
 
 _SUFFIXES = (".mcap", ".db3", ".bag", ".mcap.zstd", ".db3.zstd")
 _MOST_FILES = 200
@@ -89,7 +90,9 @@ class LogOfParts:
 
 def log_files(path: Path) -> list[Path]:
     """Return the files that a log at `path` consists of; raises SettingsError."""
-    return _files(path)
+    files = _files(path)
+    beside = [wal_of(file) for file in files]
+    return [*files, *(wal for wal in beside if first_byte(wal))]
 
 
 def _files(path: Path) -> list[Path]:

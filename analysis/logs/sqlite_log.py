@@ -123,12 +123,17 @@ class SqliteLog(OneFile):
             ) from error
 
 
+def wal_of(path: Path) -> Path:
+    """Name of the write-ahead log of a database."""
+    return path.with_name(f"{path.name}-wal")
+
+
 def _uri_of(path: Path, scratch: Path) -> str:
     """What SQLite opens: the database itself, or a copy with its write-ahead log.
 
     A hot journal is never rolled back: it may name files that SQLite would delete.
     """
-    journal, wal = (path.with_name(f"{path.name}-{end}") for end in ("journal", "wal"))
+    journal, wal = path.with_name(f"{path.name}-journal"), wal_of(path)
     if first_byte(journal) not in (b"", b"\0"):
         raise damaged(
             path,

@@ -7,7 +7,7 @@ import pytest
 
 from acquisition.errors import SettingsError
 from analysis.logs.importing import import_log
-from analysis.logs.opening import open_log
+from analysis.logs.opening import log_files, open_log
 from tests.analysis.logs.gantry import Rubbing, stated, write_bag2, write_urdf
 
 WRENCH = "/ft/wrench"
@@ -191,6 +191,7 @@ def test_messages_in_a_write_ahead_log_are_read(tmp_path):
     connection.close()
     before = {name: (crashed / name).read_bytes() for name in names}
     assert counted(crashed / path.name) == (2500, [])
+    assert [file.name for file in log_files(crashed)] == [*names]
     assert {p.name: p.read_bytes() for p in crashed.iterdir()} == before
 
 
