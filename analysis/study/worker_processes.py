@@ -61,7 +61,8 @@ def end_workers() -> None:
 
         for process in processes:  # loky's way may stumble over a call that waits
             process.terminate()
-        get_reusable_executor(reuse=True).shutdown()
+        executor: Any = get_reusable_executor  # its types state reuse as a text
+        executor(reuse=True).shutdown()
 
 
 def running_workers() -> int:
