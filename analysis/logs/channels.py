@@ -235,8 +235,9 @@ class _Rows:
         is_clock = not unset and _share_distinct(stamps) >= _DISTINCT
         fit = fit_clock(stamps, received) if is_clock else None
         if clock == "receipt":
-            is_line = fit is not None and not fit.has_step
-            times = fit.recorder_times(stamps, received) if is_line else received
+            times = received
+            if fit is not None and not fit.has_step:
+                times = fit.recorder_times(stamps, received)
         else:
             _require_stamps(log, name, stamps, unset)
             times = stamps
