@@ -242,7 +242,7 @@ def test_the_board_shows_which_trials_are_kept(recorded, config):
         ("stones=big", ["B0", "B10", "B15"]),
         ("incline_deg=10,kind=live", ["S10", "B10"]),
         ("operator=auto", ["TF"]),
-        ("session=S007", []),
+        ("terrain=TF,stones=big", []),
     ],
 )
 def test_the_board_can_be_narrowed(recorded, config, where, names):
