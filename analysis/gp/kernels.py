@@ -27,9 +27,6 @@ Evaluator = Callable[[Array], tuple[Array, Contraction]]
 _STRIP = 40  # rows of a triangle computed at a time
 
 
-KERNELS: dict[str, type] = {}  # by name: results that are kept name their kernel
-
-
 class Role(Enum):
     """What a hyperparameter is the logarithm of."""
 
@@ -86,13 +83,9 @@ class Kernel(Protocol):
 
 
 class Composable:
-    """Gives a kernel names, its matrix, `+` and `*`, and a place among `KERNELS`."""
+    """Gives a kernel names, its matrix, `+` and `*`."""
 
     __slots__ = ()
-
-    def __init_subclass__(cls) -> None:
-        super().__init_subclass__()
-        KERNELS[cls.__name__] = cls
 
     @property
     def names(self: Kernel) -> tuple[str, ...]:
