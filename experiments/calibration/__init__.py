@@ -1,6 +1,6 @@
-"""Guided calibrations: move, let settle, collect, fit, show, keep.
+"""Guided calibrations: move, let settle, collect, fit, show, write unless refused.
 
-A `GuidedCalibration` is what a module says of these, `calibrate` the way through all of
-them; the arithmetic is in `wam.calibration` and `ft_sensor.calibration`. Begin with
-`calibration`.
+A `GuidedCalibration` states these steps for one quantity, `calibrate` goes through
+them; a new one is added to `kinds`. The arithmetic is in `wam.calibration` and
+`ft_sensor.calibration`. Begin with `calibration`.
 """

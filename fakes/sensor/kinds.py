@@ -60,7 +60,8 @@ def make_stream(
 
     One on the bus gets the stream of a bota without a reader.
     """
-    return _MAKERS.get(choice.kind, _bota)(choice, source, errors, t_ns)
+    maker = _bota if choice.is_on_bus else _MAKERS[choice.kind]
+    return maker(choice, source, errors, t_ns)
 
 
 def _bota(

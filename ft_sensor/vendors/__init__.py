@@ -1,5 +1,6 @@
 """One make of sensor a module: its protocol, its start-up, its settings.
 
-Bota, Robotous and OptoForce on a serial line, Barrett on the arm's bus. A new make is a
+Bota, Robotous and OptoForce on a serial line, ATI on the network, Barrett on the arm's
+bus. A new make is a
 new module here and an entry in the registry.
 """
