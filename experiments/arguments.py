@@ -156,8 +156,7 @@ def add_analysis(parser: ArgumentParser) -> None:
     group.add_argument(
         "--models",
         metavar="NAME,..",
-        help="models to fit, with commas between: tustin, gp_se, gp_nn, gp_se_tustin, "
-        "gp_nn_tustin, gp_se_noise, gp_se_trial (all of these), gp_nn_trial, ...",
+        help="models to fit, e.g. tustin,gp_se; an unknown name lists them all",
     )
     group.add_argument(
         "--what-if",

@@ -199,8 +199,8 @@ def fit(
 
     Args:
         trials: of one terrain, e.g. a session or `tables.on("S0")`.
-        model: "tustin", "gp_se", "gp_nn", "gp_se_tustin", "gp_nn_tustin",
-            "gp_se_noise", or "gp_se_trial" whose bands hold for a trial to come.
+        model: a name of `analysis.study.models.MODELS`, e.g. "tustin", "gp_se", or
+            "gp_se_trial" whose bands hold for a trial to come.
         options: bounds, points and seed; see `FitOptions`.
 
     Raises:
