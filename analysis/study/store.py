@@ -67,10 +67,9 @@ class ResultStore:
         return result
 
     def put(self, function: Function, task: Any, result: Any) -> None:  # noqa: ANN401
-        """Keep a result.
+        """Keep a result, where the folder can be written.
 
         Raises:
-            SettingsError: the folder cannot be written.
             TypeError: a value in it has no plain form.
             ValueError: it could never be read again.
         """
@@ -80,7 +79,10 @@ class ResultStore:
         path, data = self._path(function, task), json.dumps(content).encode()
         if path.is_dir():  # nobody's result; it is made again every time
             return
-        write_atomic(path, data)
+        try:
+            write_atomic(path, data)
+        except SettingsError:  # it is computed again next time, and no less right
+            return
         if self._bytes is not None:
             self._bytes += len(data)
         if self._bytes is None or self._bytes > self._most:

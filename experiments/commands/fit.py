@@ -80,7 +80,7 @@ def _fit(args: argparse.Namespace) -> int:
     choices = analysis_choices(args)
     columns = () if args.covariate is None else parse_covariates(args.covariate)
     inputs = () if args.inputs is None else parse_inputs(args.inputs)
-    order = ReportRequest(
+    request = ReportRequest(
         args.seed,
         scheduler=args.scheduler,
         choices=choices,
@@ -97,6 +97,8 @@ def _fit(args: argparse.Namespace) -> int:
     if beside:
         further = (*inputs, *beside)
         tested = load_named_tables(args, args.files, further, args.stones)
-    page = report_tables_of_trials(args.files, args.to, trials, tested, order, console)
+    page = report_tables_of_trials(
+        args.files, args.to, trials, tested, request, console
+    )
     console.say(str(page))
     return 0

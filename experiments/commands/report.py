@@ -25,6 +25,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "sessions", nargs="*", metavar="SESSION", help="id, folder name or path"
     )
     parser.add_argument("--all", action="store_true", help="every session with trials")
+    parser.add_argument(
+        "--to",
+        type=Path,
+        metavar="DIR",
+        help="folder of the report and of what it keeps, e.g. where the data can only "
+        "be read (that of the session, or DATA/study)",
+    )
     add_scheduler(parser)
     add_covariate(
         parser, "height (of the sole), way (since the last drop), lateral, tilt, moment"
@@ -45,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
         require_extra("cluster")
     from experiments.report.workers import workers_of_report
 
-    is_new = not args.scheduler and not _is_kept(Path(args.data))
+    is_new = not args.scheduler and not _is_kept(Path(args.data), args.to)
     with workers_of_report(are_needed=is_new):
         return _report(args)
 
@@ -78,6 +85,7 @@ def _report(args: argparse.Namespace) -> int:
         covariates=()
         if args.covariate is None
         else parse_covariates(args.covariate, KNOWN),
+        out=args.to,
         with_pdf=args.pdf,
     )
     page = report_sessions(sessions, data, wanted, console)
@@ -89,11 +97,11 @@ def _report(args: argparse.Namespace) -> int:
     return 0
 
 
-def _is_kept(data: Path) -> bool:
+def _is_kept(data: Path, to: Path | None) -> bool:
     """Whether results have been kept since the last trial was recorded."""
     from experiments.session.store import FOLDS
 
-    results, trials = [data / FOLDS], data.glob("sessions/*/trials")
+    results, trials = [(to or data) / FOLDS], data.glob("sessions/*/trials")
     kept, recorded = (
         max((path.stat().st_mtime_ns for path in paths if path.is_dir()), default=0)
         for paths in (results, trials)

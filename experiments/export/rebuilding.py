@@ -66,11 +66,11 @@ def rebuild(folder: Path, console: Console) -> TableComparison:
             hint="Only a folder that traction publish wrote can be rebuilt.",
         )
     names = [str(name) for name in cast("list[object]", terrains)]
-    order = ReportRequest(seed, names)
+    request = ReportRequest(seed, names)
     fit = FitOptions(seed=seed, models=REPORTED)
     with tempfile.TemporaryDirectory(prefix="traction-rebuild-") as empty:
         sessions, data = list_sessions(folder), Path(empty)
-        analysed = study_sessions(sessions, data, order, console, fit)
+        analysed = study_sessions(sessions, data, request, console, fit)
     trials = [trial for group in analysed.trials.values() for trial in group]
     rig = with_tares([t.health for t in trials], trials)
     results = compute_results(analysed.study, rig)

@@ -21,7 +21,7 @@ def export_terrains(
     sessions: Sequence[SessionFolder],
     data: Path,
     out: Path,
-    order: ReportRequest,
+    request: ReportRequest,
     console: Console,
 ) -> None:
     """Write a terrain database of all models of the sessions' terrains to `out`.
@@ -30,11 +30,11 @@ def export_terrains(
         SessionError: no session has a kept trial.
         TrialFileError: `out` exists or cannot be written.
     """
-    judged = FitOptions(seed=order.seed, models=(GP_SE, GP_SE_TRIAL), draws=0)
-    analysed = study_sessions(sessions, data, order, console, judged)
+    judged = FitOptions(seed=request.seed, models=(GP_SE, GP_SE_TRIAL), draws=0)
+    analysed = study_sessions(sessions, data, request, console, judged)
     study = analysed.study
     options = replace(
-        study.options, fit=FitOptions(seed=order.seed, models=EXPORTED, draws=0)
+        study.options, fit=FitOptions(seed=request.seed, models=EXPORTED, draws=0)
     )
     text = database_of(
         replace(study, options=options),

@@ -15,7 +15,11 @@ from experiments.operator.console import WARNING, Console
 from experiments.report.choices import ReportRequest
 from experiments.report.duplicates import TrialDigests
 from experiments.report.progress import fitting
-from experiments.report.study_report import ReportedStudy, report_study
+from experiments.report.study_report import (
+    ReportedStudy,
+    report_study,
+    require_folder,
+)
 
 Trials = Mapping[str, Sequence[TractionSeries]]
 
@@ -25,7 +29,7 @@ def report_tables_of_trials(
     out: Path,
     trials: Trials,
     with_columns: Trials,
-    order: ReportRequest,
+    request: ReportRequest,
     console: Console,
 ) -> Path:
     """Fit trials from tables and write the report; return the page.
@@ -35,15 +39,16 @@ def report_tables_of_trials(
         out: folder of the report.
         trials: by terrain.
         with_columns: the same with the columns that are tested.
-        order: how the report is made.
+        request: how the report is made.
         console: is told what is done, and what is odd.
 
     Raises:
         SettingsError: a choice does not suit tables, trials are simulated and recorded
             ones or given twice, or none has a sample to fit.
     """
-    for choice in order.choices.variants:  # refused before anything is fitted
+    for choice in request.choices.variants:  # refused before anything is fitted
         choice.series(next(iter(trials.values()))[0])
+    require_folder(out)
     is_simulated = _is_simulated(trials)
     _refuse_repeated(trials)
     told = notes_of_tables(trials)
@@ -52,7 +57,7 @@ def report_tables_of_trials(
     count = sum(len(series) for series in trials.values())
     console.say(f"{count} trials on {len(trials)} terrains: fitting ...")
     options = StudyOptions(
-        order.choices.prepare, fit=order.fit, scheduler=order.scheduler
+        request.choices.prepare, fit=request.fit, scheduler=request.scheduler
     )
     with fitting(console) as progress:
         study = run_study(trials, options, is_simulated, progress, with_break_away=True)
@@ -66,7 +71,7 @@ def report_tables_of_trials(
         with_columns=with_columns,
         tables=_import_tables(files),
     )
-    page = report_study(reported, out, order, console)
+    page = report_study(reported, out, request, console)
     for note in study.groups:
         console.say(note)
     for warning in study.warnings:

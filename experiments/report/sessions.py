@@ -20,7 +20,11 @@ from experiments.report.commissioned import uncommissioned
 from experiments.report.covariates import recorded_columns
 from experiments.report.duplicates import TrialDigests
 from experiments.report.progress import fitting
-from experiments.report.study_report import ReportedStudy, report_study
+from experiments.report.study_report import (
+    ReportedStudy,
+    report_study,
+    require_folder,
+)
 from experiments.report.tables import cells_table, report_tables, summary_table
 from experiments.report.truth_errors import (
     TruthErrors,
@@ -101,12 +105,12 @@ def results_below(data: Path) -> ResultStore:
 
 def study_sessions(
     sessions: Sequence[SessionFolder],
-    data: Path,
-    order: ReportRequest,
+    kept: Path,
+    request: ReportRequest,
     console: Console,
     fit: FitOptions,
 ) -> StudySession:
-    """Load the kept trials and fit; finished folds are kept below `data`.
+    """Load the kept trials and fit; finished folds are kept below `kept`.
 
     Raises:
         SessionError: no session has a kept trial.
@@ -116,13 +120,13 @@ def study_sessions(
     if not count:
         ids = ", ".join(s.id for s in sessions)
         raise SessionError(f"{ids}: no kept trials to report.")
-    trials = {name: trials[name] for name in order.sorted(trials)}
+    trials = {name: trials[name] for name in request.sorted(trials)}
     console.say(f"{count} trials on {len(trials)} terrains: fitting ...")
     travel = min(t.frame.travel for group in trials.values() for t in group)
     options = StudyOptions(
-        prepare=replace(order.choices.prepare, container_travel=travel),
+        prepare=replace(request.choices.prepare, container_travel=travel),
         fit=fit,
-        scheduler=order.scheduler,
+        scheduler=request.scheduler,
     )
     series = {name: [t.series for t in group] for name, group in trials.items()}
     with fitting(console) as progress:
@@ -131,7 +135,7 @@ def study_sessions(
             options,
             sessions[0].is_simulated,
             progress,
-            results_below(data),
+            results_below(kept),
             with_break_away=True,
         )
     return StudySession(study, trials, left_out, truths)
@@ -140,23 +144,27 @@ def study_sessions(
 def report_sessions(
     sessions: Sequence[SessionFolder],
     data: Path,
-    order: ReportRequest,
+    request: ReportRequest,
     console: Console,
 ) -> Path:
     """Load the kept trials, fit, and write the report; return the page.
 
     One session is reported into its own folder, several into `data`/study, all of them
-    into that of `order` where it names one.
+    into that of `request` where it names one.
 
     Raises:
         SessionError: no session has a kept trial.
+        SettingsError: the folder cannot be written.
         MissingLibraryError: the extra `report` is not installed.
     """
-    analysed = study_sessions(sessions, data, order, console, order.fit)
     own = sessions[0].path if len(sessions) == 1 else data / "study"
-    reported = _reported(sessions, order, analysed)
-    store = results_below(data)
-    page = report_study(reported, order.out or own, order, console, store)
+    out = request.out or own
+    require_folder(out)
+    kept = request.out or data  # where results are kept for the next report
+    analysed = study_sessions(sessions, kept, request, console, request.fit)
+    reported = _reported(sessions, request, analysed)
+    store = results_below(kept)
+    page = report_study(reported, out, request, console, store)
     console.table(*summary_table(analysed.study))
     for note in analysed.study.groups:
         console.say(note)
@@ -164,7 +172,7 @@ def report_sessions(
 
 
 def _reported(
-    sessions: Sequence[SessionFolder], order: ReportRequest, analysed: StudySession
+    sessions: Sequence[SessionFolder], request: ReportRequest, analysed: StudySession
 ) -> ReportedStudy:
     """Return a study with what only its sessions can tell."""
     study, trials = analysed.study, analysed.trials
@@ -180,7 +188,7 @@ def _reported(
         subtitle=f"{len(every)} trials on {', '.join(trials)}",
         is_foreign=False,
         trials=analysed.files,
-        with_columns=recorded_columns(analysed.files, order.covariates),
+        with_columns=recorded_columns(analysed.files, request.covariates),
         cells=cells_table(study, units),
         tables=[
             *truth_tables(study, trials, analysed.truths),
@@ -189,7 +197,7 @@ def _reported(
         rig=with_tares([trial.health for trial in every], every),
         warnings=[
             *uncommissioned((trial.name, trial.metadata) for trial in every),
-            *order.missing,
+            *request.missing,
             *analysed.left_out,
             *analysed.doubts,
         ],

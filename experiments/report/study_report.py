@@ -1,11 +1,13 @@
 """The one place that makes a page: of a study of sessions, or of tables."""
 
+import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from acquisition.clock import SystemClock
+from acquisition.errors import SettingsError
 from analysis.data.load import RecordedTrial
 from analysis.data.series import TractionSeries
 from analysis.report.page_model import ReportContext
@@ -53,10 +55,30 @@ class ReportedStudy:
     numbers: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
 
+def require_folder(out: Path) -> None:
+    """Make the folder of a report, before anything is fitted.
+
+    Raises:
+        SettingsError: it cannot be made, or written.
+    """
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SettingsError(
+            f"{out}: cannot be made ({error.strerror}).",
+            hint="Name another folder: --to DIR. Nothing was fitted.",
+        ) from error
+    if not os.access(out, os.W_OK):
+        raise SettingsError(
+            f"{out}: cannot be written.",
+            hint="Name another folder: --to DIR. Nothing was fitted.",
+        )
+
+
 def report_study(
     reported: ReportedStudy,
     out: Path,
-    order: ReportRequest,
+    request: ReportRequest,
     console: Console,
     store: ResultStore | None = None,
 ) -> Path:
@@ -65,7 +87,7 @@ def report_study(
     Args:
         reported: the study.
         out: folder of the report.
-        order: what is asked for beyond the study.
+        request: what is asked for beyond the study.
         console: is told what is fitted.
         store: results of earlier runs; None = everything is computed.
 
@@ -76,10 +98,10 @@ def report_study(
     from analysis.report.page import write_report  # exporting needs no page
 
     study = reported.study
-    variants = order.choices.variants
+    variants = request.choices.variants
     others = repeat_study(study, reported.trials, variants, console, store)
     tested = columns_tested(
-        study, reported.with_columns, order.covariates, console, store
+        study, reported.with_columns, request.covariates, console, store
     )
     context = ReportContext(
         title=reported.title,
@@ -100,7 +122,7 @@ def report_study(
             "covariates": [one.numbers() for one in tested],
             **reported.numbers,
         },
-        with_pdf=order.with_pdf,
+        with_pdf=request.with_pdf,
         results=compute_results(study, reported.rig),
         store=store,
     )

@@ -123,6 +123,13 @@ def test_a_result_that_could_not_be_read_again_is_refused(tmp_path, task):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_folder_that_cannot_be_written_keeps_nothing(tmp_path, task, result):
+    (tmp_path / "file").write_text("in the way")
+    store = ResultStore(tmp_path / "file" / "results")
+    store.put(run_fold, task, result)
+    assert store.get(run_fold, task) is None
+
+
 def test_a_changed_option_or_sample_is_another_task(task):
     options = replace(task.options, seed=1)
     (own,) = task.test_trials

@@ -1,0 +1,39 @@
+"""A report is written where it is told, and the data only read."""
+
+import pytest
+
+from tests.experiments.program import traction
+
+TUSTIN = ("--models", "tustin")
+
+
+def content(folder):
+    """Return the state of every file below a folder."""
+    return {
+        path: (path.stat().st_mtime_ns, path.stat().st_size)
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
+
+
+@pytest.mark.slow
+def test_a_report_elsewhere_leaves_the_data_as_they_are(recorded, tmp_path):
+    before = content(recorded.data)
+    done = traction(
+        "report", "S001", "--data", recorded.data, "--to", tmp_path / "out", *TUSTIN
+    )
+    assert done.code == 0, done.err
+    assert (tmp_path / "out" / "report" / "index.html").is_file()
+    assert (tmp_path / "out" / ".folds").is_dir()
+    assert content(recorded.data) == before
+
+
+def test_a_folder_that_cannot_be_made_is_refused_before_anything_is_fitted(
+    recorded, tmp_path
+):
+    (tmp_path / "file").write_text("in the way")
+    out = tmp_path / "file" / "out"
+    done = traction("report", "S001", "--data", recorded.data, "--to", out, *TUSTIN)
+    assert done.code == 2
+    assert "Name another folder: --to DIR. Nothing was fitted." in done.err
+    assert "fitting" not in done.out
