@@ -12,9 +12,10 @@ from acquisition.errors import SettingsError
 from analysis.data.prepare import PrepareOptions, moving_average, prepare_trial
 from analysis.logs.importing import import_log
 from analysis.logs.request import ImportRequest
-from analysis.tables.columns import parse_columns, parse_names
+from analysis.tables.columns import parse_columns
 from analysis.tables.loading import load_tables
 from ft_sensor.payload import Payload
+from tests.analysis.tables.stated_dialects import STATED
 from tests.experiments.program import traction
 from tests.judges.judgement import Judgement, at_most, near, said
 from wam.model.arm_model import ArmModel
@@ -185,10 +186,9 @@ def csv_dialects(folder: Path) -> Iterator[Judgement]:
     """Judge sixteen dialects."""
     of = "csv_dialects"
     for name, wanted in json.loads((folder / "expected.json").read_text()).items():
-        option, _, columns = wanted["options"].partition(" ")
-        negate = parse_names(columns) if option else ()
+        stated = STATED.get(name, {})
         try:
-            ((series,),) = load_tables([folder / f"{name}.csv"], negate=negate).values()
+            ((series,),) = load_tables([folder / f"{name}.csv"], **stated).values()
         except SettingsError as error:
             value, is_right = f"refused: {error.message}", wanted["want"] == "refused"
             yield Judgement(of, name, value[-90:], wanted["want"], is_right)

@@ -7,6 +7,7 @@ import pytest
 
 from acquisition.errors import SettingsError
 from analysis.tables.loading import load_tables
+from tests.analysis.tables.stated_dialects import STATED
 
 pytestmark = pytest.mark.shared_data
 DIALECTS = (
@@ -27,19 +28,6 @@ DIALECTS = (
     "grams_force",
     "negative_load",
 )
-
-
-# What has to be stated of a file: it is neither RFC 4180 nor in N, m/s and s.
-STATED = {
-    "semicolon_comma": {"separator": ";", "decimal": ","},
-    "utf16_tab": {"separator": "\t"},
-    "sep_line": {"separator": ";", "skipped": frozenset({1})},
-    "units_row": {"units": {"v_t": "mm/s"}, "skipped": frozenset({2})},
-    "preamble_hash": {"skipped": frozenset({1, 2})},
-    "space_columns": {"separator": "blanks"},
-    "german_thousands": {"separator": ";", "decimal": ","},
-    "negative_load": {"negate": ("F_n",)},
-}
 
 
 @pytest.fixture(scope="module")

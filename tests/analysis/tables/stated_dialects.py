@@ -1,0 +1,13 @@
+"""Options that describe the files of sixteen dialects."""
+
+# What has to be stated of a file: it is neither RFC 4180 nor in N, m/s and s.
+STATED = {
+    "semicolon_comma": {"separator": ";", "decimal": ","},
+    "utf16_tab": {"separator": "\t"},
+    "sep_line": {"separator": ";", "skipped": frozenset({1})},
+    "units_row": {"units": {"v_t": "mm/s"}, "skipped": frozenset({2})},
+    "preamble_hash": {"skipped": frozenset({1, 2})},
+    "space_columns": {"separator": "blanks"},
+    "german_thousands": {"separator": ";", "decimal": ","},
+    "negative_load": {"negate": ("F_n",)},
+}
