@@ -37,7 +37,7 @@ LARGEST = 16 * 1024**2  # bytes of one result; a larger file is none
 _KEPT = 0.9  # share of the size that is left when results go
 _ROOT = Path(__file__).parents[2]  # of the sources, or of the installation
 _FIGURES = "analysis.report"  # draws what the other packages compute
-_DTYPES = {"float64": "<f8", "int64": "<i8", "bool": "|b1"}
+_DTYPES = ("<f8", "<i8", "|b1")  # of arrays: float, int, bool
 
 
 class ResultStore:
@@ -125,7 +125,7 @@ def task_key(function: Function, task: Any) -> str:  # noqa: ANN401
     """
     name = f"{function.__module__}.{function.__qualname__}"
     code = code_digest(is_drawn=name.startswith(_FIGURES))
-    return _digest([name, code, encode(task, _array_digest)])
+    return _digest([name, code, encode(task, _sha256)])
 
 
 @cache
@@ -154,23 +154,32 @@ def code_digest(root: Path = _ROOT, *, is_drawn: bool = False) -> str:
 
 
 def _digest(plain: Any) -> str:  # noqa: ANN401
-    text = json.dumps(plain, sort_keys=True, allow_nan=False)
-    return hashlib.sha256(text.encode()).hexdigest()
+    return _sha256(json.dumps(plain, sort_keys=True, allow_nan=False).encode())
 
 
-def encode(value: Any, array: Callable[[np.ndarray], Any] | None = None) -> Any:  # noqa: ANN401
-    """Return `value` as what JSON can hold; floats keep every bit.
+def _sha256(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+def _base64(content: bytes) -> str:
+    return base64.b64encode(content).decode("ascii")
+
+
+def encode(value: Any, text: Callable[[bytes], str] | None = None) -> Any:  # noqa: ANN401
+    """Return `value` as what JSON can hold; numbers keep every bit.
 
     Args:
         value: dataclasses, named tuples, enumerations, arrays, mappings, sequences,
-            numbers, texts.
-        array: gives the plain form of an array; by default one that `decode` reads.
+            numbers, texts, bytes.
+        text: gives the text that stands for bytes; by default one that `decode` reads.
 
     Raises:
         TypeError: a value of a kind that has no plain form.
     """
-    if isinstance(value, np.ndarray):
-        return (array or _encode_array)(value)
+    text = text or _base64
+    if isinstance(value, np.ndarray) and not value.dtype.hasobject:
+        kind, shape = value.dtype.str, list(value.shape)
+        return {"array": text(value.tobytes()), "dtype": kind, "shape": shape}
     if isinstance(value, np.generic):
         return encode(value.item())
     if isinstance(value, Enum):
@@ -178,18 +187,18 @@ def encode(value: Any, array: Callable[[np.ndarray], Any] | None = None) -> Any:
     if value is None or isinstance(value, bool | int | str):
         return value
     if isinstance(value, bytes):
-        return {"bytes": base64.b64encode(value).decode("ascii")}
+        return {"bytes": text(value)}
     if isinstance(value, float):
         return value if math.isfinite(value) else {"number": repr(value)}
     names = _field_names(type(value))
     if names is not None:
-        inside = {name: encode(getattr(value, name), array) for name in names}
+        inside = {name: encode(getattr(value, name), text) for name in names}
         return {"type": _name(type(value)), "fields": inside}
     if isinstance(value, list | tuple):
-        return [encode(item, array) for item in value]
+        return [encode(item, text) for item in value]
     if isinstance(value, Mapping):
         items = value.items()
-        return {"items": [[encode(k), encode(item, array)] for k, item in items]}
+        return {"items": [[encode(k), encode(item, text)] for k, item in items]}
     raise TypeError(f"{type(value).__name__} has no plain form")
 
 
@@ -258,28 +267,13 @@ def _field_names(kind: type) -> tuple[str, ...] | None:
     return getattr(kind, "_fields", None)
 
 
-def _encode_array(array: np.ndarray) -> dict[str, Any]:
-    kind = array.dtype.name
-    if kind not in _DTYPES:
-        raise TypeError(f"an array of {kind} has no plain form")
-    data = np.ascontiguousarray(array, dtype=_DTYPES[kind]).tobytes()
-    text = base64.b64encode(data).decode("ascii")
-    return {"array": text, "dtype": kind, "shape": list(array.shape)}
-
-
 def _decode_array(data: str, kind: str, shape: list[int]) -> np.ndarray:
-    raw = base64.b64decode(data, validate=True)
-    flat = np.frombuffer(raw, dtype=_DTYPES[kind])
+    if kind not in _DTYPES:
+        raise ValueError(f"an array of {kind}")
+    flat = np.frombuffer(base64.b64decode(data, validate=True), dtype=kind)
     if any(side < 0 for side in shape) or math.prod(shape) != flat.size:
         raise ValueError(f"{flat.size} numbers for an array of shape {shape}")
-    return flat.astype(kind).reshape(shape)
-
-
-def _array_digest(array: np.ndarray) -> list[Any]:
-    if array.dtype.hasobject:
-        raise TypeError("an array of objects has no digest")
-    content = hashlib.sha256(array.tobytes()).hexdigest()
-    return [content, array.dtype.str, list(array.shape)]
+    return flat.copy().reshape(shape)  # may be written to
 
 
 def write_atomic(path: Path, content: bytes) -> None:

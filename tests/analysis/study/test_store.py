@@ -72,9 +72,9 @@ def test_arrays_come_back_bit_by_bit():
         {"type": FIT_OPTIONS, "fields": {"seed": 1}},
         {"type": FIT_OPTIONS, "value": "weibull"},
         {"type": 5, "fields": {}},
-        {"array": "AAAA", "dtype": "float64", "shape": [1]},
-        {"array": "AAAA", "dtype": "object", "shape": [1]},
-        {"array": "!", "dtype": "float64", "shape": []},
+        {"array": "AAAA", "dtype": "<f8", "shape": [1]},
+        {"array": "AAAAAAAAAAA=", "dtype": "|O", "shape": [1]},
+        {"array": "!", "dtype": "<f8", "shape": []},
         {"number": "1"},
         {"bytes": "AAA"},
         {"bytes": "!AAA"},
@@ -187,7 +187,7 @@ def test_a_number_has_the_same_key_when_the_store_gives_it_back(value):
 
 @pytest.mark.parametrize("value", [object(), np.array([object()])])
 def test_what_has_no_known_content_has_no_key(value):
-    with pytest.raises(TypeError, match=r"no (plain form|digest)"):
+    with pytest.raises(TypeError, match="no plain form"):
         task_key(run_fold, [value])
 
 
