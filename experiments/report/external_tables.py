@@ -48,9 +48,9 @@ def report_tables_of_trials(
     """
     for choice in request.choices.variants:  # refused before anything is fitted
         choice.series(next(iter(trials.values()))[0])
-    require_folder(out)
     is_simulated = _is_simulated(trials)
     _refuse_repeated(trials)
+    require_folder(out)
     told = notes_of_tables(trials)
     for note in told:  # before the work: a wrong unit shows here
         console.say(f"{WARNING} {note}")

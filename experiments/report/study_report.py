@@ -65,7 +65,7 @@ def require_folder(out: Path) -> None:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise SettingsError(
-            f"{out}: cannot be made ({error.strerror}).",
+            f"{out}: cannot be written ({error.strerror}).",
             hint="Name another folder: --to DIR. Nothing was fitted.",
         ) from error
     if not os.access(out, os.W_OK):
