@@ -294,7 +294,8 @@ def resume(folder):
     story.append(Event.ENDED, reason="complete")
 
 
-@pytest.mark.timeout(120)
+@pytest.mark.slow  # hundreds of sessions resumed
+@pytest.mark.timeout(300)
 def test_a_session_killed_at_any_write_is_resumed_to_the_same_files(told, tmp_path):
     _, recording = told
     for number, disk in enumerate(kills(recording.operations)):
