@@ -96,3 +96,17 @@ def test_a_tare_at_one_angle_is_wrong_on_an_incline_and_a_calibration_is_not():
     assert np.linalg.norm(apparent[:3]) == pytest.approx(0.77, abs=0.01)
     corrected = held.contact(readings(held, turned), turned)
     assert np.linalg.norm(corrected[:3]) < 1e-9
+
+
+def test_a_weight_of_the_other_sign_is_refused_when_the_mounting_is_stated():
+    held, rotations = payload(sign=-1.0), orientations(12)
+    with pytest.raises(SettingsError, match=r"its sign is not \+1"):
+        fit_sensor(rotations, readings(held, rotations), mounting=(0.0, 1.0))
+
+
+def test_readings_of_no_weight_are_refused():
+    rotations = orientations(12)
+    shown = np.tile(BIAS, (12, 1))
+    shown[:, 2] += 1e-9 * rotations[:, 2, 2]
+    with pytest.raises(SettingsError, match="do not change with the orientation"):
+        fit_sensor(rotations, shown, mounting=(0.0, 1.0))

@@ -1,17 +1,13 @@
 import struct
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from acquisition.errors import DeviceFaultError, LinkTimeoutError, SettingsError
 from fakes.sensor.optoforce import SENSITIVITY, SERIAL_NUMBER
-from ft_sensor.serial_line.framing import FrameScanner
 from ft_sensor.serial_line.link import PortSettings
 from ft_sensor.vendors import optoforce
 from ft_sensor.vendors.optoforce import OptoForceFrame, encode_configuration
 from ft_sensor.vendors.optoforce_device import OptoForceDevice, OptoForceSettings
-from tests.ft_sensor.damage import damaged_stream, double, drop, flip, parse
 from tests.ft_sensor.sensor_bench import MS, SensorBench
 
 NORMAL = bytes.fromhex("AA07081012340000" + "00B7FF4801A80117FEFC01C0" + "0689")
@@ -24,14 +20,6 @@ GOLDEN_CONFIGURATIONS = {
     (10, 4, 0): "AA0032030A040000ED",
     (0, 0, 0): "AA00320300000000DF",
 }
-
-counts = st.integers(-32768, 32767)
-word = st.integers(0, 0xFFFF)
-frames = st.builds(OptoForceFrame, word, word, st.tuples(*[counts] * 6))
-
-
-def scanner():
-    return FrameScanner(optoforce.HEADER, optoforce.FRAME_SIZE, optoforce.decode_frame)
 
 
 def test_golden_frame_decodes_to_its_load():
@@ -97,57 +85,9 @@ def test_a_three_axis_frame_is_no_frame():
     assert optoforce.decode_frame(THREE_AXES + THREE_AXES) is None
 
 
-@pytest.mark.parametrize("position", range(22))
-def test_a_frame_with_any_byte_changed_is_none(position):
-    damaged = bytearray(NORMAL)
-    damaged[position] ^= 0x10
-    assert optoforce.decode_frame(bytes(damaged)) is None
-
-
-@pytest.mark.slow
-@given(st.lists(frames, max_size=6), st.integers(1, 60))
-def test_scanner_returns_every_frame_in_any_chunking(sent, chunk):
-    found = scanner()
-    data = b"".join(map(optoforce.encode_frame, sent))
-    assert parse(found, data, chunk) == sent
-    assert found.counters.discarded == 0
-
-
-@given(st.binary(max_size=200), st.integers(1, 60))
-def test_what_is_found_does_not_depend_on_the_chunking(noise, chunk):
-    data = NORMAL + noise + optoforce.HEADER[:2] + OVERLOAD + noise + NORMAL
-    pieces, whole = scanner(), scanner()
-    assert parse(pieces, data, chunk) == parse(whole, data, len(data))
-    assert pieces.counters == whole.counters
-
-
 def test_a_number_that_does_not_fit_is_refused():
     with pytest.raises(struct.error):
         optoforce.encode_frame(OptoForceFrame(70000, 0, (0, 0, 0, 0, 0, 0)))
-
-
-def noisy(rng, number):
-    values = tuple(rng.randrange(-2000, 2000) for _ in range(6))
-    return OptoForceFrame(number, 0, values)
-
-
-@pytest.mark.parametrize("chunk", [1, 7, 44, 1 << 20])
-@pytest.mark.parametrize("fault", [flip, drop])
-def test_one_bad_byte_costs_exactly_one_frame(fault, chunk):
-    for seed in range(10):
-        data, sent, hit = damaged_stream(noisy, optoforce.encode_frame, fault, seed)
-        kept = [frame for number, frame in enumerate(sent) if number not in hit]
-        assert parse(scanner(), data, chunk) == kept
-
-
-@pytest.mark.parametrize("chunk", [1, 7, 44, 1 << 20])
-def test_a_doubled_byte_costs_at_most_one_frame(chunk):
-    for seed in range(10):
-        data, sent, hit = damaged_stream(noisy, optoforce.encode_frame, double, seed)
-        found = parse(scanner(), data, chunk)
-        lost = {frame.counter for frame in sent} - {frame.counter for frame in found}
-        assert lost <= hit
-        assert len(found) + len(lost) == len(sent)
 
 
 def test_lost_frames_are_counted_over_the_end_of_the_counter():

@@ -5,12 +5,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.errors import DeviceFaultError, LinkTimeoutError, SettingsError
-from ft_sensor.serial_line.framing import FrameScanner
 from ft_sensor.serial_line.link import PortSettings
 from ft_sensor.vendors import robotous
 from ft_sensor.vendors.robotous import RobotousFrame, encode_command
 from ft_sensor.vendors.robotous_device import RobotousDevice, RobotousSettings
-from tests.ft_sensor.damage import damaged_stream, double, drop, flip, parse
 from tests.ft_sensor.sensor_bench import MS, SensorBench
 
 NORMAL = bytes.fromhex("550B004BFF9C01F400C8FF9C01F40000003EAA")
@@ -27,13 +25,6 @@ GOLDEN_COMMANDS = {
     encode_command(robotous.BIAS, 1): "55110100000000000012AA",
     encode_command(robotous.BIAS, 0): "55110000000000000011AA",
 }
-
-counts = st.integers(-32768, 32767)
-frames = st.builds(RobotousFrame, st.tuples(*[counts] * 6), st.integers(0, 63))
-
-
-def scanner():
-    return FrameScanner(b"\x55", robotous.FRAME_SIZE, robotous.decode_frame)
 
 
 def test_golden_sample_decodes_to_its_load():
@@ -77,25 +68,10 @@ def test_torque_scale_follows_the_model():
     assert reading.wrench[3] == pytest.approx(0.2)
 
 
-@pytest.mark.parametrize("position", range(19))
-def test_a_sample_with_any_byte_changed_is_none(position):
-    damaged = bytearray(NORMAL)
-    damaged[position] ^= 0x10
-    assert robotous.decode_frame(bytes(damaged)) is None
-
-
 def test_an_answer_or_a_single_sample_is_no_streamed_one():
     frame = RobotousFrame((0, 0, 0, 0, 0, 0), 0)
     single = robotous.encode_frame(frame, robotous.SAMPLE)
     assert robotous.decode_frame(single) is None
-
-
-@given(st.lists(frames, max_size=6), st.integers(1, 60))
-def test_scanner_returns_every_frame_in_any_chunking(sent, chunk):
-    data = b"".join(map(robotous.encode_frame, sent))
-    found = scanner()
-    assert parse(found, data, chunk) == sent
-    assert found.counters.discarded == 0
 
 
 @given(st.binary(min_size=11, max_size=11))
@@ -107,30 +83,6 @@ def test_hostile_commands_decode_or_are_none(data):
 def test_a_count_that_does_not_fit_is_refused():
     with pytest.raises(struct.error):
         robotous.encode_frame(RobotousFrame((40000, 0, 0, 0, 0, 0), 0))
-
-
-def noisy(rng, number):
-    values = tuple(rng.randrange(-2000, 2000) for _ in range(5))
-    return RobotousFrame((number, *values), 0)
-
-
-@pytest.mark.parametrize("chunk", [1, 7, 44, 1 << 20])
-@pytest.mark.parametrize("fault", [flip, drop])
-def test_one_bad_byte_costs_exactly_one_frame(fault, chunk):
-    for seed in range(10):
-        data, sent, hit = damaged_stream(noisy, robotous.encode_frame, fault, seed)
-        kept = [frame for number, frame in enumerate(sent) if number not in hit]
-        assert parse(scanner(), data, chunk) == kept
-
-
-@pytest.mark.parametrize("chunk", [1, 7, 44, 1 << 20])
-def test_a_doubled_byte_costs_at_most_one_frame(chunk):
-    for seed in range(10):
-        data, sent, hit = damaged_stream(noisy, robotous.encode_frame, double, seed)
-        found = parse(scanner(), data, chunk)
-        lost = set(sent) - set(found)
-        assert lost <= {sent[number] for number in hit}
-        assert len(found) + len(lost) == len(sent)
 
 
 def test_it_is_identified_and_its_settings_are_read_back():
