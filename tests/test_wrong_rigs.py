@@ -2,11 +2,11 @@
 
 import pytest
 
-from experiments.commissioning.evidence.order import StepId
 from experiments.commissioning.judging import LIMITS
 from experiments.commissioning.procedure import STEPS
 from fakes.world.wrong_rigs import catalogue
-from tests.wrong_rigs import FOUND, REFUSED, WARNED, found_by
+from tests.attacks.parameters import parameters
+from tests.wrong_rigs import FOUND, REFUSED, WARNED, rig_attacks
 
 # Quantities that say how a step was done, not what the rig is like.
 OF_THE_WORK = {
@@ -31,19 +31,6 @@ OF_RECORDINGS = {
 # Only in the check of every day.
 OF_THE_DAY = {"changed", "exchange", "zero", "hang_force", "hang_way", "drift"}
 ROWS = [(name, finding) for name, row in FOUND.items() for finding in row]
-_QUICK = {StepId.CONFIGURATION, StepId.LISTEN, StepId.IDENTITY}
-
-
-def marked():
-    """Return every finding; those before the loop runs are slow, the others long."""
-    return [
-        pytest.param(
-            *(name, finding),
-            id=f"{name}-{finding.step}",
-            marks=pytest.mark.slow if finding.step in _QUICK else pytest.mark.long,
-        )
-        for name, finding in ROWS
-    ]
 
 
 def test_every_rig_of_the_catalogue_is_found_and_no_other():
@@ -65,9 +52,6 @@ def test_every_quantity_is_tripped_by_a_rig_or_judged_elsewhere():
     assert set().union(tripped, *others) == set(LIMITS)
 
 
-@pytest.mark.timeout(1200)
-@pytest.mark.parametrize(("name", "finding"), marked())
-def test_a_wrong_rig_is_found_as_the_table_says(name, finding):
-    ending = found_by(name, finding)
-    assert ending.is_as(finding), ending
-    assert ending.is_gentle, ending
+@pytest.mark.parametrize("row", parameters(rig_attacks()))
+def test_a_wrong_rig_is_found_as_the_table_says(row, tmp_path):
+    row.check(tmp_path)

@@ -1,8 +1,5 @@
 """Which step of `traction commission` finds which wrong rig, by which quantity.
 
-python -m tests.wrong_rigs [NAME ...] [--seeds 1,2,3] [--friction 0.4,0.7,1.0]
-python -m tests.wrong_rigs sound --seeds 1-40 --until C7
-
 `FOUND` is the table. Each rig of the catalogue is commissioned by the scripted operator
 in stepped time, in a folder of its own, beside a container of full length, from a step
 that needs nothing of what came before. What it did before it was found is read from the
@@ -10,9 +7,7 @@ recordings of C8 to C11: energy of the arm, speed and travel of the sole, by the
 positions as believed.
 """
 
-import argparse
 import re
-import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -32,19 +27,21 @@ from experiments.commissioning.procedure import STEPS
 from experiments.commissioning.recording import Values, read_raw
 from experiments.rig.build import build_tool
 from experiments.settings.load import load_settings
-from fakes.world.wrong_rigs import catalogue, wrong_rig
+from fakes.world.wrong_rigs import wrong_rig
+from tests.attacks.attack import Attack, RunBy
 from tests.experiments.program import traction, write_config
 from wam.model.arm_model import ArmModel
 from wam.model.constants import load_constants
 
-HEAD = f"{'rig':22} {'seed':>4} {'fr.':>4} {'found':>6}  {'mJ':>5} {'mm':>4} {'m/s':>5}"
 # Nothing may go further before it is found: the guard's own bound in a proof, the way
 # of a lift, and a slow hand.
 MOST_ENERGY, MOST_TRAVEL, MOST_SPEED = 0.070, 0.025, 0.2  # J, m, m/s
 SEED, FRICTION = 1, 0.7
+_SOUND_SEEDS, _SHARES = range(1, 41), (0.4, 0.7, 1.0)
 _SPEED_OVER = 10  # cycles, over which a speed is taken
 _TRAVEL = 0.45  # m, of a container whose corners can be told apart
 REFUSED, WARNED = "no judgement", "a note"
+_QUICK = {StepId.CONFIGURATION, StepId.LISTEN, StepId.IDENTITY}
 
 
 @dataclass(frozen=True)
@@ -159,13 +156,6 @@ class Ending:
         """Return whether it is what the table says, in whatever order."""
         return self.step == finding.step and set(self.by) == set(finding.by)
 
-    def row(self, name: str, seed: int, friction: float) -> str:
-        """Return it as a line below `HEAD`; "" is the name of a sound rig."""
-        moved = f"{1e3 * self.energy:5.0f} {1e3 * self.travel:4.0f} {self.speed:5.2f}"
-        first = f"{name or 'sound':22} {seed:4} {friction:4.1f} {self.step or '-':>6}"
-        cause = self.cause.splitlines()[0] if self.cause else ""
-        return f"{first}  {moved}  {', '.join(self.by)}: {cause}"
-
 
 def commissioned(
     name: str,
@@ -195,6 +185,47 @@ def found_by(name: str, finding: Finding) -> Ending:
     """Return how the commissioning ends that has to find a rig so."""
     first = finding.first or finding.step
     return commissioned(name, first=first, last=finding.step)
+
+
+def rig_attacks() -> list[Attack]:
+    """Return every finding; those before the loop runs are quick."""
+    return [_attack(name, finding) for name, row in FOUND.items() for finding in row]
+
+
+def sound_attacks() -> list[Attack]:
+    """Return sound arms of different zeros, stops, sensors and friction."""
+    return [_sound(seed, _SHARES[seed % len(_SHARES)]) for seed in _SOUND_SEEDS]
+
+
+def _sound(seed: int, friction: float) -> Attack:
+    def check(_: Path) -> None:
+        ending = commissioned("", seed, friction)
+        assert ending.step == "", ending
+
+    return Attack(
+        "commission a sound arm",
+        f"seed {seed}, friction {friction}",
+        "passes every step",
+        check,
+        RunBy.NIGHTLY,
+        seconds=1200,
+    )
+
+
+def _attack(name: str, finding: Finding) -> Attack:
+    def check(_: Path) -> None:
+        ending = found_by(name, finding)
+        assert ending.is_as(finding), ending
+        assert ending.is_gentle, ending
+
+    return Attack(
+        name,
+        finding.step,
+        f"found by {', '.join(finding.by)}, at most {1e3 * MOST_TRAVEL:.0f} mm further",
+        check,
+        RunBy.CI if finding.step in _QUICK else RunBy.NIGHTLY,
+        seconds=1200,
+    )
 
 
 def _commission(
@@ -290,54 +321,3 @@ def _moved(recordings: Sequence[Values]) -> tuple[float, float, float]:
         rates = (model.sole_jacobian(at[i])[:3] @ qd[i] for i in fastest)
         speed = max(speed, *(float(np.linalg.norm(rate)) for rate in rates))
     return energy, travel, speed
-
-
-def _numbers(text: str) -> list[int]:
-    """Return the seeds of "1,2,3" or "1-40"."""
-    numbers: list[int] = []
-    for word in text.split(","):
-        first, _, last = word.partition("-")
-        numbers += range(int(first), int(last or first) + 1)
-    return numbers
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Print a line for every finding and the sum; return the exit code.
-
-    1 = a sound rig was stopped, or a wrong one not found at its step, or not gently.
-    """
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("names", nargs="*", help="of the catalogue, or sound (all)")
-    parser.add_argument("--seeds", default=str(SEED), help="1,2,3 or 1-40")
-    parser.add_argument("--friction", default=str(FRICTION), help="one for each seed")
-    parser.add_argument("--until", dest="last", default="", help="of sound rigs")
-    args = parser.parse_args(arguments)
-    say = sys.stdout.write
-    say(f"{HEAD}\n")
-    shares = [float(word) for word in args.friction.split(",")]
-    missed = count = 0
-    for number, seed in enumerate(_numbers(args.seeds)):
-        share = shares[number % len(shares)]
-        for name in args.names or catalogue():
-            if name == "sound":
-                ending = commissioned("", seed, share, last=args.last)
-                say(f"{ending.row('', seed, share)}\n")
-                missed += bool(ending.step)
-                count += 1
-                continue
-            for finding in FOUND[wrong_rig(name).name]:
-                ending = commissioned(
-                    *(name, seed, share),
-                    first=finding.first or finding.step,
-                    last=finding.step,
-                )
-                say(f"{ending.row(name, seed, share)}\n")
-                missed += not (ending.step == finding.step and ending.is_gentle)
-                count += 1
-            sys.stdout.flush()
-    say(f"{missed} of {count} otherwise than they should be\n")
-    return 1 if missed else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

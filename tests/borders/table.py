@@ -1,5 +1,10 @@
-"""The table of borders: what is given, and what happens."""
+"""What other programs and people give to this one, and what has to happen."""
 
+import resource
+import warnings
+from pathlib import Path
+
+from tests.attacks.attack import Attack
 from tests.borders.calls import CALLS
 from tests.borders.formats import FORMATS
 from tests.borders.layouts import LAYOUTS
@@ -15,32 +20,24 @@ SUBJECTS: dict[str, tuple[Border, ...]] = {
     "Simulated and recorded": SIMULATED,
     "Calls and names of files": CALLS,
 }
-HEAD = """\
-# Borders
-
-What other programs and people give to this one, and what happens: it is read exactly,
-read exactly and flagged by name, or refused with its cause.
-"""
+_MOST_KB = 500_000  # that a row may add to the most memory ever held
 
 
-def text() -> str:
-    """Return the table in Markdown."""
-    count = sum(len(rows) for rows in SUBJECTS.values())
-    lines = [HEAD, f"{count} rows.", ""]
-    for subject, rows in SUBJECTS.items():
-        lines += [
-            f"## {subject}",
-            "",
-            "| given | what happens | words of the answer |",
-            "| --- | --- | --- |",
-            *(
-                f"| {_cell(row.given)} | {row.outcome.value} | {_cell(row.says)} |"
-                for row in rows
-            ),
-            "",
-        ]
-    return "\n".join(lines)
+def border_attacks() -> list[Attack]:
+    """Return every row."""
+    return [_attack(subject, row) for subject, rows in SUBJECTS.items() for row in rows]
 
 
-def _cell(words: str) -> str:
-    return words.replace("|", "\\|").replace("<", "&lt;").replace("*", "\\*")
+def _attack(subject: str, row: Border) -> Attack:
+    def check(folder: Path) -> None:
+        before_kb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            answer = row.act(folder)
+        after_kb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        assert after_kb - before_kb < _MOST_KB
+        assert answer.outcome is row.outcome, answer.words
+        assert row.says in answer.words
+
+    says = f": {row.says}" if row.says else ""
+    return Attack(row.given, subject, f"{row.outcome.value}{says}", check)

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.errors import SettingsError
@@ -18,12 +18,11 @@ from ft_sensor.calibration.files import (
     terrain_to_toml,
 )
 from ft_sensor.payload import TerrainFrame
-from tests.corpus.mutations import mutated
+from tests.attacks.parameters import parameters
+from tests.corpus.damaged import damage_attacks
 from tests.corpus.readers import READERS
 from tests.corpus.samples import samples
 from tests.corpus.trial import read
-
-pytestmark = pytest.mark.slow
 
 CORPUS = Path(__file__).parents[1] / "data" / "corpus"
 ROOT = Path(__file__).parents[2]
@@ -46,6 +45,7 @@ for path in sorted(Path(sys.argv[2]).iterdir()):
 """
 
 
+@pytest.mark.slow
 def test_no_file_of_the_corpus_does_harm():
     done = subprocess.run(
         [sys.executable, "-c", READER, str(MEMORY), str(CORPUS)],
@@ -66,19 +66,16 @@ def test_every_file_of_the_corpus_has_a_reader():
     assert names <= set(READERS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", READERS)
 def test_a_sound_input_is_read(name):
     found = read(name, samples()[name])
     assert (found.error, found.strays) == ("", ())
 
 
-@pytest.mark.parametrize("name", READERS)
-@settings(max_examples=15, deadline=None, derandomize=True)
-@given(seed=st.integers(0, 1 << 30))
-def test_a_damaged_input_is_read_or_refused(name, seed):
-    found = read(name, mutated(samples()[name], seed))
-    assert found.is_sound, found
-    assert found.seconds < SECONDS
+@pytest.mark.parametrize("row", parameters(damage_attacks()))
+def test_a_damaged_input_is_read_or_refused(row, tmp_path):
+    row.check(tmp_path)
 
 
 def test_a_terrain_file_needs_finite_numbers():

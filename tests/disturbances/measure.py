@@ -22,8 +22,16 @@ from experiments.operator.console import GOOD
 from experiments.report.external_tables import require_samples
 from experiments.run.quality import review_trial
 from ft_sensor.calibration.files import payload_to_toml, terrain_to_toml
+from tests.attacks.attack import Attack
 from tests.disturbances.rewriting import rewrite
-from tests.disturbances.rows import Outcome, Recording, RecordingRow, TableRow
+from tests.disturbances.rows import (
+    RECORDINGS,
+    TABLES,
+    Outcome,
+    Recording,
+    RecordingRow,
+    TableRow,
+)
 
 DATA = Path(__file__).parents[1] / "data"
 RECORDED = DATA / "recorded" / "session-1.0.tar.xz"
@@ -43,6 +51,40 @@ class Seen:
     outcome: Outcome
     words: str
     changed: float
+
+
+def disturbance_attacks() -> list[Attack]:
+    """Return every row, of tables and of recordings."""
+    return [*map(_table_attack, TABLES), *map(_recording_attack, RECORDINGS)]
+
+
+def _table_attack(row: TableRow) -> Attack:
+    def check(_: Path) -> None:
+        _compare(row, see_table(row))
+
+    return Attack(row.name, "a table, fitted", _holds(row), check)
+
+
+def _recording_attack(row: RecordingRow) -> Attack:
+    def check(_: Path) -> None:
+        with recorded_trial() as source:
+            _compare(row, see_recording(row, source))
+
+    return Attack(row.name, "a recorded trial, at the review", _holds(row), check)
+
+
+def _holds(row: TableRow | RecordingRow) -> str:
+    if isinstance(row.word, float):
+        return f"F_t/F_n changes by at most {row.word:.1%}"
+    return f"{row.outcome.value}: {row.word}"
+
+
+def _compare(row: TableRow | RecordingRow, seen: Seen) -> None:
+    assert seen.outcome is row.outcome, seen
+    if isinstance(row.word, float):
+        assert seen.changed <= row.word + 1e-9, seen
+    else:
+        assert row.word in seen.words, seen
 
 
 def see_table(row: TableRow) -> Seen:

@@ -1,4 +1,4 @@
-"""A fault after a fault: every ordered pair, delay and phase: `-m tests.faults.pairs`.
+"""A fault after a fault: every ordered pair, delay and phase.
 
 Whatever the pair, four things hold: every verdict that the loop latched is told; once
 one of them idles, the arm is not driven again, whatever is pressed at the pendant; the
@@ -6,12 +6,7 @@ session ends if either fault ends it; and no trial is kept in which the motors h
 power.
 """
 
-import argparse
-import random
-import sys
-import tempfile
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from string import Formatter
@@ -22,6 +17,7 @@ from acquisition.devices import SafetyMode
 from acquisition.sample import SAFETY_MODE_MASK
 from acquisition.trial_file.reader import TrialReader
 from experiments.messages import CATALOGUE
+from tests.attacks.attack import Attack, RunBy
 from tests.experiments.program import write_config
 from tests.faults.phases import MOVING
 from tests.faults.rehearse import MS, Seen, SimulatedScene, Strike, run_with
@@ -76,6 +72,25 @@ class Pair:
 
     def __str__(self) -> str:
         return f"{self.first}, {self.second} after {self.delay_ms} ms, {self.phase}"
+
+
+# For each commit: pairs that differ in kind.
+EVERY_COMMIT = (
+    # What only holds, then what idles.
+    Pair("ft-stale", "pendant-idle", 100, "recording"),
+    Pair("console-silent", "bus-shared", 60, "ready"),
+    Pair("contact-force", "estop", 140, "recording"),
+    Pair("move-refused", "position-jump", 60, "tare"),
+    # What damps, then what idles, and the other way round.
+    Pair("overspeed", "pendant-idle", 100, "recording"),
+    Pair("pendant-idle", "overspeed", 20, "recording"),
+    # What idles, then what only holds.
+    Pair("estop", "console-silent", 20, "review"),
+    # What holds and would idle later, beside another that does.
+    Pair("move-refused", "can-silence", 0, "review"),
+    # While the arm moves by itself.
+    Pair("joint-limit", "puck-silent", 20, MOVING),
+)
 
 
 def every_pair() -> Iterator[Pair]:
@@ -184,35 +199,21 @@ def _kept_without_power(seen: Seen) -> list[str]:
     return bad
 
 
-def _problems(pair: Pair) -> tuple[Pair, list[str]]:
-    with tempfile.TemporaryDirectory(prefix="pair-") as scratch:
-        config = write_config(Path(scratch))
-        return pair, problems_of(pair, config, Path(scratch) / "data")
+def pair_attacks() -> list[Attack]:
+    """Return every pair."""
+    return [_attack(pair) for pair in every_pair()]
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run all pairs, or a share of them drawn by a seed; print what did not hold."""
-    options = argparse.ArgumentParser(prog="python -m tests.faults.pairs")
-    options.add_argument("--count", type=int, help="so many of them; else all")
-    options.add_argument("--seed", type=int, default=1)
-    options.add_argument("--jobs", type=int, default=2)
-    options.add_argument("--skip", type=int, default=0, help="so many, run before")
-    chosen = options.parse_args(arguments)
-    pairs = list(every_pair())
-    if chosen.count is not None:
-        pairs = random.Random(chosen.seed).sample(pairs, chosen.count)
-    pairs = pairs[chosen.skip :]
-    wrong = 0
-    with ProcessPoolExecutor(chosen.jobs) as pool:
-        for done, (pair, problems) in enumerate(pool.map(_problems, pairs), 1):
-            if problems:
-                wrong += 1
-                print(f"{pair}: {'; '.join(problems)}", flush=True)  # noqa: T201
-            if done % 100 == 0:
-                print(f"{done} of {len(pairs)}, {wrong} wrong", flush=True)  # noqa: T201
-    print(f"{len(pairs)} pairs, {wrong} wrong")  # noqa: T201
-    return 1 if wrong else 0
+def _attack(pair: Pair) -> Attack:
+    def check(folder: Path) -> None:
+        problems = problems_of(pair, write_config(folder), folder / "data")
+        assert not problems, "; ".join(problems)
 
-
-if __name__ == "__main__":
-    sys.exit(main())
+    return Attack(
+        f"{pair.first}, then {pair.second}",
+        f"{pair.delay_ms} ms later, {pair.phase}",
+        "both are told, the stricter reaction stands, nothing is kept without power",
+        check,
+        RunBy.TEST if pair in EVERY_COMMIT else RunBy.NIGHTLY,
+        seconds=240,
+    )

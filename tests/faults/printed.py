@@ -1,20 +1,12 @@
-"""Print the fault matrix and the hazards, in Markdown: `python -m tests.faults`."""
+"""Reactions, measured motion and hazards: `python -m tests.attacks hazards`."""
 
 from tests.faults import choice, hazards
-from tests.faults.bounds import BOUND_PHASES, COLUMNS, PrintedBound, read_bounds
-from tests.faults.expected import TABLE, Cell, End
+from tests.faults.bounds import BOUND_PHASES, PrintedBound, read_bounds
+from tests.faults.expected import TABLE, Cell
 from tests.faults.moving import MOVING_CELLS
 from tests.faults.phases import MOVING, PHASES
-from tests.faults.processes import TABLE as PROCESSES
 from tests.faults.truth import Promise, promise_of
 
-HEAD = """\
-# Faults in every phase of a session
-
-The result of each fault that `--fault` can raise, and of signals and killed processes,
-in each phase of a session; and, in the last column, while the arm moves by itself from
-pose to pose of a calibration.
-"""
 TRUTH = """
 ## True motion of the arm
 
@@ -28,30 +20,14 @@ holds the sole; `hand` the force between arm and hand; `sole` its largest speed 
 travel 160 mm (100 mm where the fault stops the arm), drive 50 N and hand 80 N, but
 where a note says so. Measured by `python -m tests.faults.bounds`.
 """
-_NOT_REHEARSED = Cell(
-    End.ABSENT, why="rehearsed in sessions; for ctrl-c see tests of the calibrations"
-)
 
 
-def lines() -> list[str]:
-    """Return the table, and below it why some cells are as they are."""
-    notes: list[str] = []
-
-    def word(cell: Cell) -> str:
-        if not cell.why:
-            return cell.end.value
-        if cell.why not in notes:
-            notes.append(cell.why)
-        return f"{cell.end.value} [{notes.index(cell.why) + 1}]"
-
-    rows = [f"| fault | {' | '.join(COLUMNS)} |", "|---" * (len(COLUMNS) + 1) + "|"]
-    every = _rows()
-    for fault, row in every.items():
-        rows.append(f"| `{fault}` | {' | '.join(word(cell) for cell in row)} |")
-    rows += ["", *(f"[{n}] {why}." for n, why in enumerate(notes, 1))]
-    cells = [c for row in every.values() for c in row]
-    absent = sum(cell.end is End.ABSENT for cell in cells)
-    return [*rows, "", f"{len(cells) - absent} cells, {absent} cannot exist."]
+def text() -> str:
+    """Return the three tables, in Markdown."""
+    reactions = [choice.HEAD, *choice.choice_lines()]
+    return (
+        "\n".join([*reactions, TRUTH, *truth_lines(), *hazards.hazard_lines()]) + "\n"
+    )
 
 
 def truth_lines() -> list[str]:
@@ -80,12 +56,6 @@ _MEASURED = (
 )
 
 
-def _rows() -> dict[str, tuple[Cell, ...]]:
-    arm = {fault: (*row, MOVING_CELLS[fault]) for fault, row in TABLE.items()}
-    others = {fault: (*row, _NOT_REHEARSED) for fault, row in PROCESSES.items()}
-    return {**arm, **others}
-
-
 def _cell(fault: str, phase: str) -> Cell:
     if phase == MOVING:
         return MOVING_CELLS[fault]
@@ -110,13 +80,3 @@ def _words(
         *(f"{x:.0f}" for x in (1e3 * bound.travel, bound.drive, bound.hand)),
         *("-" if ms is None else f"{ms:.0f}" for ms in times),
     )
-
-
-def text() -> str:
-    """Return all tables."""
-    parts = [HEAD, *lines(), choice.HEAD, *choice.choice_lines(), TRUTH]
-    return "\n".join([*parts, *truth_lines(), *hazards.hazard_lines()]) + "\n"
-
-
-if __name__ == "__main__":
-    print(text(), end="")  # noqa: T201

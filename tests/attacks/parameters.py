@@ -1,0 +1,23 @@
+"""Rows of an attack as parameters of a test, marked with the command that runs them."""
+
+from collections.abc import Iterable
+
+import pytest
+
+from tests.attacks.attack import Attack, RunBy
+
+_MARKS = {
+    RunBy.TEST: [],
+    RunBy.CI: [pytest.mark.slow],
+    RunBy.NIGHTLY: [pytest.mark.long],
+}
+
+
+def parameters(rows: Iterable[Attack]) -> list:
+    """Return a parameter `row` for each."""
+    return [pytest.param(row, id=str(row), marks=_marks_of(row)) for row in rows]
+
+
+def _marks_of(row: Attack) -> list[pytest.MarkDecorator]:
+    clock = [pytest.mark.wall_clock] if row.on_wall_clock else []
+    return [*_MARKS[row.run_by], *clock, pytest.mark.timeout(row.seconds)]
