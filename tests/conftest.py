@@ -65,32 +65,6 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="store_true",
         help="fail instead of skipping where ../shared/data is not there",
     )
-    parser.addoption(
-        "--share",
-        metavar="HEX/N",
-        help="run every Nth test only, from the one on that the hexadecimal HEX names",
-    )
-    parser.addoption(
-        "--share-by",
-        choices=("test", "file"),
-        default="test",
-        help="whether --share takes every Nth test, or all of every Nth file",
-    )
-
-
-@pytest.hookimpl(trylast=True)
-def pytest_collection_modifyitems(
-    config: pytest.Config, items: list[pytest.Item]
-) -> None:
-    """Leave what is not of the share that was asked for out."""
-    if (share := config.getoption("--share")) is not None:
-        number, _, parts = share.partition("/")
-        by_file = config.getoption("--share-by") == "file"
-        units = dict.fromkeys(item.path if by_file else item for item in items)
-        kept = set(list(units)[int(number, 16) % int(parts) :: int(parts)])
-        chosen = [i for i in items if (i.path if by_file else i) in kept]
-        config.hook.pytest_deselected(items=[i for i in items if i not in chosen])
-        items[:] = chosen
 
 
 @pytest.fixture(scope="session")
