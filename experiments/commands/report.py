@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from experiments.arguments import (
     add_allow_missing,
@@ -13,6 +14,9 @@ from experiments.arguments import (
     add_scheduler,
     add_seed,
 )
+
+if TYPE_CHECKING:
+    from experiments.report.up_to_date import ReportRecord
 
 EXAMPLES = """\
   traction report S012                             one session, in its own folder
@@ -50,14 +54,53 @@ def run(args: argparse.Namespace) -> int:
     require_extra("report")
     if args.scheduler:
         require_extra("cluster")
+    record = _record(args)  # as the data are now, before they are read
+    if not args.json and record.is_current():
+        _tell_up_to_date(record, args)
+        return 0
     from experiments.report.workers import workers_of_report
 
     is_new = not args.scheduler and not _is_kept(Path(args.data), args.to)
     with workers_of_report(are_needed=is_new):
-        return _report(args)
+        _report(args)
+    record.write()
+    return 0
 
 
-def _report(args: argparse.Namespace) -> int:
+def _tell_up_to_date(record: ReportRecord, args: argparse.Namespace) -> None:
+    """Say where the report is, and what it leaves out."""
+    from experiments.operator.console import WARNING, Console
+
+    console = Console(color=not args.no_color)
+    console.say("The report is up to date: trials, options and program are the same.")
+    for line in _left_out(record.out):
+        console.say(f"{WARNING} left out: {line}")
+    console.say(f"Open in a browser: {record.page}")
+
+
+def _record(args: argparse.Namespace) -> ReportRecord:
+    """Return what the report follows from, as it is now."""
+    from experiments.report.choices import choose_sessions
+    from experiments.report.up_to_date import record_of
+    from experiments.settings.load import load_settings
+
+    data = Path(args.data)
+    sessions = choose_sessions(data, args.sessions, every=args.all)
+    order = [row.name for row in load_settings(args.config).matrix.terrains]
+    own = sessions[0].path if len(sessions) == 1 else data / "study"
+    others = {"config", "data", "json", "no_color", "run"}  # what they name is compared
+    options = {name: value for name, value in vars(args).items() if name not in others}
+    return record_of(sessions, args.to or data, args.to or own, (options, order))
+
+
+def _left_out(out: Path) -> list[str]:
+    """Return the recordings that a report leaves out, and why."""
+    import json
+
+    return json.loads((out / "fits.json").read_bytes())["left_out"]
+
+
+def _report(args: argparse.Namespace) -> None:
     from analysis.tables.columns import parse_covariates
     from experiments.operator.console import Console, PageRecorder
     from experiments.report.choices import (
@@ -94,7 +137,6 @@ def _report(args: argparse.Namespace) -> int:
         Console(color=False).say(_as_json(page, names, missing))
     else:
         console.say(f"Open in a browser: {page}")
-    return 0
 
 
 def _is_kept(data: Path, to: Path | None) -> bool:

@@ -76,3 +76,44 @@ def test_another_choice_of_samples_computes_what_it_touches(reported, computed):
     done = traction("report", "S001", "--smooth", "15", "--data", data)
     assert done.code == 0, done.err
     assert "fit_planned" in computed
+
+
+@pytest.fixture
+def copied(reported, tmp_path):
+    """Return a copy of reported data whose report is up to date."""
+    shutil.copytree(reported[0], tmp_path / "data")
+    done = traction("report", "S001", "--data", tmp_path / "data")
+    assert done.code == 0, done.err
+    return tmp_path / "data"
+
+
+def is_up_to_date(data, *options):
+    done = traction("report", "S001", "--data", data, *options)
+    assert done.code == 0, done.err
+    return "up to date" in done.out
+
+
+@pytest.mark.slow
+def test_a_report_of_unchanged_data_says_so_and_reads_no_trial(copied, monkeypatch):
+    monkeypatch.setattr("experiments.report.sessions.load_trial", None)
+    assert is_up_to_date(copied)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("change", ["sidecar", "option", "page", "program", "trial"])
+def test_a_report_is_made_again_if_anything_has_changed(copied, change, monkeypatch):
+    options = ()
+    session = only_session(copied)
+    if change == "sidecar":
+        traction("note", "S001", "T01", "wet", "--data", copied)
+    elif change == "option":
+        options = ("--smooth", "15")
+    elif change == "page":
+        (session / "report" / "index.html").unlink()
+    elif change == "program":
+        monkeypatch.setattr("experiments.report.up_to_date._program", lambda: "other")
+    else:
+        (session / "trials" / "T02.mcap").rename(session / "trials" / "T09.mcap")
+        options = ("--allow-missing",)
+    assert not is_up_to_date(copied, *options)
+    assert is_up_to_date(copied, *options)
