@@ -1,0 +1,137 @@
+"""Sentences that name a cause: what establishes it, and the test that shows it.
+
+A refusal states what was observed, and asks about what may be behind it in its hint.
+These sentences state the cause itself. Those of imported logs are listed in
+tests/analysis/logs/test_refusals.py, those of the guard in the fault matrix.
+"""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("acquisition", "analysis", "experiments", "ft_sensor", "wam")
+GUESSES = ("probably", "perhaps", "likely", "maybe", "apparently")
+
+# (module, words of the sentence): (what establishes it, the test that shows it)
+CAUSES = {
+    ("wam/driver/discovery.py", "has left the bus after too many errors"): (
+        "an error frame with the bus-off bit",
+        "wam/driver/test_lost_replies.py::"
+        "test_a_controller_that_left_the_bus_is_known_until_the_arm_answers",
+    ),
+    ("wam/driver/discovery.py", "No device on the CAN bus acknowledges"): (
+        "an error frame with the no-acknowledgement bit",
+        "wam/driver/test_lost_replies.py::"
+        "test_a_host_that_nobody_acknowledges_fills_its_queue",
+    ),
+    ("wam/driver/discovery.py", "its pucks have no power"): (
+        "the module answers MODE = 0 and no puck answers",
+        "wam/driver/test_startup.py::test_a_stopped_arm_is_not_waited_for",
+    ),
+    ("wam/driver/safety_module.py", "a puck has lost its position"): (
+        "a puck in reset, and ZERO read back as 1 after 0 was written",
+        "wam/driver/test_lost_writes.py::test_no_start_calls_an_arm_zeroed_that_is_not",
+    ),
+    ("wam/driver/arm.py", "replies came after the next question"): (
+        "the count of replies in cycles without a request",
+        "wam/driver/test_late_replies.py::"
+        "test_a_start_says_that_positions_come_too_late_and_not_that_they_are_missing",
+    ),
+    ("wam/driver/startup.py", "obeys torques although the arm is idle"): (
+        "MODE of the puck while the module answers idle",
+        "wam/driver/test_lost_writes.py::"
+        "test_a_puck_that_obeys_torques_of_an_idle_arm_is_idled_or_refused",
+    ),
+    ("wam/driver/startup.py", "number P or T differently"): (
+        "the property tables of the firmware versions read from the pucks",
+        "wam/driver/test_generations.py::"
+        "test_pucks_that_one_frame_cannot_reach_together_are_refused",
+    ),
+    ("wam/driver/arm.py", "answers more often than it is asked"): (
+        "replies counted against requests",
+        "wam/driver/test_lost_replies.py::"
+        "test_an_arm_that_has_a_puck_twice_is_not_started",
+    ),
+    ("wam/model/moments.py", "to be zeroed"): (
+        "a fit with that joint's zero free is better by over four standard deviations",
+        "experiments/calibration/test_gravity.py::"
+        "test_an_arm_that_was_zeroed_elsewhere_is_refused_with_the_joint",
+    ),
+    ("experiments/run/pose_walk.py", "Something pushed the foot"): (
+        "the sensor's force less the foot's weight",
+        "experiments/calibration/test_gravity.py::"
+        "test_a_hand_on_the_foot_refuses_the_calibration",
+    ),
+    ("ft_sensor/calibration/fit.py", "turns the other way in the sensor"): (
+        "the fitted mass is negative at the stated mounting",
+        "ft_sensor/calibration/test_fit.py::"
+        "test_a_weight_of_the_other_sign_is_refused_when_the_mounting_is_stated",
+    ),
+    ("ft_sensor/calibration/fit.py", "do not change with the orientation"): (
+        "the fitted mass is not above zero",
+        "ft_sensor/calibration/test_fit.py::test_readings_of_no_weight_are_refused",
+    ),
+    ("ft_sensor/calibration/fit.py", "too much alike"): (
+        "the condition number of the orientations",
+        "ft_sensor/calibration/test_fit.py::test_orientations_that_are_alike_are_refused",
+    ),
+    ("ft_sensor/serial_line/startup.py", "stands still"): (
+        "device times of a whole check are equal",
+        "ft_sensor/vendors/test_bota_sensor.py::"
+        "test_standing_device_clock_is_refused_at_the_start",
+    ),
+    ("ft_sensor/vendors/bota_device.py", "raw gauge data or absurd forces"): (
+        "the status bit, or forces beyond the stated limits",
+        "ft_sensor/vendors/test_bota_sensor.py::"
+        "test_matrix_that_stays_inactive_is_refused",
+    ),
+    ("analysis/data/inertia.py", "show no acceleration"): (
+        "the median period of the samples against the window",
+        "analysis/data/test_inertia.py::test_samples_that_show_no_acceleration_are_refused",
+    ),
+    ("analysis/tables/other_formats.py", "this is an Excel workbook"): (
+        "its first bytes, or [Content_Types].xml in its archive",
+        "borders/test_borders.py::test_what_is_given_is_read_exactly_flagged_or_refused",
+    ),
+    ("acquisition/ipc/layout.py", "runs another version of this program"): (
+        "size and digest of the layout in the other process's memory",
+        "experiments/commands/live/test_watching.py::"
+        "test_memory_of_another_version_is_refused",
+    ),
+}
+
+
+def functions_of(path: Path) -> set[str]:
+    tree = ast.parse(path.read_text())
+    return {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
+
+
+def sentences() -> Iterator[tuple[Path, str]]:
+    """Yield every text that an error or a message begins with."""
+    for package in PACKAGES:
+        for path in sorted((ROOT / package).rglob("*.py")):
+            for node in ast.walk(ast.parse(path.read_text())):
+                name = getattr(getattr(node, "func", None), "id", "")
+                if name.endswith("Error") and node.args:
+                    yield path, ast.unparse(node.args[0])
+
+
+@pytest.mark.parametrize("row", CAUSES, ids=" ".join)
+def test_a_sentence_of_cause_is_said_and_its_test_exists(row):
+    module, words = row
+    _, test = CAUSES[row]
+    assert words in ast.unparse(ast.parse((ROOT / module).read_text()))
+    path, name = test.split("::")
+    assert name in functions_of(ROOT / "tests" / path)
+
+
+def test_no_refusal_guesses():
+    guessed = [
+        (path.name, text)
+        for path, text in sentences()
+        if any(word in text.lower() for word in GUESSES)
+    ]
+    assert guessed == []
