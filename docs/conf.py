@@ -7,7 +7,7 @@ from typing import Any
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent
-sys.path.insert(0, str(HERE))
+sys.path[:0] = [str(HERE), str(ROOT)]
 
 project = "Traction"
 author = "the Traction project"
@@ -46,6 +46,19 @@ def _as_page(text: str) -> str:
 for _name in _PAGES:
     _text = _as_page((ROOT / f"{_name}.md").read_text(encoding="utf-8"))
     (HERE / "project" / f"{_name.lower()}.md").write_text(_text, encoding="utf-8")
+
+# The messages as the program holds them.
+from experiments.messages import catalogue_table  # noqa: E402
+
+_MESSAGES = """# Messages
+
+Every message says what happened, what the arm is doing, what to do, and what is safe.
+`traction check --explain NAME` says more of one.
+
+"""
+(HERE / "project" / "messages.md").write_text(
+    _MESSAGES + "\n".join(catalogue_table()) + "\n", encoding="utf-8"
+)
 
 
 def _link_pages(_app: object, _name: str, source: list[str]) -> None:

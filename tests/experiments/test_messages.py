@@ -1,5 +1,4 @@
 from dataclasses import fields
-from pathlib import Path
 
 import pytest
 
@@ -24,17 +23,6 @@ from experiments.messages import (
 )
 from experiments.preflight.connecting import as_preflight
 from tests.experiments.program import traction
-
-PAGE = Path(__file__).parents[2] / "docs" / "messages.md"
-HEAD = "| message | what you read | the arm | what to do |"
-
-
-def test_the_table_of_the_page_is_that_of_the_catalogue():
-    lines = PAGE.read_text().splitlines()
-    table = catalogue_table()
-    begin = lines.index(HEAD)
-    assert lines[begin : begin + len(table)] == table
-    assert not any(line.startswith("|") for line in lines[begin + len(table) :])
 
 
 def test_the_whole_catalogue_can_be_explained():

@@ -32,7 +32,7 @@ def test_examples_of_a_module_print_what_they_say(module, least):
 
 def test_the_page_for_notebooks_runs_as_it_is(tmp_path, monkeypatch, workplace):
     page = ROOT / "docs" / "notebook.md"
-    (block,) = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
+    block, *_ = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
     for name in ("data", "tables"):
         (tmp_path / name).symlink_to(workplace / name)
     monkeypatch.chdir(tmp_path)

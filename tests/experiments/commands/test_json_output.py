@@ -1,4 +1,4 @@
-"""What commands print for programs, held against docs/json.md."""
+"""What commands print for programs, held against docs/data.md."""
 
 import json
 import re
@@ -15,7 +15,7 @@ from experiments.session.kept_files import Deviation
 from tests.acquisition.trials import make_cycles, write_trial
 from tests.experiments.program import traction
 
-PAGE = (Path(__file__).parents[3] / "docs" / "json.md").read_text()
+PAGE = (Path(__file__).parents[3] / "docs" / "data.md").read_text()
 
 
 def documented(command):
