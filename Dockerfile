@@ -8,5 +8,5 @@ RUN useradd --create-home lab && mkdir /home/lab/out && chown lab /home/lab/out
 USER lab
 WORKDIR /home/lab/traction
 COPY --chown=lab . .
-RUN make .venv/.installed
+RUN make .venv/.used
 CMD ["sh", "-c", "make demo && cp -r demo/. ../out"]

@@ -2,7 +2,9 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+USED := $(VENV)/.used
 STAMP := $(VENV)/.installed
+PIP := PYTHONWARNINGS=ignore $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
 DOCS := $(VENV)/.docs
 WHEEL := build/wheel
@@ -12,26 +14,31 @@ export PYTHONDONTWRITEBYTECODE :=
 
 .PHONY: demo test docs wheel lock lab lint types contracts crate-validator sbom release man clean
 
-$(STAMP): pyproject.toml constraints.txt
-	@echo "Setting up $(VENV) (a few minutes the first time) ..."
-	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade 'pip>=25.1'
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check \
-	    --constraint constraints.txt --editable '.[all]' --group test --group dev
+# What a user needs: the program and its reports.
+$(USED): pyproject.toml constraints.txt
+	@echo "Setting up $(VENV): numpy, Pinocchio, SciPy, Matplotlib ... (half a minute to two)"
+	@$(PYTHON) -m venv $(VENV)
+	@$(PIP) --constraint constraints.txt --editable '.[report]'
+	@touch $@
+
+# What tests and checks need besides.
+$(STAMP): $(USED)
+	@echo "Adding what the tests need to $(VENV) (half a minute to two) ..."
+	@$(PIP) --upgrade 'pip>=25.1'
+	@$(PIP) --constraint constraints.txt --editable '.[all]' --group test --group dev
 	@touch $@
 
 test: $(STAMP)  ## set up, then run every test of the default suite
 	$(BIN)/python -m pytest -n 2 --dist loadfile
 
 $(DOCS): $(STAMP) docs/constraints.txt
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check \
-	    --constraint constraints.txt --constraint docs/constraints.txt --group docs
+	@$(PIP) --constraint constraints.txt --constraint docs/constraints.txt --group docs
 	@touch $@
 
 docs: $(DOCS)  ## the documentation: docs/_build/html/index.html
 	$(BIN)/python -m sphinx -W --keep-going -q docs docs/_build/html
 
-demo: $(STAMP)  ## two simulated sessions of ten trials, then the report of both
+demo: $(USED)  ## two simulated sessions of ten trials, then the report of both
 	rm -rf demo
 	@echo "Two simulated sessions side by side, ten trials each; their logs: demo/*.log"
 	@mkdir -p demo
