@@ -17,7 +17,6 @@ from tests.experiments.commands.live.test_watching import written
 from tests.experiments.commands.live.viewer import Viewer
 from tests.processes.watching import CLOCK, START, running_trial, until
 
-pytest.importorskip("foxglove")
 pytestmark = pytest.mark.wall_clock
 STALLED = 60.0  # s in which a client does not read
 LONGEST = 20.0

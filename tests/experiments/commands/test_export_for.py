@@ -20,7 +20,6 @@ def export(db, to, *options):
 
 
 def test_every_target_has_its_folder(db, tmp_path):
-    pytest.importorskip("onnx")
     done = export(db, tmp_path / "made", *FOR)
     assert (done.code, done.err) == (0, "")
     assert "SIMULATED" in done.out
@@ -33,7 +32,6 @@ def test_every_target_has_its_folder(db, tmp_path):
 
 
 def test_two_runs_write_the_same_bytes(db, tmp_path):
-    pytest.importorskip("onnx")
     made = []
     for name in ("a", "b"):
         assert export(db, tmp_path / name, *FOR).code == 0

@@ -19,8 +19,6 @@ HOSTILE = (
 
 @pytest.fixture(params=target_names())
 def target(request):
-    if request.param == "onnx":
-        pytest.importorskip("onnx")
     return request.param
 
 

@@ -3,7 +3,10 @@
 import sys
 
 import numpy as np
+import onnx
 import pytest
+from onnx.reference import ReferenceEvaluator
+from onnxruntime import InferenceSession
 
 from acquisition.errors import MissingLibraryError
 from analysis.terrains.export.folder import target_files
@@ -15,17 +18,15 @@ ROW = np.array([[3.5, 0.05]], dtype=np.float32)
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    pytest.importorskip("onnx")
     return write(tmp_path_factory.mktemp("onnx"), "onnx")
 
 
 def runner(path, engine):
     """Return a function from rows to forces by one of two independent runtimes."""
     if engine == "reference":
-        reference = pytest.importorskip("onnx.reference")
-        session = reference.ReferenceEvaluator(str(path))
+        session = ReferenceEvaluator(str(path))
     else:
-        session = pytest.importorskip("onnxruntime").InferenceSession(str(path))
+        session = InferenceSession(str(path))
     return lambda rows: session.run(None, {"x": rows})[0]
 
 
@@ -52,7 +53,7 @@ def test_nan_stays_nan(folder, engine, place):
 
 
 def test_only_four_operators_and_what_it_is_of(folder):
-    model = pytest.importorskip("onnx").load(folder / "S0.onnx")
+    model = onnx.load(folder / "S0.onnx")
     assert {n.op_type for n in model.graph.node} == {"Gemm", "Max", "Min", "Mul"}
     gemm = [n for n in model.graph.node if n.op_type == "Gemm"]
     assert all({a.name: a.i for a in n.attribute}.get("transB") == 1 for n in gemm)

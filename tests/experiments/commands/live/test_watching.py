@@ -29,8 +29,6 @@ from tests.acquisition.test_schema import filled
 from tests.experiments.commands.live.viewer import Viewer
 from tests.experiments.program import traction
 
-pytest.importorskip("foxglove")
-
 
 @pytest.fixture
 def shared():
