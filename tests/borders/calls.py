@@ -83,7 +83,7 @@ CALLS: tuple[Border, ...] = (
         "from 0 to 1",
     ),
     _refused(
-        'predict(F_n="3")', lambda _: points_of("3", 0.1), "F_n = '3' is no number"
+        'predict(F_n="3")', lambda _: points_of("3", 0.1), "F_n = '3' is neither"
     ),
     _refused(
         "predict of a NaN", lambda _: points_of(3.0, np.nan), "v_t has to be finite"
