@@ -124,7 +124,7 @@ CALLS: tuple[Border, ...] = (
     _refused(
         "a pattern that no file fits",
         lambda f: load_tables([f / "*.csv"]),
-        "no file fits this pattern",
+        "no file matches this pattern",
     ),
     _refused(
         "a name that is not there",
