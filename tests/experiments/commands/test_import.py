@@ -120,7 +120,7 @@ def test_a_changed_record_of_an_import_is_refused(given, tmp_path):
     (tmp_path / "a" / "import.json").write_text('{"format": "other"}')
     done = traction("fit", tmp_path / "a", "--to", tmp_path / "b")
     assert done.code == 2
-    assert "no record of an import" in done.err
+    assert "not a record of an import" in done.err
 
 
 @pytest.mark.parametrize(
