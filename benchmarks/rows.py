@@ -26,7 +26,7 @@ class BenchRow:
 
     @property
     def verdict(self) -> str:
-        """"met" or "not met"; empty without a goal or a value."""
+        """Verdict "met" or "not met"; empty without a goal or a value."""
         if self.goal is None or self.value is None:
             return ""
         is_met = self.value >= self.goal if self.is_least else self.value <= self.goal

@@ -82,9 +82,7 @@ CALLS: tuple[Border, ...] = (
         lambda _: _TERRAIN.predict(2.0, 0.1).quantile(1.5),
         "from 0 to 1",
     ),
-    _refused(
-        'predict(F_n="3")', lambda _: points_of("3", 0.1), "F_n = '3' is neither"
-    ),
+    _refused('predict(F_n="3")', lambda _: points_of("3", 0.1), "F_n = '3' is neither"),
     _refused(
         "predict of a NaN", lambda _: points_of(3.0, np.nan), "v_t has to be finite"
     ),

@@ -113,9 +113,7 @@ def test_a_reading_that_never_changes_is_left_out_and_named(imported):
 
     rubbing = Rubbing(changes=changing(WRENCH, change))
     found = imported(rubbing)
-    assert any(
-        "unchanged reading for 2.50 s from 5.01" in w for w in found.warnings
-    )
+    assert any("unchanged reading for 2.50 s from 5.01" in w for w in found.warnings)
     assert worst_F_n(found, rubbing) < 0.3
     (trial,) = found.trials
     at = trial.t + trial.start

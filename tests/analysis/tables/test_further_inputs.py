@@ -145,7 +145,9 @@ def test_an_input_whose_name_stands_twice_is_taken_by_its_place(tmp_path):
     path.write_text(f"{header},angle\n{wide}\n")
     with pytest.raises(SettingsError, match="angle occurs twice") as refused:
         load(path)
-    assert refused.value.hint == "Take one by its position: 6 or 7 for angle in --inputs"
+    assert (
+        refused.value.hint == "Take one by its position: 6 or 7 for angle in --inputs"
+    )
     trials = load_tables([path], COLUMNS, rate=1.0, inputs=("7",))
     assert set(trials["a"][0].further["7"]) == {7.0}
 

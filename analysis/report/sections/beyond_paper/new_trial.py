@@ -20,9 +20,7 @@ from analysis.study.study import Study
 from analysis.study.terrain_fit import mean_of
 from analysis.study.trial_components import TrialComponents
 
-_LEAST = (
-    0.01  # noise relative to the residual within a trial, indistinguishable from 0
-)
+_LEAST = 0.01  # noise relative to the residual within a trial, indistinguishable from 0
 
 
 def new_trial_tables(results: StudyResults) -> list[ReportTable]:
