@@ -172,7 +172,7 @@ def test_exchanged_axes_are_named(imported, axes, said):
 
 def test_a_forgotten_weight_is_named_with_what_it_costs(imported):
     found = imported(Rubbing(tilt=0.3), mass=0.0)
-    assert any("every 0.1 kg of weight" in text for text in found.warnings)
+    assert any("every 0.1 kg of mass" in text for text in found.warnings)
 
 
 @pytest.mark.slow
