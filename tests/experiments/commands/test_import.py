@@ -54,7 +54,7 @@ def test_a_list_prints_the_command_line_that_imports(given, tmp_path):
     frames = ("--foot", "foot", "--sensor", "gauge", "--acts", "ground-on-foot")
     done = traction("import", log, "--urdf", urdf, *frames, "--list")
     assert done.code == 0, done.err
-    assert "--tool-mass: the quiet foot turned by 0 degrees, 20 show it" in done.out
+    assert "--tool-mass: the quiet foot turned by 0 degrees, 20 are needed" in done.out
     _, _, line = done.out.partition("traction import ")
     words = shlex.split(line.replace("\\\n", " "))
     assert words[words.index("--tool-mass") + 1] == "KG"
