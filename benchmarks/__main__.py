@@ -1,9 +1,9 @@
-"""All benchmarks, one table: what, today, goal, met or not.
+"""Run all benchmarks and print one table: measurement, today's value, goal, verdict.
 
     python -m benchmarks [--only NAME ...]
 
-Each benchmark runs in a process of its own, one after the other, with the program's
-settings of linear algebra.
+The benchmarks run one after the other, each in its own process, with the program's
+linear-algebra settings.
 """
 
 import argparse
@@ -37,7 +37,7 @@ _MARK = "ROWS "
 
 
 def run_one(name: str) -> list[BenchRow]:
-    """Return the rows of one benchmark, run in a process of its own."""
+    """Run one benchmark in its own process and return its rows."""
     command = [sys.executable, "-m", "benchmarks", "--inside", name]
     try:
         done = subprocess.run(
@@ -55,20 +55,20 @@ def run_one(name: str) -> list[BenchRow]:
     return [BenchRow(**row) for row in json.loads(line.removeprefix(_MARK))]
 
 
-def table_of(found: dict[str, list[BenchRow]]) -> str:
-    """Return the table in Markdown."""
+def table_of(rows_by_name: dict[str, list[BenchRow]]) -> str:
+    """Return the results as a Markdown table."""
     lines = ["| what | today | goal | | `python -m benchmarks --only` |"]
     lines.append("|---|---|---|---|---|")
     lines += [
         f"| {' | '.join(row.cells())} | {name} |"
-        for name, rows in found.items()
+        for name, rows in rows_by_name.items()
         for row in rows
     ]
     return "\n".join(lines)
 
 
 def main() -> int:
-    """Run and print."""
+    """Run the selected benchmarks and print their rows and the table."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--only", nargs="+", choices=NAMES, default=NAMES)
     parser.add_argument("--inside", choices=NAMES, help=argparse.SUPPRESS)
@@ -77,12 +77,12 @@ def main() -> int:
         rows = importlib.import_module(f"benchmarks.{arguments.inside}").rows()
         print(_MARK + json.dumps([row.plain() for row in rows]))
         return 0
-    found: dict[str, list[BenchRow]] = {}
+    rows_by_name: dict[str, list[BenchRow]] = {}
     for name in arguments.only:
-        found[name] = run_one(name)
-        for row in found[name]:
+        rows_by_name[name] = run_one(name)
+        for row in rows_by_name[name]:
             print("  ".join(row.cells()), flush=True)
-    print(f"\n{surroundings(PEERS)}\n\n{table_of(found)}\n")
+    print(f"\n{surroundings(PEERS)}\n\n{table_of(rows_by_name)}\n")
     return 0
 
 

@@ -1,8 +1,9 @@
-"""What the analysis costs: one recorded trial, one fold, one answer of a table.
+"""Cost of the analysis: loading a trial, fitting a fold, querying a terrain table.
 
     python -m benchmarks.analysis_speed
 
-Processor time, the best of a few repeats; memory is what Python and numpy allocate.
+Times are processor time, the best of a few repeats; memory is that allocated by Python
+and numpy.
 """
 
 import tempfile
@@ -27,8 +28,8 @@ from benchmarks.rows import BenchRow
 from benchmarks.study_race import SLICE, folds_of
 from experiments.__main__ import main as traction
 
-_SECONDS = 30.0  # of a trial
-_HELD = 8  # trials that are held at once
+_SECONDS = 30.0  # length of a trial
+_TRIALS_IN_MEMORY = 8
 
 
 def best(function: Callable[[], object], repeats: int, calls: int = 1) -> float:
@@ -43,41 +44,41 @@ def best(function: Callable[[], object], repeats: int, calls: int = 1) -> float:
 
 
 def trial_rows() -> list[BenchRow]:
-    """Return what a simulated trial costs, scaled to 30 s of recording."""
+    """Return time and memory of a simulated trial, scaled to 30 s of recording."""
     with tempfile.TemporaryDirectory() as folder:
         options = "run S0 --fake --fast --operator-script auto --trials 1"
         if traction([*options.split(), "--data", folder]):
             raise RuntimeError("the session was not recorded")
         (path,) = Path(folder).glob("sessions/*/trials/T01.mcap")
         seconds = float(np.ptp(load_trial(path).t))
-        spent = best(lambda: load_trial(path).series(), 7) * _SECONDS / seconds
-        held = held_bytes(path) * _SECONDS / seconds
+        cpu_s = best(lambda: load_trial(path).series(), 7) * _SECONDS / seconds
+        size = trial_bytes(path) * _SECONDS / seconds
     what = "one trial of 30 s loaded, all derived arrays"
     return [
-        BenchRow(what, 1e3 * spent, "ms", 12),
-        BenchRow("report's memory per trial of 30 s held", held / 1e6, "MB", 1),
+        BenchRow(what, 1e3 * cpu_s, "ms", 12),
+        BenchRow("report's memory per trial of 30 s", size / 1e6, "MB", 1),
     ]
 
 
-def held_bytes(path: Path) -> float:
-    """Return what a report holds of a trial, its samples prepared for fits [bytes]."""
-    _held(path)  # what is loaded once stays loaded
+def trial_bytes(path: Path) -> float:
+    """Return the memory that a report keeps per trial, prepared samples included."""
+    _loaded(path)  # fills caches that all trials share
     tracemalloc.start()
-    held = [_held(path) for _ in range(_HELD)]
-    used = tracemalloc.get_traced_memory()[0] / len(held)
+    trials = [_loaded(path) for _ in range(_TRIALS_IN_MEMORY)]
+    used = tracemalloc.get_traced_memory()[0] / len(trials)
     tracemalloc.stop()
     return used
 
 
-def _held(path: Path) -> tuple[HeldTrial, PreparedTrial]:
+def _loaded(path: Path) -> tuple[HeldTrial, PreparedTrial]:
     trial = HeldTrial.of(load_trial(path))
     return trial, prepare_trial(trial.series, PrepareOptions())
 
 
 def worker_rows() -> list[BenchRow]:
-    """Return what a fold of the report's models costs in a study's worker.
+    """Return the cost of a fold of the report's models in a study's worker.
 
-    And what one likelihood with its gradient does.
+    The second row is the cost of one likelihood evaluation with its gradient.
     """
     keep_memory()
     task = folds_of(SLICE)[0]
@@ -85,33 +86,33 @@ def worker_rows() -> list[BenchRow]:
     what = f"a fold of the report's {len(REPORTED)} models"
     evaluate = our_evaluation(*chosen(load_rows()))
     with threadpool_limits(1):
-        fold, one = best(lambda: run_fold(task), 2), best(evaluate, 5, 20)
+        fold_s, evaluation_s = best(lambda: run_fold(task), 2), best(evaluate, 5, 20)
     return [
-        BenchRow(what, fold, "s", 0.4),
-        BenchRow(f"{EVALUATION} in a study's worker", 1e3 * one, "ms", 1.15),
+        BenchRow(what, fold_s, "s", 0.4),
+        BenchRow(f"{EVALUATION} in a study's worker", 1e3 * evaluation_s, "ms", 1.15),
     ]
 
 
 def table_rows() -> list[BenchRow]:
-    """Return what answers of a terrain database cost."""
-    dice = np.random.default_rng(1)
+    """Return the cost of queries to a terrain database."""
+    rng = np.random.default_rng(1)
     loads, speeds = np.linspace(0.5, 20.0, 20), np.linspace(0.005, 0.2, 16)
-    forces = np.sort(dice.normal(size=(9, 20, 16)), axis=0)
+    forces = np.sort(rng.normal(size=(9, 20, 16)), axis=0)
     rows = tuple(tuple(map(tuple, grid)) for grid in forces.tolist())
     shares = tuple(np.linspace(0.01, 0.99, 9).tolist())
     table = Table(tuple(loads.tolist()), tuple(speeds.tolist()), shares, rows)
-    found: dict[int, float] = {}
+    cpu_s: dict[int, float] = {}
     for count, calls in ((10, 1000), (100_000, 3)):
-        F_n, v_t = dice.uniform(0.5, 20.0, count), dice.uniform(0.005, 0.2, count)
-        found[count] = best(lambda F=F_n, v=v_t: table.over(F, v), 5, calls)
+        F_n, v_t = rng.uniform(0.5, 20.0, count), rng.uniform(0.005, 0.2, count)
+        cpu_s[count] = best(lambda F=F_n, v=v_t: table.over(F, v), 5, calls)
     return [
-        BenchRow("terrain database, 10 points", 1e6 * found[10], "us", 8),
-        BenchRow("terrain database, 100,000 points", 1e3 * found[100_000], "ms", 10),
+        BenchRow("terrain database, 10 points", 1e6 * cpu_s[10], "us", 8),
+        BenchRow("terrain database, 100,000 points", 1e3 * cpu_s[100_000], "ms", 10),
     ]
 
 
 def rows() -> list[BenchRow]:
-    """Return what was measured, for the table."""
+    """Return the measurements as table rows."""
     return [*trial_rows(), *worker_rows(), *table_rows()]
 
 

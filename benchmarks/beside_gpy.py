@@ -1,4 +1,4 @@
-"""GPy as an opponent: the SE kernel with our starts, its own L-BFGS-B."""
+"""GPy for comparison: the SE kernel from the same starts, with GPy's own L-BFGS-B."""
 
 import contextlib
 import io
@@ -9,7 +9,7 @@ import numpy as np
 
 
 def fitter(X: np.ndarray, y: np.ndarray) -> Callable[[Sequence[np.ndarray]], float]:
-    """Return what fits from given starts and returns the best log likelihood.
+    """Return a function that fits from given starts; it returns the best likelihood.
 
     Raises:
         ImportError: GPy is not installed.
@@ -17,7 +17,7 @@ def fitter(X: np.ndarray, y: np.ndarray) -> Callable[[Sequence[np.ndarray]], flo
     from GPy.kern import RBF
     from GPy.models import GPRegression
 
-    def climbed(start: np.ndarray) -> float:
+    def optimised(start: np.ndarray) -> float:
         sf, *lengths, sn = np.exp(start)
         kernel = RBF(X.shape[1], sf**2, lengths, ARD=True)
         model = GPRegression(X, y[:, None], kernel, noise_var=sn**2)
@@ -27,6 +27,6 @@ def fitter(X: np.ndarray, y: np.ndarray) -> Callable[[Sequence[np.ndarray]], flo
     def fit(starts: Sequence[np.ndarray]) -> float:
         with warnings.catch_warnings(), contextlib.redirect_stdout(io.StringIO()):
             warnings.simplefilter("ignore")
-            return max(climbed(start) for start in starts)
+            return max(optimised(start) for start in starts)
 
     return fit

@@ -1,4 +1,4 @@
-"""scikit-learn as an opponent: our kernels, starts and bounds in its own terms."""
+"""scikit-learn for comparison: the same kernels, starts and bounds in its interface."""
 
 import warnings
 from collections.abc import Sequence
@@ -24,23 +24,23 @@ KERNELS = {"SE fit": SquaredExponential(), "NN fit": Arcsine()}
 
 
 class NeuralNetwork(Kernel):
-    """The arcsine kernel of unit variance for scikit-learn, by its own interface."""
+    """The arcsine kernel of unit variance as a scikit-learn kernel."""
 
     def __init__(self, lengths: object = (1.0, 1.0), beta: float = 1.0) -> None:
         self.lengths, self.beta = lengths, beta
 
     @property
     def hyperparameter_lengths(self) -> Hyperparameter:
-        """Lengths, one per input."""
+        """Length scales, one per input."""
         return Hyperparameter("lengths", "numeric", (np.exp(-4), np.exp(6)), 2)
 
     @property
     def hyperparameter_beta(self) -> Hyperparameter:
-        """Share of the bias."""
+        """Variance of the bias."""
         return Hyperparameter("beta", "numeric", (np.exp(-6), np.exp(6)))
 
     def __call__(self, X, Y=None, eval_gradient=False):  # noqa: ANN001, ANN204
-        """Return the covariances and, if asked for, their derivatives."""
+        """Return the covariances and, with `eval_gradient`, their derivatives."""
         lengths = np.asarray(self.lengths)
         Y = X if Y is None else Y
         Z, Z_other = 2.0 * X / lengths**2, Y
@@ -55,9 +55,9 @@ class NeuralNetwork(Kernel):
         q = 1.0 / np.sqrt(1.0 - u * u)
         slopes = []
         for d in range(X.shape[1]):
-            own, other = X[:, d] ** 2 / A, Y[:, d] ** 2 / B
+            of_X, of_Y = X[:, d] ** 2 / A, Y[:, d] ** 2 / B
             part = -4.0 * np.outer(X[:, d], Y[:, d]) / root
-            slopes.append(q * (part + 2.0 * u * np.add.outer(own, other))
+            slopes.append(q * (part + 2.0 * u * np.add.outer(of_X, of_Y))
                           / lengths[d] ** 2)  # fmt: skip
         bias = self.beta * q * (1.0 / root - 0.5 * u * np.add.outer(1.0 / A, 1.0 / B))
         return K, np.stack([bias, *slopes], axis=-1)
@@ -68,7 +68,7 @@ class NeuralNetwork(Kernel):
         return np.arcsin(p / (1.0 + p))
 
     def is_stationary(self) -> bool:
-        """Return that it is not."""
+        """Return False: the kernel is not stationary."""
         return False
 
 
@@ -86,28 +86,28 @@ def theirs(part: str, start: np.ndarray, sd: float) -> Kernel:
 
 
 def three_starts(part: str, X: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return three thetas to begin with: where our search begins, then its design."""
+    """Return three initial thetas: the start of our search, then its design points."""
     kernel, noise = KERNELS[part], ConstantNoise()
-    begun = posterior_search(kernel, noise, X, y).began
+    starts = posterior_search(kernel, noise, X, y).began
     sd = float(y.std())
     design = [
         np.concatenate([point, noise.start(sd)])
         for point in initial_points(kernel, sd, np.ones(X.shape[1]))
     ]
-    return (*begun, *design)[:_STARTS]
+    return (*starts, *design)[:_STARTS]
 
 
 def fit_theirs(
     part: str, X: np.ndarray, y: np.ndarray, starts: Sequence[np.ndarray]
 ) -> GaussianProcessRegressor:
-    """Return the likeliest of scikit-learn's models from the same starts.
+    """Fit scikit-learn's model from each start and return the likeliest.
 
-    They are given: what their choice costs is ours to bear.
+    The starts are given, so the time for choosing them counts only for our search.
     """
-    reached, sd = [], float(y.std())
+    models, sd = [], float(y.std())
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # a length at its bound is no error
+        warnings.simplefilter("ignore")  # length scales may end at their bounds
         for start in starts:
             model = GaussianProcessRegressor(theirs(part, start, sd), alpha=1e-10)
-            reached.append(model.fit(X, y))
-    return max(reached, key=lambda model: model.log_marginal_likelihood_value_)
+            models.append(model.fit(X, y))
+    return max(models, key=lambda model: model.log_marginal_likelihood_value_)

@@ -1,6 +1,6 @@
-"""tinygp as an opponent: the SE kernel with our starts, L-BFGS over a jitted gradient.
+"""tinygp for comparison: the SE kernel from the same starts, L-BFGS, jitted gradient.
 
-Compilation is not counted: a first fit is thrown away.
+Compilation is not counted: the first fit is discarded.
 """
 
 from collections.abc import Callable, Sequence
@@ -11,7 +11,7 @@ _METHOD = "L-BFGS-B"
 
 
 def fitter(X: np.ndarray, y: np.ndarray) -> Callable[[Sequence[np.ndarray]], float]:
-    """Return what fits from given starts and returns the best log likelihood.
+    """Return a function that fits from given starts; it returns the best likelihood.
 
     Raises:
         ImportError: tinygp or jax is not installed.
@@ -37,7 +37,7 @@ def fitter(X: np.ndarray, y: np.ndarray) -> Callable[[Sequence[np.ndarray]], flo
         return float(value), np.asarray(slope)
 
     def fit(starts: Sequence[np.ndarray]) -> float:
-        found = (minimize(value_and_slope, s, jac=True, method=_METHOD) for s in starts)
-        return -min(float(one.fun) for one in found)
+        fits = (minimize(value_and_slope, s, jac=True, method=_METHOD) for s in starts)
+        return -min(float(result.fun) for result in fits)
 
     return fit

@@ -1,11 +1,10 @@
-"""What the 13 frames of a cycle cost through each transport, side by side.
+"""Processor time of the 13 frames of a cycle through each CAN transport.
 
-Four frames leave and nine arrive in every cycle of 2 ms. Each transport does so in
-turns and pauses in between, so that neither finds warm caches. Linux's CAN needs an
-interface; here datagrams on the loopback device carry the same 16 bytes, stamped by the
-kernel, and the sockets' options are the same. Processor time of this thread is
-measured, and no processor sleeps, as while the arm is driven: waking up would count as
-work.
+Four frames leave and nine arrive in every cycle of 2 ms. The transports take turns with
+pauses in between, so that neither finds warm caches. SocketCAN needs an interface; here
+datagrams on the loopback device carry the same 16 bytes, time-stamped by the kernel,
+with the same socket options. The processor time of this thread is measured. Processors
+are kept out of sleep states as while the arm is driven, since waking up would count.
 """
 
 import argparse
@@ -44,7 +43,7 @@ from wam.bus.properties import MODERN, Device, property_number
 from wam.bus.socketcan import SocketcanTransport
 from wam.bus.transports import PythonCanTransport
 
-GOAL_US = 45.0  # of the kernel's socket, per cycle
+GOAL_US = 45.0  # for the kernel socket, per cycle
 _PERIOD_NS = 2_000_000
 _WARM_UP = 100  # cycles
 _FRAME = struct.Struct("=IB3x8s")
@@ -61,8 +60,8 @@ class TransportCost:
     """Processor time of one cycle's frames.
 
     Attributes:
-        name: the transport.
-        median_us: over cycles [us].
+        name: name of the transport.
+        median_us: median over cycles [us].
         p99_us: 99th percentile [us].
     """
 
@@ -72,7 +71,7 @@ class TransportCost:
 
 
 class Ends:
-    """A transport and the far end of its bus."""
+    """Both ends of a loopback bus: a transport and the socket opposite it."""
 
     def __init__(self, near: socket.socket, transport: Transport) -> None:
         self.far = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -89,34 +88,34 @@ class Ends:
         self._ft = encode_get(property_number(Device.SENSOR, "FT"))
 
     def cycle(self) -> int:
-        """Return the processor time of one cycle's frames [ns]."""
+        """Exchange the frames of one cycle and return the processor time [ns]."""
         link, begin = self.link, time.thread_time_ns()
         link.send(group_id(Group.ARM), self._p)
         link.send(SENSOR_NODE, self._ft)
-        spent = time.thread_time_ns() - begin
+        cpu_ns = time.thread_time_ns() - begin
         for can_id, data in _ARRIVING:
             self.far.send(_FRAME.pack(can_id, len(data), data))
         begin = time.thread_time_ns()
         arrived = len(link.receive())
         link.send(group_id(Group.LOWER_TORQUE), encode_torques([1, 2, 3, 4], self._t))
         link.send(group_id(Group.WRIST_TORQUE), encode_torques([5, 6, 7], self._t))
-        spent += time.thread_time_ns() - begin
+        cpu_ns += time.thread_time_ns() - begin
         if arrived != len(_ARRIVING):
             raise RuntimeError(f"{arrived} of {len(_ARRIVING)} frames arrived")
         for _ in range(4):
             self.far.recv(_FRAME.size)
-        return spent
+        return cpu_ns
 
 
 def kernel_ends() -> Ends:
-    """Return our transport over the kernel's socket."""
+    """Return this project's transport over a kernel socket."""
     near = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     transport = SocketcanTransport(near, "loopback", SystemClock(), system_call())
     return Ends(near, transport)
 
 
 def library_ends() -> Ends:
-    """Return python-can's own bus for SocketCAN behind our transport."""
+    """Return python-can's SocketCAN bus behind this project's transport."""
     near = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     library: Any = socketcan
     library.create_socket = lambda: near
@@ -126,7 +125,7 @@ def library_ends() -> Ends:
 
 
 def measure(cycles: int) -> list[TransportCost]:
-    """Return what each transport costs in `cycles` paced cycles."""
+    """Return the cost of each transport over `cycles` paced cycles."""
     request(RealtimeRequest(is_awake=True))
     transports = {"kernel socket": kernel_ends(), "python-can": library_ends()}
     next_ns = time.monotonic_ns()
@@ -136,16 +135,16 @@ def measure(cycles: int) -> list[TransportCost]:
         for ends in transports.values():
             next_ns = max(next_ns + _PERIOD_NS, time.monotonic_ns())
             time.sleep(max(0.0, (next_ns - time.monotonic_ns()) * 1e-9))
-            spent = ends.cycle()
+            cpu_ns = ends.cycle()
             if number >= _WARM_UP:
-                ends.times.append(spent)
+                ends.times.append(cpu_ns)
     gc.enable()
     return [_cost(name, ends.times) for name, ends in transports.items()]
 
 
 def rows() -> list[BenchRow]:
-    """Return what was measured, for the table."""
-    logging.disable()  # python-can: datagrams have no options of CAN
+    """Return the measurements as table rows."""
+    logging.disable()  # python-can warns that datagrams lack CAN options
     return [
         BenchRow(
             f"13 frames of a cycle through the {cost.name}, paced",
@@ -158,19 +157,19 @@ def rows() -> list[BenchRow]:
 
 
 def _cost(name: str, times: list[int]) -> TransportCost:
-    late = sorted(times)[math.ceil(0.99 * len(times)) - 1]
-    return TransportCost(name, statistics.median(times) / 1e3, late / 1e3)
+    p99 = sorted(times)[math.ceil(0.99 * len(times)) - 1]
+    return TransportCost(name, statistics.median(times) / 1e3, p99 / 1e3)
 
 
 def main() -> int:
-    """Measure and print; the exit code says nothing about the figures."""
+    """Measure and print; the exit code does not depend on the figures."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument(
-        "--cycles", type=int, default=3000, help="of each transport (3000)"
+        "--cycles", type=int, default=3000, help="cycles per transport (3000)"
     )
     parser.add_argument("--json", action="store_true", help="print JSON instead")
     args = parser.parse_args()
-    logging.disable()  # python-can: datagrams have no options of CAN
+    logging.disable()  # python-can warns that datagrams lack CAN options
     costs = measure(max(1, args.cycles))
     if args.json:
         print(json.dumps([asdict(cost) for cost in costs], indent=2))

@@ -1,10 +1,10 @@
-"""Two workers against one: on this machine, and on a Dask cluster.
+"""Speed-up of two workers over one, on this machine and on a Dask cluster.
 
     python -m benchmarks.cluster [--rounds 3]
 
-Folds are those of a report, with all its models. On this machine one worker is this
-process; a cluster's are processes here with one thread each. One and two workers take
-turns, and all are warm.
+The folds are those of a report with all its models. On this machine, one worker means
+this process; the cluster's workers are local processes with one thread each. One and
+two workers take turns, after a warm-up.
 """
 
 import argparse
@@ -22,14 +22,14 @@ from analysis.tables.loading import load_tables
 from benchmarks.rows import BenchRow
 from benchmarks.study_race import SLICE
 
-_GOAL = 1.7  # times that two workers are faster than one
+_GOAL = 1.7  # speed-up of two workers over one
 _ROUNDS = 3
 
 
 def planned() -> list[FoldTask]:
     """Return the folds of the trials in the repository."""
     trials = {
-        f"{name} {part}": [prepare_trial(one, PrepareOptions()) for one in group]
+        f"{name} {part}": [prepare_trial(s, PrepareOptions()) for s in group]
         for name, group in load_tables([SLICE]).items()
         for part in "abcd"  # many more folds than workers, and an even number
     }
@@ -38,7 +38,7 @@ def planned() -> list[FoldTask]:
 
 @contextmanager
 def cluster(workers: int) -> Iterator[str]:
-    """Run so many workers on this machine; yield the scheduler's address."""
+    """Run a Dask cluster on this machine; yield the scheduler's address."""
     from distributed import LocalCluster
 
     local: Any = LocalCluster(
@@ -52,26 +52,26 @@ def cluster(workers: int) -> Iterator[str]:
         yield local.scheduler_address
 
 
-def spent(folds: Sequence[FoldTask], where: Workers) -> float:
-    """Return how long all folds take [s]."""
+def wall_time(folds: Sequence[FoldTask], workers: Workers) -> float:
+    """Return the wall time of all folds [s]."""
     before = time.perf_counter()
-    run_tasks(run_fold, folds, where)
+    run_tasks(run_fold, folds, workers)
     return time.perf_counter() - before
 
 
 def gain(
     folds: Sequence[FoldTask], one: Workers, two: Workers, rounds: int = _ROUNDS
 ) -> float:
-    """Return how much faster two workers are than one, median of the rounds."""
-    for where in (one, two):
-        spent(folds[:4], where)  # workers import what they need
+    """Return the speed-up of two workers over one, median of the rounds."""
+    for workers in (one, two):
+        wall_time(folds[:4], workers)  # lets the workers import their modules
     return statistics.median(
-        spent(folds, one) / spent(folds, two) for _ in range(rounds)
+        wall_time(folds, one) / wall_time(folds, two) for _ in range(rounds)
     )
 
 
 def rows(rounds: int = _ROUNDS) -> list[BenchRow]:
-    """Return what was measured, for the table."""
+    """Return the measurements as table rows."""
     folds = planned()
     gains = {"this machine": gain(folds, Workers(1), Workers(2), rounds)}
     with cluster(1) as one, cluster(2) as two:

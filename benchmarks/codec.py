@@ -1,8 +1,8 @@
-"""What one cycle's frames cost in Python: the codec, and python-can beside it.
+"""Cost of one cycle's frames in Python: the codec, compared with python-can.
 
 A cycle has 13 frames: the position request, seven replies, two torque frames, the F/T
-request and its two replies. Parts alternate within a round, so that whatever else the
-machine does meets all of them; medians are over rounds.
+request and its two replies. Parts alternate within a round, so that other load on the
+machine affects all of them alike; medians are over rounds.
 """
 
 import argparse
@@ -35,7 +35,7 @@ from wam.bus.frames import (
 )
 from wam.bus.properties import MODERN, Device, property_number
 
-GOAL_US = 30.0  # of the codec, per cycle
+GOAL_US = 30.0  # for the codec, per cycle
 _WARM_UP = 200  # rounds
 _COUNTS = (12, -36840, 36901, -36728, 417, -95, 3)
 _UNITS = (-64, -877, 556, -750, 168, 34, -59)  # puck units
@@ -47,13 +47,13 @@ _FT = property_number(Device.SENSOR, "FT")
 
 @dataclass(frozen=True, slots=True)
 class PageSection:
-    """One part of a cycle as measured.
+    """Measured cost of one part of a cycle.
 
     Attributes:
-        name: what is done.
-        frames: how many frames of the cycle it handles.
+        name: name of the part.
+        frames: number of frames it handles per cycle.
         median_us: cost per cycle, median over rounds [us].
-        p99_us: the same, 99th percentile [us].
+        p99_us: 99th percentile over rounds [us].
         per_codec: median as a multiple of the whole codec's.
     """
 
@@ -73,7 +73,7 @@ class _Work:
 
 
 def main() -> int:
-    """Measure and print; the exit code says nothing about the figures."""
+    """Measure and print; the exit code does not depend on the figures."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument(
         "--rounds", type=_positive, default=5000, metavar="N", help="cycles (5000)"
@@ -90,10 +90,10 @@ def main() -> int:
 
 
 def rows() -> list[BenchRow]:
-    """Return what was measured, for the table."""
+    """Return the measurements as table rows."""
     parts = measure(codec_work(), 2000)
-    spent = sum(part.median_us for part in parts)
-    return [BenchRow("13 frames of a cycle, coded and decoded", spent, "us", GOAL_US)]
+    total = sum(part.median_us for part in parts)
+    return [BenchRow("13 frames of a cycle, coded and decoded", total, "us", GOAL_US)]
 
 
 def codec_work() -> list[_Work]:
@@ -122,9 +122,9 @@ def codec_work() -> list[_Work]:
 
 
 def library_work(bus: can.BusABC, other: can.BusABC) -> list[_Work]:
-    """Return what python-can costs for the same frames: objects, and a bus of its own.
+    """Return python-can's handling of the same frames: message objects, virtual bus.
 
-    The virtual bus copies what it carries; an adapter's driver costs more or less.
+    The virtual bus copies its messages; a real adapter's driver may cost more or less.
     """
     sent = [
         (group_id(Group.ARM), encode_get(_P)),
@@ -132,17 +132,17 @@ def library_work(bus: can.BusABC, other: can.BusABC) -> list[_Work]:
         (group_id(Group.LOWER_TORQUE), encode_torques(_UNITS[:4], _T)),
         (group_id(Group.WRIST_TORQUE), encode_torques(_UNITS[4:], _T)),
     ]
-    heard = [
+    received = [
         (position_reply_id(node), encode_position(counts))
         for node, counts in zip(MOTOR_NODES, _COUNTS, strict=True)
     ]
-    heard += [
+    received += [
         (group_id(Group.FORCE, SENSOR_NODE), encode_force(_FORCE)),
         (group_id(Group.TORQUE, SENSOR_NODE), encode_torque(_TORQUE)),
     ]
-    messages, answers = _messages(sent), _messages(heard)
+    messages, answers = _messages(sent), _messages(received)
 
-    def pass_on() -> None:
+    def exchange() -> None:
         for message in messages:
             bus.send(message)
         for message in answers:
@@ -153,19 +153,19 @@ def library_work(bus: can.BusABC, other: can.BusABC) -> list[_Work]:
             pass
 
     return [
-        _Work("python-can messages", 13, False, lambda: _messages([*sent, *heard])),
-        _Work("python-can virtual bus", 13, False, pass_on),
+        _Work("python-can messages", 13, False, lambda: _messages([*sent, *received])),
+        _Work("python-can virtual bus", 13, False, exchange),
     ]
 
 
 def measure(work: list[_Work], rounds: int) -> list[PageSection]:
-    """Run all parts `rounds` times in turn and return what each costs per cycle."""
-    took: list[list[int]] = [[] for _ in work]
+    """Run all parts `rounds` times in turn and return the cost of each per cycle."""
+    durations: list[list[int]] = [[] for _ in work]
     gc.collect()
     gc.disable()
     try:
         for number in range(_WARM_UP + rounds):
-            for part, times in zip(work, took, strict=True):
+            for part, times in zip(work, durations, strict=True):
                 begin = time.perf_counter_ns()
                 part.run()
                 end = time.perf_counter_ns()
@@ -173,20 +173,18 @@ def measure(work: list[_Work], rounds: int) -> list[PageSection]:
                     times.append(end - begin)
     finally:
         gc.enable()
-    codec = [times for part, times in zip(work, took, strict=True) if part.is_codec]
+    timed_work = list(zip(work, durations, strict=True))
+    codec = [times for part, times in timed_work if part.is_codec]
     whole = [sum(parts) for parts in zip(*codec, strict=True)]
     unit = statistics.median(whole)
-    found = [
-        _part(part.name, part.frames, times, unit)
-        for part, times in zip(work, took, strict=True)
-    ]
-    return [_part("codec, whole cycle", 13, whole, unit), *found]
+    parts = [_part(part.name, part.frames, times, unit) for part, times in timed_work]
+    return [_part("codec, whole cycle", 13, whole, unit), *parts]
 
 
 def _part(name: str, frames: int, times: list[int], unit: float) -> PageSection:
-    middle = statistics.median(times)
-    late = sorted(times)[math.ceil(0.99 * len(times)) - 1]
-    return PageSection(name, frames, middle / 1e3, late / 1e3, middle / unit)
+    median = statistics.median(times)
+    p99 = sorted(times)[math.ceil(0.99 * len(times)) - 1]
+    return PageSection(name, frames, median / 1e3, p99 / 1e3, median / unit)
 
 
 def _messages(frames: list[tuple[int, bytes]]) -> list[can.Message]:
@@ -198,7 +196,7 @@ def _messages(frames: list[tuple[int, bytes]]) -> list[can.Message]:
 
 @contextmanager
 def _two_ends() -> Generator[tuple[can.BusABC, can.BusABC]]:
-    """Give two ends of a virtual bus while this lasts."""
+    """Open two ends of a virtual bus."""
     with (
         can.Bus("codec", interface="virtual") as one,
         can.Bus("codec", interface="virtual") as other,

@@ -1,7 +1,7 @@
-"""What fits cost, beside scikit-learn and 20-start least squares in the same run.
+"""Cost of the fits, compared with scikit-learn and 20-start least squares.
 
-The others get three starts, one linear-algebra thread each, parts alternating, so that
-whatever else the machine does meets all of them. Medians over rounds.
+The peers get three starts and one linear-algebra thread each. Fits alternate, so that
+other load on the machine affects all of them alike. Times are medians over rounds.
 """
 
 import argparse
@@ -33,10 +33,10 @@ from benchmarks.study_race import SLICE, race
 
 Fitter = Callable[[np.ndarray, np.ndarray], Callable[[Sequence[np.ndarray]], float]]
 
-EVALUATION = "one SE evaluation, n = 300"  # name of a row
+EVALUATION = "one SE evaluation, n = 300"  # row name
 _POINTS = 300
 _STARTS_OF_TUSTIN = 20
-_ROUNDS = 3  # of every fold of the short race, medians
+_ROUNDS = 3  # repeats of every fold of the short race
 _GOALS = {"evaluation": 5.0, "SE fit": 4.0, "NN fit": 2.0, "Tustin fit": 10.0}
 
 
@@ -48,14 +48,14 @@ def load_rows() -> SampleTable:
 
 
 def chosen(rows: SampleTable) -> tuple[np.ndarray, np.ndarray]:
-    """Return 300 standardised inputs and centred outputs."""
+    """Draw 300 rows; return their standardised inputs and centred outputs."""
     index = np.random.default_rng(0).choice(rows.count, _POINTS, replace=False)
     X, y = rows.inputs[index], rows.F_t[index]
     return (X - X.mean(axis=0)) / X.std(axis=0), y - y.mean()
 
 
 def many_starts(rows: SampleTable) -> float:
-    """Return the best sum of squares of 20-start bounded least squares."""
+    """Return the smallest sum of squares of 20-start bounded least squares."""
     pairs = np.array([pair for _, pair in TustinBounds().items()])
     low, high = pairs.T.copy()
     for k in (2, 3):
@@ -75,24 +75,24 @@ def many_starts(rows: SampleTable) -> float:
 def duel(
     ours: Callable[[], object], other: Callable[[], object], rounds: int
 ) -> tuple[float, float]:
-    """Return both medians of processor time [s], the two taking turns."""
-    spent: tuple[list[float], list[float]] = ([], [])
+    """Run two functions in turn; return the median processor time of each [s]."""
+    durations: tuple[list[float], list[float]] = ([], [])
     for _ in range(rounds):
-        for function, times in zip((ours, other), spent, strict=True):
+        for function, times in zip((ours, other), durations, strict=True):
             before = time.process_time()
             function()
             times.append(time.process_time() - before)
-    return statistics.median(spent[0]), statistics.median(spent[1])
+    return statistics.median(durations[0]), statistics.median(durations[1])
 
 
 class SpeedComparison(NamedTuple):
-    """A fit measured beside the same fit by another library.
+    """A fit to be timed against the same fit by another library.
 
     Attributes:
-        name: what is printed.
-        ours: does it, returns what it reached.
-        other: the same by the other.
-        rounds: how often both do it.
+        name: printed name.
+        ours: our fit; returns the optimum it reached.
+        other: the other library's fit, likewise.
+        rounds: number of repeats of both.
     """
 
     name: str
@@ -101,7 +101,7 @@ class SpeedComparison(NamedTuple):
     rounds: int
 
     def measured(self) -> dict[str, object]:
-        """Return both times, their ratio and what was reached."""
+        """Return both times, their ratio and both optima."""
         ours, other = duel(self.ours, self.other, self.rounds)
         return {
             "part": self.name,
@@ -115,7 +115,7 @@ class SpeedComparison(NamedTuple):
 
 
 def parts(rounds: int) -> list[SpeedComparison]:
-    """Return what is measured of single fits."""
+    """Return the comparisons of single fits."""
     rows = load_rows()
     X, y = chosen(rows)
     starts = {part: three_starts(part, X, y) for part in KERNELS}
@@ -148,61 +148,61 @@ def parts(rounds: int) -> list[SpeedComparison]:
 
 
 def our_evaluation(X: np.ndarray, y: np.ndarray) -> Callable[[], float]:
-    """Return what makes one likelihood with its gradient, as a search asks for it."""
+    """Return a function that evaluates one likelihood with its gradient."""
     theta = three_starts("SE fit", X, y)[0]
     likelihood = Likelihood(KERNELS["SE fit"], ConstantNoise(), X, y)
     return lambda: likelihood(theta)[0]
 
 
 def evaluation(X: np.ndarray, y: np.ndarray, rounds: int) -> SpeedComparison:
-    """Return one likelihood with its gradient beside that of scikit-learn."""
+    """Compare one likelihood evaluation with its gradient against scikit-learn's."""
     theta = three_starts("SE fit", X, y)[0]
     model = GaussianProcessRegressor(
         theirs("SE fit", theta, float(y.std())), alpha=1e-10, optimizer=None
     ).fit(X, y)
-    at = model.kernel_.theta
+    fitted = model.kernel_.theta
     return SpeedComparison(
         "evaluation",
         our_evaluation(X, y),
         lambda: model.log_marginal_likelihood(
-            at, eval_gradient=True, clone_kernel=False
+            fitted, eval_gradient=True, clone_kernel=False
         )[0],
         rounds,
     )
 
 
 def rows() -> list[BenchRow]:
-    """Return what was measured, for the table."""
+    """Return the measurements as table rows."""
     with threadpool_limits(1):
-        found = {str(part["part"]): part for part in (p.measured() for p in parts(3))}
-        rivals = [
+        by_name = {str(part["part"]): part for part in (p.measured() for p in parts(3))}
+        peers = [
             beside(what, goal, maker)
             for what, goal, maker in (
                 ("the same against GPy", 10, beside_gpy.fitter),
                 ("the same against tinygp, compiled before", 8, beside_tinygp.fitter),
             )
         ]
-    ratio = {name: float(str(part["ratio"])) for name, part in found.items()}
-    spent = {name: float(str(part["ours_ms"])) for name, part in found.items()}
+    ratio = {name: float(str(part["ratio"])) for name, part in by_name.items()}
+    ours_ms = {name: float(str(part["ours_ms"])) for name, part in by_name.items()}
     least_squares_of = "Tustin fit against 20-start least squares"
     equal = "against scikit-learn, three starts"
     return [
         BenchRow(f"SE fit, n = 300, {equal}", ratio["SE fit"], "times", 8, True),
-        *rivals,
+        *peers,
         BenchRow(f"NN fit, n = 300, {equal}", ratio["NN fit"], "times"),
-        BenchRow("NN fit, n = 300", spent["NN fit"], "ms", 80),
-        BenchRow(EVALUATION, spent["evaluation"], "ms", 1.15),
+        BenchRow("NN fit, n = 300", ours_ms["NN fit"], "ms", 80),
+        BenchRow(EVALUATION, ours_ms["evaluation"], "ms", 1.15),
         BenchRow(least_squares_of, ratio["Tustin fit"], "times", 30, is_least=True),
     ]
 
 
 def beside(what: str, goal: float, maker: Fitter) -> BenchRow:
-    """Return the ratio of SE fits from the same starts, and of what is reached.
+    """Return the speed-up of our SE fit over a peer's, the likelihood gap as its note.
 
     Args:
         what: name of the row.
-        goal: of the ratio.
-        maker: makes the peer's fit; raises ImportError where it is not installed.
+        goal: smallest acceptable ratio of times.
+        maker: returns the peer's fit; raises ImportError if it is not installed.
     """
     X, y = chosen(load_rows())
     try:
@@ -210,10 +210,10 @@ def beside(what: str, goal: float, maker: Fitter) -> BenchRow:
     except ImportError:
         return not_installed(what, goal)
     starts = three_starts("SE fit", X, y)
-    reached = fit(starts)  # compiles, where it does
+    reached = fit(starts)  # untimed: tinygp compiles in the first fit
     ours, other = duel(lambda: fit_gp(X, y), lambda: fit(starts), 3)
     gap = fit_gp(X, y).lml - reached
-    note = f"log likelihood {gap:+.3f} beside its own"
+    note = f"log likelihood {gap:+.3f} relative to its own"
     return BenchRow(what, other / ours, "times", goal, True, note)
 
 
@@ -225,7 +225,7 @@ def main() -> None:
     parser.add_argument(
         "--keep-memory",
         action="store_true",
-        help="all sides keep memory between fits, as a study's workers do",
+        help="keep memory between fits on all sides, like a study's workers",
     )
     parser.add_argument(
         "--whole",
@@ -244,23 +244,23 @@ def main() -> None:
     if arguments.keep_memory:
         keep_memory()
     with threadpool_limits(1):
-        found = [part.measured() for part in parts(arguments.rounds)]
-        found.append(
+        results = [part.measured() for part in parts(arguments.rounds)]
+        results.append(
             race(arguments.whole, arguments.share)
             if arguments.whole
             else race(SLICE, rounds=_ROUNDS, is_whole=False)
         )
     if arguments.json:
-        print(json.dumps(found, indent=1))
+        print(json.dumps(results, indent=1))
         return
-    for part in found:
+    for part in results:
         goal = f" (goal {part['goal']:g})" if part["goal"] else ""
         print(
             f"{part['part']}: {part['ours_ms']:.2f} ms, other {part['other_ms']:.2f} "
             f"ms, ratio {part['ratio']:.1f}{goal}; reached {part['reached']:.4f}, "
             f"other {part['other_reached']:.4f}"
         )
-    for line in found[-1]["notes"]:
+    for line in results[-1]["notes"]:
         print(f"  {line}")
 
 

@@ -1,12 +1,12 @@
-"""How fast trial files become arrays, and how fast other readers are beside it.
+"""Speed of loading trial files into arrays, compared with other readers.
 
     python -m benchmarks.load [--trials 80] [--seconds 30] [--rounds 7] [--json]
 
-Trials are written by the recorder's own writer: cycles with the noise of encoders and
-sensor, views at 50 Hz, sensor samples, a chunk every 0.25 s. A few differ, the others
-are copies of them in files of their own. All are then loaded one after the other on
-one core. One trial is read in turns by this reader and by others, and what they read is
-compared; times are medians of CPU time over the rounds. Files are in the page cache.
+The recorder's own writer writes the trials: cycles with encoder and sensor noise, views
+at 50 Hz, sensor samples, a chunk every 0.25 s. A few trials are distinct, the others
+are copied files. All are then loaded one after the other on one core. One trial is read
+by all readers in turn, and their results are compared; times are medians of CPU time
+over the rounds. Files are in the page cache.
 """
 
 import argparse
@@ -56,9 +56,9 @@ class Side:
     """One way to read a trial.
 
     Attributes:
-        name: the reader.
-        median_ms: CPU time of one trial [ms].
-        ratio: times slower than this project's reader.
+        name: name of the reader.
+        median_ms: median CPU time of one trial [ms].
+        ratio: that time over this project's reader's.
     """
 
     name: str
@@ -67,7 +67,7 @@ class Side:
 
 
 def make_cycles(seconds: float, rng: np.random.Generator) -> Record:
-    """Return cycles of an arm that is pushed: smooth motion under real-size noise."""
+    """Return cycles of a pushed arm: smooth motion with noise of realistic size."""
     count = round(seconds * _RATE_HZ)
     out = np.frombuffer(bytearray(CYCLE.template * count), CYCLE.dtype)
     out["cycle"] = np.arange(count)
@@ -93,7 +93,7 @@ def make_cycles(seconds: float, rng: np.random.Generator) -> Record:
 
 
 def write_trial(path: Path, seconds: float, seed: int) -> None:
-    """Write one trial as the recorder does."""
+    """Write one trial in the recorder's format."""
     rng = np.random.default_rng(seed)
     cycles = make_cycles(seconds, rng)
     samples = np.zeros(round(seconds * 1e9 / _SENSOR_PERIOD_NS), WRENCH_DTYPE)
@@ -110,7 +110,7 @@ def write_trial(path: Path, seconds: float, seed: int) -> None:
 
 
 def write_trials(folder: Path, trials: int, seconds: float) -> list[Path]:
-    """Return `trials` files below `folder`."""
+    """Write `trials` trial files below `folder` and return their paths."""
     paths = [folder / f"T{number:03d}.mcap" for number in range(trials)]
     for number, path in enumerate(paths):
         if number < _DISTINCT:
@@ -121,25 +121,25 @@ def write_trials(folder: Path, trials: int, seconds: float) -> list[Path]:
 
 
 def this_reader(path: Path) -> Positions:
-    """Read the rows of a trial as the analysis gets them."""
+    """Read a trial with this project's reader."""
     return TrialReader(path).cycles().data["position"]
 
 
 def iterating(path: Path) -> Positions:
-    """Read the same rows message by message, through mcap's own reader."""
+    """Read a trial message by message with mcap's own reader."""
     return _joined(path, in_order=True)
 
 
 def iterating_unsorted(path: Path) -> Positions:
-    """The same in the order of the file, which spares mcap's reader its heap."""
+    """Read like `iterating`, in file order, which spares mcap's reader its heap."""
     return _joined(path, in_order=False)
 
 
 def _joined(path: Path, *, in_order: bool) -> Positions:
     with path.open("rb") as file:
         reader = make_reader(file, validate_crcs=True)
-        found = reader.iter_messages(topics="/cycle", log_time_order=in_order)
-        joined = b"".join(message.data for _, _, message in found)
+        messages = reader.iter_messages(topics="/cycle", log_time_order=in_order)
+        joined = b"".join(message.data for _, _, message in messages)
     return np.frombuffer(joined, CYCLE.dtype)["position"]
 
 
@@ -151,8 +151,8 @@ def decoding_with_ros2(path: Path) -> Positions:
         reader = make_reader(
             file, validate_crcs=True, decoder_factories=[DecoderFactory()]
         )
-        found = reader.iter_decoded_messages(topics="/cycle")
-        return np.array([decoded.position for _, _, _, decoded in found])
+        messages = reader.iter_decoded_messages(topics="/cycle")
+        return np.array([decoded.position for _, _, _, decoded in messages])
 
 
 def decoding_with_rosbags(path: Path) -> Positions:
@@ -165,10 +165,10 @@ def decoding_with_rosbags(path: Path) -> Positions:
     reader = McapReader(path)
     reader.open()
     try:
-        wanted = [c for c in reader.connections if c.topic == "/cycle"]
+        connections = [c for c in reader.connections if c.topic == "/cycle"]
         rows = [
             store.deserialize_cdr(data, CYCLE.type_name).position  # pyright: ignore[reportAttributeAccessIssue]
-            for _, _, data in reader.messages(wanted)
+            for _, _, data in reader.messages(connections)
         ]
     finally:
         reader.close()
@@ -176,8 +176,8 @@ def decoding_with_rosbags(path: Path) -> Positions:
 
 
 def readers() -> dict[str, Callable[[Path], Positions]]:
-    """Return the readers that are installed, this project's first."""
-    found = {
+    """Return the installed readers by name, this project's first."""
+    functions = {
         "this reader": this_reader,
         "mcap iter_messages + frombuffer": iterating,
         "the same without sorting": iterating_unsorted,
@@ -186,33 +186,33 @@ def readers() -> dict[str, Callable[[Path], Positions]]:
     try:
         import mcap_ros2.decoder  # noqa: F401 # pyright: ignore[reportMissingImports]
     except ImportError:
-        return found
-    return found | {"mcap-ros2-support, decoded": decoding_with_ros2}
+        return functions
+    return functions | {"mcap-ros2-support, decoded": decoding_with_ros2}
 
 
 def compare(path: Path, rounds: int) -> list[Side]:
-    """Read one trial with every reader in turns, after one round to warm up.
+    """Read one trial with every reader in turn, after one warm-up round.
 
     Raises:
-        RuntimeError: two readers disagree.
+        RuntimeError: a reader returns other positions.
     """
-    spent: dict[str, list[float]] = {name: [] for name in readers()}
+    times_ms: dict[str, list[float]] = {name: [] for name in readers()}
     positions = TrialReader(path).cycles().data["position"]
     for _ in range(rounds + 1):
         for name, read in readers().items():
             start = time.process_time()
-            found = read(path)
-            spent[name].append((time.process_time() - start) * 1e3)
-            if found.tobytes() != positions.tobytes():
+            read_positions = read(path)
+            times_ms[name].append((time.process_time() - start) * 1e3)
+            if read_positions.tobytes() != positions.tobytes():
                 raise RuntimeError(f"{name} reads other positions")
-    medians = {name: statistics.median(values[1:]) for name, values in spent.items()}
+    medians = {name: statistics.median(times[1:]) for name, times in times_ms.items()}
     ours = medians["this reader"]
     return [Side(name, median, median / ours) for name, median in medians.items()]
 
 
 def load_all(paths: list[Path]) -> dict[str, float]:
     """Load every trial once; return wall and CPU time [s], and peak memory [MB]."""
-    Path("/proc/self/clear_refs").write_text("5")  # the peak counts from here
+    Path("/proc/self/clear_refs").write_text("5")  # reset the peak memory counter
     wall, cpu = time.perf_counter(), time.process_time()
     cycles = sum(len(TrialReader(path).cycles().data) for path in paths)
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
@@ -232,7 +232,7 @@ def _status_mb(field: str) -> float:
 
 
 def rows() -> list[BenchRow]:
-    """Return what was measured, for the table."""
+    """Return the measurements as table rows."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "T01.mcap"
         write_trial(path, 30.0, 1)
@@ -259,7 +259,7 @@ def rows() -> list[BenchRow]:
 
 
 def main() -> None:
-    """Write, load, compare and print; the exit code says nothing about the figures."""
+    """Write, load, compare and print; the exit code ignores the figures."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--trials", type=int, default=80, metavar="N")
     parser.add_argument("--seconds", type=float, default=30.0, metavar="S")

@@ -1,10 +1,10 @@
-"""How much faster than the clock a stepped simulation runs, and where the time goes.
+"""Speed of a stepped simulation relative to real time, and its breakdown by part.
 
     python -m benchmarks.lockstep [--seconds 20] [--rounds 3] [--json]
 
-The loop, the drivers, the recorder and the simulated devices are the ones of a session;
-everything runs in one thread. The whole is processor time of runs that nothing watches;
-how it divides is seen in runs whose calls are watched.
+Loop, drivers, recorder and simulated devices are those of a session, all in one thread.
+The total is the processor time of runs without instrumentation; the breakdown comes
+from instrumented runs.
 """
 
 import argparse
@@ -64,7 +64,7 @@ HEADER = TrialHeader(
 
 
 def float_rig() -> Rig:
-    """Return a simulated rig whose hand pushes the foot over stones."""
+    """Return a simulated rig whose operator pushes the foot over stones."""
     settings = load_settings(None)
     rig = build_rig(settings, settings.row(TERRAIN), FakeOptions("fast", seed=1))
     backend, hand = rig.backend, rig.simulation
@@ -86,7 +86,7 @@ def float_rig() -> Rig:
 
 
 def without_collector() -> None:
-    """Tidy up and keep the garbage collector out, as the control process does."""
+    """Collect garbage, then disable the collector as the control process does."""
     gc.enable()
     gc.collect()
     gc.freeze()
@@ -96,9 +96,12 @@ def without_collector() -> None:
 def timed(
     rig: Rig, seconds: float, parts: "PartClock | None" = None
 ) -> tuple[float, str]:
-    """Return (CPU seconds of `seconds` of simulation, digest of its samples).
+    """Simulate with the recorder on; return (CPU time [s], digest of the samples).
 
-    With the recorder; `parts` watches.
+    Args:
+        rig: simulated rig; closed at the end.
+        seconds: simulated time.
+        parts: instruments the calls, if given.
     """
     digest = hashlib.sha256()
     without_collector()
@@ -111,21 +114,21 @@ def timed(
         with nullcontext() if parts is None else parts.watching():
             start = time.process_time()
             rig.backend.loop_client.advance(seconds)
-            spent = time.process_time() - start
+            cpu_s = time.process_time() - start
         rig.backend.recorder.finish("bench")
     rig.backend.close()
-    return spent, digest.hexdigest()
+    return cpu_s, digest.hexdigest()
 
 
 class PartClock:
-    """Tells how the time of a simulation divides among its parts.
+    """Measures how the time of a simulation divides among its parts.
 
-    A call that is watched takes the time from the part that it interrupts, so the parts
-    add up to the whole. The time is the machine's: processor time takes ten times as
-    long to read, and a machine that is busy elsewhere delays all parts alike.
+    A watched call stops the clock of the part that it interrupts, so the parts sum to
+    the whole. Wall time is used: reading processor time takes ten times as long, and
+    other load on the machine delays all parts alike.
 
     Attributes:
-        spent_ns: by part; what no watched call takes is the loop's own.
+        spent_ns: time by part; time outside watched calls belongs to the loop.
     """
 
     def __init__(self, now_ns: Callable[[], int] = time.perf_counter_ns) -> None:
@@ -134,14 +137,14 @@ class PartClock:
         self._part, self._since_ns = LOOP, now_ns()
 
     def shares(self) -> dict[str, float]:
-        """Return the share of every part."""
+        """Return the share of time of every part."""
         self._enter(LOOP)
         whole_ns = sum(self.spent_ns.values())
         return {part: ns / whole_ns for part, ns in self.spent_ns.items()}
 
     @contextmanager
     def watching(self) -> Generator[None]:
-        """Watch the calls of `PARTS`."""
+        """Instrument the calls of `PARTS` inside the with block."""
         with ExitStack() as stack:
             for part, calls in PARTS.items():
                 for owner, name in calls:
@@ -161,7 +164,7 @@ class PartClock:
         return watched
 
     def _enter(self, part: str) -> str:
-        """Let the time of `part` begin; return whose ended."""
+        """Start the clock of `part`; return the part whose clock stopped."""
         now_ns, before = self._now_ns(), self._part
         self.spent_ns[before] += now_ns - self._since_ns
         self._part, self._since_ns = part, now_ns
@@ -169,21 +172,21 @@ class PartClock:
 
 
 def rows() -> list[BenchRow]:
-    """Return what was measured, for the table."""
-    spent = [timed(float_rig(), 8.0)[0] for _ in range(2)]
-    pace = 8.0 / min(spent)
+    """Return the measurements as table rows."""
+    cpu_s = [timed(float_rig(), 8.0)[0] for _ in range(2)]
+    pace = 8.0 / min(cpu_s)
     what = "stepped simulation with recorder, against real time"
     return [BenchRow(what, pace, "times", GOAL, is_least=True)]
 
 
 def measured(seconds: float, rounds: int) -> dict[str, Any]:
-    """Return medians of `rounds` runs, alternately watched and not."""
+    """Return medians of `rounds` pairs of runs, without and with instrumentation."""
     whole: list[float] = []
     shares: list[dict[str, float]] = []
     digests: set[str] = set()
     for _ in range(rounds):
-        spent, digest = timed(float_rig(), seconds)
-        whole.append(spent)
+        cpu_s, digest = timed(float_rig(), seconds)
+        whole.append(cpu_s)
         parts = PartClock()
         digests |= {digest, timed(float_rig(), seconds, parts)[1]}
         shares.append(parts.shares())
@@ -204,7 +207,7 @@ def measured(seconds: float, rounds: int) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Measure, alternating, and print medians."""
+    """Measure and print medians."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--rounds", type=int, default=3)

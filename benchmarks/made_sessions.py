@@ -1,8 +1,7 @@
-"""Sessions as they lie on the disk, made in a moment: what `scale` counts.
+"""Generate complete session folders quickly, as input for `scale`.
 
-Journal, session.json and sidecars are what the program writes; the recordings are a few
-kilobytes of noise where nothing else is given, for `status` looks at nothing but their
-checksums.
+Journal, session.json and sidecars are as the program writes them. By default, the
+recordings are a few kilobytes of noise, since `status` reads only their checksums.
 """
 
 import hashlib
@@ -30,23 +29,23 @@ def make_sessions(
     """Write complete sessions below `data` and return their folders.
 
     Args:
-        data: a data folder, without sessions.
-        count: how many sessions.
-        trials: kept trials of each.
-        size: of a recording of noise [bytes].
-        terrain: of all of them; None = in turn.
-        record: writes the recording of a trial to a path; None = of noise.
+        data: a data folder without sessions.
+        count: number of sessions.
+        trials: kept trials per session.
+        size: size of a noise recording [bytes].
+        terrain: terrain of all sessions; None = all terrains in turn.
+        record: writes the recording of a trial to a path; None = noise.
     """
     folders: list[Path] = []
     for number in range(1, count + 1):
-        of = terrain or TERRAINS[number % len(TERRAINS)]
-        folders.append(data / "sessions" / f"2027-01-15_S{number:03d}_{of}.fake")
+        name = terrain or TERRAINS[number % len(TERRAINS)]
+        folders.append(data / "sessions" / f"2027-01-15_S{number:03d}_{name}.fake")
         noise = random.Random(number)
 
         def write_noise(path: Path, noise: random.Random = noise) -> None:
             path.write_bytes(noise.randbytes(size))
 
-        _make_session(folders[-1], of, trials, record or write_noise)
+        _make_session(folders[-1], name, trials, record or write_noise)
     return folders
 
 

@@ -1,10 +1,10 @@
-"""Small errors sown into the code that decides: do the tests notice? Run by hand.
+"""Mutation testing of the safety-critical and decision code; run manually.
 
 python -m benchmarks.mutation_check [--count 300] [--seed 1] [--round 0] [--only guard]
 
-Every mutation - a comparison flipped, a constant or sign changed, a statement removed -
+Every mutation (a flipped comparison, a changed constant or sign, a removed statement)
 is run against the tests of its module in a copy of the tree, with a time limit. Rounds
-of one seed have no mutation in common.
+of the same seed share no mutation.
 """
 
 import argparse
@@ -27,9 +27,9 @@ from acquisition.clock import SystemClock
 from benchmarks.mutation_targets import EQUIVALENT, TESTS
 
 ROOT = Path(__file__).parents[1]
-# A mutation that hangs is noticed: beyond 10 s and eight times what is usual.
+# A hanging mutation counts as killed: after 10 s and eight times the usual duration.
 LONGEST, TIMES = 10.0, 8.0
-REQUIRED = 0.95  # share of mutations that the tests have to notice
+REQUIRED = 0.95  # share of mutations that the tests must kill
 _LARGE = 10
 LIBRARIES = ("hypothesis", "mcap", "pinocchio", "pydantic", "pytest", "scipy.linalg")
 _COPIED = ("acquisition", "analysis", "experiments", "fakes", "ft_sensor", "wam")
@@ -59,13 +59,13 @@ _FLIPPED = {
 
 @dataclass(frozen=True, slots=True)
 class Mutation:
-    """A change of one node.
+    """A change of one syntax node.
 
     Attributes:
-        path: of the module.
-        line: where.
-        text: what was changed.
-        source: the module with it.
+        path: path of the module.
+        line: line of the node.
+        text: the changed line, before and after.
+        source: source of the mutated module.
     """
 
     path: str
@@ -75,7 +75,7 @@ class Mutation:
 
 
 def _changes(node: ast.AST) -> Iterator[Callable[[ast.AST], None]]:
-    """Return what may be done to a node, as functions of its copy."""
+    """Yield the possible changes of a node, as functions applied to its copy."""
     if isinstance(node, ast.Compare) and type(node.ops[0]) in _FLIPPED:
         yield lambda n: n.ops.__setitem__(0, _FLIPPED[type(n.ops[0])]())
     if isinstance(node, ast.BinOp | ast.BoolOp) and type(node.op) in _FLIPPED:
@@ -85,30 +85,30 @@ def _changes(node: ast.AST) -> Iterator[Callable[[ast.AST], None]]:
     if isinstance(node, ast.If | ast.IfExp) and not isinstance(node.test, ast.Compare):
         yield lambda n: setattr(n, "test", ast.UnaryOp(ast.Not(), n.test))
     if isinstance(node, ast.Constant) and type(node.value) in {int, float}:
-        yield lambda n: setattr(n, "value", _other(n.value))
+        yield lambda n: setattr(n, "value", _changed_number(n.value))
     if isinstance(node, ast.FunctionDef | ast.If | ast.For):
         for index, statement in enumerate(node.body):
             if _is_removable(statement):
                 yield lambda n, i=index: n.body.__setitem__(i, ast.Pass())
 
 
-def _other(value: float) -> float:
-    """Return a number that is wrong and not only a little off; 500 ms and 501 agree."""
+def _changed_number(value: float) -> float:
+    """Return a clearly wrong number; 501 ms instead of 500 would make no difference."""
     return value + 1 if abs(value) < _LARGE else 2 * value
 
 
 def _is_removable(statement: ast.stmt) -> bool:
-    """Return whether a statement does something and is no docstring."""
+    """Return whether removing a statement may change the behaviour."""
     if isinstance(statement, ast.Expr):
         return not isinstance(statement.value, ast.Constant)
     return isinstance(statement, ast.Raise | ast.AugAssign | ast.If)
 
 
 def _skipped(tree: ast.Module) -> set[int]:
-    """Return nodes that no test should see: annotations and the text of messages."""
+    """Return the ids of nodes not to mutate: annotations and formatted messages."""
     hidden: set[int] = set()
     for node in ast.walk(tree):
-        if isinstance(node, ast.JoinedStr) or _is_start_of_time(node):
+        if isinstance(node, ast.JoinedStr) or _is_zero_time(node):
             hidden |= {id(n) for n in ast.walk(node)}
         for name in ("annotation", "returns", "decorator_list"):
             part = getattr(node, name, None)
@@ -117,8 +117,8 @@ def _skipped(tree: ast.Module) -> set[int]:
     return hidden
 
 
-def _is_start_of_time(node: ast.AST) -> bool:
-    """Return whether a time begins at 0 ns: one at 1 ns is the same."""
+def _is_zero_time(node: ast.AST) -> bool:
+    """Return whether a time is initialised to 0 ns: 1 ns would be equivalent."""
     if not isinstance(node, ast.Assign | ast.AnnAssign):
         return False
     target = node.targets[0] if isinstance(node, ast.Assign) else node.target
@@ -127,11 +127,11 @@ def _is_start_of_time(node: ast.AST) -> bool:
 
 
 def mutations(path: str) -> list[Mutation]:
-    """Return every mutation of a module."""
+    """Return every mutation of a module that is not known to be equivalent."""
     tree = ast.parse((ROOT / path).read_text())
     nodes, hidden = list(ast.walk(tree)), _skipped(tree)
-    sound = ast.unparse(tree)
-    found: list[Mutation] = []
+    original = ast.unparse(tree)
+    results: list[Mutation] = []
     for index, node in enumerate(nodes):
         if id(node) in hidden:
             continue
@@ -140,14 +140,14 @@ def mutations(path: str) -> list[Mutation]:
             twin = list(ast.walk(changed))[index]
             list(_changes(twin))[number](twin)
             source = ast.unparse(ast.fix_missing_locations(changed))
-            text = _first_change(sound, source)
+            text = _first_change(original, source)
             if text and (path, text) not in EQUIVALENT:
-                found.append(Mutation(path, getattr(node, "lineno", 0), text, source))
-    return found
+                results.append(Mutation(path, getattr(node, "lineno", 0), text, source))
+    return results
 
 
 def _first_change(before: str, after: str) -> str:
-    """Return the first line that differs, as it was and as it is; "" for none."""
+    """Return the first line that differs as "before -> after"; "" for none."""
     for old, new in zip(before.splitlines(), after.splitlines(), strict=False):
         if old != new:
             return f"{old.strip()} -> {new.strip()}"
@@ -155,7 +155,7 @@ def _first_change(before: str, after: str) -> str:
 
 
 class MutatedTree:
-    """A copy of the project whose tests run in processes that have the libraries."""
+    """A copy of the project; its tests run in forks with the libraries loaded."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -168,7 +168,7 @@ class MutatedTree:
         self._processes.set_forkserver_preload(list(LIBRARIES))
 
     def is_sound(self, path: str) -> bool:
-        """Return whether the tests of a module pass as it is; keep their bytecode."""
+        """Return whether the tests pass without a mutation; measure their duration."""
         started_ns = SystemClock().now_ns()
         code = self._exit_code(TESTS[path], 60.0 * TIMES, keeps_bytecode=True)
         self._longest[path] = max(
@@ -177,20 +177,20 @@ class MutatedTree:
         return code == 0
 
     def is_killed(self, mutation: Mutation) -> bool:
-        """Return whether the tests of the module notice."""
+        """Return whether the tests of the module fail with the mutation."""
         target = self._folder / mutation.path
-        sound = target.read_text()
+        original = target.read_text()
         target.write_text(mutation.source)
         tests, longest = TESTS[mutation.path], self._longest[mutation.path]
         try:
             return self._exit_code(tests, longest, keeps_bytecode=False) != 0
         finally:
-            target.write_text(sound)
+            target.write_text(original)
 
     def _exit_code(
         self, tests: tuple[str, ...], longest: float, *, keeps_bytecode: bool
     ) -> int | None:
-        """Return what pytest returned; None = it ran too long."""
+        """Return pytest's exit code; None = timed out."""
         process = self._processes.Process(
             target=run_tests, args=(self._folder, tests, keeps_bytecode)
         )
@@ -211,42 +211,42 @@ def run_tests(folder: Path, tests: tuple[str, ...], keeps_bytecode: bool) -> Non
     for name in [n for n in sys.modules if n.split(".")[0] in (*_COPIED, "tests")]:
         del sys.modules[name]
     sys.dont_write_bytecode = not keeps_bytecode
-    with Path(os.devnull).open("w") as nothing:
-        os.dup2(nothing.fileno(), 1)
-        os.dup2(nothing.fileno(), 2)
+    with Path(os.devnull).open("w") as null:
+        os.dup2(null.fileno(), 1)
+        os.dup2(null.fileno(), 2)
     pytest = importlib.import_module("pytest")
     hypothesis = importlib.import_module("hypothesis")
-    # A failure is enough: to look for the least one takes a minute.
+    # Any failure will do: shrinking it to a minimal example takes a minute.
     phases = [hypothesis.Phase.explicit, hypothesis.Phase.generate]
     hypothesis.settings.register_profile("sown", phases=phases)
     hypothesis.settings.load_profile("sown")
-    # What is imported already cannot be rewritten by pytest, and need not be.
+    # pytest cannot rewrite modules that are already imported, and need not.
     rewriting = "ignore::pytest.PytestAssertRewriteWarning"
     options = ["-x", "-p", "no:cacheprovider", "-W", rewriting]
     os._exit(int(pytest.main([*options, *tests])))
 
 
 def sample(count: int, seed: int, number: int, only: str) -> list[Mutation]:
-    """Return round `number` of about `count` mutations, as many of every module."""
+    """Return round `number` of about `count` mutations, equally many per module."""
     paths = [path for path in TESTS if only in path]
     size = -(-count // len(paths))
     chosen: list[Mutation] = []
     for path in paths:
-        every = mutations(path)
-        order = np.random.default_rng(seed).permutation(len(every))
-        chosen += [every[i] for i in sorted(order[number * size : (number + 1) * size])]
+        pool = mutations(path)
+        order = np.random.default_rng(seed).permutation(len(pool))
+        chosen += [pool[i] for i in sorted(order[number * size : (number + 1) * size])]
     return chosen
 
 
 def main() -> int:
-    """Print every survivor and the share that was killed."""
+    """Print every mutation and the share that was killed."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--count", type=int, default=300)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--round", type=int, default=0, help="of this seed")
+    parser.add_argument("--round", type=int, default=0, help="round of this seed")
     parser.add_argument("--only", default="", help="part of a module's path")
-    given = parser.parse_args()
-    chosen, killed = sample(given.count, given.seed, given.round, given.only), 0
+    args = parser.parse_args()
+    chosen, killed = sample(args.count, args.seed, args.round, args.only), 0
     with tempfile.TemporaryDirectory(prefix="mutations-") as scratch:
         tree = MutatedTree(Path(scratch))
         paths = dict.fromkeys(mutation.path for mutation in chosen)

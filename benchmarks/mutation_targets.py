@@ -1,4 +1,4 @@
-"""Modules whose errors are sown, each with the tests that have to notice."""
+"""Modules to mutate, each with the tests that must kill the mutations."""
 
 _LOOP, _LOOP_TESTS = "acquisition/control_loop", "tests/acquisition/control_loop"
 _FILE, _FILE_TESTS = "acquisition/trial_file", "tests/acquisition/trial_file"
@@ -149,10 +149,10 @@ TESTS = {
     f"{_RUN}/tare.py": (f"{_RUN_TESTS}/test_tare.py",),
     "analysis/data/prepare.py": ("tests/analysis/data/test_prepare.py",),
 }
-# What changes nothing that a test could see; the reason for each.
-_AT_REST = "at this very instant both ways give the same numbers"
-_BELOW = "nanoseconds, or a share of a millisecond, where milliseconds count"
-_TUNED = "a choice of many equally good ones: the poses it leads to are judged instead"
+# Equivalent mutations: they change nothing that a test could observe, with the reason.
+_AT_REST = "at the boundary itself both branches give the same numbers"
+_BELOW = "a difference of nanoseconds or part of a millisecond where milliseconds count"
+_TUNED = "one of many equally good choices: the resulting poses are tested instead"
 _BODIES = (
     "return [('the base', (0, *_capsule(0.12, -BASE_HEIGHT, -0.1))), "
     "('the shoulder', ({}, coal.Sphere(0.15), _at(0.0, 0.0, 0.0))), "
@@ -162,11 +162,11 @@ _BODIES = (
     "('the wrist', (6, coal.Sphere(0.065), _at(0.0, 0.0, 0.0))), "
     "('the foot', (7, *_capsule(0.045, 0.0, end, x, y)))]"
 )
-_SHORTCUT = "a look that saves the loop; its rows say the same of every number"
+_SHORTCUT = "a fast path that skips the loop; the loop gives the same result"
 _UNREAD = "overwritten before it is read"
-_MARK = "a mark of one way; it is only held against that of the other and 0"
-_LIMP = "only the stiffness 0 of joint 7 is below either, and its limit is 0"
-_EIGHTH = "there is no eighth motor that would read it"
+_MARK = "a direction code; it is only compared with the other direction's and 0"
+_LIMP = "only joint 7's stiffness of 0 is below either bound, and its limit is 0"
+_EIGHTH = "no eighth motor reads it"
 _TILTS = "_TILTS = ((5, -1.2), (4, 1.0), (4, -1.0), (5, -0.6))"
 EQUIVALENT: dict[tuple[str, str], str] = {
     (
@@ -188,7 +188,7 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     (
         f"{_LOOP}/contact.py",
         "if since_ns == state.since_ns and points is state.points: -> pass",
-    ): "an equal state, made anew in every cycle",
+    ): "an equal state, created anew in every cycle",
     (
         f"{_FILE}/salvage.py",
         "latest = (self.last_ns if self.last_ns > 0 else start_ns) + _LONGEST_NS -> "
@@ -211,24 +211,24 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     (
         f"{_CONTROL}/soft_walls.py",
         "_ALL_ARMED = 127 -> _ALL_ARMED = 254",
-    ): "whether walls that are all armed are looked at once more",
+    ): "whether the walls are checked again once all are armed",
     (
         f"{_DRIVER}/property_watch.py",
         "known = nearest_documented(firmware[node - 1]) -> "
         "known = nearest_documented(firmware[node - 2])",
-    ): "what is watched has the same number in every documented firmware",
+    ): "watched properties have the same number in every documented firmware",
     (
         f"{_DRIVER}/property_watch.py",
         "self._next = 0 -> self._next = 1",
-    ): "before a start it is not read; a test has the same line of `begin`",
+    ): "not read before a start; the same line of `begin` is tested",
     (
         f"{_DRIVER}/status_poller.py",
         "self._until_pendant = 0 -> self._until_pendant = 1",
-    ): "this cycle asks for the mode, and the next one for the word either way",
+    ): "this cycle requests the mode and the next one the pendant either way",
     (
         f"{_DRIVER}/safety_module.py",
         "_CONFIG_GAP_NS = 10000000 -> _CONFIG_GAP_NS = 20000000",
-    ): "a gap that is longer than promised keeps the promise",
+    ): "a longer gap than required satisfies the requirement",
     (
         "wam/model/clearance.py",
         "if (distances < limits).any(): -> if (distances <= limits).any():",
@@ -236,7 +236,7 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     (
         f"{_CONTROL}/friction_compensation.py",
         "if now == before: -> pass",
-    ): "a step of nothing bends nothing",
+    ): "a step of 0 bends no bristle",
     (
         f"{_CONTROL}/soft_walls.py",
         "if not low <= angle <= high: -> if not low < angle <= high:",
@@ -254,7 +254,7 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         f"{_DRIVER}/home.py",
         "wrapped = (apart + turn / 2) % turn - turn / 2 -> "
         "wrapped = (apart - turn / 2) % turn - turn / 2",
-    ): "half a turn more or less is the same of a whole one",
+    ): "plus and minus half a turn are equal modulo a whole turn",
     (
         f"{_DRIVER}/safety_module.py",
         "while self._clock.now_ns() < deadline_ns: -> "
@@ -264,11 +264,11 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         f"{_DRIVER}/safety_module.py",
         "self._properties.pause(_RETRY_NS // 10) -> "
         "self._properties.pause(_RETRY_NS // 20)",
-    ): "how often is asked within a fixed time",
+    ): "the number of requests within a fixed time",
     (
         "ft_sensor/payload.py",
         "if force_7.ndim == 1: -> pass",
-    ): "the general product gives the same of one reading, slower",
+    ): "the general product gives the same for a single reading, slower",
     (
         "acquisition/ipc/loop_server.py",
         "if self._cycle.is_recording and now_ns - heartbeats.last_ns(_RECORDER) > "
@@ -293,12 +293,12 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     (
         f"{_CONTROL}/friction_compensation.py",
         "self._rested_ns = -_FADE_NS -> self._rested_ns = +_FADE_NS",
-    ): "what fades before anything was pushed is 0 all the time",
+    ): "before the first push the fading torque is always 0",
     (
         f"{_CONTROL}/friction_compensation.py",
         "if load and (less := (load_at - abs(load_torque))) > 0.0: -> "
         "if load and (less := (load_at - abs(load_torque))) >= 0.0:",
-    ): "a load that is less by nothing takes nothing",
+    ): "a load reduced by 0 removes nothing",
     (
         f"{_CONTROL}/friction_compensation.py",
         "if z * step > 0.0 and (bent := abs(z)) > ELASTIC: -> "
@@ -318,7 +318,7 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         f"{_CONTROL}/friction_compensation.py",
         "tau *= np.where(self._j2mp != 0.0, free, 1.0).min(axis=1) -> "
         "tau *= np.where(self._j2mp != 0.0, free, 2.0).min(axis=1)",
-    ): "every motor turns a joint, and no joint is freer than 1",
+    ): "every motor turns a joint, and no joint's factor exceeds 1",
     (
         f"{_CONTROL}/friction_compensation.py",
         "self._fading = np.zeros(7) -> self._fading = np.zeros(8)",
@@ -340,12 +340,12 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         f"{_CONTROL}/friction_compensation.py",
         "if z * step > 0.0 and (bent := abs(z)) > ELASTIC: -> "
         "if z * step > 0.0 and (bent := abs(z)) >= ELASTIC:",
-    ): "where a bristle begins to slide its plastic share is 0",
+    ): "at the onset of sliding the plastic share of a bristle is 0",
     (
         f"{_CONTROL}/friction_compensation.py",
         "level = forward if z > 0.0 else backward -> "
         "level = forward if z >= 0.0 else backward",
-    ): "a bristle that is not bent pushes nothing, whatever its level",
+    ): "an unbent bristle exerts no force, whatever its level",
     (
         f"{_CONTROL}/friction_compensation.py",
         "way = 1 if z > _BENT else -1 if z < -_BENT else 0 -> "
@@ -383,7 +383,7 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         f"{_CONTROL}/soft_walls.py",
         "inward = 1.0 if depth > 0.0 else -1.0 -> "
         "inward = 1.0 if depth >= 0.0 else -1.0",
-    ): "a joint without depth is in no wall",
+    ): "a joint at depth 0 is not inside a wall",
     (
         f"{_CONTROL}/soft_walls.py",
         "if lower <= angle <= upper: -> if lower < angle <= upper:",
@@ -391,7 +391,7 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     (
         f"{_CONTROL}/soft_walls.py",
         "if push > 0.0: -> if push >= 0.0:",
-    ): "a push of 0 leaves a torque as it is, whichever way it is bounded",
+    ): "a push of 0 leaves the torque unchanged on either branch",
     (
         f"{_LOOP}/contact.py",
         "return 0 < since_ns <= now_ns - LASTING_NS -> "
@@ -417,11 +417,11 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     (
         f"{_DRIVER}/status_poller.py",
         "if reply.value is None: -> pass",
-    ): "a decoded reply has a value; the look is for the type checker",
+    ): "a decoded reply has a value; the check is for the type checker",
     (
         f"{_DRIVER}/status_poller.py",
         "self._until_mode = 0 -> self._until_mode = 1",
-    ): "the first cycle asks either way",
+    ): "the first cycle sends the request either way",
     (
         f"{_DRIVER}/joint_estimator.py",
         "ahead = elapsed if elapsed < _LONGEST_GUESS else _LONGEST_GUESS -> "
@@ -443,7 +443,7 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     (
         "wam/model/clearance.py",
         f"{_BODIES.format(1)} -> {_BODIES.format(2)}",
-    ): "the axes of joints 1 and 2 meet in the middle of the ball",
+    ): "the axes of joints 1 and 2 meet at the centre of the sphere",
     (
         "wam/calibration/free_space.py",
         "return bool(heights.min() >= min(floor, heights[0], heights[-1]) - _SLACK) -> "
@@ -460,7 +460,7 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         "wam/calibration/free_space.py",
         "return np.stack([x, y, reach * np.cos(q[:, 1]) - width], axis=-1) -> "
         "return np.stack([x, y, reach * np.cos(q[:, 1]) - width], axis=+1)",
-    ): "the last axis of two is the second",
+    ): "of two axes, the last one is axis 1",
     ("wam/calibration/poses.py", "_CANDIDATES = 1000 -> _CANDIDATES = 2000"): _TUNED,
     ("wam/calibration/poses.py", "_SEED = 7 -> _SEED = 8"): _TUNED,
     (
@@ -491,7 +491,7 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         f"{_RUN}/tare.py",
         "residual = residual_force(tared, known) if known is not None else 0.0 -> "
         "residual = residual_force(tared, known) if known is not None else 1.0",
-    ): "of an unknown bias it is not looked at",
+    ): "not read if the bias is unknown",
     (
         f"{_RUN}/tare.py",
         "while still < STILL_SECONDS: -> while still <= STILL_SECONDS:",
@@ -513,7 +513,7 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     (
         f"{_CONTROL}/proof.py",
         "limit = low if way < low else high -> limit = low if way <= low else high",
-    ): "a joint at the end of its way has been let pass before",
+    ): "a joint at the end of its range was already accepted before",
     (
         f"{_CONTROL}/position_control.py",
         "if length * self.acceleration < self.speed ** 2: -> "
@@ -523,17 +523,17 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         f"{_CONTROL}/position_control.py",
         "if error * rate > 0.0 and (not -_SLOW <= rate <= _SLOW): -> "
         "if error * rate >= 0.0 and (not -_SLOW <= rate <= _SLOW):",
-    ): "a spring that is not stretched pulls nothing, at every speed",
+    ): "an unstretched spring exerts no force at any speed",
     (
         "wam/calibration/free_space.py",
         "reach, width = (constants.d[2], abs(constants.a[2])) -> "
         "reach, width = (constants.d[2], abs(constants.a[3]))",
-    ): "the elbow's axis is as far off the upper arm as off the forearm",
+    ): "the elbow axis has the same offset from the upper arm and the forearm",
     (
         "wam/calibration/poses.py",
         "down = [-model.plate_pose(q)[1][2] for q in reachable] -> "
         "down = [+model.plate_pose(q)[1][2] for q in reachable]",
-    ): "up tells as much as down",
+    ): "up carries the same information as down",
     (
         "wam/calibration/poses.py",
         "reachable = [q for q in drawn[heights > space.floor] if all((space.holds("
@@ -569,14 +569,14 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         "wam/bus/frames.py",
         "if not -TORQUE_LIMIT <= value <= TORQUE_LIMIT: -> "
         "if not +TORQUE_LIMIT <= value <= TORQUE_LIMIT:",
-    ): "what is within the limits is clipped to itself",
+    ): "clipping leaves values within the limits unchanged",
     (
         "wam/calibration/poses.py",
         "heights = np.min([lowest(model, drawn + side) for side in sides], axis=0) -> "
         "heights = np.min([lowest(model, drawn - side) for side in sides], axis=0)",
     ): "the sides are the same on both sides",
 }
-# What is no number makes any sum of it none, whatever the signs.
+# NaN makes any sum NaN, whatever the signs.
 _TOTAL = "total = sum(facts.q) + sum(facts.qd) + sum(facts.tau)"
 _FINITE = "if isfinite(total + seen.foot_speed + seen.joint7_offset):"
 for _text, _other in (
@@ -586,7 +586,7 @@ for _text, _other in (
     (_FINITE, _FINITE.replace("+ seen.joint7", "- seen.joint7")),
 ):
     EQUIVALENT[f"{_LOOP}/guard.py", f"{_text} -> {_other}"] = (
-        "of no number every sum and difference is none"
+        "every sum and difference with NaN is NaN"
     )
 _BOUNDED = (
     "value = low if wanted < low else high if wanted > high else wanted",
@@ -596,4 +596,4 @@ for _text in _BOUNDED:
     for _strict, _loose in (("< ", "<= "), ("> ", ">= ")):
         EQUIVALENT[
             f"{_LOOP}/limits.py", f"{_text} -> {_text.replace(_strict, _loose)}"
-        ] = "a number at its bound is the bound"
+        ] = "a number at its bound equals the bound"

@@ -1,11 +1,11 @@
-"""README's commands, one after the other as on a fresh machine, timed.
+"""Run and time README's commands in order, as on a fresh machine.
 
     python -m benchmarks.newcomer [--without "make test"]
 
-Every command of README, its Python example last, runs in an empty folder with an empty
-home, where only what the shell needs is set; the repository is cloned from here. A
-command with a screen gets a terminal of 80 x 24, and the keys that it asks for. The
-first that fails ends the run with its last words.
+The commands of README and then its Python example run in an empty home folder with a
+minimal environment; the repository is cloned from this one. Commands run in a terminal
+of 80 x 24 and get the keys that their screens ask for. The first failure ends the run
+and its last output is printed.
 """
 
 import argparse
@@ -29,23 +29,24 @@ from benchmarks.surroundings import surroundings
 ADDRESS = "URL-OF-THIS-REPOSITORY"
 _BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 _COMMENT = re.compile(r"\s{2,}#.*")
-_KEPT = re.compile("PATH$|LANG$|PIP_|SSL_|HTTPS?_PROXY")  # where packages come from
+# Environment variables passed on: path, language and the source of packages.
+_PASSED_ON = re.compile("PATH$|LANG$|PIP_|SSL_|HTTPS?_PROXY")
 _PIP = Path("~/.config/pip/pip.conf").expanduser()
-_KEYS = (("[k]", "k"), ("[space]", " "))  # what a screen asks for, and what is pressed
-_PATIENCE = 1.0  # s between two keys
-_LAST = 2000  # characters of a screen that are looked at
+_KEYS = (("[k]", "k"), ("[space]", " "))  # prompt on the screen, key to press
+_KEY_INTERVAL = 1.0  # s
+_TAIL = 2000  # characters of output that are searched
 _LIMIT_S = 1800.0
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One command and what it took.
+    """One command and its result.
 
     Attributes:
-        text: as README has it.
-        seconds: that it took.
-        code: that it ended with.
-        words: its last words.
+        text: the command as in README.
+        seconds: its duration [s].
+        code: its exit code.
+        words: the end of its output.
     """
 
     text: str
@@ -55,7 +56,7 @@ class Step:
 
 
 def commands_of(page: str) -> list[str]:
-    """Return the commands of README's blocks without a language, in order."""
+    """Return the commands of README's code blocks without a language, in order."""
     lines = [
         line
         for language, block in _BLOCK.findall(page)
@@ -71,16 +72,16 @@ def example_of(page: str) -> str:
 
 
 class Newcomer:
-    """Somebody with an empty home who types what README says."""
+    """A shell user with an empty home folder who types README's commands."""
 
     def __init__(self, home: Path) -> None:
         self.folder = home
-        kept = {name: text for name, text in os.environ.items() if _KEPT.match(name)}
-        self._surroundings = {"PIP_CONFIG_FILE": str(_PIP)} if _PIP.exists() else {}
-        self._surroundings |= kept | {"HOME": str(home), "TERM": "xterm-256color"}
+        kept = {name: v for name, v in os.environ.items() if _PASSED_ON.match(name)}
+        self._environment = {"PIP_CONFIG_FILE": str(_PIP)} if _PIP.exists() else {}
+        self._environment |= kept | {"HOME": str(home), "TERM": "xterm-256color"}
 
     def type(self, text: str) -> Step:
-        """Run one line in the shell; press the keys that its screen asks for."""
+        """Run one line in the shell and press the keys that its screen asks for."""
         line = text.replace(ADDRESS, str(ROOT))
         screen, program = pty.openpty()
         fcntl.ioctl(program, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
@@ -88,14 +89,14 @@ class Newcomer:
         process = subprocess.Popen(
             ["bash", "-c", f"{line}\npwd > '{self._folder_file}'"],
             cwd=self.folder,
-            env=self._surroundings,
+            env=self._environment,
             stdin=program,
             stdout=program,
             stderr=program,
             start_new_session=True,
         )
         os.close(program)
-        words = _sit_at(screen, process, start + _LIMIT_S)
+        words = _press_keys(screen, process, start + _LIMIT_S)
         seconds = time.monotonic() - start
         code = process.wait()
         os.close(screen)
@@ -105,34 +106,34 @@ class Newcomer:
 
     @property
     def _folder_file(self) -> Path:
-        return Path(self._surroundings["HOME"]) / "place"
+        return Path(self._environment["HOME"]) / "place"
 
 
-def _sit_at(screen: int, process: subprocess.Popen, end: float) -> str:
-    """Press what is asked for until the program has ended; return its last words.
+def _press_keys(screen: int, process: subprocess.Popen, end: float) -> str:
+    """Press the requested keys until the program ends; return the end of its output.
 
-    A key that comes with its question may be forgotten: it is pressed again while the
-    question is the last.
+    A key pressed while its prompt is still being drawn may be lost, so it is pressed
+    again while the prompt is the last one.
     """
-    words, pressed = "", time.monotonic() - _PATIENCE
+    words, pressed = "", time.monotonic() - _KEY_INTERVAL
     while time.monotonic() < end:
         if select.select([screen], [], [], 0.2)[0]:
             try:
                 words += os.read(screen, 65536).decode(errors="replace")
             except OSError:  # the other end is closed
-                return words[-_LAST:]
+                return words[-_TAIL:]
         elif process.poll() is not None:
-            return words[-_LAST:]
-        key = _key_for(words[-_LAST:])
-        if key and time.monotonic() - pressed >= _PATIENCE:
+            return words[-_TAIL:]
+        key = _key_for(words[-_TAIL:])
+        if key and time.monotonic() - pressed >= _KEY_INTERVAL:
             os.write(screen, key.encode())
             pressed = time.monotonic()
     process.kill()
-    return words[-_LAST:]
+    return words[-_TAIL:]
 
 
 def _key_for(words: str) -> str:
-    """Return the key that the last question on a screen asks for, empty for none."""
+    """Return the key for the last prompt on a screen, "" for none."""
     for line in reversed(words.splitlines()):
         for question, key in _KEYS:
             if question in line:
@@ -141,32 +142,32 @@ def _key_for(words: str) -> str:
 
 
 def print_step(step: Step) -> Step:
-    """Print what a step took."""
+    """Print the duration of a step; return the step."""
     print(f"{step.seconds:7.1f} s  {step.text}", flush=True)
     return step
 
 
 def walk(home: Path, without: list[str]) -> list[Step]:
-    """Return the steps of a newcomer, up to the first that fails."""
+    """Run README's commands up to the first failure; return the steps."""
     page = README.read_text()
-    somebody = Newcomer(home)
+    user = Newcomer(home)
     steps = list[Step]()
     for text in (x for x in commands_of(page) if x not in without):
-        steps.append(print_step(somebody.type(text)))
+        steps.append(print_step(user.type(text)))
         if steps[-1].code:
             return steps
-    (somebody.folder / "example.py").write_text(example_of(page))
-    steps.append(print_step(somebody.type(".venv/bin/python example.py")))
+    (user.folder / "example.py").write_text(example_of(page))
+    steps.append(print_step(user.type(".venv/bin/python example.py")))
     return steps
 
 
 def main() -> int:
-    """Run the commands, print what they took; return 1 where one failed."""
+    """Run the commands and print their durations; return 1 if one failed."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--without", action="append", default=[], metavar="COMMAND")
-    given = parser.parse_args()
+    args = parser.parse_args()
     with tempfile.TemporaryDirectory() as home:
-        steps = walk(Path(home), given.without)
+        steps = walk(Path(home), args.without)
     if steps[-1].code:
         print(steps[-1].words)
         return 1

@@ -1,9 +1,9 @@
-"""Do the fits of a study reach the best of twenty starts? Every fold, every model.
+"""Check that a study's fits reach the best of twenty starts, in every fold and model.
 
-Twenty starts for each: half anywhere in the box of the search, half where fits usually
-end. Best is the best of these and of our search. A Gaussian process has missed it if
-its log likelihood is more than 0.05 nat lower, a Tustin fit if its sum of squares is
-more than 1e-4 larger. Every process is fitted with a level of each trial, too.
+Half of the starts are drawn from the whole search box, half from the region where fits
+usually end. The best is that of these and of our search. A Gaussian process misses it
+if its log likelihood is more than 0.05 nat lower, a Tustin fit if its sum of squares is
+more than 1e-4 larger. Every process is fitted with and without trial levels.
 """
 
 import argparse
@@ -31,21 +31,21 @@ from benchmarks.study_race import FITS, folds_of, given
 
 _STARTS = 20
 _MISSED = 0.05  # nat
-_SQUARES = 1e-4  # of their sum
+_SQUARES = 1e-4  # relative to the sum of squares
 _LEVEL = " + level"
 
 
 @dataclass(frozen=True)
 class RawRecord:
-    """What one fit reached beside the best of twenty starts.
+    """Optimum of one fit, compared with the best of twenty starts.
 
     Attributes:
-        fold: terrain and its fold.
-        model: its name.
-        ours: log likelihood, or minus the sum of squares.
+        fold: terrain and fold number.
+        model: name of the model.
+        ours: log likelihood, or minus the sum of squares, of our search.
         best: the same of the best of all runs.
-        is_missed: ours is lower by more than the tolerance.
-        evaluations: how often our search evaluated the likelihood.
+        is_missed: `ours` is lower than `best` by more than the tolerance.
+        evaluations: number of likelihood evaluations of our search.
         seconds: processor time of our search [s].
     """
 
@@ -59,13 +59,13 @@ class RawRecord:
 
 
 def examine(task: FoldTask) -> list[RawRecord]:
-    """Return what the models of one fold reached."""
+    """Fit the models of one fold and return their optima."""
     chosen = choose_rows(task)
     rows = given(task)
     sse, best = rows.curve.sse, many_starts(task.training)
     fold = f"{task.terrain} fold {task.fold + 1}"
     is_missed = sse > (1.0 + _SQUARES) * best
-    found = [RawRecord(fold, TUSTIN, -sse, -min(sse, best), is_missed, 0, 0.0)]
+    records = [RawRecord(fold, TUSTIN, -sse, -min(sse, best), is_missed, 0, 0.0)]
     training = TrainingSet(task.training, task.lengths, chosen)
     trial, order = training.trial_of()[chosen], np.argsort(chosen)
     trials = TrialRows(trial[order])
@@ -76,23 +76,23 @@ def examine(task: FoldTask) -> list[RawRecord]:
         for title, likelihood in ((name, alone), (name + _LEVEL, level)):
             before = time.process_time()
             ours = likeliest(likelihood)
-            spent = time.process_time() - before
+            cpu_s = time.process_time() - before
             best = max(ours.lml, twenty(likelihood, task.fold))
             count = sum(start.evaluations for start in ours.starts)
             is_missed = ours.lml < best - _MISSED
-            found.append(
-                RawRecord(fold, title, ours.lml, best, is_missed, count, spent)
+            records.append(
+                RawRecord(fold, title, ours.lml, best, is_missed, count, cpu_s)
             )
-    return found
+    return records
 
 
 def twenty(likelihood: Likelihood, seed: int) -> float:
-    """Return the largest log likelihood that twenty starts reach."""
+    """Return the largest log likelihood reached from twenty starts."""
     kernel, noise, sd = likelihood.kernel, likelihood.noise, float(likelihood.r.std())
     box = np.vstack([bounds(kernel, sd, np.ones(2)), noise.bounds(sd)])
-    middle = np.log([sd, *np.ones(len(kernel.names) - 1)])
-    middle = np.concatenate([middle, noise.start(sd)])
-    near = np.clip(np.column_stack([middle - 2.3, middle + 2.3]).T, *box.T)
+    centre = np.log([sd, *np.ones(len(kernel.names) - 1)])
+    centre = np.concatenate([centre, noise.start(sd)])
+    near = np.clip(np.column_stack([centre - 2.3, centre + 2.3]).T, *box.T)
     rng, half = np.random.default_rng(seed), _STARTS // 2
     starts: list[Array] = [
         *rng.uniform(*box.T, (half, box.shape[0])),
@@ -102,27 +102,28 @@ def twenty(likelihood: Likelihood, seed: int) -> float:
     return max(climb(posterior, start, box).value for start in starts)
 
 
-def summary(found: Sequence[RawRecord]) -> list[str]:
-    """Return what to print: a line for every model, and every fit that missed."""
+def summary(records: Sequence[RawRecord]) -> list[str]:
+    """Return the printed lines: one per model, and one per fit that missed."""
     lines = []
-    for name in dict.fromkeys(one.model for one in found):
-        group = [one for one in found if one.model == name]
-        missed = sum(one.is_missed for one in group)
+    for name in dict.fromkeys(record.model for record in records):
+        group = [record for record in records if record.model == name]
+        missed = sum(record.is_missed for record in group)
         line = f"{name}: {missed} of {len(group)} fits missed the best of {_STARTS}"
         if name != TUSTIN:
-            count, spent = np.mean(
-                [(one.evaluations, one.seconds) for one in group], axis=0
+            count, cpu_s = np.mean(
+                [(record.evaluations, record.seconds) for record in group], axis=0
             )
-            loss = np.mean([one.best - one.ours for one in group])
+            loss = np.mean([record.best - record.ours for record in group])
             line += (
                 f" starts ({missed / len(group):.0%}, mean loss {loss:.3f} nat), "
-                f"{count:.0f} evaluations, {1e3 * spent:.0f} ms"
+                f"{count:.0f} evaluations, {1e3 * cpu_s:.0f} ms"
             )
         lines.append(line)
     return lines + [
-        f"  missed: {one.fold} {one.model}: {one.ours:.4f}, best {one.best:.4f}"
-        for one in found
-        if one.is_missed
+        f"  missed: {record.fold} {record.model}: {record.ours:.4f}, "
+        f"best {record.best:.4f}"
+        for record in records
+        if record.is_missed
     ]
 
 
@@ -132,8 +133,8 @@ def main() -> None:
     parser.add_argument("trials", type=Path, nargs="?", default=SLICE, help="npz")
     parser.add_argument("--jobs", type=int, default=1)
     arguments = parser.parse_args()
-    found = run_tasks(examine, folds_of(arguments.trials), arguments.jobs)
-    for line in summary([one for fold in found for one in fold]):
+    folds = run_tasks(examine, folds_of(arguments.trials), arguments.jobs)
+    for line in summary([record for fold in folds for record in fold]):
         print(line)
 
 

@@ -1,11 +1,11 @@
-"""Simulated sessions at the pace of the wall clock, on a busy machine and waiting.
+"""Paced simulated sessions on a busy machine, and their processor use while waiting.
 
 python -m benchmarks.paced [--trials 10] [--busy 4] [--waiting 60] [--terrain TF]
 
-Runs a paced session beside so many busy processes a core, and the same with --fast:
-the trials have to be equal byte for byte. Printed are exit code, how much of real time
-was kept, and, at the first prompt of a session that nobody answers, how much of a core
-it takes, paced and with --fast. With --busy 0 the machine has to be quiet.
+Runs a paced session alongside N busy processes per core, and the same session with
+--fast: the trials must be equal byte for byte. Prints the exit codes, the simulated
+over the wall time, and the share of a core that a session uses at its unanswered first
+prompt, paced and with --fast. With --busy 0 the machine must be idle.
 """
 
 import argparse
@@ -28,7 +28,7 @@ PROGRAM = (sys.executable, "-m", "experiments")
 
 
 def session(data: Path, terrain: str, trials: int, *more: str) -> tuple[int, float]:
-    """Run a session; return its exit code and how much of real time it kept."""
+    """Run a session; return its exit code and the ratio of simulated to wall time."""
     command = ("run", terrain, "--fake", "--operator-script", "auto", *more)
     options = ("--trials", str(trials), "--data", str(data))
     process = subprocess.Popen(
@@ -55,20 +55,20 @@ def digests(data: Path) -> list[str]:
 
 
 def share_while_waiting(data: Path, seconds: float, *more: str) -> float:
-    """Return the share of a core that a session takes at its first prompt."""
+    """Return the share of a core that a session uses at its first prompt."""
     main, child = pty.openpty()
     command = ("run", "TF", "--fake", "--trials", "1", "--data", str(data), *more)
     process = subprocess.Popen(
         (*PROGRAM, *command), stdin=child, stdout=child, stderr=child
     )
     try:
-        seen = b""
-        while b"[space]" not in seen:
-            seen += os.read(main, 4096)
+        output = b""
+        while b"[space]" not in output:
+            output += os.read(main, 4096)
         time.sleep(2.0)
-        before = _used(process.pid)
+        before = _cpu_time(process.pid)
         time.sleep(seconds)
-        return (_used(process.pid) - before) / seconds
+        return (_cpu_time(process.pid) - before) / seconds
     finally:
         process.kill()
         process.wait()
@@ -76,17 +76,17 @@ def share_while_waiting(data: Path, seconds: float, *more: str) -> float:
         os.close(child)
 
 
-def _used(pid: int) -> float:
+def _cpu_time(pid: int) -> float:
     """Return the processor time of a process [s]."""
     fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def main() -> int:
-    """Measure and print; return 1 where a trial differs or waiting costs too much."""
+    """Measure and print; return 1 if a trial differs or waiting costs too much."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--trials", type=int, default=10)
-    parser.add_argument("--busy", type=int, default=4, help="processes a core (4)")
+    parser.add_argument("--busy", type=int, default=4, help="processes per core (4)")
     parser.add_argument("--waiting", type=float, default=60.0, help="seconds (60)")
     parser.add_argument("--terrain", default="TF")
     args = parser.parse_args()
@@ -108,7 +108,7 @@ def main() -> int:
         fast, speed = session(folders[1], args.terrain, args.trials, "--fast")
         is_equal = digests(folders[0]) == digests(folders[1]) != []
         print(
-            f"paced beside {len(busy)} busy processes: exit {code}, {share:.2f} x real "
+            f"paced, {len(busy)} busy processes: exit {code}, {share:.2f} x real "
             f"time, {args.trials} trials; --fast: exit {fast}, {speed:.2f} x; trials "
             f"{'equal byte for byte' if is_equal else 'DIFFER'}"
         )

@@ -1,10 +1,10 @@
-"""What one frame of a wrist sensor costs, from bytes to a dated sample.
+"""Cost of one wrist-sensor frame, from bytes to a time-stamped sample.
 
     python -m benchmarks.parsing [--frames 20000]
 
-Each sensor's stream is fed in pieces as they come while the loop runs (3 ms), and at
-once; the dating is that of the product. The last column is how many times the stream's
-own rate one core keeps up with.
+Each sensor's stream is parsed in pieces of 3 ms, as in the running loop, and all at
+once; time stamps come from the product's timestamper. The last column is the number of
+such streams that one core keeps up with.
 """
 
 import argparse
@@ -30,7 +30,7 @@ SENSITIVITY = (18.28, 18.41, 2.12, 278.72, 259.55, 448.47)
 
 
 def devices() -> dict[str, SerialDevice]:
-    """Return the driver of each kind."""
+    """Return a driver of each sensor kind."""
     return {
         "bota": BotaDevice(PortSettings("none", 460800), BotaSettings()),
         "robotous": RobotousDevice(PortSettings("none", 921600), RobotousSettings()),
@@ -44,7 +44,7 @@ def devices() -> dict[str, SerialDevice]:
 
 
 def pieces(kind: str, frames: int, device: SerialDevice) -> list[tuple[int, bytes]]:
-    """Return (arrival [ns], bytes) of a stream, every 3 ms what has come."""
+    """Return (arrival [ns], bytes) of a stream, in pieces of 3 ms."""
 
     def load(t_ns: int) -> tuple[float, ...]:
         return tuple(3.0 * math.sin(t_ns * 1e-8 + axis) for axis in range(6))
@@ -58,7 +58,7 @@ def pieces(kind: str, frames: int, device: SerialDevice) -> list[tuple[int, byte
 
 
 def cost_us(device: SerialDevice, stream: list[tuple[int, bytes]]) -> float:
-    """Return the time of one frame from bytes to a dated sample [us]."""
+    """Return the time per frame from bytes to a time-stamped sample [us]."""
     scanner, timestamper = device.scanner(), SampleTimestamper(device.timing)
     count = 0
     begun_ns = CLOCK.now_ns()
@@ -68,7 +68,7 @@ def cost_us(device: SerialDevice, stream: list[tuple[int, bytes]]) -> float:
 
 
 def scan_us(device: SerialDevice, stream: list[tuple[int, bytes]]) -> float:
-    """Return the time of one frame from bytes to numbers, all bytes at once [us]."""
+    """Return the time per frame from bytes to numbers, all bytes at once [us]."""
     data = b"".join(data for _, data in stream)
     scanner = device.scanner()
     begun_ns = CLOCK.now_ns()

@@ -1,12 +1,12 @@
-"""Forces drawn along recorded paths, beside those recorded.
+"""Forces sampled along recorded paths, compared with the recorded forces.
 
     python -m benchmarks.path_samples TABLE|SESSION ... [--data DIR] [--count 200]
 
-Each trial is left out: the quantiles come from the model of the other trials, and so
-does the copula, from the normal scores that these have when they are left out. For
-every terrain: energy score of half-second pieces over that of independent rows with the
-same quantiles, and correlation of normal scores 1 and 20 kept samples apart, recorded
-and drawn, around 0.
+Each trial is held out in turn: the quantiles come from the model of the other trials,
+the copula from the held-out normal scores of the other trials. Printed per terrain: the
+energy score of half-second pieces relative to independent samples with the same
+quantiles, and the correlation about 0 of normal scores 1 and 20 kept samples apart, of
+recorded and sampled trials.
 """
 
 import argparse
@@ -27,21 +27,21 @@ from analysis.terrains.table import Table, rows_of
 from traction.trials import Trial
 
 PIECE = 50  # kept samples: 0.5 s
-COUNT = 200  # trials drawn along each path
-NEAR, FAR = 1, 20  # kept samples apart
-_POINTS = 32  # of each axis of a table
+COUNT = 200  # trials sampled along each path
+NEAR, FAR = 1, 20  # lags [kept samples]
+_POINTS = 32  # per axis of a table
 _OPTIONS = PrepareOptions()
 
 
 @dataclass(frozen=True, slots=True)
 class SampledTerrain:
-    """How trials drawn on a terrain compare with those recorded there.
+    """Comparison of sampled and recorded trials of a terrain.
 
     Attributes:
-        terrain: its name.
-        energy_ratio: mean energy score over that of independent rows.
-        recorded: correlations of recorded scores, near and far.
-        drawn: those of drawn scores.
+        terrain: name of the terrain.
+        energy_ratio: mean energy score relative to independent samples.
+        recorded: correlations of recorded normal scores at the near and far lag.
+        drawn: the same of sampled trials.
     """
 
     terrain: str
@@ -59,7 +59,7 @@ def compare_samples(
     for trial in trials:
         by_terrain.setdefault(trial.terrain, []).append(trial.kept)
     return [
-        _compared(
+        _comparison(
             name,
             [
                 (prepared[k], fold.models[GP_SE_TRIAL].model)
@@ -74,7 +74,7 @@ def compare_samples(
     ]
 
 
-def _compared(
+def _comparison(
     name: str,
     held_out: Sequence[tuple[PreparedTrial, FittedModel]],
     count: int,
@@ -88,33 +88,32 @@ def _compared(
     drawn: list[ScoredTrial] = []
     scores: list[tuple[float, float]] = []
     for k, (trial, model) in enumerate(held_out):
-        terrain = _known(name, trial, model, [*recorded[:k], *recorded[k + 1 :]])
-        forces = _drawn_along(terrain, trial, count, rng)
-        alone = terrain.predict(trial.F_n, trial.v_t)
-        rows = alone.at_scores(rng.standard_normal(forces.shape))
+        terrain = _tabulated(name, trial, model, [*recorded[:k], *recorded[k + 1 :]])
+        forces = _sampled_forces(terrain, trial, count, rng)
+        marginal = terrain.predict(trial.F_n, trial.v_t)
+        independent = marginal.at_scores(rng.standard_normal(forces.shape))
         for begin in range(0, trial.kept - PIECE + 1, PIECE):
             piece = slice(begin, begin + PIECE)
             truth = trial.F_t[piece]
-            pair = (energy_score(f[:, piece], truth) for f in (forces, rows))
+            pair = (energy_score(f[:, piece], truth) for f in (forces, independent))
             scores.append((next(pair), next(pair)))
         prediction = model.predict(trial.F_n, trial.v_t)
-        for one in forces[:20]:
-            made = ScoredTrial.of(replace(trial, F_t=one), prediction, slowest)
-            drawn.append(made)
-    ours, independent = np.mean(scores, axis=0)
-    return SampledTerrain(
-        name, float(ours / independent), _correlations(recorded), _correlations(drawn)
-    )
+        for force in forces[:20]:
+            sampled = ScoredTrial.of(replace(trial, F_t=force), prediction, slowest)
+            drawn.append(sampled)
+    of_copula, of_independent = np.mean(scores, axis=0)
+    ratio = float(of_copula / of_independent)
+    return SampledTerrain(name, ratio, _correlations(recorded), _correlations(drawn))
 
 
 def _correlations(trials: Sequence[ScoredTrial]) -> tuple[float, float]:
     return lag_correlation(trials, NEAR), lag_correlation(trials, FAR)
 
 
-def _known(
+def _tabulated(
     name: str, trial: PreparedTrial, model: FittedModel, others: Sequence[ScoredTrial]
 ) -> KnownTerrain:
-    """Return a terrain that knows nothing of a trial, tabulated over its range."""
+    """Return a terrain fitted without `trial`, tabulated over the trial's range."""
     F_n = np.linspace(trial.F_n.min(), trial.F_n.max(), _POINTS)
     v_t = np.geomspace(_OPTIONS.slowest, _OPTIONS.fastest, _POINTS)
     grid = (axis.ravel() for axis in np.meshgrid(F_n, v_t, indexing="ij"))
@@ -125,7 +124,7 @@ def _known(
         name=name,
         kind=name,
         trials=len(others),
-        samples=sum(one.score.size for one in others),
+        samples=sum(other.score.size for other in others),
         rho=0.0,
         limits={},
         tables={GP_SE_TRIAL: table},
@@ -135,12 +134,12 @@ def _known(
     )
 
 
-def _drawn_along(
+def _sampled_forces(
     terrain: KnownTerrain, trial: PreparedTrial, count: int, rng: np.random.Generator
 ) -> Array:
-    """Return forces at the kept samples of a trial [N], shape (count, n).
+    """Return sampled forces at the kept samples of a trial [N], shape (count, n).
 
-    They are drawn along all of its thinned path, where the foot sticks included.
+    They are sampled along the whole thinned path, including where the foot sticks.
     """
     first, last = trial.indices[[0, -1]]
     rows = np.arange(first, last + 1, trial.widths[1])
@@ -154,18 +153,18 @@ def energy_score(draws: Array, truth: Array) -> float:
     """Return the energy score of a path [N]: Gneiting and Raftery (2007), section 4.3.
 
     Args:
-        draws: paths drawn [N], shape (count, n).
-        truth: the one recorded [N], shape (n,).
+        draws: sampled paths [N], shape (count, n).
+        truth: the recorded path [N], shape (n,).
     """
     count = len(draws)
     squares = (draws**2).sum(axis=1)
-    apart = np.add.outer(squares, squares) - 2.0 * draws @ draws.T
-    spread = np.sqrt(np.maximum(apart, 0.0)).sum() / (count * (count - 1))
+    distances2 = np.add.outer(squares, squares) - 2.0 * draws @ draws.T
+    spread = np.sqrt(np.maximum(distances2, 0.0)).sum() / (count * (count - 1))
     return float(np.linalg.norm(draws - truth, axis=1).mean() - 0.5 * spread)
 
 
 def loaded(sources: Iterable[str], data: Path) -> list[Trial]:
-    """Return the trials of tables that are there, and of sessions by their names."""
+    """Return the trials of sources: paths of tables, or names of sessions."""
     return [
         trial
         for source in sources
@@ -185,11 +184,11 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=COUNT)
     args = parser.parse_args()
     print("terrain   energy   lag 1: recorded drawn   lag 20: recorded drawn")
-    for one in compare_samples(loaded(args.sources, args.data), args.count):
+    for row in compare_samples(loaded(args.sources, args.data), args.count):
         print(
-            f"{one.terrain:9} {one.energy_ratio:6.3f}"
-            f"{one.recorded[0]:18.2f} {one.drawn[0]:5.2f}"
-            f"{one.recorded[1]:19.2f} {one.drawn[1]:5.2f}"
+            f"{row.terrain:9} {row.energy_ratio:6.3f}"
+            f"{row.recorded[0]:18.2f} {row.drawn[0]:5.2f}"
+            f"{row.recorded[1]:19.2f} {row.drawn[1]:5.2f}"
         )
 
 

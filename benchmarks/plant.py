@@ -1,9 +1,9 @@
 # pyright: reportMissingImports=false
-"""What one 2 ms cycle of the simulated arm costs, in contact on small stones.
+"""Cost of one 2 ms cycle of the simulated arm, in contact on small stones.
 
-A trial on level ground is simulated once to note what every part was given, once again
-to time whole cycles, and then each part by itself is given the same. Medians are over
-cycles in contact; integration is what the other parts leave of the whole.
+A trial on level ground is simulated once to record the inputs of every part, again to
+time whole cycles, and then each part alone is run on its recorded inputs. Medians are
+over cycles in contact; integration is the whole minus the other parts.
 """
 
 import argparse
@@ -35,17 +35,17 @@ from wam.model.tool import Tool, box_inertia, sensor_body
 GOAL_US = 160.0  # per cycle of four substeps
 SUBSTEPS = 4
 _EFFECTIVE_MASS = 0.30  # kg
-_SETTLING = 1000  # cycles in which the foot is put down
+_SETTLING = 1000  # cycles for putting the foot down
 _SEED, _TERRAIN, _TRIAL = 1, "S0", 1
 _FRAME = TerrainFrame(0.0, 0.0, (0.70, 0.0, 0.12), 0.45)
 _START = np.array([0.0, 0.7696, 0.0, 1.1857, 0.0, 1.1863, 0.0])
-_LOCK_KP, _LOCK_KD = 20.0, 0.2  # of joint 7: N m/rad, N m s/rad
+_LOCK_KP, _LOCK_KD = 20.0, 0.2  # lock of joint 7: N m/rad, N m s/rad
 _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
 @dataclass(frozen=True, slots=True)
 class PageSection:
-    """One part of a cycle as measured [us]; `share` is that of the whole's median."""
+    """Measured cost of one part of a cycle [us]; `share` is of the whole's median."""
 
     name: str
     median_us: float
@@ -55,7 +55,7 @@ class PageSection:
 
 @dataclass(slots=True)
 class Notes:
-    """What the parts were given: motions per substep, everything else per cycle."""
+    """Recorded inputs of the parts: motions per substep, everything else per cycle."""
 
     motions: list[Motion] = field(default_factory=list)
     views: list[HandView] = field(default_factory=list)
@@ -64,7 +64,7 @@ class Notes:
 
 
 class _NotedGround:
-    """A ground that notes how the foot moved on it."""
+    """A ground that records the motion of the foot."""
 
     def __init__(self, notes: Notes) -> None:
         self._notes = notes
@@ -78,10 +78,10 @@ class _NotedGround:
 
 
 def main() -> int:
-    """Measure and print; the exit code says nothing about the figures."""
+    """Measure and print; the exit code does not depend on the figures."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument(
-        "--cycles", type=_positive, default=4000, metavar="N", help="of a trial (4000)"
+        "--cycles", type=_positive, default=4000, metavar="N", help="per trial (4000)"
     )
     parser.add_argument("--json", action="store_true", help="print JSON instead")
     args = parser.parse_args()
@@ -97,7 +97,7 @@ def main() -> int:
 
 
 def measure(cycles: int) -> list[PageSection]:
-    """Simulate `cycles` of a push and return whole and parts."""
+    """Simulate `cycles` of a push and return the cost of the whole and of each part."""
     notes = Notes()
     for _ in _run(cycles, notes):
         pass
@@ -114,20 +114,20 @@ def measure(cycles: int) -> list[PageSection]:
     finally:
         gc.enable()
     timed["integration"] = [
-        whole - sum(rest) for whole, *rest in zip(*timed.values(), strict=True)
+        whole - sum(parts) for whole, *parts in zip(*timed.values(), strict=True)
     ]
-    kept = {
+    in_contact = {
         name: [
             us for us, touches in zip(row, notes.is_touching, strict=True) if touches
         ]
         for name, row in timed.items()
     }
-    whole = statistics.median(kept["whole"])
-    return [_part(name, row, whole) for name, row in kept.items()]
+    whole = statistics.median(in_contact["whole"])
+    return [_part(name, row, whole) for name, row in in_contact.items()]
 
 
 def _run(cycles: int, notes: Notes | None) -> Iterator[float]:
-    """Simulate a push; yield what each cycle took [us]."""
+    """Simulate a push; yield the time of each cycle [us]."""
     model = ArmModel(load_constants(), _tool())
     plant = _plant(model)
     plant.terrain = _ground() if notes is None else _NotedGround(notes)
@@ -159,7 +159,7 @@ def _note_views(plant: ArmPlant, notes: Notes) -> None:
 
 
 def _cycle(plant: ArmPlant, model: ArmModel) -> float:
-    """Let one cycle pass, weightless and with joint 7 locked; return its time [us]."""
+    """Advance one cycle, gravity-compensated, joint 7 locked; return its time [us]."""
     constants = model.constants
     tau = compensation(model, plant.q, _EFFECTIVE_MASS).copy()
     tau[6] -= _LOCK_KP * plant.q[6] + _LOCK_KD * plant.qd[6]
@@ -171,16 +171,16 @@ def _cycle(plant: ArmPlant, model: ArmModel) -> float:
 
 
 def _time(run: Callable[[int], None], cycles: int) -> list[float]:
-    took: list[float] = []
+    times: list[float] = []
     for cycle in range(cycles):
         begin = time.perf_counter_ns()
         run(cycle)
-        took.append((time.perf_counter_ns() - begin) * 1e-3)
-    return took
+        times.append((time.perf_counter_ns() - begin) * 1e-3)
+    return times
 
 
 def _pinocchio(notes: Notes) -> Callable[[int], None]:
-    """Return the calls of the library that a cycle makes."""
+    """Return a function that makes the Pinocchio calls of a cycle."""
     constants, tool = load_constants(), _tool()
     model = build_pinocchio(constants, (tool.sensor, tool.foot))
     frames = [add_point(model, constants, name, tool.sole) for name in ("a", "b")]
@@ -252,10 +252,10 @@ def _ground() -> Terrain:
     )
 
 
-def _part(name: str, took: list[float], whole: float) -> PageSection:
-    middle = statistics.median(took)
-    late = sorted(took)[math.ceil(0.99 * len(took)) - 1]
-    return PageSection(name, middle, late, middle / whole)
+def _part(name: str, times: list[float], whole: float) -> PageSection:
+    median = statistics.median(times)
+    p99 = sorted(times)[math.ceil(0.99 * len(times)) - 1]
+    return PageSection(name, median, p99, median / whole)
 
 
 def _print_table(parts: list[PageSection], cycles: int) -> None:

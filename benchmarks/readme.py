@@ -1,7 +1,7 @@
-"""README's figures of the demo, held against its results.
+"""Compare README's figures of the demo with the demo's results.
 
-Exit 1 where README drifted, or where the report warns of the simulated rig of the demo,
-which has no flaw.
+Exits with 1 if README is out of date, or if the report warns about the demo's simulated
+rig, which has no fault.
 
     make demo && python benchmarks/readme.py [--folder demo]
 """
@@ -21,18 +21,18 @@ _DRIFT = 0.05
 
 
 def demo_rows(fits: dict[str, Any]) -> list[str]:
-    """Return the rows of README's table that the demo's fits.json gives."""
+    """Return the rows of README's table from the demo's fits.json."""
     plate, stones = fits["terrains"]["TF"], fits["terrains"]["S0"]
-    true = next(t for t in fits["tables"] if t["name"] == "Measured against true")
+    errors = next(t for t in fits["tables"] if t["name"] == "Measured against true")
     v_t, F_t, F_n = (
-        statistics.median(float(row[column]) for row in true["rows"])
+        statistics.median(float(row[column]) for row in errors["rows"])
         for column in (1, 2, 3)
     )
     return [
         "| mean absolute error, plate with tread (TF): Tustin, GP, a constant "
         f"| {_errors(plate)} | `make demo`, Summary of the report |",
         f"| the same, small stones (S0) | {_errors(stones)} | same |",
-        f"| measured against true over the {len(true['rows'])} trials, median: v_t, "
+        f"| measured against true over the {len(errors['rows'])} trials, median: v_t, "
         f"F_t, F_n | {v_t:.1f} mm/s, {F_t:.2f} N, {F_n:.2f} N | same, table "
         '"Measured against true" |',
     ]
@@ -45,9 +45,9 @@ def _errors(terrain: dict[str, Any]) -> str:
 
 
 def is_same(row: str, printed: str) -> bool:
-    """Return whether a line of README says what a row does, to 5 % of each number.
+    """Return whether a line of README equals a row, each number within 5 %.
 
-    Libraries of linear algebra differ in the last digits from machine to machine.
+    Linear-algebra libraries differ in the last digits from machine to machine.
     """
     if _NUMBER.sub("#", row) != _NUMBER.sub("#", printed):
         return False
@@ -56,7 +56,7 @@ def is_same(row: str, printed: str) -> bool:
 
 
 def main() -> int:
-    """Print the rows; say which README does not have."""
+    """Print the rows and mark those that README does not contain."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--folder", type=Path, default=ROOT / "demo")
     folder, readme = parser.parse_args().folder, README.read_text()

@@ -1,4 +1,4 @@
-"""The table of the loop beside C: what was measured, and whether it is enough."""
+"""The table comparing the loop with C: measurements, goals and verdicts."""
 
 import dataclasses
 import statistics
@@ -17,7 +17,7 @@ Times = NDArray[np.int64]
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Row:
-    """One line of the table; `is_met` None = nothing was promised."""
+    """One row of the table; `is_met` None = no goal."""
 
     what: str
     goal: str
@@ -27,7 +27,7 @@ class Row:
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Window:
-    """Cycles of one window: columns deadline, woke, replies, sent [ns]."""
+    """Cycles of one window, shape (n, 4): deadline, woke, replies, sent [ns]."""
 
     cycles: Times
 
@@ -38,14 +38,14 @@ class Window:
 
 
 def missed(cycles: Times) -> Times:
-    """Return when cycles were missed [ns]: begun late, or skipped."""
+    """Return the times of missed cycles [ns]: begun late, or skipped."""
     late = cycles[:, 1] - cycles[:, 0] > LATE_NS
     gaps = np.diff(cycles[:, 0], prepend=cycles[0, 0] - PERIOD_NS) // PERIOD_NS - 1
     return np.repeat(cycles[:, 1], np.maximum(gaps, 0) + late)
 
 
 def explained(moments: Times, stalls: Times) -> NDArray[np.bool_]:
-    """Return which of `moments` lie within 4 ms of a witnessed stall."""
+    """Return which of `moments` lie within 4 ms of a stall."""
     if not len(stalls):
         return np.zeros(len(moments), bool)
     ends, lengths = stalls[:, 0], stalls[:, 1]
@@ -57,7 +57,7 @@ def explained(moments: Times, stalls: Times) -> NDArray[np.bool_]:
 
 @dataclasses.dataclass(slots=True)
 class RawRecord:
-    """What the windows gave: loop reports, the loop's cycles, both C programs."""
+    """Measurements of all windows: loop reports, loop cycles, both C programs."""
 
     reports: list[BenchReport] = dataclasses.field(default_factory=list)
     loops: list[Window] = dataclasses.field(default_factory=list)
@@ -69,40 +69,40 @@ class RawRecord:
         return np.concatenate([window.cycles for window in self.loops])
 
     def cpu(self, process: str) -> float:
-        """Return the median share of a core that `process` used."""
+        """Return the median share of a core used by `process`."""
         return statistics.median(use_of(r, process).cpu for r in self.reports)
 
 
 def use_of(report: BenchReport, process: str) -> ProcessUse:
-    """Return what `process` used."""
+    """Return the resource use of `process`."""
     return next(use for use in report.processes if use.name == process)
 
 
-def table(found: RawRecord, stalls: Times) -> list[Row]:
-    """Return all lines; `stalls` are the witness's, end and length [ns]."""
+def table(record: RawRecord, stalls: Times) -> list[Row]:
+    """Return all rows; `stalls`: end and length of each stall [ns], shape (n, 2)."""
     return [
-        *cycle_rows(found, stalls),
-        *wake_rows(found),
-        *miss_rows(found, stalls),
-        *use_rows(found),
+        *cycle_rows(record, stalls),
+        *wake_rows(record),
+        *miss_rows(record, stalls),
+        *use_rows(record),
     ]
 
 
 def quantiles(times: Times) -> str:
-    """Return 50, 99 and 99.9 % and the largest [us] as text."""
+    """Return the 50, 99 and 99.9 % quantiles and the maximum [us] as text."""
     values = [*np.percentile(times, QUANTILES), times.max()]
     return " / ".join(f"{value / 1000:.0f}" for value in values) + " us"
 
 
-def cycle_rows(found: RawRecord, stalls: Times) -> list[Row]:
-    """Return the lines on what happens within a cycle."""
-    cycles = found.cycles()
+def cycle_rows(record: RawRecord, stalls: Times) -> list[Row]:
+    """Return the rows on the timing within a cycle."""
+    cycles = record.cycles()
     whole = (cycles[:, 2] > cycles[:, 1]) & (cycles[:, 3] >= cycles[:, 2])
     clean = cycles[whole & ~explained(cycles[:, 1], stalls)]
     compute, out = clean[:, 3] - clean[:, 2], clean[:, 3] - clean[:, 0]
     c_50, c_999 = np.percentile(compute, (50, 99.9)) / 1000
     o_50, o_999 = np.percentile(out, (50, 99.9)) / 1000
-    in_c_out = np.concatenate([w.cycles[w.cycles[:, 3] > 0] for w in found.exchanges])
+    in_c_out = np.concatenate([w.cycles[w.cycles[:, 3] > 0] for w in record.exchanges])
     return [
         Row(
             "compute, last reply to torque, clean: p50, p99.9",
@@ -125,16 +125,16 @@ def cycle_rows(found: RawRecord, stalls: Times) -> list[Row]:
     ]
 
 
-def wake_rows(found: RawRecord) -> list[Row]:
-    """Return the lines on waking up, medians over the windows for the ratios."""
+def wake_rows(record: RawRecord) -> list[Row]:
+    """Return the rows on wake-up latency; ratios are medians over the windows."""
     ratio = {
         q: statistics.median(
             np.percentile(loop.late, q) / np.percentile(wake.late, q)
-            for loop, wake in zip(found.loops, found.wakes, strict=True)
+            for loop, wake in zip(record.loops, record.wakes, strict=True)
         )
         for q in QUANTILES
     }
-    cycles = found.cycles()
+    cycles = record.cycles()
     return [
         Row(
             "wake-up, p50 / p99 / p99.9 / max",
@@ -145,7 +145,7 @@ def wake_rows(found: RawRecord) -> list[Row]:
         Row(
             "  in C",
             "",
-            quantiles(np.concatenate([wake.late for wake in found.wakes])),
+            quantiles(np.concatenate([wake.late for wake in record.wakes])),
             None,
         ),
         Row(
@@ -157,15 +157,15 @@ def wake_rows(found: RawRecord) -> list[Row]:
     ]
 
 
-def miss_rows(found: RawRecord, stalls: Times) -> list[Row]:
-    """Return the lines on missed cycles."""
-    count = len(found.cycles())
-    own = np.concatenate([missed(window.cycles) for window in found.loops])
-    theirs = np.concatenate([missed(window.cycles) for window in found.exchanges])
-    in_c_count = sum(len(window.cycles) for window in found.exchanges)
-    unexplained = int((~explained(own, stalls)).sum())
+def miss_rows(record: RawRecord, stalls: Times) -> list[Row]:
+    """Return the rows on missed cycles."""
+    count = len(record.cycles())
+    in_loop = np.concatenate([missed(window.cycles) for window in record.loops])
+    in_c = np.concatenate([missed(window.cycles) for window in record.exchanges])
+    in_c_count = sum(len(window.cycles) for window in record.exchanges)
+    unexplained = int((~explained(in_loop, stalls)).sum())
     per_million = unexplained / count * 1e6
-    allowed = 1.5 * len(theirs) * count / in_c_count + 5
+    allowed = 1.5 * len(in_c) * count / in_c_count + 5
     return [
         Row(
             "missed, not explained",
@@ -176,18 +176,18 @@ def miss_rows(found: RawRecord, stalls: Times) -> list[Row]:
         Row(
             "missed, all",
             f"<= {allowed:.0f} (1.5 x C + 5)",
-            f"{len(own)}; C {len(theirs)} of {in_c_count}",
-            len(own) <= allowed,
+            f"{len(in_loop)}; C {len(in_c)} of {in_c_count}",
+            len(in_loop) <= allowed,
         ),
         Row("stalls seen by the witness", "", str(len(stalls)), None),
     ]
 
 
-def use_rows(found: RawRecord) -> list[Row]:
-    """Return the lines on processors, memory and the recorder."""
-    loop, recorder = found.cpu("control"), found.cpu("recorder")
-    faults = sum(use_of(r, "control").page_faults for r in found.reports)
-    lost = sum(report.lost for report in found.reports)
+def use_rows(record: RawRecord) -> list[Row]:
+    """Return the rows on processor use, memory and the recorder."""
+    loop, recorder = record.cpu("control"), record.cpu("recorder")
+    faults = sum(use_of(r, "control").page_faults for r in record.reports)
+    lost = sum(report.lost for report in record.reports)
     return [
         Row(
             "CPU of a core: loop, recorder",

@@ -1,10 +1,10 @@
-"""The recorder under load: losses, backlog, processor and memory of its process.
+"""The recorder under load: losses, backlog, processor time and memory of its process.
 
     python -m benchmarks.recorder [--seconds 60] [--rate 500] [--json]
 
-A pacing writer fills the shared memory as a loop would, `--rate` cycles a second with
-two force samples and thirteen frames each, bit patterns changing so that compression
-has work.
+A paced writer fills the shared memory in place of the loop, `--rate` cycles per second
+with two force samples and thirteen frames each; bit patterns vary so that the data do
+not compress unrealistically well.
 """
 
 import argparse
@@ -43,7 +43,7 @@ HEADER = TrialHeader(
 
 
 class Load:
-    """Writes what a loop would write, cycle after cycle."""
+    """Writes the data of a control loop, cycle by cycle."""
 
     def __init__(self, shared: SharedLayout) -> None:
         self._shared = shared
@@ -53,7 +53,7 @@ class Load:
         self.cycles = 0
 
     def cycle(self, now_ns: int) -> None:
-        """Write one cycle of monotonic time `now_ns`."""
+        """Write one cycle with the monotonic time `now_ns`."""
         sample, number = self._sample, self.cycles
         sample.cycle[0] = number
         sample.host_ns[0] = now_ns
@@ -76,7 +76,7 @@ def usage(pid: int) -> tuple[float, float]:
 
 
 def run(seconds: float, rate: int) -> dict[str, float]:
-    """Record for `seconds` at `rate` cycles a second; return what was seen."""
+    """Record for `seconds` at `rate` cycles per second; return the measurements."""
     clock, shared = SystemClock(), SharedLayout.create()
     child = Child("recorder", MAIN, {}, shared)
     recorder, load = RemoteRecorder(child, shared), Load(shared)
@@ -90,7 +90,7 @@ def run(seconds: float, rate: int) -> dict[str, float]:
         for burst in range(int(seconds * NS_PER_S / BURST_NS)):
             clock.sleep_until(start_ns + burst * BURST_NS)
             for _ in range(per_burst):
-                # Dated as if it were 500 Hz, or the file would be refused for its pace.
+                # Time stamps of 500 Hz: the file is refused at any other rate.
                 load.cycle(start_ns + load.cycles * PERIOD_NS)
             if burst % 100 == 0:
                 memory.append(usage(child.pid)[1])
@@ -102,7 +102,7 @@ def run(seconds: float, rate: int) -> dict[str, float]:
         lost = int(reader.metadata["result"]["lost_in_ring"])
         size = path.stat().st_size
     child.stop()
-    warm = memory[min(len(memory) // 2, 180) :]  # the buffers have been round by then
+    warm = memory[min(len(memory) // 2, 180) :]  # the ring buffers have wrapped by then
     return {
         "seconds": seconds,
         "rate": rate,
@@ -120,11 +120,11 @@ def run(seconds: float, rate: int) -> dict[str, float]:
 
 
 def rows() -> list[BenchRow]:
-    """Return what was measured, for the table."""
-    found = run(10.0, 5000)
+    """Return the measurements as table rows."""
+    results = run(10.0, 5000)
     return [
-        BenchRow("recorder at 5000 cycles/s for 10 s: lost", found["lost"], "", 0),
-        BenchRow("its processor time", found["us_per_cycle"], "us a cycle"),
+        BenchRow("recorder at 5000 cycles/s for 10 s: lost", results["lost"], "", 0),
+        BenchRow("its processor time", results["us_per_cycle"], "us a cycle"),
     ]
 
 
@@ -135,11 +135,11 @@ def main() -> None:
     parser.add_argument("--rate", type=int, default=500)
     parser.add_argument("--json", action="store_true")
     args = parser.parse_args()
-    found = run(args.seconds, args.rate)
+    results = run(args.seconds, args.rate)
     if args.json:
-        print(json.dumps(found, indent=2))
+        print(json.dumps(results, indent=2))
         return
-    for name, value in found.items():
+    for name, value in results.items():
         print(f"{name:18}{value}")
 
 

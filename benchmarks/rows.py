@@ -1,4 +1,4 @@
-"""One line of the table of measurements: what every benchmark returns."""
+"""A row of the table of measurements; every benchmark returns such rows."""
 
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -6,15 +6,15 @@ from typing import Any
 
 @dataclass(frozen=True, slots=True)
 class BenchRow:
-    """One measurement, beside its goal.
+    """One measurement and its goal.
 
     Attributes:
-        what: is measured, in words.
-        value: that was found; None where it could not be measured.
-        unit: of value and goal.
-        goal: that is to be met; None for none.
-        is_least: the value is to be at least the goal, not at most.
-        note: what a reader should know of the value, or why there is none.
+        what: description of the measured quantity.
+        value: measured value; None if it could not be measured.
+        unit: unit of value and goal.
+        goal: bound on the value; None = no goal.
+        is_least: the goal is a lower bound, not an upper one.
+        note: remark on the value, or why it is missing.
     """
 
     what: str
@@ -26,14 +26,14 @@ class BenchRow:
 
     @property
     def verdict(self) -> str:
-        """Whether the goal is met, in a word; empty without a goal or a value."""
+        """Verdict "met" or "not met"; empty without a goal or a value."""
         if self.goal is None or self.value is None:
             return ""
         is_met = self.value >= self.goal if self.is_least else self.value <= self.goal
         return "met" if is_met else "not met"
 
     def cells(self) -> tuple[str, str, str, str]:
-        """Return what, today, goal and verdict as text."""
+        """Return description, today's value, goal and verdict as text."""
         today = f"{self.value:.3g} {self.unit}" if self.value is not None else "-"
         sign = "≥" if self.is_least else "≤"
         goal = "" if self.goal is None else f"{sign} {self.goal:g} {self.unit}"
@@ -41,10 +41,10 @@ class BenchRow:
         return (self.what + note, today.strip(), goal.strip(), self.verdict)
 
     def plain(self) -> dict[str, Any]:
-        """Return it for JSON."""
+        """Return the row as a dictionary for JSON."""
         return asdict(self)
 
 
 def not_installed(what: str, goal: float) -> BenchRow:
-    """Return the line of a comparison with a library that is not there."""
+    """Return the row of a comparison with a library that is not installed."""
     return BenchRow(what, None, "times", goal, True, "not installed")

@@ -1,12 +1,11 @@
-"""How cost grows: folds with the number of trials, `status` with that of sessions.
+"""Growth of cost: folds with the number of trials, `status` with that of sessions.
 
     python -m benchmarks.scale [--json]
 
-Time is processor time, memory the peak of what Python and numpy allocate. The exponent
-is that of the growth from the largest but one size to the largest; beyond 1.25, which
-leaves room for a busy machine, the exit code is 1. Folds carry their trials: up to the
-50 trials of a terrain that are left out one by one, here 400 trials, planning grows
-with their square.
+Time is processor time, memory the peak allocated by Python and numpy. The exponent is
+that between the two largest sizes; above 1.25, which leaves room for a busy machine,
+the exit code is 1. Folds carry their trials: up to 50 trials per terrain, which are
+held out one at a time (here 400 trials), planning grows quadratically.
 """
 
 import argparse
@@ -32,26 +31,26 @@ from benchmarks.made_sessions import TERRAINS, make_sessions
 from benchmarks.rows import BenchRow
 
 TRIALS, SESSIONS = (10, 80, 400, 1600), (10, 100, 1000)
-_KEPT = 450  # rows of a trial that models are fitted to
+_KEPT = 450  # kept samples per trial
 _LINEAR = 1.25
 _REPEATS = 3
 
 
 def made_trials(count: int) -> dict[str, list[Any]]:
-    """Return prepared trials on eight terrains that have only their kept samples."""
+    """Return generated trials on eight terrains, with kept samples only."""
     noise = np.random.default_rng(count)
     trials: dict[str, list[Any]] = {}
     for k in range(count):
         F_n, v_t, F_t = noise.normal(size=(3, _KEPT))
-        made = SimpleNamespace(
+        trial = SimpleNamespace(
             name=f"T{k}", kept=_KEPT, F_n=F_n, v_t=v_t, F_t=F_t, further=None
         )
-        trials.setdefault(TERRAINS[k % len(TERRAINS)], []).append(made)
+        trials.setdefault(TERRAINS[k % len(TERRAINS)], []).append(trial)
     return trials
 
 
 def folds_of(count: int) -> dict[str, float]:
-    """Return what planning so many folds takes, and what is shipped with one."""
+    """Return the cost of planning the folds of `count` trials, and a fold's size."""
     trials, times = made_trials(count), []
     for _ in range(_REPEATS):
         start = time.process_time()
@@ -75,21 +74,21 @@ def folds_of(count: int) -> dict[str, float]:
 
 
 def status_of(count: int) -> dict[str, float]:
-    """Return the processor time of `traction status` over so many sessions [s].
+    """Return the processor time of `traction status` over `count` sessions [s].
 
-    The second look counts, at files that have not changed; the first one hashes all.
+    The runs after the first count, on unchanged files; the first run hashes all.
     """
     with tempfile.TemporaryDirectory() as folder:
         data, home = Path(folder) / "data", Path(folder) / "cache"
         make_sessions(data, count)
-        time.sleep(2.1)  # what has just changed is read again
+        time.sleep(2.1)  # recently changed files would be read again
         _status(data, home)
         times = [_status(data, home) for _ in range(_REPEATS)]
     return {"count": count, "seconds": min(times)}
 
 
 def _status(data: Path, home: Path) -> float:
-    """Return the processor time of one status [s]."""
+    """Return the processor time of one `traction status` [s]."""
     before = os.times()
     subprocess.run(
         [sys.executable, "-m", "traction", "status", "--data", str(data)],
@@ -115,21 +114,21 @@ def exponent(points: list[dict[str, float]], key: str) -> float:
 
 
 def measured() -> dict[str, Any]:
-    """Return costs by size."""
+    """Return the costs by size."""
     with tempfile.TemporaryDirectory() as folder:
         empty = Path(folder) / "data"
         _status(empty, Path(folder))
-        nothing = min(_status(empty, Path(folder)) for _ in range(_REPEATS))
+        of_empty = min(_status(empty, Path(folder)) for _ in range(_REPEATS))
     return {
         "folds": [folds_of(count) for count in TRIALS],
         "boards": [status_of(count) for count in SESSIONS],
-        "empty": nothing,
+        "empty": of_empty,
     }
 
 
-def rows_of(found: dict[str, Any]) -> list[BenchRow]:
-    """Return the table's lines."""
-    folds, statuses = found["folds"], found["boards"]
+def rows_of(costs: dict[str, Any]) -> list[BenchRow]:
+    """Return the costs as table rows."""
+    folds, statuses = costs["folds"], costs["boards"]
     last, status = folds[-1], statuses[-1]
     unchanged = "`status`, 1,000 sessions, nothing changed"
     grown = {
@@ -142,28 +141,28 @@ def rows_of(found: dict[str, Any]) -> list[BenchRow]:
         BenchRow("folds of 1,600 trials: memory", last["megabytes"], "MB", 300),
         BenchRow("folds of 1,600 trials: planned and known", last["seconds"], "s", 5),
         BenchRow("folds of 1,600 trials: shipped with one", last["shipped"], "MB", 4),
-        BenchRow("`status`, an empty folder", 1e3 * found["empty"], "ms", 150),
+        BenchRow("`status`, an empty folder", 1e3 * costs["empty"], "ms", 150),
         BenchRow(unchanged, status["seconds"], "s", 1.0),
         *(BenchRow(what, power, "", _LINEAR) for what, power in grown.items()),
     ]
 
 
 def rows() -> list[BenchRow]:
-    """Return what was measured, for the table."""
+    """Return the measurements as table rows."""
     return rows_of(measured())
 
 
 def main() -> int:
-    """Print costs by size and what they grow with; 1 beyond linear."""
+    """Print the costs by size and their exponents; return 1 if one is too large."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--json", action="store_true", help="print JSON instead")
     arguments = parser.parse_args()
-    found = measured()
-    lines = rows_of(found)
+    costs = measured()
+    lines = rows_of(costs)
     if arguments.json:
-        print(json.dumps(found | {"rows": [row.plain() for row in lines]}, indent=1))
+        print(json.dumps(costs | {"rows": [row.plain() for row in lines]}, indent=1))
     else:
-        for point in [*found["folds"], *found["boards"]]:
+        for point in [*costs["folds"], *costs["boards"]]:
             print("  ".join(f"{key} {value:.3g}" for key, value in point.items()))
         for row in lines:
             print("  ".join(row.cells()))

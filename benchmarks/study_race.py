@@ -1,10 +1,10 @@
-"""Folds of a study beside scikit-learn: four Gaussian processes each, and predictions.
+"""A study's folds raced against scikit-learn: four Gaussian processes, predictions.
 
-Both get the same chosen rows and the same Tustin curve; scikit-learn is given the
-starts that ours chooses in its own time. Both predict the same rows: means for the
-training rows and the trials of all other terrains, mean and spread for the trial left
-out. The two take turns, fold by fold; what counts is processor time, one thread each,
-so that other programs do not.
+Both get the same selected rows and the same Tustin curve; scikit-learn also gets the
+starts, while choosing them counts for ours. Both predict the same rows: means for the
+training rows and the trials of all other terrains, mean and standard deviation for the
+held-out trial. The two take turns, fold by fold. Processor time of one thread each is
+measured, so that other programs do not count.
 """
 
 import statistics
@@ -34,7 +34,7 @@ from benchmarks.beside_sklearn import fit_theirs, three_starts
 
 SLICE = Path(__file__).parents[1] / "tests" / "data" / "rehearsal_slice.npz"
 _GOAL = 4.0
-# model -> its part in `benchmarks.beside_sklearn`, and is it around a Tustin curve?
+# model -> its part in `benchmarks.beside_sklearn`, whether its mean is a Tustin curve
 FITS = {
     GP_SE: ("SE fit", False),
     GP_NN: ("NN fit", False),
@@ -44,15 +44,15 @@ FITS = {
 
 
 class Given(NamedTuple):
-    """What the Gaussian processes of one fold are fitted to.
+    """Training data of the Gaussian processes of one fold.
 
     Attributes:
-        curve: Tustin fit of all training rows.
-        centre: means of the chosen rows' inputs, shape (2,).
+        curve: Tustin fit to all training rows.
+        centre: means of the selected rows' inputs, shape (2,).
         scale: their standard deviations, shape (2,).
-        X: standardised inputs of the chosen rows, shape (n, 2).
-        outputs: F_t [N] of the chosen rows without the mean, or without the curve,
-            shape (n,), by the name of the model.
+        X: standardised inputs of the selected rows, shape (n, 2).
+        outputs: F_t [N] of the selected rows minus its mean or the curve, shape (n,),
+            by name of the model.
     """
 
     curve: TustinFit
@@ -62,17 +62,17 @@ class Given(NamedTuple):
     outputs: dict[str, Array]
 
     def standardised(self, rows: SampleTable) -> Array:
-        """Return the inputs of other rows in the same terms, shape (m, 2)."""
+        """Return the inputs of other rows in the same scaling, shape (m, 2)."""
         return (rows.inputs - self.centre) / self.scale
 
 
 class Lap(NamedTuple):
-    """One fold run by both.
+    """Times and likelihoods of one fold.
 
     Attributes:
-        mine: processor time of ours [s].
-        its: the same of scikit-learn.
-        reached: log likelihoods of ours and of scikit-learn, fit by fit.
+        mine: our processor time [s].
+        its: scikit-learn's processor time [s].
+        reached: (our, scikit-learn's) log likelihood of each fit.
     """
 
     mine: float
@@ -83,24 +83,24 @@ class Lap(NamedTuple):
 def race(
     path: Path, share: float = 1.0, *, rounds: int = 1, is_whole: bool = True
 ) -> dict[str, Any]:
-    """Return times and likelihoods of both, one fold after the other.
+    """Race all folds in turn; return times and likelihoods of both sides.
 
     Args:
-        path: trials as npz.
-        share: of the folds, those that both run; drawn at random, always the same.
-            Ours runs the others too.
-        rounds: how often every fold is run; medians count.
-        is_whole: every fold; else the first one of every terrain.
+        path: npz file of trials.
+        share: share of the folds that both run, drawn with a fixed seed; the other
+            folds are run by ours alone.
+        rounds: repeats of every fold; medians count.
+        is_whole: run every fold; else only the first of every terrain.
     """
     tasks = folds_of(path)
-    run_fold(tasks[0])  # whatever is loaded or set up at first
+    run_fold(tasks[0])  # warm-up: imports and caches
     if not is_whole:
         tasks = [task for task in tasks if task.fold == 0]
     count = max(1, round(share * len(tasks)))
     drawn = np.random.default_rng(0).choice(len(tasks), count, replace=False)
     laps = [lap(tasks[k], rounds) for k in sorted(drawn.tolist())]
-    rest = [task for k, task in enumerate(tasks) if k not in drawn]
-    alone, _ = timed(lambda: [run_fold(task) for task in rest])
+    others = [task for k, task in enumerate(tasks) if k not in drawn]
+    alone, _ = timed(lambda: [run_fold(task) for task in others])
     return report(laps, alone, len(tasks)) | {
         "notes": [*compared(laps), *where_time_goes(tasks[0])]
     }
@@ -116,24 +116,27 @@ def folds_of(path: Path) -> list[FoldTask]:
 
 
 def given(task: FoldTask) -> Given:
-    """Return what the Gaussian processes of one fold are fitted to."""
+    """Return the training data of the Gaussian processes of one fold."""
     training = TrainingSet(task.training, task.lengths, choose_rows(task))
     curve = ModelFitter(training, task.options).curve()
     subset = training.subset
     plain = subset.F_t - subset.F_t.mean()
-    left = subset.F_t - curve.mean(subset.F_n, subset.v_t)
+    residual = subset.F_t - curve.mean(subset.F_n, subset.v_t)
     centre, scale = subset.inputs.mean(axis=0), subset.inputs.std(axis=0)
     return Given(
         curve=curve,
         centre=centre,
         scale=scale,
         X=(subset.inputs - centre) / scale,
-        outputs={n: left if is_around else plain for n, (_, is_around) in FITS.items()},
+        outputs={
+            name: residual if has_curve else plain
+            for name, (_, has_curve) in FITS.items()
+        },
     )
 
 
 def lap(task: FoldTask, rounds: int) -> Lap:
-    """Return what both spend on one fold, taking turns."""
+    """Run one fold on both sides in turn; return times and likelihoods."""
     mine, its, models, likelihoods = [], [], {}, {}
     starts = starts_of(task)
     for _ in range(rounds):
@@ -146,8 +149,8 @@ def lap(task: FoldTask, rounds: int) -> Lap:
 
 
 def report(laps: list[Lap], alone: float, folds: int) -> dict[str, Any]:
-    """Return the figures of a race; `alone` [s] is what our other folds took."""
-    mine, its = sum(one.mine for one in laps), sum(one.its for one in laps)
+    """Return the figures of a race; `alone` is the time of our other folds [s]."""
+    mine, its = sum(lap.mine for lap in laps), sum(lap.its for lap in laps)
     ours, theirs = likelihoods_of(laps)
     part = f"study, {ours.size} fits with predictions"
     if len(laps) < folds:
@@ -167,7 +170,7 @@ def report(laps: list[Lap], alone: float, folds: int) -> dict[str, Any]:
 
 
 def compared(laps: list[Lap]) -> list[str]:
-    """Return how often one of the two reached a larger likelihood."""
+    """Return a line: in how many fits either side's likelihood is larger."""
     ours, theirs = likelihoods_of(laps)
     worse = int(np.count_nonzero(ours < theirs - 1e-3))
     better = int(np.count_nonzero(ours > theirs + 1e-3))
@@ -178,14 +181,14 @@ def compared(laps: list[Lap]) -> list[str]:
 
 
 def likelihoods_of(laps: list[Lap]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the likelihoods of ours and of scikit-learn, one per fit."""
-    pairs = [pair for one in laps for pair in one.reached]
+    """Return our and scikit-learn's likelihoods, one per fit."""
+    pairs = [pair for lap in laps for pair in lap.reached]
     ours, theirs = (np.array(column) for column in zip(*pairs, strict=True))
     return ours, theirs
 
 
 def starts_of(task: FoldTask) -> dict[str, tuple[Array, ...]]:
-    """Return where the searches of one fold begin, by the name of the model."""
+    """Return the starts of the searches of one fold, by name of the model."""
     rows = given(task)
     return {n: three_starts(FITS[n][0], rows.X, r) for n, r in rows.outputs.items()}
 
@@ -193,43 +196,43 @@ def starts_of(task: FoldTask) -> dict[str, tuple[Array, ...]]:
 def run_theirs(
     task: FoldTask, starts: dict[str, tuple[Array, ...]]
 ) -> dict[str, float]:
-    """Return scikit-learn's likelihoods of one fold, after the same predictions."""
+    """Fit and predict one fold with scikit-learn; return the log likelihoods."""
     rows = given(task)
     foreign = [trial for trials in task.others.values() for trial in trials]
     tested = rows.standardised(SampleTable.joined([task.training, *foreign]))
-    own = rows.standardised(SampleTable.joined(task.test_trials))
-    found = {}
+    held_out = rows.standardised(SampleTable.joined(task.test_trials))
+    likelihoods = {}
     for name, (part, _) in FITS.items():
         model = fit_theirs(part, rows.X, rows.outputs[name], starts[name])
         model.predict(tested)
-        model.predict(own, return_std=True)
-        found[name] = float(model.log_marginal_likelihood_value_)
-    return found
+        model.predict(held_out, return_std=True)
+        likelihoods[name] = float(model.log_marginal_likelihood_value_)
+    return likelihoods
 
 
 def where_time_goes(task: FoldTask) -> list[str]:
-    """Return what the parts of one of our folds cost."""
+    """Return a line with the processor time of the parts of one of our folds."""
     training = TrainingSet(task.training, task.lengths, choose_rows(task))
     fitter = ModelFitter(training, task.options)
-    spent, _ = timed(lambda: fitter.fit(TUSTIN))
-    parts = [f"Tustin of {task.training.count} rows {1e3 * spent:.0f} ms"]
+    cpu_s, _ = timed(lambda: fitter.fit(TUSTIN))
+    parts = [f"Tustin of {task.training.count} rows {1e3 * cpu_s:.0f} ms"]
     foreign = [rows for trials in task.others.values() for rows in trials]
     tested = SampleTable.joined([task.training, *foreign])
-    own = SampleTable.joined(task.test_trials)
+    held_out = SampleTable.joined(task.test_trials)
     predicting = 0.0
     for name in FITS:
-        spent, model = timed(lambda name=name: fitter.fit(name))
+        cpu_s, model = timed(lambda name=name: fitter.fit(name))
         starts = model.process.starts
         count = sum(start.evaluations for start in starts)
-        parts.append(f"{name} {1e3 * spent:.0f} ms ({count} evaluations)")
+        parts.append(f"{name} {1e3 * cpu_s:.0f} ms ({count} evaluations)")
         predicting += timed(lambda m=model: m.mean(tested.F_n, tested.v_t))[0]
-        predicting += timed(lambda m=model: m.predict(own.F_n, own.v_t))[0]
+        predicting += timed(lambda m=model: m.predict(held_out.F_n, held_out.v_t))[0]
     parts.append(f"predictions of {tested.count} rows {1e3 * predicting:.0f} ms")
     return ["one of our folds: " + ", ".join(parts)]
 
 
 def timed(function: Callable[[], Any]) -> tuple[float, Any]:
-    """Return (processor time spent [s], result)."""
+    """Call `function`; return (processor time [s], result)."""
     before = time.process_time()
     result = function()
     return time.process_time() - before, result

@@ -1,4 +1,4 @@
-"""Where and with what a measurement was made."""
+"""The machine and software versions of a measurement."""
 
 import datetime
 import importlib.metadata
@@ -40,7 +40,7 @@ def processor() -> str:
 
 
 def version_of(name: str) -> str:
-    """Return a library with its version."""
+    """Return a library's name and version."""
     try:
         return f"{name} {importlib.metadata.version(name)}"
     except importlib.metadata.PackageNotFoundError:

@@ -1,10 +1,10 @@
-"""What a query of the C header costs, beside the same one in Python.
+"""Cost of queries to the exported C header, compared with Python.
 
     python -m benchmarks.terrain_header [--terrain-db FILE] [--runs 9]
 
-Exports the database (without one: two terrains made here, 24 x 20 points), compiles it
-with cc -std=c99 -O2 and asks at random points inside the tables. Each figure is the
-median of the runs.
+Exports the database (by default a test database of two terrains, 24 x 20 points),
+compiles it with cc -std=c99 -O2 and queries random points inside the tables. Each
+figure is the median of the runs.
 """
 
 import argparse
@@ -59,7 +59,7 @@ int main(void)
     for (k = 0; k < ROUNDS; k++)
         for (i = 0; i < POINTS; i++) {
             sum += traction_quantiles(one, F_n[i], v_t[i], out);
-            for (j = 0; j < TRACTION_SHARES; j++) /* all of them are wanted */
+            for (j = 0; j < TRACTION_SHARES; j++) /* none may be optimised away */
                 kept[j] = out[j];
         }
     printf("%f ", since(begin));
@@ -91,7 +91,7 @@ _QUERIES = (
 
 
 def measured_in_c(export: TerrainExport, runs: int, folder: Path) -> list[float]:
-    """Return nanoseconds of each query, the median of the runs."""
+    """Return the time of each query [ns], median of the runs."""
     compiler = shutil.which("cc")
     if compiler is None:
         sys.exit("There is no C compiler (cc) here.")
@@ -110,7 +110,7 @@ def measured_in_c(export: TerrainExport, runs: int, folder: Path) -> list[float]
 
 
 def measured_in_python(export: TerrainExport, runs: int) -> float:
-    """Return nanoseconds of one query of all shares in Python, the median."""
+    """Return the time of a query of all shares in Python [ns], median of the runs."""
     table = export.terrains[0].table
     rng = np.random.default_rng(1)
     points = [
@@ -144,8 +144,8 @@ def main() -> None:
             size = len(target_files("c", export)["traction_terrains.h"])
             kind = "float" if is_float else "double"
             print(f"{kind}, {len(export.terrains)} terrains, {size / 1e3:.0f} kB")
-            made = measured_in_c(export, args.runs, folder)
-            for name, nanoseconds in zip(_QUERIES, made, strict=True):
+            times = measured_in_c(export, args.runs, folder)
+            for name, nanoseconds in zip(_QUERIES, times, strict=True):
                 print(f"  {name:24}{nanoseconds:8.0f} ns")
         print(
             f"Python, all shares        {measured_in_python(export, args.runs):8.0f} ns"

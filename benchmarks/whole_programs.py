@@ -1,9 +1,9 @@
-"""What a user waits for: the demo, its report a second time, a study of 80 trials.
+"""Time of whole programs: the demo, its report a second time, a study of 80 trials.
 
     python -m benchmarks.whole_programs
 
-The program runs as from a shell, each command in a process of its own, two at once
-where two cores are there. The second report finds its fits in the store of results.
+Each command runs in its own process, as from a shell, the two sessions at the same
+time. The second report takes its fits from the result store.
 """
 
 import ctypes
@@ -19,19 +19,19 @@ from benchmarks.rows import BenchRow
 
 TRIALS = Path(__file__).parents[2] / "shared" / "data" / "rehearsal_trials.npz"
 _TERRAINS = ("S0", "TF")
-_SUBREAPER = 36  # of prctl(2)
-# goals; that of a study is for a search by SciPy
+_SUBREAPER = 36  # PR_SET_CHILD_SUBREAPER of prctl(2)
+# Goals; that of the study assumes SciPy's optimiser.
 _DEMO_S, _AGAIN_S, _STUDY_S = 30.0, 4.0, 100.0
 
 
 def started(*arguments: str) -> subprocess.Popen[bytes]:
-    """Return the program, started with these arguments and a silent terminal."""
+    """Start the program with these arguments, its output discarded."""
     command = [sys.executable, "-m", "traction", *arguments]
     return subprocess.Popen(command, stdout=subprocess.DEVNULL)
 
 
 def ended(*programs: subprocess.Popen[bytes]) -> None:
-    """Wait for programs.
+    """Wait for programs to end.
 
     Raises:
         CalledProcessError: one of them failed.
@@ -41,10 +41,10 @@ def ended(*programs: subprocess.Popen[bytes]) -> None:
             raise subprocess.CalledProcessError(code, program.args)
 
 
-def spent() -> float:
+def cpu_time() -> float:
     """Return the processor time of all programs that have ended so far [s].
 
-    Processes that a program has left to end by themselves are waited for and count.
+    Processes that a program left running are waited for and included.
     """
     while True:
         try:
@@ -56,14 +56,14 @@ def spent() -> float:
 
 
 def demo_rows(folder: Path) -> list[BenchRow]:
-    """Return what `make demo` takes once installed, and its report again."""
+    """Return the time of `make demo` once installed, and of its report again."""
     where = ("--data", str(folder))
     begin = time.perf_counter()
     ended(*(started("run", row, "--fake", "--fast", *where) for row in _TERRAINS))
     recorded = time.perf_counter()
     ended(started("report", "--all", *where))
     whole, recording = time.perf_counter() - begin, recorded - begin
-    before = spent()
+    before = cpu_time()
     ended(started("report", "--all", *where))
     return [
         BenchRow(
@@ -75,7 +75,7 @@ def demo_rows(folder: Path) -> list[BenchRow]:
         ),
         BenchRow(
             "the report of 20 trials again, results kept",
-            spent() - before,
+            cpu_time() - before,
             "s",
             _AGAIN_S,
         ),
@@ -83,20 +83,20 @@ def demo_rows(folder: Path) -> list[BenchRow]:
 
 
 def study_row(folder: Path) -> BenchRow:
-    """Return what fits and figures of 80 trials on 8 terrains take."""
+    """Return the time of fits and figures of 80 trials on 8 terrains."""
     what = "80 trials on 8 terrains: all fits, figures and page, wall time"
     if not TRIALS.exists():
         return BenchRow(what, None, "s", _STUDY_S, note="its trials are not there")
-    begin, before = time.perf_counter(), spent()
+    begin, before = time.perf_counter(), cpu_time()
     ended(started("fit", str(TRIALS), "--to", str(folder)))
     wall = time.perf_counter() - begin
-    used = f"{spent() - before:.0f} s of processor time"
+    used = f"{cpu_time() - before:.0f} s of processor time"
     return BenchRow(what, wall, "s", _STUDY_S, note=used)
 
 
 def rows() -> list[BenchRow]:
-    """Return what was measured, for the table."""
-    ctypes.CDLL(None).prctl(_SUBREAPER, 1)  # their processes become ours
+    """Return the measurements as table rows."""
+    ctypes.CDLL(None).prctl(_SUBREAPER, 1)  # adopt processes left running
     with tempfile.TemporaryDirectory() as folder:
         root = Path(folder)
         return [*demo_rows(root / "demo"), study_row(root / "study")]

@@ -1,4 +1,4 @@
-"""Boots the machine and runs scenarios: python -m lab [--only NAME] ..."""
+"""Boot the emulated machine and run scenarios: python -m lab [--only NAME] ..."""
 
 import argparse
 import compileall
@@ -31,8 +31,8 @@ _PROGRAM = (
     "lab",
 )
 CACHE = ROOT / ".lab"
-NOT_READY = 75  # as EX_TEMPFAIL: something has to be installed first
-_MOST_MACHINES = 2  # unless more are asked for
+NOT_READY = 75  # EX_TEMPFAIL: a package has to be installed first
+_DEFAULT_MACHINES = 2
 _CLOCK = SystemClock()
 _JOB = """\
 export PATH=/usr/sbin:/usr/bin:/sbin:/bin
@@ -44,39 +44,39 @@ sleep 60
 
 
 def parser() -> argparse.ArgumentParser:
-    """Return the options."""
+    """Return the parser of the command line."""
     options = argparse.ArgumentParser(prog="python -m lab", description=__doc__)
     options.add_argument(
-        "--only", action="append", default=[], metavar="NAME", help="this scenario"
+        "--only", action="append", default=[], metavar="NAME", help="run this scenario"
     )
-    options.add_argument("--list", action="store_true", help="name them and end")
+    options.add_argument("--list", action="store_true", help="list the scenarios")
     options.add_argument(
-        "--check", action="store_true", help="say what is missing and end"
+        "--check", action="store_true", help="only check for missing packages"
     )
     options.add_argument("--cache", type=Path, default=CACHE, metavar="FOLDER")
     options.add_argument(
         "--machines",
         type=int,
         choices=range(1, 9),
-        default=min(_MOST_MACHINES, os.cpu_count() or 1),
-        help="so many at once; each keeps a core busy",
+        default=min(_DEFAULT_MACHINES, os.cpu_count() or 1),
+        help="number of machines at once; each keeps a core busy",
     )
     options.add_argument(
-        "--console", action="store_true", help="show what the machine says"
+        "--console", action="store_true", help="show the machine's console"
     )
     return options
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run what the arguments ask for; return the exit code."""
+    """Run the command line; return the exit code."""
     options = parser().parse_args(arguments)
     names = {scenario.name for scenario in ALL}
     if unknown := [name for name in options.only if name not in names]:
-        print(f"--only {unknown[0]!r} is none of: {', '.join(sorted(names))}")
+        print(f"No scenario {unknown[0]!r}; there are: {', '.join(sorted(names))}")
         return 2
     scenarios = chosen(options.only)
     if options.list:
-        print("\n".join(f"{one.name:<28} {one.what}" for one in scenarios))
+        print("\n".join(f"{s.name:<28} {s.what}" for s in scenarios))
         return 0
     return _run_if_ready(scenarios, options)
 
@@ -106,22 +106,23 @@ def _run(scenarios: Sequence[Scenario], options: argparse.Namespace) -> int:
 
 
 def shares(scenarios: Sequence[Scenario], count: int) -> list[list[Scenario]]:
-    """Return what each of at most `count` machines runs; none is empty.
+    """Distribute scenarios over at most `count` machines; none is left empty.
 
-    The heaviest goes first, each to the machine that has the least until then.
+    Scenarios are assigned by decreasing weight, each to the least loaded machine.
     """
     parts: list[list[Scenario]] = [[] for _ in range(min(count, len(scenarios)))]
-    for one in sorted(scenarios, key=lambda scenario: -scenario.weight):
-        min(parts, key=lambda part: sum(other.weight for other in part)).append(one)
+    for scenario in sorted(scenarios, key=lambda each: -each.weight):
+        least_loaded = min(parts, key=lambda part: sum(each.weight for each in part))
+        least_loaded.append(scenario)
     return parts
 
 
 def run_machines(
     parts: Sequence[Sequence[Scenario]], cache: Path, *, is_shown: bool
 ) -> list[ScenarioResult]:
-    """Run a machine for each part, all at once; return results in ALL's order."""
-    fetch_kernel(cache)  # once, before they all want it
-    for package in _PROGRAM:  # the emulated processor is many times slower at it
+    """Run one machine per part in parallel; return the results in the order of ALL."""
+    fetch_kernel(cache)  # before the machines use it in parallel
+    for package in _PROGRAM:  # compiling is many times slower in the emulator
         compileall.compile_dir(ROOT / package, quiet=1)
     with ThreadPoolExecutor(max(1, len(parts))) as pool:
         runs = [
@@ -135,29 +136,29 @@ def run_machines(
 def run_machine(
     scenarios: Sequence[Scenario], cache: Path, *, is_shown: bool
 ) -> list[ScenarioResult]:
-    """Run scenarios in turn and return their results; boot again after a panic.
+    """Run scenarios in turn and return their results; reboot after a kernel panic.
 
-    No program of a user can make a kernel panic; the emulator does so now and then.
-    The scenario that it panics in is repeated once, and its result says so.
+    A user program cannot make the kernel panic, but the emulator sometimes does. The
+    interrupted scenario is repeated once, which its result mentions.
 
     Args:
-        scenarios: what to run.
-        cache: where the kernel is kept.
-        is_shown: the machine's own output is printed, too.
+        scenarios: scenarios to run.
+        cache: folder of the unpacked kernel.
+        is_shown: also print the machine's own output.
     """
     results: list[ScenarioResult] = []
     repeated: set[str] = set()
-    left = list(scenarios)
-    while left:
-        came = boot(left, cache, is_shown=is_shown)
-        lost = came[-1]
-        if lost.reason != PANICKED or lost.name in repeated:
-            results += came
+    remaining = list(scenarios)
+    while remaining:
+        batch = boot(remaining, cache, is_shown=is_shown)
+        last = batch[-1]
+        if last.reason != PANICKED or last.name in repeated:
+            results += batch
             break
-        repeated.add(lost.name)
-        results += came[:-1]
+        repeated.add(last.name)
+        results += batch[:-1]
         done = {result.name for result in results}
-        left = [scenario for scenario in left if scenario.name not in done]
+        remaining = [scenario for scenario in remaining if scenario.name not in done]
     return [
         replace(result, figures={**result.figures, "repeated": PANICKED})
         if result.name in repeated
@@ -169,29 +170,29 @@ def run_machine(
 def boot(
     scenarios: Sequence[Scenario], cache: Path, *, is_shown: bool
 ) -> list[ScenarioResult]:
-    """Boot, run scenarios in turn and return their results, at least one.
+    """Boot once, run scenarios in turn and return their results, at least one.
 
     Args:
-        scenarios: what to run.
-        cache: where the kernel is kept.
-        is_shown: the machine's own output is printed, too.
+        scenarios: scenarios to run.
+        cache: folder of the unpacked kernel.
+        is_shown: also print the machine's own output.
     """
     kernel = fetch_kernel(cache)
-    words = " ".join(shlex.quote(scenario.name) for scenario in scenarios)
+    names = " ".join(shlex.quote(scenario.name) for scenario in scenarios)
     if is_shown:
-        words += " --echo"
-    job = _JOB.format(root=ROOT, python=sys.executable, names=words)
+        names += " --echo"
+    job = _JOB.format(root=ROOT, python=sys.executable, names=names)
     with tempfile.TemporaryDirectory(prefix="lab") as scratch:
         folder = Path(scratch)
-        first_root = folder / "initramfs"
+        root_archive = folder / "initramfs"
         busybox = Path(program("busybox"))
-        first_root.write_bytes(initramfs.build(busybox, kernel.modules, job))
-        names = ("line", "monitor", "memory", "debugger")
-        sockets = Sockets(*(folder / name for name in names))
-        machine = Machine(kernel, first_root, sockets)
+        root_archive.write_bytes(initramfs.build(busybox, kernel.modules, job))
+        files = ("line", "monitor", "memory", "debugger")
+        sockets = Sockets(*(folder / name for name in files))
+        machine = Machine(kernel, root_archive, sockets)
         try:
             run = Follower(is_shown=is_shown)
-            return run.follow(machine, [one.name for one in scenarios])
+            return run.follow(machine, [scenario.name for scenario in scenarios])
         finally:
             machine.close()
 

@@ -1,8 +1,8 @@
-"""How the guest's relay calls the host's arm: what lies where in the memory they share.
+"""Calls from the guest's relay to the host's arm: layout of the shared memory.
 
-The relay writes its part, then reads a word of a PCI device whose registers the host
-answers for (`far.proxy_device`). The processor that reads stands still until the
-answer has come: no guest time passes in a call, however busy the host is.
+The relay writes its request, then reads a register of a PCI device that the host
+implements (`far.proxy_device`). The emulated processor stalls until the answer arrives,
+so no guest time passes during a call, however busy the host is.
 """
 
 import mmap
@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from enum import IntEnum
 
 MEMORY_SIZE = 1 << 20
-PCI_ID = (0x1234, 0x7AC7)  # vendor and device that no driver of Linux knows
+PCI_ID = (0x1234, 0x7AC7)  # vendor and device number, unknown to Linux drivers
 REGISTERS_SIZE = 4096
-DONE = 1  # what a call returns; after any other value the text says what went wrong
+DONE = 1  # return value of a successful call; otherwise the text holds the error
 FRAME = struct.Struct("=IB3x8s")  # struct can_frame of Linux
 MOST_FRAMES = 256
 _PART = struct.Struct("<qII")  # time [ns], number of frames, number of bytes
@@ -28,10 +28,10 @@ Memory = mmap.mmap | bytearray
 
 
 class Call(IntEnum):
-    """What is asked for, by the offset of the word that is read.
+    """Kind of call, by the offset of the register that is read.
 
-    ADVANCE: frames and bytes go both ways, up to a time. SERVE: begin anew with what
-    the text names. DO: what a line of the text says.
+    ADVANCE: exchange frames and bytes and simulate up to a time. SERVE: start the
+    device described by the text. DO: carry out the command in the text.
     """
 
     ADVANCE = 0
@@ -40,26 +40,26 @@ class Call(IntEnum):
 
 
 class Exchange:
-    """The shared memory; the relay asks, the host answers.
+    """The shared memory: requests of the relay, answers of the host.
 
-    Frames lie at `FRAMES_IN_AT` and `FRAMES_OUT_AT`, where the kernel of the guest puts
-    and takes them.
+    The guest's kernel writes received frames directly to `FRAMES_IN_AT` and reads
+    frames to send from `FRAMES_OUT_AT`.
     """
 
     def __init__(self, memory: Memory) -> None:
         self._memory = memory
 
     def ask(self, t_ns: int, frames: int, data: bytes) -> None:
-        """Write the relay's part: the time [ns], so many frames, the line's bytes."""
+        """Write the request: time [ns], number of frames, bytes of the serial line."""
         _PART.pack_into(self._memory, _ASKED_AT, t_ns, frames, len(data))
         if data:
             self._memory[_BYTES_IN_AT : _BYTES_IN_AT + len(data)] = data
 
     def asked(self) -> tuple[int, list[Frame], bytes]:
-        """Return the relay's part.
+        """Return the request: time [ns], frames, bytes of the serial line.
 
         Raises:
-            ValueError: it holds more than there is room for.
+            ValueError: it exceeds the size of the memory.
         """
         t_ns, count, size = _PART.unpack_from(self._memory, _ASKED_AT)
         if count > MOST_FRAMES or size > MOST_BYTES:
@@ -70,15 +70,15 @@ class Exchange:
         return t_ns, frames, bytes(self._memory[_BYTES_IN_AT : _BYTES_IN_AT + size])
 
     def answer(self, wake_ns: int, frames: Sequence[Frame], data: bytes) -> None:
-        """Write the host's part.
+        """Write the answer of the host.
 
         Args:
             wake_ns: when the next call is due [ns of the relay's time].
-            frames: to be sent now.
-            data: for the serial line.
+            frames: frames to send now.
+            data: bytes for the serial line.
 
         Raises:
-            ValueError: there is not enough room.
+            ValueError: it exceeds the size of the memory.
         """
         if len(frames) > MOST_FRAMES or len(data) > MOST_BYTES:
             raise ValueError(f"an answer of {len(frames)} frames, {len(data)} bytes.")
@@ -88,7 +88,7 @@ class Exchange:
         _PART.pack_into(self._memory, _ANSWERED_AT, wake_ns, len(frames), len(data))
 
     def answered(self) -> tuple[int, int, bytes]:
-        """Return when to wake [ns], how many frames to send, bytes for the line."""
+        """Return the answer: wake-up time [ns], number of frames to send, bytes."""
         wake_ns, count, size = _PART.unpack_from(self._memory, _ANSWERED_AT)
         if not size:
             return wake_ns, count, b""
@@ -96,14 +96,14 @@ class Exchange:
         return wake_ns, count, bytes(data)
 
     def say(self, text: str) -> None:
-        """Write a text; one that is too long is cut."""
+        """Write a text, truncated if too long."""
         start = _TEXT_AT + _LENGTH.size
         data = text.encode()[: MEMORY_SIZE - start]
         _LENGTH.pack_into(self._memory, _TEXT_AT, len(data))
         self._memory[start : start + len(data)] = data
 
     def message(self) -> str:
-        """Return the text of the other side."""
+        """Return the text written by the other side."""
         (length,) = _LENGTH.unpack_from(self._memory, _TEXT_AT)
         start = _TEXT_AT + _LENGTH.size
         return self._memory[start : start + length].decode(errors="replace")

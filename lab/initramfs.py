@@ -1,4 +1,4 @@
-"""The first root of the machine: busybox, modules, and an init."""
+"""The machine's initramfs: busybox, kernel modules and an init script."""
 
 import stat
 from collections.abc import Iterable
@@ -39,9 +39,9 @@ class Entry:
     """One file of an archive.
 
     Attributes:
-        name: its path without the first slash.
+        name: path without the leading slash.
         mode: type and permissions.
-        content: of a regular file.
+        content: bytes of a regular file.
         device: major and minor number of a device.
     """
 
@@ -52,7 +52,7 @@ class Entry:
 
 
 def cpio(entries: Iterable[Entry]) -> bytes:
-    """Return an archive in the form "newc", as the kernel unpacks it."""
+    """Return an archive in the "newc" format of the kernel."""
     rows = [*entries, Entry(_TRAILER, 0)]
     return b"".join(_packed(number, row) for number, row in enumerate(rows, start=1))
 
@@ -84,12 +84,12 @@ def _padded(part: bytes) -> bytes:
 
 
 def build(busybox: Path, modules: Iterable[Path], job: str) -> bytes:
-    """Return the archive of the first root.
+    """Return the initramfs archive.
 
     Args:
-        busybox: the static program.
-        modules: to be loaded in this order.
-        job: shell script that the machine runs on the host's root as process 1.
+        busybox: the statically linked program.
+        modules: kernel modules in the order of loading.
+        job: shell script, run as process 1 on the host's root file system.
     """
     files = list(modules)
     order = "".join(f"{path.name}\n" for path in files)

@@ -1,4 +1,4 @@
-"""Debian's kernel: its package in the cache, unpacked, and its modules in order."""
+"""Debian's kernel: download, unpacking, and the load order of its modules."""
 
 import lzma
 import re
@@ -36,8 +36,8 @@ class Kernel:
     """An unpacked kernel.
 
     Attributes:
-        image: the file to boot.
-        modules: files of the modules to load, in this order.
+        image: bootable file.
+        modules: module files in load order.
     """
 
     image: Path
@@ -45,10 +45,10 @@ class Kernel:
 
 
 def image_package(depends: str) -> str:
-    """Return the package of the kernel from the output of `apt-cache depends`.
+    """Return the kernel's package from the output of `apt-cache depends`.
 
     Raises:
-        LabError: it names none.
+        LabError: the output names no package.
     """
     match = _IMAGE.search(depends)
     if match is None:
@@ -60,12 +60,12 @@ def image_package(depends: str) -> str:
 
 
 def fetch_kernel(cache: Path) -> Kernel:
-    """Return the kernel below `cache`; downloaded and unpacked the first time.
+    """Return the kernel below `cache`; download and unpack it the first time.
 
     Raises:
-        LabError: it cannot be downloaded.
+        LabError: the download failed.
     """
-    # A kernel that is there already serves without a network.
+    # A cached kernel needs no network.
     folder = next(iter(sorted(cache.glob("kernel/linux-image-*"))), None)
     if folder is None:
         folder = _unpack(cache)
@@ -75,9 +75,9 @@ def fetch_kernel(cache: Path) -> Kernel:
 
 
 def _unpacked(packed: Path, plain: Path) -> Path:
-    """Return the kernel as an ELF file, or as it is where it is not packed with xz.
+    """Return the kernel as an ELF file, or `packed` if it is not compressed with xz.
 
-    The emulated processor would unpack it in twenty times the time.
+    Unpacking in the emulator would take twenty times as long.
     """
     if not plain.exists():
         content = packed.read_bytes()

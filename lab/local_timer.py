@@ -1,8 +1,8 @@
-"""Tells the guest's kernel the true rate of its local timer, through QEMU's gdb stub.
+"""Sets the true rate of the local timer in the guest's kernel through QEMU's gdb stub.
 
-The kernel's time passes `SLOWNESS` times slower than the timer counts. It calibrates
-the timer against clocks that are not slowed, so each interrupt comes after one sixth of
-what is left to wait, and some thirty come in place of one.
+The kernel's time passes `SLOWNESS` times slower than the timer counts. The kernel
+calibrates the timer against clocks that are not slowed, so each interrupt comes after a
+sixth of the remaining wait, and some thirty interrupts replace one.
 """
 
 import socket
@@ -12,25 +12,26 @@ from pathlib import Path
 
 _PATIENCE = 30.0  # s of the host
 _POINTER = struct.Struct("<Q")
-# struct clock_event_device of Linux: three functions, the next event, then these.
-_RATE = struct.Struct("<32x QQ II")  # longest and shortest wait [ns], factor, its shift
+# struct clock_event_device of Linux: three functions, the next event, then longest and
+# shortest wait [ns], factor and its shift.
+_RATE = struct.Struct("<32x QQ II")
 _LONGEST_AT, _FACTOR_AT = 32, 48
 _SHIFT = 32
 _MASK = 2**64 - 1
 
 
 class DebuggerError(Exception):
-    """The stub does not answer, or the kernel is another one than was expected."""
+    """The stub does not answer, or the kernel is not the expected one."""
 
 
 @dataclass(frozen=True, slots=True)
 class Rate:
-    """How a clock event device turns nanoseconds into counts.
+    """Conversion of a clock event device from nanoseconds to counts.
 
     Attributes:
         longest: longest wait [ns].
-        factor: counts of a nanosecond, times 2 ** shift.
-        shift: of the factor.
+        factor: counts per nanosecond, times 2 ** shift.
+        shift: binary exponent of the factor.
     """
 
     longest: int
@@ -38,10 +39,10 @@ class Rate:
     shift: int
 
     def slowed(self, slowness: int) -> "Rate":
-        """Return the rate of the same timer in a kernel whose time passes slower.
+        """Return the rate for a kernel whose time passes `slowness` times slower.
 
         Raises:
-            DebuggerError: it is not the local timer, or its factor has no room.
+            DebuggerError: this is not the local timer, or the factor overflows.
         """
         factor = self.factor * slowness
         if self.shift != _SHIFT or not 0 < self.factor < factor < 2**32:
@@ -50,7 +51,7 @@ class Rate:
 
 
 class Debugger:
-    """A connection to the stub; the machine stands still while it is open."""
+    """A connection to the stub; the machine is stopped while it is open."""
 
     def __init__(self, path: Path) -> None:
         """Connect; raises OSError."""
@@ -64,7 +65,7 @@ class Debugger:
 
     def __exit__(self, *_: object) -> None:
         with self._link:
-            self._ask("D")  # detach: the machine goes on
+            self._ask("D")  # detach: the machine continues
 
     def read(self, address: int, size: int) -> bytes:
         """Return memory at a virtual address; raises DebuggerError."""
@@ -81,12 +82,12 @@ class Debugger:
             raise DebuggerError(f"the stub answered {answer!r}.")
 
     def _ask(self, text: str) -> str:
-        """Return the answer to a packet; raises DebuggerError where none comes."""
+        """Send a packet; return the answer; raises DebuggerError without one."""
         data = text.encode()
         self._link.sendall(b"$%s#%02x" % (data, sum(data) % 256))
         while True:
             answer = self._packet()
-            if not answer.startswith("T"):  # that the machine has stopped: unasked
+            if not answer.startswith("T"):  # unsolicited report of a stop
                 return answer
 
     def _packet(self) -> str:
@@ -105,16 +106,17 @@ class Debugger:
 
 
 def correct(path: Path, events: int, offsets: int, slowness: int) -> None:
-    """Slow the local timer of the first processor down to its kernel's time.
+    """Correct the rate of the first processor's local timer for the kernel's time.
 
     Args:
-        path: of the stub's socket.
-        events: the kernel's symbol `lapic_events`, relative to a processor's area.
-        offsets: its symbol `__per_cpu_offset`: where the areas begin.
-        slowness: the kernel's time passes so many times slower than the timer counts.
+        path: path of the stub's socket.
+        events: the kernel's symbol `lapic_events`, relative to a per-processor area.
+        offsets: the kernel's symbol `__per_cpu_offset`, the table of these areas.
+        slowness: counting rate of the timer over that of the kernel's time.
 
     Raises:
-        DebuggerError, OSError: there is no stub, or the kernel is another one.
+        DebuggerError: the kernel is not the expected one.
+        OSError: there is no stub.
     """
     with Debugger(path) as debugger:
         (area,) = _POINTER.unpack(debugger.read(offsets, _POINTER.size))

@@ -17,16 +17,16 @@ from lab.kernel import Kernel
 from lab.requirements import program
 from lab.results import TimerFound
 
-# With -icount an instruction takes 1 ns. The kernel is given a time stamp counter of
-# six times the true rate, so its time passes six times slower than the processor's,
-# consistently: driver, recorder and console then fit into one cycle.
+# With -icount an instruction takes 1 ns. The kernel is told that the time stamp counter
+# runs six times faster than it does, so all of its time passes six times slower than
+# the processor's: driver, recorder and console then fit into one cycle.
 SLOWNESS = 6
 _APPEND = (
     "console=ttyS0 quiet panic=-1 mitigations=off nokaslr random.trust_cpu=on "
     f"tsc_early_khz={SLOWNESS}000000 clocksource=tsc tsc=reliable lpj=4000000"
 )
-# Copies of whole words in place of single bytes, page tables of four levels in place of
-# five: both are emulated step by step.
+# Copy whole words instead of bytes, and use page tables of four levels instead of five:
+# both are emulated step by step.
 _PROCESSOR = "max,erms=off,la57=off"
 MEMORY_MB = 3072
 _CLOCK = SystemClock()
@@ -34,12 +34,12 @@ _CLOCK = SystemClock()
 
 @dataclass(frozen=True, slots=True)
 class Sockets:
-    """Unix sockets of one machine, and memory, below a short path.
+    """Paths of a machine's Unix sockets and shared memory, kept short.
 
     Attributes:
-        line: the far end of the serial adapter.
-        monitor: QEMU's, to plug devices in and out.
-        memory: a file that guest and simulated arm share.
+        line: far end of the serial adapter.
+        monitor: QEMU's monitor, for plugging devices in and out.
+        memory: file shared by the guest and the simulated arm.
         debugger: QEMU's gdb stub.
     """
 
@@ -53,14 +53,14 @@ def command(kernel: Kernel, initramfs: Path, sockets: Sockets, proxy: int) -> li
     """Return the command line of the machine.
 
     Both ends of the serial adapter and of QEMU's monitor are in the guest: each socket
-    is joined to a port of its own, so a simulated sensor runs on guest time, too.
-    `proxy` is the descriptor of the socket behind which the simulated arm answers.
+    is connected to a virtio port, so that a simulated sensor also runs on guest time.
+    `proxy` is the descriptor of the socket to the simulated arm.
     """
     options = (
         f"-accel tcg -cpu {_PROCESSOR} -smp 1 -nodefaults -no-reboot -display none "
         "-serial stdio -icount shift=0,sleep=off -no-hpet "
         "-rtc base=2026-01-01T08:00:00,clock=vm "
-        # qboot and the unpacked kernel start in a few seconds less
+        # qboot with the unpacked kernel boots a few seconds faster
         "-bios qboot.rom"
     )
     return [
@@ -82,7 +82,7 @@ def command(kernel: Kernel, initramfs: Path, sockets: Sockets, proxy: int) -> li
 
 
 def _options(*pairs: tuple[str, str]) -> list[str]:
-    """Return options, each with its value, as words of a command."""
+    """Return options and their values as words of a command."""
     return [word for pair in pairs for word in pair]
 
 
@@ -96,7 +96,7 @@ def _host_files() -> list[str]:
 
 
 def _can_cards() -> list[str]:
-    """Two cards on one bus; each can be pulled out of its slot."""
+    """Return the options of two cards on one bus that can be unplugged."""
     return _options(
         ("-object", "can-bus,id=bus0"),
         ("-device", "kvaser_pci,canbus=bus0,id=card0,addr=0x10"),
@@ -125,7 +125,7 @@ def _monitor(socket: Path) -> list[str]:
 
 
 def _memory() -> list[str]:
-    """Memory that has a descriptor: the proxy device sends it to its other end."""
+    """Return the options of RAM with a descriptor, which the proxy device requires."""
     return _options(
         ("-m", str(MEMORY_MB)),
         ("-machine", "memory-backend=ram"),
@@ -134,7 +134,7 @@ def _memory() -> list[str]:
 
 
 def _far_side(memory: Path, proxy: int) -> list[str]:
-    """Memory shared with the simulated arm, and the device that it is called by."""
+    """Return the options of memory shared with the simulated arm and of the proxy."""
     size = f"share=on,mem-path={memory},size={MEMORY_SIZE}"
     return _options(
         ("-object", f"memory-backend-file,id=shared,{size}"),
@@ -163,7 +163,7 @@ class Machine:
                 pass_fds=(here.fileno(),),
             )
         self._debugger = sockets.debugger
-        self._taken = [0.0, 0.0]
+        self._used = [0.0, 0.0]  # s of processor time, by process
         self._lines: queue.Queue[str | None] = queue.Queue()
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
@@ -172,10 +172,10 @@ class Machine:
         """Return the console's next line; None once the machine has ended.
 
         Args:
-            until_ns: monotonic time of the host after which it counts as hung.
+            until_ns: the host's monotonic time after which the machine counts as hung.
 
         Raises:
-            TimeoutError: it is hung.
+            TimeoutError: no line arrived until then.
         """
         left = (until_ns - _CLOCK.now_ns()) / NS_PER_S
         try:
@@ -184,18 +184,18 @@ class Machine:
             raise TimeoutError from None
 
     def processor_seconds(self) -> float:
-        """Return the processor time that both processes have taken so far [s]."""
+        """Return the processor time of both processes so far [s]."""
         for number, process in enumerate((self._process, self._far_side)):
-            with contextlib.suppress(OSError):  # it has ended
-                self._taken[number] = _taken_by(process.pid)
-        return sum(self._taken)
+            with contextlib.suppress(OSError):  # the process has ended
+                self._used[number] = _cpu_time(process.pid)
+        return sum(self._used)
 
     def correct_timer(self, found: TimerFound) -> None:
-        """Tell its kernel the true rate of its local timer; raises DebuggerError."""
+        """Set the true rate of the kernel's local timer; raises DebuggerError."""
         local_timer.correct(self._debugger, found.events, found.offsets, SLOWNESS)
 
     def close(self) -> None:
-        """Switch it off; safe to repeat."""
+        """Kill the machine and its arm; safe to repeat."""
         for process in (self._process, self._far_side):
             process.kill()
             process.wait()
@@ -215,16 +215,16 @@ def far_command(memory: Path, link: int) -> list[str]:
     """Return the command of the process that simulates the arm.
 
     Args:
-        memory: shared with the guest.
-        link: descriptor of its end of the proxy device's socket.
+        memory: file of the memory shared with the guest.
+        link: descriptor of the process's end of the proxy device's socket.
     """
     options = ["--link", str(link), "--memory", str(memory)]
     return [sys.executable, "-m", "lab.far", *options]
 
 
-def _taken_by(pid: int) -> float:
+def _cpu_time(pid: int) -> float:
     """Return the processor time of a process [s]; raises OSError once it has ended."""
     stat = Path(f"/proc/{pid}/stat").read_text(encoding="ascii")
-    # The name in parentheses may hold anything.
+    # The name in parentheses may contain any character.
     user, system = stat.rpartition(")")[2].split()[11:13]
     return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")

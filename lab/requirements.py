@@ -1,4 +1,4 @@
-"""What the laboratory needs on the host, and how to install what is missing."""
+"""Packages that the laboratory needs on the host, and how to install them."""
 
 import shutil
 from collections.abc import Callable, Mapping
@@ -14,23 +14,23 @@ PROGRAMS: Mapping[str, str] = {
     "dpkg-deb": "dpkg",
     "apt-get": "apt",
 }
-ALWAYS = ("seabios",)  # no program of its own: the firmware of the emulated machine
+ALWAYS = ("seabios",)  # firmware of the emulated machine; contains no program to check
 SEARCH_PATH = "/usr/sbin:/usr/bin:/sbin:/bin:/usr/local/sbin:/usr/local/bin"
 
 
 class LabError(Exception):
-    """The laboratory cannot be set up; the message says why and what to do."""
+    """The laboratory cannot be set up; the message gives reason and remedy."""
 
 
 def find_program(name: str) -> str | None:
-    """Return the path of a program, also of those only root has in its PATH."""
+    """Return the path of a program, also one that only root has in its PATH."""
     return shutil.which(name) or shutil.which(name, path=SEARCH_PATH)
 
 
 def missing_packages(
     find: Callable[[str], str | None] = find_program,
 ) -> list[str]:
-    """Return the Debian packages whose programs are not there, sorted."""
+    """Return the Debian packages whose programs are missing, sorted."""
     return sorted({package for name, package in PROGRAMS.items() if not find(name)})
 
 

@@ -1,18 +1,18 @@
-"""What a scenario comes to, as a line of JSON on the machine's serial console."""
+"""Results of scenarios as lines of JSON on the machine's serial console."""
 
 import json
 from dataclasses import asdict, dataclass, field
 from enum import Enum
 from typing import Any
 
-MARK = "@lab "  # before each line of JSON; everything else is the machine's own output
+MARK = "@lab "  # prefix of each line of JSON; other lines are the machine's own output
 
 
 class Verdict(Enum):
-    """How a scenario ended.
+    """Outcome of a scenario.
 
-    EXPECTED: it fails for a reason that is known and written beside it. SURPRISING: it
-    was expected to fail and passed, so its reason is out of date.
+    EXPECTED: it failed for the documented reason. SURPRISING: it passed although a
+    failure is documented, so that reason is out of date.
     """
 
     PASSED = "passed"
@@ -29,16 +29,16 @@ class Verdict(Enum):
 
 @dataclass(frozen=True, slots=True)
 class ScenarioResult:
-    """How one scenario ended.
+    """Result of one scenario.
 
     Attributes:
-        name: of the scenario.
-        verdict: how it ended.
-        seconds: guest time that it took [s].
-        figures: what was measured, in words with units, by name.
-        reason: why it is not simply passed.
-        output: of the commands that it ran; kept where it failed.
-        processor: time of the host that the emulation took [s], as the host adds it.
+        name: name of the scenario.
+        verdict: its outcome.
+        seconds: its duration in guest time [s].
+        figures: measured values as text with units, by name.
+        reason: explanation of any verdict but passed.
+        output: output of its commands if it failed.
+        processor: the host's processor time [s], added by the host.
     """
 
     name: str
@@ -52,25 +52,25 @@ class ScenarioResult:
 
 @dataclass(frozen=True, slots=True)
 class Begun:
-    """A scenario has begun; until its result comes, a hanging machine hangs in it."""
+    """A scenario has begun; if no result follows, the machine hung in it."""
 
     name: str
 
 
 @dataclass(frozen=True, slots=True)
 class Finished:
-    """The machine has run everything; `boot_seconds`: guest time until the first."""
+    """All scenarios have run; `boot_seconds` is the guest time until the first [s]."""
 
     boot_seconds: float
 
 
 @dataclass(frozen=True, slots=True)
 class TimerFound:
-    """Where the kernel keeps its local timer: values of two of its symbols.
+    """Location of the kernel's local timer: the values of two kernel symbols.
 
     Attributes:
-        events: `lapic_events`.
-        offsets: `__per_cpu_offset`.
+        events: value of `lapic_events`.
+        offsets: value of `__per_cpu_offset`.
     """
 
     events: int
@@ -80,7 +80,7 @@ class TimerFound:
 Message = ScenarioResult | Begun | Finished | TimerFound
 
 
-_PLAIN = {one.__name__: one for one in (Begun, Finished, TimerFound)}
+_PLAIN = {kind.__name__: kind for kind in (Begun, Finished, TimerFound)}
 
 
 def to_line(message: Message) -> str:
@@ -92,8 +92,8 @@ def to_line(message: Message) -> str:
 
 
 def from_line(line: str) -> Message | None:
-    """Return the message of a line, None where it is something else or is damaged."""
-    # A kernel message may stand before the mark on the same line.
+    """Return the message of a line, None if there is none or it is damaged."""
+    # A kernel message may precede the mark on the same line.
     _, mark, text = line.partition(MARK)
     if not mark:
         return None

@@ -5,13 +5,13 @@
     session = tr.load_session("S002")       # kept trials of a recorded session, or
     trial = tr.load_trial("T04.mcap")       # one recorded trial or table, or
     tables = tr.load_tables("tables")       # what `traction export` wrote
-    session["T01"].plot()                   # as the report draws it
+    session["T01"].plot()                   # the figure of the report
     frame = session.to_pandas()             # units in frame.attrs["units"]
     model = tr.fit(session, "tustin")       # or a Gaussian process
-    scores = tr.compare(session)            # one whole trial left out at a time
-    rest = tr.fit_break_away(tables)        # before a foot at rest slips
-    known = tr.load_terrains("terrains.json")
-    session = tr.simulate("S0", trials=10)  # as `traction run --fake --fast` does
+    scores = tr.compare(session)            # leave-one-trial-out cross-validation
+    limits = tr.fit_break_away(tables)      # force at which a foot at rest slips
+    terrains = tr.load_terrains("terrains.json")
+    session = tr.simulate("S0", trials=10)  # same as `traction run --fake --fast`
 
 SI units throughout: forces in N, velocities in m/s; v_t and F_t are positive in
 ordinary slip, F_n in compression. Begin with `loading`, then `models`.
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
     __version__: str
 
-# Loaded when first asked for: the program `traction` starts through this package.
+# Imported on first use, since the program `traction` starts through this package.
 _MODULES = {
     "Comparison": "models",
     "Model": "models",

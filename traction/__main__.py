@@ -1,5 +1,5 @@
 # PYTHON_ARGCOMPLETE_OK
-"""The command line, once it is certain that the program's own packages are loaded."""
+"""Entry point of the command line; checks first that no package is shadowed."""
 
 import os
 import sys
@@ -24,16 +24,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def open_standard_streams() -> None:
-    """Point closed standard streams at nothing, as services and cron start programs.
+    """Open closed standard streams on the null device.
 
-    Else the next files that are opened take their numbers, and processes that are
-    started lose them.
+    Services and cron may start programs with these closed. The next files opened would
+    take their descriptors 0 to 2, and child processes would lose them.
     """
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         try:
             os.fstat(number)
         except OSError:
-            os.open(os.devnull, os.O_RDWR)  # takes the lowest number that is free
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest free descriptor
             os.set_inheritable(number, True)
         if getattr(sys, name) is None:
             mode = "r" if name == "stdin" else "w"

@@ -1,4 +1,4 @@
-"""Tables as pandas data frames, the only module that imports pandas."""
+"""Tables as pandas data frames; the only module that imports pandas."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ def data_frame(
     """Return columns as a data frame.
 
     Args:
-        columns: values by name, all of shape (n,).
-        units: by name; kept in `attrs["units"]`.
-        about: kept in `attrs`.
+        columns: values by column name, all of shape (n,).
+        units: unit by column name; stored in `attrs["units"]`.
+        about: further entries of `attrs`.
 
     Raises:
         MissingLibraryError: pandas is not installed.

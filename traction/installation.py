@@ -1,4 +1,4 @@
-"""Whether the packages of the program are its own, and none of the same name."""
+"""Check that no other package of the same name shadows those of the program."""
 
 from functools import cache
 from importlib.util import find_spec
@@ -9,7 +9,7 @@ OWN = ("acquisition", "analysis", "experiments", "fakes", "ft_sensor", "wam")
 
 @cache
 def check_packages() -> None:
-    """Compare every package of the program with what Python would import.
+    """Check that Python imports every package of the program from its own folder.
 
     Raises:
         ImportError: another folder or module of the same name comes first, or one of
@@ -35,7 +35,7 @@ def check_packages() -> None:
 
 
 def _locations(name: str) -> list[Path]:
-    """Return where Python finds a package: its folders, or its file."""
+    """Return the folders or the file from which Python would import a package."""
     try:
         spec = find_spec(name)
     except (ImportError, ValueError):  # a module without a specification

@@ -1,4 +1,4 @@
-"""Trials from the disk: of a session, a recording, or tables."""
+"""Load trials from a session, a recording or tables."""
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -17,7 +17,7 @@ _RECORDED = ".mcap"
 def load_session(
     name: str, data: Path | str = "data", *, allow_missing: bool = False
 ) -> TrialSet:
-    """Return the kept trials of a recorded session, held against their checksums.
+    """Return the kept trials of a recorded session, checked by their checksums.
 
     >>> import traction as tr
     >>> session = tr.load_session("S001")
@@ -28,8 +28,8 @@ def load_session(
 
     Args:
         name: "S012", the name of its folder, or a path to it.
-        data: the data folder, as `--data` of the commands.
-        allow_missing: go on without kept trials that are missing or changed.
+        data: the data folder, like the option `--data` of the commands.
+        allow_missing: skip kept trials that are missing or changed.
 
     Raises:
         SessionError: there is no such session, or it has no kept trial.
@@ -57,7 +57,7 @@ def load_trial(path: Path | str) -> Trial:
             F_n and F_t.
 
     Raises:
-        TrialFileError: the file is no sound recording.
+        TrialFileError: the file is not a readable recording.
         SettingsError: the table cannot be read, or holds more than one trial.
     """
     path = Path(path).expanduser()
@@ -82,7 +82,7 @@ def load_tables(
     decimal: str = ".",
     skipped: Iterable[int] = (),
 ) -> TrialSet:
-    """Return the trials of tables: those of `traction export`, or of other programs.
+    """Return the trials of tables written by `traction export` or another program.
 
     >>> import traction as tr
     >>> tr.load_tables("tables")
@@ -90,24 +90,24 @@ def load_tables(
 
     Args:
         paths: a folder of `traction export`, CSV or Parquet files of one trial each, or
-            npz files of many; one or several. `~` and patterns are expanded.
+            npz files of many; one path or several. `~` and patterns are expanded.
         columns: names of t, v_t, F_n and F_t in the tables, where they differ.
-        terrain: of every CSV and Parquet file; by default what its data package says.
+        terrain: of every CSV and Parquet file; by default that of its data package.
         units: of columns whose header gives none, e.g. {"v_t": "mm/s"}.
         rate: rows per second where a CSV has no time [Hz].
-        negate: columns with the other sign, e.g. ["F_n"].
+        negate: columns with the opposite sign, e.g. ["F_n"].
         separator: between the columns of a CSV: one character, or "blanks".
         decimal: decimal mark of a CSV, "." or ",".
-        skipped: lines of a CSV that are no part of the table, from 1.
+        skipped: numbers from 1 of CSV lines that do not belong to the table.
 
     Raises:
-        SettingsError: a table that is missing, too large, changed, or none.
+        SettingsError: a table is missing, too large, changed or not readable.
     """
     files = _files(paths)
     for name, value in (("columns", columns), ("units", units)):
         if value is not None and not isinstance(value, Mapping):
             raise SettingsError(
-                f"load_tables: {name} is {value!r:.60}, and no dictionary.",
+                f"load_tables: {name} is {value!r:.60}, not a dictionary.",
                 hint='Several files go into a list: load_tables(["a.csv", "b.csv"]).',
             )
     tables = tables_by_terrain(
@@ -128,17 +128,17 @@ def load_tables(
 
 
 def _files(paths: Path | str | Iterable[Path | str]) -> list[Path]:
-    """Return the names of files.
+    """Return one path or several as a list.
 
     Raises:
-        SettingsError: something else was given.
+        SettingsError: the argument is neither a path nor a list of paths.
     """
     if isinstance(paths, str | Path):
         return [Path(paths)]
     if not isinstance(paths, Mapping) and isinstance(paths, Iterable):
-        many = list(paths)
-        if all(isinstance(path, str | Path) for path in many):
-            return [Path(path) for path in many]
+        items = list(paths)
+        if all(isinstance(path, str | Path) for path in items):
+            return [Path(path) for path in items]
     raise SettingsError(
         f"load_tables: {paths!r:.60} is no name of a file and no list of names.",
         hint='Write e.g. load_tables("a.csv") or load_tables(["a.csv", "b.csv"]).',

@@ -1,4 +1,4 @@
-"""Models of trials: fitted, compared with one trial left out at a time, and known."""
+"""Fit models to trials, compare them by cross-validation, load known terrains."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ from traction.trials import Trial
 if TYPE_CHECKING:
     from traction.frames import DataFrame
 
-_CONSTANT = "constant"  # the median F_t of the other trials, for scale
+_CONSTANT = "constant"  # median F_t of the training trials, the baseline
 _SCORE_UNITS = {
     "mae": "N",
     "mae_error": "N",
@@ -58,10 +58,10 @@ class Model:
 
     Attributes:
         name: e.g. "tustin" or "gp_se".
-        terrain: it was fitted to.
-        trials: it was fitted to.
-        samples: kept samples of these trials.
-        fitted: the model of `analysis.study`.
+        terrain: name of the terrain.
+        trials: number of trials it was fitted to.
+        samples: number of kept samples of these trials.
+        fitted: the underlying model of `analysis.study`.
     """
 
     name: str
@@ -83,16 +83,16 @@ class Model:
 
     @property
     def parameters(self) -> dict[str, Any]:
-        """Parameters as fitted; those of "tustin" are mu, F_s, v_s, delta_s and b."""
+        """Fitted parameters; those of "tustin" are mu, F_s, v_s, delta_s and b."""
         return self.fitted.describe()
 
     @property
     def flags(self) -> tuple[str, ...]:
-        """What to know before the parameters are believed."""
+        """Warnings about the fit and its parameters."""
         return self.fitted.flags
 
     def predict(self, F_n: ArrayLike, v_t: ArrayLike) -> Distribution:
-        """Return the traction to expect of a measurement, noise included.
+        """Return the predictive distribution of a measured F_t, noise included.
 
         >>> import traction as tr
         >>> answer = tr.fit(tr.load_session("S001"), "tustin").predict(3.5, [0.02, 0.1])
@@ -107,19 +107,20 @@ class Model:
             `.mean`, `.sd` and `.quantiles(shares)` of F_t [N], shape (n,).
 
         Raises:
-            SettingsError: the two do not have one shape, or a value is not finite.
+            SettingsError: the shapes differ, or a value is not finite.
         """
         return self.fitted.predict(*points_of(F_n, v_t))
 
 
 @dataclass(frozen=True, slots=True)
 class ModelScore:
-    """How well a model predicts trials that it was not fitted to.
+    """Scores of a model on held-out trials.
 
     Attributes:
-        terrain: of the trials.
-        model: its name; "constant" is the median F_t of the other trials, for scale.
-        trials: that were left out, one at a time.
+        terrain: terrain of the trials.
+        model: name of the model; "constant" is the median F_t of the training trials,
+            the baseline.
+        trials: number of held-out trials.
         mae: mean absolute error [N].
         mae_error: standard error of `mae` over the trials [N].
         rmse: root mean square error [N].
@@ -141,10 +142,10 @@ class ModelScore:
 
 @dataclass(frozen=True, slots=True, repr=False, eq=False)
 class Comparison:
-    """Models compared on trials that were left out.
+    """Models compared on held-out trials.
 
     Attributes:
-        scores: by terrain, the smallest error first.
+        scores: by terrain, smallest error first.
         folds: every fold with its fitted models.
     """
 
@@ -162,7 +163,7 @@ class Comparison:
         return "\n".join(lines)
 
     def best(self, terrain: str) -> ModelScore:
-        """Return the model with the smallest mean absolute error on a terrain.
+        """Return the score with the smallest mean absolute error on a terrain.
 
         Raises:
             SettingsError: the terrain was not compared.
@@ -170,9 +171,9 @@ class Comparison:
         for score in self.scores:
             if score.terrain == terrain:
                 return score
-        known = ", ".join(dict.fromkeys(score.terrain for score in self.scores))
+        names = ", ".join(dict.fromkeys(score.terrain for score in self.scores))
         raise SettingsError(
-            f"There is no terrain {terrain!r}.", hint=f"The terrains are {known}."
+            f"There is no terrain {terrain!r}.", hint=f"The terrains are {names}."
         )
 
     def to_pandas(self) -> DataFrame:
@@ -198,20 +199,20 @@ def fit(
     <Tustin of TF, 2 trials, ... samples: mu ..., F_s ... N, v_s ... m/s, ...>
 
     Args:
-        trials: of one terrain, e.g. a session or `tables.on("S0")`.
+        trials: trials of one terrain, e.g. a session or `tables.on("S0")`.
         model: a name of `analysis.study.models.MODELS`, e.g. "tustin", "gp_se", or
-            "gp_se_trial" whose bands hold for a trial to come.
+            "gp_se_trial", whose bands hold for a new trial.
         options: bounds, points and seed; see `FitOptions`.
 
     Raises:
         SettingsError: there is no such model, the trials are of several terrains, or
-            their samples are too few.
+            there are too few samples.
     """
     groups = by_terrain([trials] if isinstance(trials, Trial) else trials)
     if len(groups) != 1:
-        named = ", ".join(groups) or "none"
+        names = ", ".join(groups) or "none"
         raise SettingsError(
-            f"A model is fitted to trials of one terrain; these are of {named}.",
+            f"A model is fitted to trials of one terrain; these are of {names}.",
             hint='Choose one, e.g. trials.on("S0").',
         )
     ((terrain, prepared),) = groups.items()
@@ -228,7 +229,7 @@ def compare(
     options: FitOptions | None = None,
     n_jobs: int | None = None,
 ) -> Comparison:
-    """Return how well models predict whole trials that they were not fitted to.
+    """Compare models by leave-one-trial-out cross-validation.
 
     >>> import traction as tr
     >>> scores = tr.compare(tr.load_session("S001"), ["tustin"], n_jobs=1)
@@ -240,9 +241,9 @@ def compare(
     'tustin'
 
     Args:
-        trials: of one terrain or several, two of each at least.
-        models: their names, or a single one; by default the five of the paper's Fig. 9.
-        options: bounds, points and seed; its `models` are not used.
+        trials: trials of one terrain or several, at least two of each.
+        models: one name or several; by default the five of the paper's Fig. 9.
+        options: bounds, points and seed; its `models` are ignored.
         n_jobs: processes; one per core by default. Does not change the results.
 
     Raises:
@@ -256,10 +257,10 @@ def compare(
             hint="Give two trials of each terrain at least.",
         )
     names = (models,) if isinstance(models, str) else tuple(models)
-    wanted = replace(options or FitOptions(), models=names)
-    plan, _ = plan_folds(groups, wanted)
+    fold_options = replace(options or FitOptions(), models=names)
+    plan, _ = plan_folds(groups, fold_options)
     folds = tuple(run_tasks(run_fold, plan, n_jobs))
-    scores = [s for terrain in groups for s in _scores(terrain, folds, wanted.models)]
+    scores = [s for terrain in groups for s in _scores(terrain, folds, names)]
     return Comparison(tuple(scores), folds)
 
 
@@ -268,30 +269,32 @@ def fit_break_away(
     kinds: Mapping[str, str] | None = None,
     options: BreakAwayOptions | None = None,
 ) -> dict[str, BreakAwayModel]:
-    """Return what every terrain of three trials or more gives before a foot slips.
+    """Fit the break-away force of every terrain with three trials or more.
 
-    `model.slip_risk(required, F_n)` and `model.available(F_n, risk)` answer for a push
-    from rest.
+    `model.slip_risk(required, F_n)` is the probability of slip in a push from rest,
+    `model.available(F_n, risk)` the traction available at that risk.
 
     Args:
-        trials: of one terrain or several; stones share what they have in common.
+        trials: trials of one terrain or several; stone terrains are fitted together
+            and share some parameters.
         kinds: "small", "big" or "flat" by terrain; by default the paper's, by name.
-        options: velocity that makes a slip, and number of resampled fits.
+        options: slip velocity threshold and number of bootstrap fits.
     """
     groups = by_terrain(trials)
-    known = {name: terrain_kind(name) for name in groups} | dict(kinds or {})
-    return fit_of_terrains(groups, known, options)
+    all_kinds = {name: terrain_kind(name) for name in groups} | dict(kinds or {})
+    return fit_of_terrains(groups, all_kinds, options)
 
 
 def load_terrains(path: Path | str) -> TerrainDatabase:
     """Return the terrain database that `traction export --terrain-db` wrote.
 
-    `known.terrain("S0").predict(F_n=3.5, v_t=0.05)` is the traction to expect [N],
-    `.slip_risk(required, F_n)` answers for a push from rest, `.risk_in_motion` for a
-    foot that slides, `.sample(F_n, v_t, dt, seed)` draws new trials along a path.
+    `terrains.terrain("S0").predict(F_n=3.5, v_t=0.05)` is the expected traction [N],
+    `.slip_risk(required, F_n)` the probability of slip in a push from rest,
+    `.risk_in_motion` that of a sliding foot, and `.sample(F_n, v_t, dt, seed)` draws
+    new trials along a path.
 
     Raises:
-        SettingsError: the file cannot be read or is none.
+        SettingsError: the file cannot be read or is not a terrain database.
     """
     return load(path)
 
@@ -299,19 +302,20 @@ def load_terrains(path: Path | str) -> TerrainDatabase:
 def _scores(
     terrain: str, folds: Sequence[FoldResult], models: Sequence[str]
 ) -> list[ModelScore]:
-    own = [fold for fold in folds if fold.terrain == terrain]
-    scores = [score for name in models if (score := _score(terrain, own, name))]
+    of_terrain = [fold for fold in folds if fold.terrain == terrain]
+    scores = [score for name in models if (score := _score(terrain, of_terrain, name))]
     scores.sort(key=lambda score: score.mae)
-    if own:
-        constant = [fold.constant_mae for fold in own]
+    if of_terrain:
+        constant = [fold.constant_mae for fold in of_terrain]
         mae, error = float(np.mean(constant)), standard_error(constant)
         unknown = (None, None, None, None)
-        scores.append(ModelScore(terrain, _CONSTANT, len(own), mae, error, *unknown))
+        count = len(of_terrain)
+        scores.append(ModelScore(terrain, _CONSTANT, count, mae, error, *unknown))
     return scores
 
 
 def _score(terrain: str, folds: Sequence[FoldResult], name: str) -> ModelScore | None:
-    """Return the means over the folds; None where the model could not be fitted."""
+    """Return the mean scores over the folds; None if the model was never fitted."""
     of_model = [fold.models[name].score for fold in folds if name in fold.models]
     if not of_model:
         return None
@@ -329,6 +333,6 @@ def _score(terrain: str, folds: Sequence[FoldResult], name: str) -> ModelScore |
 
 
 def _shortened(flags: Sequence[str]) -> str:
-    """Return the first of what is to be doubted in a model, and how many more."""
+    """Return the first warning and the number of the others."""
     first, more = flags[0], len(flags) - 1
     return f"{first}, and {more} more" if more else first

@@ -15,7 +15,7 @@ from traction.loading import load_session
 if TYPE_CHECKING:
     from traction.trial_sets import TrialSet
 
-_SAID = 300  # characters of what the command said last
+_OUTPUT_TAIL = 300  # characters of the command's output quoted in an error
 
 
 def simulate(
@@ -27,7 +27,7 @@ def simulate(
     config: Path | str | None = None,
     pace: str = "steady",
 ) -> TrialSet:
-    """Return the trials of a new simulated session, recorded as the command does.
+    """Record a new simulated session and return its trials.
 
     The files are those of `traction run TERRAIN --fake --fast --operator-script auto
     --trials N --seed N`, byte for byte: arm, sensor, loop, recorder and review are the
@@ -38,14 +38,14 @@ def simulate(
     Args:
         terrain: a name in matrix.toml.
         trials: number of trials to keep.
-        seed: of the ground, the hand and the errors of the sensor.
-        data: the data folder, as `--data` of the commands.
-        config: rig.toml; None = the settings that are shipped.
-        pace: how the simulated person pushes: "steady", "slow", "fast", "clumsy".
+        seed: seed of the ground, the operator's hand and the sensor errors.
+        data: the data folder, like the option `--data` of the commands.
+        config: rig.toml; None = the shipped settings.
+        pace: how the simulated operator pushes: "steady", "slow", "fast" or "clumsy".
 
     Raises:
-        SettingsError: there is no such terrain, or an argument is none.
-        SessionError: a session is unfinished in the folder, or this one stayed so.
+        SettingsError: there is no such terrain, or an argument is invalid.
+        SessionError: the folder holds an unfinished session, or this one failed.
     """
     from experiments.arguments import add_global_options
     from experiments.commands import run
@@ -55,25 +55,26 @@ def simulate(
     run.add_arguments(parser)
     options = ["--fake", "--fast", "--operator-script", "auto", f"--pace={pace}"]
     numbers = [f"--trials={trials}", f"--seed={seed}"]
-    places = [f"--data={data}", *([] if config is None else [f"--config={config}"])]
-    args = parser.parse_args([*options, *numbers, *places, "--", str(terrain)])
-    said = io.StringIO()
-    with contextlib.redirect_stdout(said):
+    paths = [f"--data={data}", *([] if config is None else [f"--config={config}"])]
+    args = parser.parse_args([*options, *numbers, *paths, "--", str(terrain)])
+    output = io.StringIO()
+    with contextlib.redirect_stdout(output):
         code = run.run(args)
     if code:
         raise SessionError(
-            f"The session was not finished: {said.getvalue().strip()[-_SAID:]}",
-            hint="What was recorded is kept: traction status.",
+            "The session was not finished: "
+            f"{output.getvalue().strip()[-_OUTPUT_TAIL:]}",
+            hint="Recorded trials are kept: see traction status.",
         )
     newest = list_sessions(Path(data))[-1]
     return load_session(newest.id, data)
 
 
 class _RefusingParser(argparse.ArgumentParser):
-    """Refuses arguments by an error of this program."""
+    """Argument parser that raises SettingsError instead of exiting."""
 
     def error(self, message: str) -> None:  # type: ignore[override]
-        """Raise what the command would have printed.
+        """Raise the message that the command would have printed.
 
         Raises:
             SettingsError: always.

@@ -1,4 +1,4 @@
-"""Several trials in order: to choose from, plot and tabulate."""
+"""An ordered set of trials: select, plot and tabulate."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, repr=False, eq=False)
 class TrialSet(Sequence[Trial]):
-    """Trials in order: of a session, or of tables.
+    """Trials of a session or of tables, in order.
 
     Attributes:
-        name: where they come from.
-        trials: the trials.
+        name: name of the session, or of the files.
+        trials: the trials in order.
     """
 
     name: str
@@ -52,24 +52,24 @@ class TrialSet(Sequence[Trial]):
     def __getitem__(self, key: slice) -> TrialSet: ...
 
     def __getitem__(self, key: int | str | slice) -> Trial | TrialSet:
-        """Return a trial by its number from 0 or its name, or several.
+        """Return a trial by its index or name, or a slice of the set.
 
         Raises:
-            IndexError: there is no such number.
+            IndexError: the index is out of range.
             SettingsError: no trial, or more than one, has that name.
         """
         if isinstance(key, slice):
             return TrialSet(self.name, self.trials[key])
         if isinstance(key, int):
             return self.trials[key]
-        named = [t for t in self.trials if key in {t.name, t.name.rpartition("/")[2]}]
-        if len(named) != 1:
+        matches = [t for t in self.trials if key in {t.name, t.name.rpartition("/")[2]}]
+        if len(matches) != 1:
             names = ", ".join(trial.name for trial in self.trials[:20])
             raise SettingsError(
-                f"{self.name}: {len(named)} trials are called {key!r}.",
+                f"{self.name}: {len(matches)} trials are called {key!r}.",
                 hint=f"There are {names}.",
             )
-        return named[0]
+        return matches[0]
 
     @property
     def terrains(self) -> tuple[str, ...]:
@@ -99,8 +99,8 @@ class TrialSet(Sequence[Trial]):
         ['trial', 'terrain', 't', 'v_t', 'F_n', 'F_t', 'kept_row', 'simulated']
 
         Args:
-            kept: only the samples that models are fitted to, smoothed; else every
-                cycle, v_t, F_n and F_t over t.
+            kept: only the smoothed samples that models are fitted to; else t, v_t, F_n
+                and F_t of every cycle.
 
         Raises:
             MissingLibraryError: pandas is not installed.
@@ -120,7 +120,7 @@ class TrialSet(Sequence[Trial]):
         return data_frame(labels | columns, units, name=self.name)
 
     def plot(self) -> Figure:
-        """Return F_t over the way of every trial side by side, as the report draws it.
+        """Return the report's figure of F_t over travel, all trials side by side.
 
         Raises:
             SettingsError: there is no trial.
@@ -140,7 +140,7 @@ class TrialSet(Sequence[Trial]):
 
 
 def by_terrain(trials: Iterable[Trial]) -> dict[str, list[PreparedTrial]]:
-    """Return the kept samples of trials by terrain.
+    """Group the kept samples of trials by terrain.
 
     Raises:
         SettingsError: some are simulated and others are not.

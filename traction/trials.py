@@ -1,4 +1,4 @@
-"""One trial as a person handles it: to look at, plot and tabulate."""
+"""One trial for interactive use: inspect, plot and tabulate."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ class Trial:
     Attributes:
         series: v_t, F_n and F_t at the recorded rate.
         kept: the samples that models are fitted to: smoothed, thinned and inside the
-            window of velocities.
-        recorded: joints, wrench and sole as recorded; None for a table.
+            velocity window.
+        recorded: recorded joints, wrench and sole; None for a table.
     """
 
     series: TractionSeries
@@ -45,12 +45,12 @@ class Trial:
 
     @property
     def name(self) -> str:
-        """Session and trial, e.g. S012/T04; of a table its file."""
+        """Session and trial, e.g. S012/T04, or the file of a table."""
         return self.series.name
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was decided when the table was read: dropped rows, gaps, spikes."""
+        """Decisions made while the table was read: dropped rows, gaps, spikes."""
         return self.series.notes
 
     @property
@@ -97,10 +97,10 @@ class Trial:
         ('m/s', 'N m')
 
         Args:
-            kept: only the samples that models are fitted to, smoothed.
+            kept: only the smoothed samples that models are fitted to.
 
         Returns:
-            A row per sample. `attrs` holds "units" and "meanings" by column, "trial",
+            One row per sample. `attrs` holds "units" and "meanings" by column, "trial",
             "terrain" and "simulated".
 
         Raises:
@@ -117,9 +117,9 @@ class Trial:
         )
 
     def plot(self) -> Figure:
-        """Return F_t and v_t over time as the report's Fig. 4 draws them, slips marked.
+        """Return the report's Fig. 4: F_t and v_t over time, slips marked.
 
-        A notebook shows the figure; `figure.savefig("T01.pdf")` keeps it.
+        A notebook shows the figure; `figure.savefig("T01.pdf")` saves it.
         """
         from analysis.report.sections.paper import excerpts
 
@@ -137,7 +137,7 @@ class Trial:
 
 
 def trial_of(source: RecordedTrial | TractionSeries) -> Trial:
-    """Return a recording or a series as a trial, prepared by the default rule."""
+    """Return a recording or a series as a trial, prepared with the default options."""
     if isinstance(source, TractionSeries):
         return Trial(source, prepare_trial(source, PrepareOptions()))
     options = PrepareOptions(container_travel=source.frame.travel)

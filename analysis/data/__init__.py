@@ -1,4 +1,4 @@
-"""Recorded trials as samples ready for a model: smoothed, thinned, windowed, graded.
+"""Preparation of recorded trials: smoothing, thinning, windowing, quality.
 
 Begin with `series`, then `load`, which reads a trial file, and `prepare`; `events`
 finds slips, `quality` grades coverage.

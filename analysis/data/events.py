@@ -1,8 +1,8 @@
-"""Slips: the foot breaks loose, runs, and is caught again.
+"""Slip detection: the foot breaks away, slides, and sticks again.
 
-A slip is a stretch of smoothed v_t above 0.03 m/s that rises above 0.12 m/s. The force
-before it, the force left while the foot runs, and the throw-back when it is caught are
-what tells loose stones from a plate.
+A slip is a stretch of smoothed v_t above 0.03 m/s that rises above 0.12 m/s. The peak
+force before the slip, the lowest force during it and the bounce-back at its end
+distinguish loose stones from a plate.
 """
 
 from dataclasses import dataclass
@@ -14,16 +14,16 @@ from analysis.data.series import Array
 
 SLIP_SPEED = 0.12  # m/s that makes a stretch a slip
 EDGE_SPEED = 0.03  # m/s where a slip begins and ends
-BOUNCE_SPEED = -0.01  # m/s below which the foot is thrown back
-SAG_SHARE = 0.08  # loss of force before the drop that counts as sag
+BOUNCE_SPEED = -0.01  # m/s below which the foot bounces back
+SAG_SHARE = 0.08  # relative loss of force before the drop that counts as sag
 
 LONGEST_STEP = 1.0  # s between two rows of one slip
-_LOADING = 0.6  # s before the onset in which the peak is sought
+_LOADING = 0.6  # s before the onset in which the force peak is searched
 _RELEASE = 0.12  # s after the onset in which the peak may still come
-_FLOOR = 0.15  # s after the fastest moment in which the floor is sought
-_BOUNCE = 0.6  # s after the end in which the foot may be thrown back
-_SPIKE = 0.15  # s before the lowest velocity in which the spike is sought
-_DROP_LEAD = 0.1  # s before the onset in which the steepest drop is sought
+_FLOOR = 0.15  # s after the peak speed in which the lowest force is searched
+_BOUNCE = 0.6  # s after the end in which the foot may bounce back
+_SPIKE = 0.15  # s before the lowest velocity in which the spike is searched
+_DROP_LEAD = 0.1  # s before the onset in which the steepest drop is searched
 _SAG_FROM, _SAG_TO = 0.030, 0.006  # s before the drop over which force is averaged
 
 
@@ -37,10 +37,10 @@ class Slip:
         peak_speed: largest v_t [m/s].
         length: distance slipped [m].
         peak: largest F_t around the onset [N].
-        floor: smallest F_t while the foot ran [N].
+        floor: smallest F_t while the foot slid [N].
         bounce_speed: lowest v_t after the end [m/s], None without a bounce-back.
         spike: F_t at re-sticking above the floor [N], None without a bounce-back.
-        has_sag: F_t had fallen by 8 % before the steepest drop.
+        has_sag: F_t fell by 8 % before the steepest drop.
     """
 
     onset: float
@@ -55,7 +55,7 @@ class Slip:
 
     @property
     def has_bounce(self) -> bool:
-        """Whether the foot was thrown back after the slip."""
+        """Whether the foot bounced back after the slip."""
         return self.bounce_speed is not None
 
 
@@ -69,12 +69,12 @@ def find_slips(trial: Smoothed) -> tuple[Slip, ...]:
 
 
 def _after_gaps(t: Array) -> list[int]:
-    """Return the rows that follow a gap of the record."""
+    """Return the rows that follow a gap in the record."""
     return [int(row) + 1 for row in np.flatnonzero(np.diff(t) > LONGEST_STEP)]
 
 
 def _stretches(is_above: np.ndarray, cuts: list[int]) -> list[tuple[int, int]]:
-    """Return first and last row of every run of True, which ends before each cut."""
+    """Return first and last row of every run of True; runs are split at the cuts."""
     edges = np.diff(np.concatenate([[0], is_above.astype(np.int8), [0]]))
     inner = [cut for cut in cuts if is_above[cut - 1] and is_above[cut]]
     starts = sorted([*np.flatnonzero(edges == 1).tolist(), *inner])
@@ -120,9 +120,9 @@ def _bounce(
 
 
 def _has_sag(trial: Smoothed, onset: float) -> bool:
-    """Return whether F_t had sagged before it dropped most steeply."""
+    """Return whether F_t sagged before its steepest drop."""
     t, F_t = trial.t, trial.F_t
-    # only up to the onset: inside the slip the foot chatters and drops again
+    # only up to the onset: during the slip the foot chatters and the force drops again
     falling = _between(t, onset - _DROP_LEAD, onset)
     if falling.stop - falling.start < 2:
         return False

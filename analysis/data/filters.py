@@ -1,7 +1,7 @@
-"""Filters of evenly sampled values that shift nothing in time; pure, and numpy alone.
+"""Zero-phase filters for evenly sampled values; pure, NumPy only.
 
-They run after every trial, on the screen's way to the review: scipy.signal takes a
-second to be loaded.
+They run after every trial before the review appears; importing scipy.signal would
+delay it by a second.
 """
 
 from math import factorial
@@ -10,22 +10,22 @@ import numpy as np
 
 from analysis.data.series import Array
 
-_SETTLES = 3.0  # periods of the lower corner by which a signal is prolonged
+_SETTLES = 3.0  # periods of the lower corner by which a signal is padded
 
 
 def band_pass(values: Array, low: float, high: float, rate: float, order: int) -> Array:
-    """Return values after a Butterworth band pass, run forwards and backwards.
+    """Apply a Butterworth band pass forwards and backwards.
 
-    The gain is the square of the digital filter's (bilinear transform, corners
-    prewarped), the phase zero. Before its begin and after its end a signal goes on as
-    its own image, turned about the end point.
+    The gain is the square of the digital filter's (bilinear transform, prewarped
+    corners), the phase zero. Both ends are padded by odd reflection about the end
+    point.
 
     Args:
         values: shape (..., n), evenly sampled.
         low: corner [Hz], above zero.
         high: corner [Hz], below half of `rate`.
         rate: samples a second [Hz].
-        order: of the low pass that the band pass is made of.
+        order: order of the low-pass prototype.
     """
     n = values.shape[-1]
     pad = min(n - 1, round(_SETTLES * rate / low))
@@ -43,7 +43,7 @@ def band_pass(values: Array, low: float, high: float, rate: float, order: int) -
         np.tan(np.pi * f / rate) for f in (frequency[1:], np.array([low, high]))
     )
     detuned = (warped**2 - bottom * top) / (warped * (top - bottom))
-    gain = np.zeros(frequency.size)  # no constant passes
+    gain = np.zeros(frequency.size)  # zero gain at DC
     gain[1:] = 1.0 / (1.0 + detuned ** (2 * order))
     passed = np.fft.irfft(gain * np.fft.rfft(longer), longer.shape[-1])
     return passed[..., pad : pad + n]
@@ -52,17 +52,17 @@ def band_pass(values: Array, low: float, high: float, rate: float, order: int) -
 def local_polynomial(
     values: Array, width: int, order: int, *, deriv: int = 0, step: float = 1.0
 ) -> Array:
-    """Return the polynomial fitted to the samples around each, or a derivative of it.
+    """Savitzky-Golay filter: local polynomial fit, or its derivative, at every sample.
 
-    The first and the last half of a window lie on the polynomial of the first and the
-    last whole one (Savitzky and Golay 1964, Anal. Chem. 36(8), 1627-1639).
+    The first and last half window are evaluated on the polynomial of the first and
+    last full window (Savitzky and Golay 1964, Anal. Chem. 36(8), 1627-1639).
 
     Args:
         values: shape (n, k), evenly sampled, n >= `width`.
-        width: samples of one fit, odd.
-        order: of the polynomial, below `width`.
-        deriv: which derivative; 0 = the value.
-        step: between two samples; the unit of the derivative.
+        width: samples per fit, odd.
+        order: order of the polynomial, below `width`.
+        deriv: order of the derivative; 0 = the value.
+        step: sampling interval; sets the unit of the derivative.
     """
     half = width // 2
     fit = np.linalg.pinv(np.vander(np.arange(-half, half + 1), order + 1)[:, ::-1])

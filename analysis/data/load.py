@@ -1,4 +1,4 @@
-"""From a trial file to arrays: joint positions and raw wrench, and what follows.
+"""Loading of a trial file: joint positions and raw wrench, and derived quantities.
 
 The analysis starts again from joint positions and raw wrench with the calibration that
 the file carries, so a better calibration can be applied years later.
@@ -31,8 +31,8 @@ Array = NDArray[np.float64]
 Frame = Literal["terrain", "sole"]
 _CALIBRATION, _TERRAIN = "ft_calibration.toml", "terrain.toml"
 _ARM_MODEL = "arm_model.toml"
-ATTACHMENTS = (_CALIBRATION, _TERRAIN, _ARM_MODEL)  # without one nothing is computed
-_LONGEST_AGE = 0.1  # s; stamps further apart are none
+ATTACHMENTS = (_CALIBRATION, _TERRAIN, _ARM_MODEL)  # all three are required
+_LONGEST_AGE = 0.1  # s; time stamps further apart are ignored
 _LARGEST_ANGLE = 10.0  # rad, beyond every joint stop
 _LONGEST_NUMBER = 20  # digits of 64 bits
 
@@ -49,18 +49,18 @@ class RecordedTrial:
         t: time since the first cycle [s], shape (n,).
         sole: centre of the sole in the base frame [m], shape (n, 3).
         rotation: foot to base, z out of the arm, shape (n, 3, 3).
-        velocity: its velocity in the base frame [m/s], shape (n, 3); NaN beside gaps.
+        velocity: of the sole in the base frame [m/s], shape (n, 3); NaN next to gaps.
         force: of the ground on the foot in the base frame [N], shape (n, 3).
         traction: v_t [m/s], F_t [N], F_n [N] in the terrain frame, shape (n, 3).
         lateral: force along y_T [N], shape (n,).
-        frame: where the container stood.
-        payload: calibration and tare that were applied.
-        constants: the arm model that was applied.
+        frame: pose of the container.
+        payload: applied calibration and tare.
+        constants: applied arm model.
         sole_point: centre of the sole in the frame of the tool plate [m], shape (3,).
-        bracket: the tares before and after it; None where one is not known.
-        sensor_height: of the sensor's origin above the tool plate [m]; None where the
-            recorded settings do not tell.
-        friction_text: calibration of the arm's friction; empty where none was there.
+        bracket: the tares before and after the trial; None where one is not known.
+        sensor_height: height of the sensor's origin above the tool plate [m]; None
+            where the recorded settings do not give it.
+        friction_text: calibration of the arm's friction; empty if there was none.
     """
 
     path: Path
@@ -90,12 +90,12 @@ class RecordedTrial:
 
     @property
     def stones(self) -> str:
-        """Size of the stones: "small", "big", "none"; empty where it was not kept."""
+        """Size of the stones: "small", "big", "none"; empty if not recorded."""
         return self.metadata["trial"].get("stone_size", "")
 
     @property
     def factors(self) -> StatedFactors:
-        """What the recording states of its terrain and foot."""
+        """Recorded factors of the terrain and the foot."""
         return stated_factors(self.metadata["trial"])
 
     @property
@@ -109,12 +109,12 @@ class RecordedTrial:
         return self.frame.displacement(self.sole)
 
     def series(self, frame: Frame = "terrain") -> TractionSeries:
-        """Return the trial as the models want it.
+        """Return the trial as velocity and forces over time.
 
         Args:
-            frame: "terrain" projects on the plane of the container, "sole" on the sole
-                with its tilt of each cycle; the normal is against joint 7's axis,
-                slip is along what x_T leaves in the sole.
+            frame: "terrain" projects onto the plane of the container, "sole" onto the
+                sole with its tilt in each cycle; there the normal is opposite to joint
+                7's axis and slip is along the projection of x_T onto the sole.
         """
         v_t, F_t, F_n = (self.traction if frame == "terrain" else self._on_sole()).T
         return TractionSeries(
@@ -134,16 +134,16 @@ class RecordedTrial:
 
     @property
     def stamped_lag(self) -> float:
-        """How much older than the joints the forces are by their time stamps [s]."""
+        """Age of the forces relative to the joints by their time stamps [s]."""
         ages = self.cycles["arm_ns"].astype(float) - self.cycles["ft_ns"].astype(float)
         fresh = (self.cycles["flags"] & Flag.FT_FRESH) != 0
         age = float(np.median(ages[fresh])) * 1e-9 if fresh.any() else 0.0
         return age if abs(age) < _LONGEST_AGE else 0.0
 
     def interpolated(self) -> "RecordedTrial":
-        """Return the trial with the sensor's zero on a line between its two tares.
+        """Return the trial with the sensor's zero interpolated between its two tares.
 
-        The trial itself where one of the tares is not known.
+        Without both tares the trial is returned unchanged.
         """
         if self.bracket is None:
             return self
@@ -151,9 +151,9 @@ class RecordedTrial:
         return self._with_force(self.force - self.payload.to_base(drift, self.rotation))
 
     def inertial_force(self) -> InertialForce:
-        """Return the force that accelerates the foot, base frame; raises SettingsError.
+        """Inertial force of the foot in the base frame; raises SettingsError.
 
-        The centre of mass is that of the payload, everything below the gauges.
+        The centre of mass is that of the payload: everything below the gauges.
         """
         origin = np.array([0.0, 0.0, self.sensor_height or 0.0])  # of the sensor
         from_sole = origin + self.payload.rotation @ self.payload.com - self.sole_point
@@ -165,7 +165,7 @@ class RecordedTrial:
             raise SettingsError(text, hint=error.hint) from error
 
     def without_inertia(self) -> "RecordedTrial":
-        """Return the trial with the ground's force alone; raises SettingsError."""
+        """Return the trial with the inertial force removed; raises SettingsError."""
         return self._with_force(self.force + self.inertial_force().force)
 
     def _with_force(self, force: Array) -> "RecordedTrial":
@@ -178,7 +178,7 @@ class RecordedTrial:
         )
 
     def _on_sole(self) -> Array:
-        """Return v_t, F_t, F_n by the sole's own axes, shape (n, 3)."""
+        """Return v_t, F_t, F_n along the axes of the sole, shape (n, 3)."""
         normal = -self.rotation[:, :, 2]
         x_T = self.frame.axes()[0]
         along = x_T - (normal @ x_T)[:, None] * normal
@@ -199,13 +199,13 @@ def load_trial(path: Path | str) -> RecordedTrial:
     _check_metadata(reader)
     cycles = reader.cycles().data
     _check_cycles(path, cycles)
-    at_hand = _calibrated(reader)
-    payload, frame, axes = at_hand.payload, at_hand.frame, at_hand.frame.axes()
+    setup = _read_setup(reader)
+    payload, frame, axes = setup.payload, setup.frame, setup.frame.axes()
     metadata, attachments = reader.metadata, reader.attachments
-    del reader  # with the whole file, before as much is allocated again
+    del reader  # frees the whole file before as much memory is allocated again
     start_ns = int(cycles["host_ns"][0])
     t = (cycles["host_ns"] - np.uint64(start_ns)).astype(float) * 1e-9
-    path_of_sole = at_hand.model.sole_path(np.ascontiguousarray(cycles["position"]))
+    path_of_sole = setup.model.sole_path(np.ascontiguousarray(cycles["position"]))
     velocity = foot_velocity(t, path_of_sole.position)
     raw = np.ascontiguousarray(cycles["wrench_raw"])
     contact = payload.contact(raw, path_of_sole.rotation)
@@ -213,7 +213,7 @@ def load_trial(path: Path | str) -> RecordedTrial:
     trial = RecordedTrial(
         path=path,
         metadata=metadata,
-        terrain=at_hand.terrain,
+        terrain=setup.terrain,
         cycles=cycles,
         t=t,
         sole=path_of_sole.position,
@@ -224,8 +224,8 @@ def load_trial(path: Path | str) -> RecordedTrial:
         lateral=force @ axes[1],
         frame=frame,
         payload=payload,
-        constants=at_hand.model.constants,
-        sole_point=at_hand.sole_point,
+        constants=setup.model.constants,
+        sole_point=setup.sole_point,
         bracket=read_bracket(path, metadata["trial"], payload.bias, start_ns),
         sensor_height=sensor_height_of(attachments.get("config.toml", b"")),
         friction_text=attachments.get("friction.toml", b"").decode(errors="ignore"),
@@ -237,8 +237,8 @@ def load_trial(path: Path | str) -> RecordedTrial:
     return trial
 
 
-class _Calibrated(NamedTuple):
-    """What a trial file carries besides its cycles."""
+class _Setup(NamedTuple):
+    """Calibration, terrain and arm model attached to a trial file."""
 
     payload: Payload
     sole_point: Array
@@ -247,7 +247,7 @@ class _Calibrated(NamedTuple):
     model: ArmModel
 
 
-def _calibrated(reader: TrialReader) -> _Calibrated:
+def _read_setup(reader: TrialReader) -> _Setup:
     """Return calibration, terrain and arm of a trial file.
 
     Raises:
@@ -262,19 +262,19 @@ def _calibrated(reader: TrialReader) -> _Calibrated:
     except (ValueError, ArithmeticError, RuntimeError) as error:
         text = f"has an impossible arm model ({error})"
         raise TrialFileError(reader.path, text) from error
-    return _Calibrated(payload, sole_point, terrain, frame, model)
+    return _Setup(payload, sole_point, terrain, frame, model)
 
 
-@lru_cache(maxsize=16)  # the trials of a study have one or a few
+@lru_cache(maxsize=16)  # the trials of a study share one or a few arm models
 def _arm(constants: str, sole: tuple[float, ...]) -> ArmModel:
-    """Return the kinematics of `arm_model.toml` and of a sole on the tool plate."""
+    """Return the arm model of `arm_model.toml` with a sole point on the tool plate."""
     none = Body(0.0, np.zeros(3), np.zeros((3, 3)))
     return ArmModel(load_constants(constants), Tool(none, none, np.array(sole)))
 
 
 @lru_cache(maxsize=16)
 def sensor_height_of(config: bytes) -> float | None:
-    """Return the height of the sensor's origin by recorded settings [m], if told."""
+    """Return the sensor height in recorded settings [m]; None if missing or invalid."""
     try:
         height = parse_toml(config.decode())["ft_sensor"]["height"]
     except (ValueError, KeyError, TypeError):
@@ -283,7 +283,7 @@ def sensor_height_of(config: bytes) -> float | None:
 
 
 def _check_metadata(reader: TrialReader) -> None:
-    """Refuse a file that lacks what the report says about every trial."""
+    """Refuse a file without the metadata that the report shows for every trial."""
     for section, key in (("clock", "utc_offset_ns"), ("result", "cycles_missed")):
         value = reader.metadata.get(section, {}).get(key, "")
         if not value.removeprefix("-").isdecimal() or len(value) > _LONGEST_NUMBER:

@@ -1,8 +1,8 @@
-"""Whether a trial can be what it says it is: signs, directions, units; pure.
+"""Plausibility checks of a trial: signs, directions, units; pure.
 
-A foot that slips is slowed by the ground, pressed by it along the normal, and pushed
-aside less than along its way. A sensor that is mounted or calibrated otherwise, a
-swapped column or a wrong unit breaks one of these, and no fit notices.
+The ground slows a slipping foot, presses on it along the normal, and pushes it sideways
+less than along its path. A sensor mounted or calibrated differently, a swapped column
+or a wrong unit violates one of these, and no fit would notice.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -18,21 +18,21 @@ from analysis.data.prepare import PreparedTrial, Smoothed
 from analysis.data.series import Array
 from analysis.data.tare_bracket import LARGEST_CHANGE
 
-SLOWEST = 0.005  # m/s; a slower foot sticks, and its forces may point anywhere
-PRESSED = 1.0  # N; below it the direction of a force is the sensor's noise
-_REST = 0.2  # s of standing before the foot first moves
+SLOWEST = 0.005  # m/s; a slower foot sticks, and its force may point anywhere
+PRESSED = 1.0  # N below which the direction of a force is sensor noise
+_REST = 0.2  # s at rest before the foot first moves
 FEWEST = 20  # moving samples below which nothing is judged
 FRICTION = (0.15, 5.0)  # F_t over F_n; a smooth plate has 0.18 in some trials
-LATEST_MS = 3.0  # of the force against the motion, its time stamps' age apart
-SHORTEST = 0.05  # m of a way that has a direction
-UNEVEN = 0.010  # m that stones lift or turn a foot aside, however short its way
-HEADING, INCLINE = 5.0, 4.0  # degrees that a way may differ from the container's
-FARTHEST = 0.08  # m of the centre of pressure from the sole's centre
+LATEST_MS = 3.0  # lag of the force beyond the age in its time stamps
+SHORTEST = 0.05  # m of travel below which the path has no clear direction
+UNEVEN = 0.010  # m by which stones deflect a foot, however short its path
+HEADING, INCLINE = 5.0, 4.0  # degrees that the path may differ from the container's
+FARTHEST = 0.08  # m from the sole's centre to the centre of pressure
 FREE_MOMENT = 0.03  # moment along the force over the force [m]
-# Medians beyond which a column is in another unit than its own.
+# Limits beyond which a column is probably in another unit.
 _FASTEST, _STRONGEST, _WEAKEST, _RAREST = 2.0, 500.0, 0.02, 0.2
 
-# What helps a table that another program recorded: its sensor is not at hand.
+# Remedies for a table from another program, whose sensor cannot be recalibrated.
 _OF_TABLES = {
     "power": "--negate F_t",
     "ratio": "--negate F_t",
@@ -68,7 +68,7 @@ class Doubt:
 
     Attributes:
         name: which one.
-        seen: what was measured, with the number.
+        seen: the observation, with the number.
         cause: the likely cause.
         remedy: what to do.
     """
@@ -80,12 +80,12 @@ class Doubt:
 
     @property
     def text(self) -> str:
-        """The doubt in one sentence and a half."""
+        """Observation, likely cause and remedy in one line."""
         return f"{self.seen}; likely: {self.cause}: {self.remedy}"
 
 
 def doubts_of(trial: PreparedTrial) -> list[Doubt]:
-    """Return why velocity and forces of a trial cannot be right; empty if they can."""
+    """Check velocity and forces of a prepared trial; empty if they are plausible."""
     doubts = _doubts_of(trial)
     if not trial.is_foreign:
         return doubts
@@ -108,10 +108,10 @@ def _doubts_of(trial: PreparedTrial) -> list[Doubt]:
 
 
 def doubts_of_record(recorded: RecordedTrial) -> list[Doubt]:
-    """Return why a recording cannot be that of a foot that is pushed along x_T.
+    """Check a recording against a foot that is pushed along x_T.
 
-    It sees what velocity and two forces do not show: the force across the way, the
-    moment, and the way of the sole itself.
+    Covers what v_t, F_n and F_t do not show: the lateral force, the moment and the path
+    of the sole.
     """
     v_t, F_t, F_n = recorded.traction.T
     sensor = [*_frozen(recorded), *_zero(recorded)]
@@ -122,7 +122,7 @@ def doubts_of_record(recorded: RecordedTrial) -> list[Doubt]:
     wrench = recorded.payload.contact(raw, recorded.rotation[moving])
     return [
         *sensor,
-        *_way(recorded, moving),
+        *_path(recorded, moving),
         *_sideways(recorded.lateral[moving], F_t[moving]),
         *free_moment(wrench[:, :3], wrench[:, 3:]),
         *_pressure(recorded, wrench),
@@ -130,7 +130,7 @@ def doubts_of_record(recorded: RecordedTrial) -> list[Doubt]:
 
 
 def summed_up(judged: Iterable[tuple[str, Sequence[Doubt]]]) -> list[str]:
-    """Return one line for every kind of doubt.
+    """Summarise the doubts of many trials, one line per kind.
 
     Args:
         judged: (name of the trial, its doubts), in the order of the trials.
@@ -168,7 +168,7 @@ def _units(smooth: Smoothed) -> Iterator[Doubt]:
 
 
 def _is_numbered(smooth: Smoothed) -> bool:
-    """Return whether the times are 0, 1, 2, ...: numbers of rows."""
+    """Return whether the times are row numbers: 0, 1, 2, ..."""
     return bool((np.diff(smooth.t) == 1.0).all() and smooth.t[0] in (0.0, 1.0))
 
 
@@ -176,7 +176,7 @@ _NUMBERED = Doubt(
     "unit",
     "t counts the rows: 0, 1, 2, ...",
     "rows are conditions or means, not samples of a motion",
-    "slips and lags are not to be seen in them",
+    "slips and lags cannot be seen in them",
 )
 
 
@@ -211,9 +211,9 @@ def _timing(trial: PreparedTrial) -> Iterator[Doubt]:
 
 
 def _is_swapped(trial: PreparedTrial) -> bool:
-    """Return whether the foot, before it first moves, is loaded along the way.
+    """Return whether F_t exceeds F_n before the foot first moves.
 
-    It stands there with its weight, and nobody pushes it yet.
+    At that time it stands under its weight and is not yet pushed.
     """
     smooth = trial.smooth
     end = standing_rows(smooth)
@@ -224,7 +224,7 @@ def _is_swapped(trial: PreparedTrial) -> bool:
 
 
 def standing_rows(smooth: Smoothed) -> int:
-    """Return how many rows a foot stands before it first moves; 0 where too short."""
+    """Count the rows before the foot first moves; 0 if it stands too briefly."""
     moving = np.flatnonzero(np.abs(smooth.v_t) > 2.0 * SLOWEST)
     end = int(moving[0]) if moving.size else 0
     return end if end >= 2 and smooth.t[end] - smooth.t[0] >= _REST else 0
@@ -245,7 +245,7 @@ def _signs(v: Array, load: Array, along: Array) -> Iterator[Doubt]:
     if travel < 0.0:
         yield Doubt(
             "direction",
-            f"the foot goes backward in {0.5 - travel / 2:.0%} of its way",
+            f"the foot moves backward over {0.5 - travel / 2:.0%} of its path",
             "the heading of the container is turned by 180 degrees",
             "traction calibrate terrain",
         )
@@ -258,7 +258,7 @@ def _signs(v: Array, load: Array, along: Array) -> Iterator[Doubt]:
         yield Doubt(
             "no-traction",
             "F_t is 0 throughout",
-            "its column was never filled, or is another one",
+            "the column was never filled, or is the wrong one",
             "--columns F_t=...",
         )
     elif ratio <= 0.0:
@@ -272,7 +272,7 @@ def _signs(v: Array, load: Array, along: Array) -> Iterator[Doubt]:
 
 
 def _frozen(recorded: RecordedTrial) -> Iterator[Doubt]:
-    """Judge each channel of the sensor, from the foot's first motion to its last."""
+    """Check each sensor channel between the foot's first and last motion."""
     moving = np.flatnonzero(np.abs(recorded.traction[:, 0]) > SLOWEST)
     if moving.size < FEWEST:
         return
@@ -280,12 +280,12 @@ def _frozen(recorded: RecordedTrial) -> Iterator[Doubt]:
     taken_ns = recorded.cycles["ft_ns"][slid]
     is_new = np.concatenate([[True], taken_ns[1:] != taken_ns[:-1]])
     wrench = recorded.cycles["wrench_raw"][slid][is_new]
-    found = frozen_channels(recorded.t[slid][is_new], wrench)
-    if found:
+    channels = frozen_channels(recorded.t[slid][is_new], wrench)
+    if channels:
         yield Doubt(
             "frozen",
-            f"{', '.join(channel.text for channel in found)} while the foot slides",
-            "a broken gauge or wire, or a channel at its end; no force is vouched for",
+            f"{', '.join(channel.text for channel in channels)} while the foot slides",
+            "a broken gauge or wire, or a saturated channel; no force is reliable",
             "change the cable or the sensor, and record again",
         )
 
@@ -296,7 +296,7 @@ def _zero(recorded: RecordedTrial) -> Iterator[Doubt]:
 
 
 def zero_doubts(change: float) -> Iterator[Doubt]:
-    """Judge by how much the sensor's zero moved between the tares about a trial [N]."""
+    """Check the change of the sensor's zero between the tares around a trial [N]."""
     if change > LARGEST_CHANGE:
         yield Doubt(
             "zero",
@@ -307,8 +307,8 @@ def zero_doubts(change: float) -> Iterator[Doubt]:
         )
 
 
-def _way(recorded: RecordedTrial, moving: NDArray[np.bool_]) -> Iterator[Doubt]:
-    """Hold the way of the sole against the plane and the heading of the container."""
+def _path(recorded: RecordedTrial, moving: NDArray[np.bool_]) -> Iterator[Doubt]:
+    """Compare the path of the sole with the heading and incline of the container."""
     ahead, aside, above = (
         (recorded.sole[moving] - np.array(recorded.frame.far_end))
         @ recorded.frame.axes().T
@@ -324,11 +324,11 @@ def _way(recorded: RecordedTrial, moving: NDArray[np.bool_]) -> Iterator[Doubt]:
         ("incline", tilted, INCLINE, "the incline differs, or was"),
     )
     for name, angle, limit, what in sides:
-        beside = float(np.ptp(ahead)) * np.tan(np.radians(abs(angle)))
-        if abs(angle) > limit and beside > UNEVEN:
+        deviation = float(np.ptp(ahead)) * np.tan(np.radians(abs(angle)))
+        if abs(angle) > limit and deviation > UNEVEN:
             yield Doubt(
                 name,
-                f"the sole's way is {angle:+z.1f} degrees off the container's "
+                f"the sole's path is {angle:+z.1f} degrees off the container's "
                 f"{name} (limit {limit:g})",
                 f"{what} entered wrong",
                 "traction calibrate terrain",
@@ -340,16 +340,16 @@ def _sideways(lateral: Array, along: Array) -> Iterator[Doubt]:
     if aside > forward:
         yield Doubt(
             "lateral",
-            f"{aside:.1f} N across the way, {forward:.1f} N along it",
+            f"{aside:.1f} N across the path, {forward:.1f} N along it",
             "the sensor is turned by 90 degrees about z, or the heading is wrong",
         )
 
 
 def free_moment(force: Array, moment: Array) -> Iterator[Doubt]:
-    """Judge the part of the moment along the force, which no point of action gives.
+    """Check the moment along the force, which no point of action can produce.
 
-    A force at a point has no moment along itself; what a sliding sole adds about the
-    normal is small against the force times the sole's radius.
+    A force at a point has no moment along itself; the moment of a sliding sole about
+    the normal is small compared with the force times the radius of the sole.
     """
     along = np.einsum("ni,ni->n", force, moment)
     pitch = float(np.median(np.abs(along) / np.einsum("ni,ni->n", force, force)))
@@ -364,7 +364,7 @@ def free_moment(force: Array, moment: Array) -> Iterator[Doubt]:
 
 
 def _pressure(recorded: RecordedTrial, wrench: Array) -> Iterator[Doubt]:
-    """Judge where on the sole the ground presses: under it, not beside it."""
+    """Check that the centre of pressure lies on the sole."""
     if recorded.sensor_height is None:
         return
     origin = np.array([0.0, 0.0, recorded.sensor_height])

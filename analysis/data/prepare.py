@@ -1,10 +1,10 @@
-"""From a recorded trial to the samples that models are fitted to.
+"""Preparation of a recorded trial for model fitting.
 
-Smooth with a centred moving average, keep every fifth sample, keep the window of
-velocities; in this order. Sticking, backward motion and fast peaks are left out.
-Widths count samples at 500 Hz and follow the rate: 11 samples are 22 ms. Where times
-are not evenly apart, they are times: what lies within 11 ms is averaged. A gap of the
-record stays one: nothing is averaged or integrated across it.
+Steps: centred moving average, every fifth sample, velocity window. Sticking, backward
+motion and fast peaks are thereby left out. Widths are given in samples at 500 Hz and
+scale with the rate: 11 samples are 22 ms. Unevenly sampled records are averaged over
+that time, 11 ms to either side. Nothing is averaged or integrated across a gap in the
+record.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -18,14 +18,14 @@ from acquisition.errors import SettingsError
 from analysis.data.lag import ForceLag, force_lag
 from analysis.data.series import Array, Indices, TractionSeries
 
-MINIMUM_KEPT = 250  # kept samples that make a trial count
-MINIMUM_TRAVEL_SHARE = 0.9  # of the container
+MINIMUM_KEPT = 250  # kept samples needed for a trial to count
+MINIMUM_TRAVEL_SHARE = 0.9  # of the container's length
 _WIDEST = 501  # samples of smoothing: a second
-_LITTLE = 1e-3
+_ROUNDING = 1e-3  # samples
 _LONGEST_GAP = 3  # missing samples that a difference may span
-_GAP = 10.0  # steps of the median one, above which a step is a gap of the record
-_UNEVEN = 1.5  # times the median step, or its inverse, that no even step exceeds
-_EVEN_SHARE = 0.9  # of the steps of a record that is smoothed by numbers of samples
+_GAP = 10.0  # multiple of the median step above which a step is a gap in the record
+_UNEVEN = 1.5  # largest factor between an even step and the median step
+_EVEN_SHARE = 0.9  # share of even steps above which smoothing counts samples
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,19 +75,19 @@ class PrepareOptions:
             )
 
     def widths(self, series: TractionSeries) -> tuple[int, int]:
-        """Return (samples that are averaged, one of how many is kept) of a trial.
+        """Return averaging width and thinning factor of a trial [samples].
 
-        Both are times: at another rate than 500 Hz they are other numbers of samples.
-        Rows that were prepared before are taken as they are.
+        Both represent times, so they scale with the sampling rate. Rows that were
+        prepared before are neither averaged nor thinned.
         """
         if series.is_prepared:
             return 1, 1
-        # A time in a wrong unit makes any rate; nothing is wider than the trial.
-        most = float(series.t.size)
-        scale = min(series.rate, most * RATE_HZ) / RATE_HZ
-        # Half a sample counts down: a rate is known to a few digits only.
-        half = round(min((self.smoothing * scale - 1.0) / 2.0 - _LITTLE, most))
-        every = round(min(self.downsample * scale, most))
+        # Times in a wrong unit give an arbitrary rate: limit widths to the trial.
+        rows = float(series.t.size)
+        scale = min(series.rate, rows * RATE_HZ) / RATE_HZ
+        # Exact halves round down, because the rate is known to a few digits only.
+        half = round(min((self.smoothing * scale - 1.0) / 2.0 - _ROUNDING, rows))
+        every = round(min(self.downsample * scale, rows))
         return 2 * max(half, 0) + 1, max(every, 1)
 
 
@@ -112,10 +112,10 @@ class Smoothed:
 
 @dataclass(frozen=True, slots=True)
 class CoverageShares:
-    """How the thinned samples of a trial divide by velocity; they sum to one.
+    """Shares of a trial's thinned samples by velocity; they sum to one.
 
     Attributes:
-        window: inside the window, these are kept.
+        window: inside the window; these are kept.
         sticking: slower than the window in either direction.
         backward: faster backward than the window's lower edge.
         fast: above the window.
@@ -128,14 +128,14 @@ class CoverageShares:
 
     @property
     def window_of_moving(self) -> float | None:
-        """Share of the moving samples that is in the window; None if none moves."""
+        """Share of the moving samples that are in the window; None if none moves."""
         moving = 1.0 - self.sticking
         return self.window / moving if moving > 0 else None
 
 
 @dataclass(frozen=True, slots=True)
 class PreparedTrial:
-    """The kept samples of one trial and what they were taken from.
+    """Kept samples of one trial and the smoothed record they come from.
 
     Attributes:
         terrain: name of the terrain.
@@ -144,21 +144,20 @@ class PreparedTrial:
         F_n: kept normal forces [N], shape (m,).
         F_t: kept traction forces [N], shape (m,).
         indices: rows of `smooth` that were kept, shape (m,).
-        shares: how the thinned samples divide by velocity.
+        shares: shares of the thinned samples by velocity.
         smooth: the whole trial after smoothing.
         travel: distance along the slip direction [m].
-        is_countable: enough kept samples and, where the container is known, travel.
-        dropped_rows: rows that were not finite in the record.
-        repeated_rows: rows of the record that were there twice.
-        lag: how much later than the motion the forces are; None where the trial does
-            not show it.
-        stamped_lag: the same by the record's time stamps [s].
+        is_countable: enough kept samples and, if the container is known, enough travel.
+        dropped_rows: number of rows of the record that were not finite.
+        repeated_rows: number of duplicate rows of the record.
+        lag: lag of the forces behind the motion; None if the trial does not
+            determine it.
+        stamped_lag: lag of the forces by the record's time stamps [s].
         is_simulated: the devices were simulated.
-        is_foreign: a table that no session of this program states.
-        widths: samples that were averaged, and one of how many was kept.
+        is_foreign: the trial is a table from another program.
+        widths: averaging width and thinning factor [samples].
         is_prepared: the record's rows had been prepared before.
-        further: other inputs of the kept samples, shape (m, k); None where there are
-            none.
+        further: other inputs of the kept samples, shape (m, k); None without any.
     """
 
     terrain: str
@@ -202,16 +201,16 @@ def moving_average(x: Array, width: int) -> Array:
 def foot_velocity(t: Array, position: Array) -> Array:
     """Return the velocity of the foot [m/s] by central differences of its position.
 
-    The recorded times are used, so a missing cycle does no harm; the two ends take the
-    one-sided difference. A difference over more than three missing samples would invent
-    motion: there the velocity is NaN, for the row to be dropped.
+    The recorded times are used, so a missing cycle does no harm; the two ends use
+    one-sided differences. A difference over more than three missing samples would
+    invent motion: there the velocity is NaN, so that the row is dropped.
 
     Args:
         t: recorded time [s], shape (n,), strictly increasing, n >= 2.
         position: position of the sole [m], shape (n,) or (n, 3).
 
     Returns:
-        Velocity of the shape of `position`.
+        Velocity, same shape as `position`.
     """
     steps = np.diff(t)
     velocity = (_central_change(position).T / _central_change(t)).T
@@ -222,7 +221,7 @@ def foot_velocity(t: Array, position: Array) -> Array:
 
 
 def _central_change(values: Array) -> Array:
-    """Return the next less the last row; at the ends the row itself for one of them."""
+    """Return next minus previous row; one-sided differences at the ends."""
     change = np.empty_like(values)
     np.subtract(values[2:], values[:-2], out=change[1:-1])
     change[0], change[-1] = values[1] - values[0], values[-1] - values[-2]
@@ -258,12 +257,12 @@ def prepare_trial(series: TractionSeries, options: PrepareOptions) -> PreparedTr
         is_prepared=series.is_prepared,
         is_simulated=series.is_simulated,
         is_foreign=series.is_foreign,
-        further=_beside(smooth.further, indices),
+        further=_stacked_inputs(smooth.further, indices),
     )
 
 
 def smoothed(series: TractionSeries, options: PrepareOptions) -> Smoothed:
-    """Return a whole trial after the moving average, and nothing else of it."""
+    """Return a whole trial after the moving average, without windowing."""
     width, _ = options.widths(series)
     average = _average_over(series, options, width)
     return Smoothed(
@@ -278,7 +277,7 @@ def smoothed(series: TractionSeries, options: PrepareOptions) -> Smoothed:
 def _average_over(
     series: TractionSeries, options: PrepareOptions, width: int
 ) -> Callable[[Array], Array]:
-    """Return what smooths a column of a trial, by its times."""
+    """Return the averaging function for the columns of a trial."""
     if series.is_prepared:
         return lambda x: x
     if not is_even(series.t):
@@ -288,8 +287,8 @@ def _average_over(
     return lambda x: np.concatenate([moving_average(x[a:b], width) for a, b in parts])
 
 
-def _beside(further: Mapping[str, Array], rows: Indices) -> Array | None:
-    """Return rows of further inputs side by side, shape (m, k); None without any."""
+def _stacked_inputs(further: Mapping[str, Array], rows: Indices) -> Array | None:
+    """Return the further inputs as columns, shape (m, k); None without any."""
     return np.column_stack([x[rows] for x in further.values()]) if further else None
 
 
@@ -313,19 +312,19 @@ def is_even(t: Array) -> bool:
 
 
 def _nearby(t: Array, span: float) -> tuple[Indices, Indices]:
-    """Return first row and end of what lies within half a span of every row."""
+    """Return first row and end of the rows within half a span of every row."""
     first = np.searchsorted(t, t - span / 2.0, "left")
     return first, np.searchsorted(t, t + span / 2.0, "right")
 
 
 def _mean_of_rows(x: Array, first: Indices, end: Indices) -> Array:
-    """Return the mean of x over rows first to end, each (n,)."""
+    """Return the mean of x over rows `first` to `end`, each of shape (n,)."""
     sums = np.concatenate([[0.0], np.cumsum(x)])
     return (sums[end] - sums[first]) / (end - first)
 
 
 def _thinned(series: TractionSeries, options: PrepareOptions) -> Indices:
-    """Return the rows of which those inside the window are kept."""
+    """Return the rows that remain after thinning, before the velocity window."""
     _, every = options.widths(series)
     if series.is_prepared or is_even(series.t):
         return np.arange(0, series.t.size, every)
@@ -334,9 +333,9 @@ def _thinned(series: TractionSeries, options: PrepareOptions) -> Indices:
 
 
 def _travel(smooth: Smoothed, parts: Sequence[tuple[int, int]]) -> float:
-    """Return the way [m] along stretches of the record."""
-    ways = (np.trapezoid(smooth.v_t[a:b], smooth.t[a:b]) for a, b in parts)
-    return float(sum(ways))
+    """Return the distance travelled [m], summed over stretches of the record."""
+    travels = (np.trapezoid(smooth.v_t[a:b], smooth.t[a:b]) for a, b in parts)
+    return float(sum(travels))
 
 
 def _shares(v: Array, options: PrepareOptions) -> CoverageShares:

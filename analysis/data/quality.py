@@ -1,4 +1,4 @@
-"""What a trial is worth and where the trials of a terrain still have gaps; pure."""
+"""Quality of a trial, and coverage of speed and load on a terrain; pure."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,21 +17,21 @@ _SPEED_WORDS = (
     "faster than 0.2 m/s",
 )
 _LOAD_WORDS = ("below 2 N", "at 2 to 5 N", "above 5 N", "above 10 N")
-# What people can do: the extremes come by themselves in slips and at lift-off.
+# Cells an operator can aim at; the extremes occur by themselves in slips and lift-off.
 _AIMS = ((1, 1), (1, 2), (2, 1), (2, 2), (0, 1), (0, 2))
 JOINT7_WARNING = 0.020  # motion of the locked joint that is reported [rad]
-ENOUGH = 0.02  # share of the samples a cell should hold
+ENOUGH = 0.02  # smallest share of the samples in a well covered cell
 SENSOR_ERROR = 0.4  # N, mean error of the paper's force sensor
-# In slips the foot hops, and F_n is nothing but the error of a sound sensor, which
-# drifts by about that much after a tare. No ground pulls: what is further below zero
-# is the tare's or the plane's.
+# In slips the foot hops, and F_n is then only the error of a sound sensor, which drifts
+# by about that much after a tare. The ground cannot pull: an F_n further below zero
+# comes from the tare or the plane.
 PULLED = 2.0 * SENSOR_ERROR  # N
 PULLED_WARNING = 0.03  # share of the kept samples below that
 
 
 @dataclass(frozen=True, slots=True)
 class CoverageGrid:
-    """How the moving samples spread over speed and load.
+    """Distribution of the kept samples over speed and load.
 
     Attributes:
         counts: samples per cell, shape (4, 4), rows speed, columns load.
@@ -52,7 +52,7 @@ class CoverageGrid:
 
 
 def coverage(trials: Sequence[PreparedTrial]) -> CoverageGrid:
-    """Return how the kept samples of `trials` spread over speed and load."""
+    """Count the kept samples of `trials` in cells of speed and load."""
     counts = np.zeros((4, 4), np.int64)
     for trial in trials:
         cells, _, _ = np.histogram2d(
@@ -63,9 +63,9 @@ def coverage(trials: Sequence[PreparedTrial]) -> CoverageGrid:
 
 
 def thinnest(grid: CoverageGrid) -> str:
-    """Return the cell with fewest samples, in words; empty when none is thin.
+    """Describe the cell with the fewest samples; empty if all are well covered.
 
-    Of the cells that a person can aim at, if it has less than 2 % of the samples.
+    Only cells that an operator can aim at, and with less than 2 % of the samples.
     """
     shares = grid.shares
     if not grid.counts.sum():

@@ -1,4 +1,4 @@
-"""Columns of a recorded trial that may tell more of F_t than F_n and v_t do."""
+"""Columns of a recorded trial that may explain F_t beyond F_n and v_t."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -10,24 +10,24 @@ from analysis.data.series import Array, TractionSeries
 
 
 def height(trial: RecordedTrial) -> Array:
-    """Return how high the sole is above the plane [m], shape (n,); sinkage is below."""
+    """Height of the sole above the plane [m], shape (n,); negative for sinkage."""
     return trial.frame.height(trial.sole)
 
 
 def lateral(trial: RecordedTrial) -> Array:
-    """Return the force across the push [N], shape (n,)."""
+    """Lateral force, perpendicular to the push [N], shape (n,)."""
     return trial.lateral
 
 
 def tilt(trial: RecordedTrial) -> Array:
-    """Return the pitch of the sole against the plane [rad], shape (n,)."""
+    """Pitch of the sole relative to the plane [rad], shape (n,)."""
     x_T, _, z_T = trial.frame.axes()
     normal = -trial.rotation[:, :, 2]
     return np.arctan2(normal @ x_T, normal @ z_T)
 
 
 def moment(trial: RecordedTrial) -> Array:
-    """Return the ground's moment about the sensor across the push [N m], (n,)."""
+    """Moment of the ground about the sensor's lateral axis [N m], shape (n,)."""
     raw = np.ascontiguousarray(trial.cycles["wrench_raw"])
     in_sensor = trial.payload.contact(raw, trial.rotation)[:, 3:]
     in_foot = in_sensor @ trial.payload.rotation.T
@@ -43,5 +43,5 @@ RECORDED: Mapping[str, Callable[[RecordedTrial], Array]] = {
 
 
 def with_covariates(trial: RecordedTrial, names: Sequence[str]) -> TractionSeries:
-    """Return a trial with columns of `RECORDED` as its further inputs."""
+    """Return a trial with the named columns of `RECORDED` as further inputs."""
     return replace(trial.series(), further={n: RECORDED[n](trial) for n in names})

@@ -1,4 +1,4 @@
-"""Factors as recordings and data packages state them, held to what is allowed."""
+"""Factors stated by recordings and data packages, restricted to allowed values."""
 
 import json
 from collections.abc import Mapping
@@ -13,11 +13,11 @@ FOOT = "foot"
 
 
 class StatedFactors(NamedTuple):
-    """What a recording states of its terrain and foot.
+    """Recorded factors of the terrain and the foot.
 
     Attributes:
-        values: by name; None = does not apply.
-        units: of numbers, by name; "" = none.
+        values: factor values by name; None = does not apply.
+        units: units of numeric factors by name; "" = none.
     """
 
     values: dict[str, Value]
@@ -25,34 +25,34 @@ class StatedFactors(NamedTuple):
 
 
 def foot_of(tread: str) -> str:
-    """Return the name of the foot that a recording states as `tread`; "" = none."""
+    """Return the name of the foot for a recorded `tread`; "" = none."""
     return _FEET.get(tread, tread)
 
 
 def tread_of(foot: str) -> str:
-    """Return what recordings state as `tread` of a foot."""
+    """Return the recorded `tread` value of a foot."""
     return {name: tread for tread, name in _FEET.items()}.get(foot, foot)
 
 
 def value_text(value: Value, digits: int = 6) -> str:
-    """Return a factor's value as text; "-" = it does not apply."""
+    """Format the value of a factor; "-" = does not apply."""
     if value is None:
         return "-"
     return value if isinstance(value, str) else f"{value:.{digits}g}"
 
 
 def stated_factors(trial: Mapping[str, str]) -> StatedFactors:
-    """Return the factors in a trial's metadata; what is no factor is left out."""
+    """Return the factors in a trial's metadata; invalid entries are dropped."""
     foot = trial.get(FOOT) or foot_of(trial.get("tread", ""))
     values = checked_factors(_parsed(trial.get("factors", "")))
-    known = {**values, FOOT: foot[:LONGEST]} if foot else values
+    factors = {**values, FOOT: foot[:LONGEST]} if foot else values
     texts = _parsed(trial.get("factor_units", ""))
     units = {k: v[:LONGEST] for k, v in texts.items() if isinstance(v, str)}
-    return StatedFactors(known, units)
+    return StatedFactors(factors, units)
 
 
 def checked_factors(values: Mapping[str, Any]) -> dict[str, Value]:
-    """Return those of the values that factors may have: at most 13, finite, short."""
+    """Keep the values that are valid factors: at most 13, finite, short."""
     kept: dict[str, Value] = {}
     for name, value in list(values.items())[:MOST]:
         if isinstance(value, bool) or not _is_word(name):
@@ -69,7 +69,7 @@ def _is_word(text: str) -> bool:
 
 
 def _parsed(text: str) -> dict[str, Any]:
-    """Return the object in a JSON text, {} where there is none."""
+    """Return the object in a JSON text; {} if it holds none."""
     try:
         value: object = json.loads(text) if text else {}
     except (ValueError, RecursionError):

@@ -1,4 +1,4 @@
-"""Samples as models take them: columns, and where one trial ends."""
+"""Tables of samples for model fitting, with the length of every trial."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from analysis.data.series import Array, Indices
 
 
 def inputs_of(F_n: Array, v_t: Array, further: Array | None = None) -> Array:
-    """Return inputs of models side by side, shape (n, 2 + k).
+    """Stack the model inputs as columns, shape (n, 2 + k).
 
     Args:
         F_n: normal force [N], shape (n,).
@@ -45,12 +45,12 @@ class SampleTable:
     def joined(cls, parts: Sequence["SampleTable"]) -> "SampleTable":
         """Return the rows of `parts`, one after the other."""
         empty = np.zeros(0)
-        beside = [part.further for part in parts if part.further is not None]
+        further = [part.further for part in parts if part.further is not None]
         return cls(
             F_n=np.concatenate([empty, *(part.F_n for part in parts)]),
             v_t=np.concatenate([empty, *(part.v_t for part in parts)]),
             F_t=np.concatenate([empty, *(part.F_t for part in parts)]),
-            further=np.concatenate(beside) if beside else None,
+            further=np.concatenate(further) if further else None,
         )
 
     @property
@@ -67,18 +67,18 @@ class SampleTable:
 
     @property
     def inputs(self) -> Array:
-        """Return (F_n, v_t) and further inputs side by side, shape (n, 2 + k)."""
+        """F_n, v_t and further inputs as columns, shape (n, 2 + k)."""
         return inputs_of(self.F_n, self.v_t, self.further)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrainingSet:
-    """What a model is fitted to; compared and hashed as the object it is.
+    """Training data of a model; compared and hashed by identity.
 
     Attributes:
         rows: kept samples of all training trials, one trial after the other.
         lengths: number of rows of every trial.
-        chosen: the rows that a Gaussian process is given.
+        chosen: indices of the rows that a Gaussian process is fitted to.
     """
 
     rows: SampleTable
@@ -89,7 +89,7 @@ class TrainingSet:
     def of(
         cls, trials: Sequence[PreparedTrial], points: int, seed: int
     ) -> "TrainingSet":
-        """Return all kept samples of `trials`, `points` of them chosen at random."""
+        """Take all kept samples of `trials` and choose `points` of them at random."""
         rows = SampleTable.of(trials)
         rng = np.random.default_rng(seed)
         chosen = rng.choice(rows.count, min(points, rows.count), replace=False)
@@ -97,9 +97,9 @@ class TrainingSet:
 
     @property
     def subset(self) -> SampleTable:
-        """Return the chosen rows."""
+        """The chosen rows."""
         return self.rows.take(self.chosen)
 
     def trial_of(self) -> Indices:
-        """Return the number of the trial of every row, shape (n,)."""
+        """Return the trial index of every row, shape (n,)."""
         return np.repeat(np.arange(len(self.lengths)), self.lengths)

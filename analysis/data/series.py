@@ -1,4 +1,4 @@
-"""The record of one trial as the analysis takes it: velocity and forces over time."""
+"""Velocity and forces of one trial over time: the input of the analysis."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -21,9 +21,9 @@ _COLUMNS = ("t", "v_t", "F_n", "F_t")
 class TractionSeries:
     """One trial at the recorded rate, neither smoothed nor windowed.
 
-    Rows with a value that is not finite, and rows that repeat the one before in all
+    Rows with a value that is not finite, and rows that repeat the previous one in all
     columns, are dropped at construction and counted; the arrays are then read-only
-    copies, all of one shape (n,).
+    copies, all of shape (n,).
 
     Attributes:
         terrain: name of the terrain, e.g. "S10".
@@ -34,20 +34,20 @@ class TractionSeries:
         F_t: traction force [N], > 0 in slip.
         stones: size of the stones as recorded or given: "small", "big" or "none";
             empty where it is not known.
-        incline_deg: of the plane along the push [degrees]; None where it is not known.
-        factors: what else is known of the terrain and the foot, by name; None = does
+        incline_deg: incline of the plane along the push [degrees]; None if unknown.
+        factors: further properties of the terrain and the foot by name; None = does
             not apply.
-        units: of numbers among the factors, by name.
-        stamped_lag: how much older than the velocity the forces are by their own time
-            stamps [s]; 0 where they have none.
+        units: units of the numeric factors by name.
+        stamped_lag: age of the forces relative to the velocity by their own time
+            stamps [s]; 0 without time stamps.
         is_prepared: the rows are samples kept by an earlier preparation: smoothed,
             thinned and windowed.
         is_simulated: the devices were simulated.
-        is_foreign: a table that no session of this program states.
-        notes: what was decided when a table was read, for people.
-        further: other inputs of every row by name, each of shape (n,): an angle, say.
+        is_foreign: the trial is a table from another program.
+        notes: decisions made when a table was read, for the reader.
+        further: other inputs of every row by name, each of shape (n,), e.g. an angle.
         dropped_rows: number of rows that were not finite.
-        repeated_rows: number of rows that were there twice.
+        repeated_rows: number of duplicate rows.
 
     Raises:
         SettingsError: the arrays differ in length, too few rows are finite, time does
@@ -78,11 +78,11 @@ class TractionSeries:
         columns = [np.asarray(getattr(self, key), dtype=np.float64) for key in _COLUMNS]
         columns += [np.asarray(x, dtype=np.float64) for x in self.further.values()]
         _check_shapes(columns, (*_COLUMNS, *self.further), self.name)
-        is_finite = _of_all([np.isfinite(column) for column in columns])
+        is_finite = _all_true([np.isfinite(column) for column in columns])
         rows = int(np.count_nonzero(is_finite))
         if rows < is_finite.size:
             columns = [column[is_finite] for column in columns]
-        is_repeated = _of_all([column[1:] == column[:-1] for column in columns])
+        is_repeated = _all_true([column[1:] == column[:-1] for column in columns])
         repeated = int(np.count_nonzero(is_repeated))
         if rows - repeated < MINIMUM_SAMPLES:
             raise SettingsError(
@@ -109,13 +109,13 @@ class TractionSeries:
             return float(1.0 / np.median(np.diff(self.t)))
 
     def with_forces_from(self, lag: float) -> "TractionSeries":
-        """Return the trial with the forces of `lag` [s] later at every time.
+        """Compensate a lag of the forces: take them from `lag` [s] later.
 
-        Rows whose forces are not recorded are left out.
+        Rows for which no such forces were recorded are dropped.
 
         Raises:
-            SettingsError: fewer than three rows are left, or the rows were prepared:
-                what lay between them is gone.
+            SettingsError: fewer than three rows are left, or the rows were prepared,
+                so that the samples between them are gone.
         """
         if self.is_prepared:
             raise SettingsError(
@@ -136,9 +136,9 @@ class TractionSeries:
         )
 
 
-def _of_all(claims: list[NDArray[np.bool_]]) -> NDArray[np.bool_]:
-    """Return where all columns are so, shape (n,)."""
-    return np.logical_and.reduce(claims)
+def _all_true(masks: list[NDArray[np.bool_]]) -> NDArray[np.bool_]:
+    """Combine masks of all columns by logical and, shape (n,)."""
+    return np.logical_and.reduce(masks)
 
 
 def _check_name(terrain: str, name: str) -> None:

@@ -1,4 +1,4 @@
-"""The two tares around a trial: what the sensor's zero did meanwhile."""
+"""The tares before and after a trial, and the zero drift between them."""
 
 import json
 from collections.abc import Mapping
@@ -13,8 +13,8 @@ from acquisition.settings import Number
 from acquisition.trial_file.data_files import read_data
 from analysis.data.series import Array
 
-# Between two tares the zero of a good sensor wanders by 0.3 N on each axis. A foot that
-# came loose, a knock or another gain moves it farther.
+# Between two tares the zero of a good sensor drifts by 0.3 N on each axis. A loose
+# foot, a knock or another gain moves it further.
 LARGEST_CHANGE = 2.0  # N
 _LARGEST = 1e6  # N, N m: beyond every sensor
 _Axis = Annotated[Number, Field(strict=True, gt=-_LARGEST, lt=_LARGEST)]
@@ -36,8 +36,8 @@ class TareBracket:
     """The zero of the sensor before and after a trial.
 
     Attributes:
-        times: of the two tares, from the first cycle of the trial [s].
-        biases: reading without load at both [N, N m], shape (2, 6).
+        times: times of the two tares, from the first cycle of the trial [s].
+        biases: unloaded readings at both tares [N, N m], shape (2, 6).
     """
 
     times: tuple[float, float]
@@ -45,16 +45,16 @@ class TareBracket:
 
     @property
     def change(self) -> Array:
-        """How far the zero has moved from one to the other [N, N m], shape (6,)."""
+        """Change of the zero between the two tares [N, N m], shape (6,)."""
         return self.biases[1] - self.biases[0]
 
     @property
     def force_change(self) -> float:
-        """How far the zero of the force has moved from one to the other [N]."""
+        """Magnitude of the change of the force zero between the two tares [N]."""
         return float(np.linalg.norm(self.change[:3]))
 
     def drift(self, t: Array) -> Array:
-        """Return the change since the first tare at `t` [s], linear, shape (n, 6)."""
+        """Interpolate the change since the first tare at `t` [s], shape (n, 6)."""
         first, second = self.times
         share = np.clip((t - first) / (second - first), 0.0, 1.0)
         return share[:, None] * self.change
@@ -63,15 +63,15 @@ class TareBracket:
 def read_bracket(
     path: Path, trial: Mapping[str, str], bias: Array, start_ns: int
 ) -> TareBracket | None:
-    """Return the tares around a trial; None where one of them is not known.
+    """Read the tares around a trial; None if one of them is not known.
 
-    The tare before the trial stands in its file, the one after it in the sidecar
-    beside the file, which the last trial of a session that was cut short does not have.
+    The tare before the trial is in its file, the one after it in its sidecar, which the
+    last trial of an aborted session lacks.
 
     Args:
         path: the trial file.
-        trial: its metadata of that name.
-        bias: reading without load that the file carries, shape (6,).
+        trial: the metadata section "trial" of the file.
+        bias: unloaded reading in the file, shape (6,).
         start_ns: host time of the first cycle [ns].
     """
     try:

@@ -1,10 +1,9 @@
-"""The kind of a terrain: its grain size, a flat plate, or its own.
+"""Kind of a terrain: its grain size, "flat" for a plate, or the terrain's own name.
 
-The size of the stones is a fact of the recording (`stones` or d50 in matrix.toml,
-`stone_size` in a trial's metadata) or is given with a table; it never follows from a
-terrain's name. Only where nothing is recorded do the eight names of the paper stand for
-their stones. Any other terrain of unknown stones is a kind of its own, under its own
-name.
+The size of the stones is recorded (`stones` or d50 in matrix.toml, `stone_size` in a
+trial's metadata) or given with a table; it is not derived from a terrain's name. Only
+if nothing is recorded do the eight names of the paper imply their stones. Any other
+terrain of unknown stones is a kind of its own, under its own name.
 """
 
 import re
@@ -30,7 +29,7 @@ PAPER_INCLINES: Mapping[str, float] = {
     **dict.fromkeys(("S10", "B10"), 10.0),
     **dict.fromkeys(("S15", "B15"), 15.0),
 }
-_OTHER_INCLINE = 2.5  # degrees; half of what the paper's differ by
+_OTHER_INCLINE = 2.5  # degrees; half of the smallest difference in the paper
 _TITLES = {
     SMALL: "small stones",
     BIG: "big stones",
@@ -41,7 +40,7 @@ _TITLES = {
 
 
 def stones_of(ground: str, d50: float | None) -> str:
-    """Return the word for stones that a recording states.
+    """Return the stone size as recordings state it.
 
     Args:
         ground: "stones", "plate" or "fine".
@@ -56,29 +55,29 @@ def stones_of(ground: str, d50: float | None) -> str:
 
 
 def ground_of(d50: float | None) -> str:
-    """Return "plate", "fine" or "stones" for a grain size [mm]; None = has none."""
+    """Return "plate", "fine" or "stones" for a grain size [mm]; None for a plate."""
     if d50 is None:
         return "plate"
     return FINE if d50 < FINEST_STONES else STONES
 
 
 def _stated(word: str) -> str:
-    """Return the kind that a recorded size of stones stands for, "" for none."""
+    """Return the kind for a recorded stone size; "" if the text states none."""
     if word in (FINE, STONES) or _MILLIMETRES.fullmatch(word):
         return word
     return STONE_SIZES.get(word, "")
 
 
 def terrain_kind(terrain: str, stones: Iterable[str] = ()) -> str:
-    """Return "small", "big", "flat", e.g. "12 mm", "fine" or "stones".
+    """Return the kind: "small", "big", "flat", "fine", "stones" or e.g. "12 mm".
 
-    The terrain's own name where it is unknown.
+    The terrain's own name if the kind is unknown.
 
     Args:
         terrain: its name.
-        stones: sizes that its recordings state: "small", "big", "none", e.g. "12 mm",
-            "fine" or "stones"; any other text states nothing. Recordings that
-            contradict each other make the terrain a kind of its own.
+        stones: sizes stated by its recordings: "small", "big", "none", "fine", "stones"
+            or e.g. "12 mm"; any other text is ignored. Contradictory recordings make
+            the terrain a kind of its own.
     """
     stated = {kind for kind in map(_stated, stones) if kind}
     if not stated:
@@ -92,16 +91,16 @@ def terrain_incline(
     """Return the incline of a terrain [degrees], None where it is unknown.
 
     Args:
-        terrain: its name; those of the paper stand for their incline.
-        inclines: what its recordings state [degrees]; None states nothing. Their
-            median counts.
+        terrain: its name; the names of the paper imply their incline.
+        inclines: inclines stated by its recordings [degrees], None where not stated;
+            their median is used.
     """
     stated = [angle for angle in inclines if angle is not None]
     return median(stated) if stated else PAPER_INCLINES.get(terrain)
 
 
 def is_papers(terrain: str, kind: str, incline_deg: float | None) -> bool:
-    """Whether a terrain is one of the paper's: its name, stones and incline.
+    """Whether a terrain matches one of the paper's by name, stones and incline.
 
     Args:
         terrain: its name.
@@ -116,14 +115,14 @@ def is_papers(terrain: str, kind: str, incline_deg: float | None) -> bool:
 
 
 def kind_title(kind: str) -> str:
-    """Return a kind in words, e.g. "small stones"; a terrain's own kind is its name."""
+    """Return a kind in words, e.g. "small stones"; an own kind gives its own name."""
     return (
         f"stones of {kind}" if _MILLIMETRES.fullmatch(kind) else _TITLES.get(kind, kind)
     )
 
 
 def is_stony(kind: str) -> bool:
-    """Whether the ground is of stones, of whatever size."""
+    """Whether the ground consists of stones of any size."""
     return (
         kind == STONES
         or kind in SIZE_BY_WORD
@@ -132,15 +131,15 @@ def is_stony(kind: str) -> bool:
 
 
 def surface_of(kind: str) -> str:
-    """Return "flat" or "rocky"; fine ground and an own kind stay what they are."""
+    """Return "flat" or "rocky"; fine ground and own kinds are returned unchanged."""
     return "rocky" if is_stony(kind) else kind
 
 
 def groups_of(kinds: Mapping[str, str]) -> dict[str, dict[str, str]]:
-    """Return what every terrain counts as, by level: its name, its stones, its surface.
+    """Return the class of every terrain at each level: name, stones and surface.
 
     Args:
-        kinds: kind by name of the terrain.
+        kinds: kind by terrain name.
     """
     return {
         "terrain": {name: name for name in kinds},
@@ -150,7 +149,7 @@ def groups_of(kinds: Mapping[str, str]) -> dict[str, dict[str, str]]:
 
 
 def parse_stones(text: str) -> dict[str, str]:
-    """Return the size of the stones by terrain from `Sand=none,Beach=small`.
+    """Parse stone sizes by terrain, e.g. `Sand=none,Beach=small`.
 
     Raises:
         SettingsError: a part is not TERRAIN=SIZE, or there is no such size.

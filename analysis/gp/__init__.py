@@ -1,5 +1,6 @@
 """Exact Gaussian processes: kernels, likelihood with gradient, search, prediction.
 
-Begin with `regression`, which predicts; `kernels` compose with + and *, `likelihood` is
-the log marginal likelihood and its gradient, `search` chooses starts and optimises.
+Begin with `regression`: fit and prediction. `kernels` compose with + and *,
+`likelihood` is the log marginal likelihood with its gradient, `search` optimises the
+hyperparameters.
 """

@@ -5,8 +5,7 @@ k(x, x') = sf^2 asin(N / sqrt((c + p(x)) (c + p(x'))))
 
 c = 1 is the covariance of a network (Rasmussen and Williams 2006, eq. 4.29, with
 beta = 2 sigma_0^2 and their 2/pi inside sf). c = 0 is eq. (5) as printed: there k(x, x)
-is the same everywhere and the arcsine has a cusp at zero distance, so functions are
-very rough.
+is constant and the arcsine has a cusp at zero distance, so functions are very rough.
 """
 
 from collections.abc import Sequence
@@ -66,7 +65,7 @@ class Arcsine(Composable):
 
     @property
     def c(self) -> float:
-        """What is added to both factors under the root [-]."""
+        """Constant added to both factors under the root [-]."""
         return 0.0 if self.as_printed else 1.0
 
     def rows(self, theta: Array, X: Array) -> Augmented:
@@ -83,7 +82,7 @@ class Arcsine(Composable):
         )
 
     def over(self, X: Array, X_other: Array | None = None) -> Evaluator:
-        """Return what gives K and its contraction for any theta."""
+        """Return the evaluator of K and its contraction."""
         other = X if X_other is None else X_other
         parts = computed_parts(len(X), len(other), is_upper=X_other is None)
         over = _PrintedOver if self.as_printed else _NetworkOver
@@ -91,10 +90,10 @@ class Arcsine(Composable):
 
 
 class _NetworkOver:
-    """The kernel of a network, c = 1, over two sets of rows in memory of its own.
+    """Evaluator for c = 1 over two sets of rows, in preallocated memory.
 
-    With V = U / sqrt(A) the sine is u = V V'. As 1 - u^2 is above 1/(1 + p), it loses
-    no more digits to cancellation than the size of p has: five at the steepest.
+    With V = U / sqrt(A) the sine is u = V V'. Because 1 - u^2 exceeds 1/(1 + p), at
+    most log10(1 + p) digits are lost to cancellation: five at the steepest.
     """
 
     def __init__(
@@ -122,8 +121,8 @@ class _NetworkOver:
         """Return sum_ij W_ij dK_ij/dtheta.
 
         For any parameter t, dk/dt = sf^2 [dN/dt / sqrt(A A') - u/2 (dA/dt / A +
-        dA'/dt / A')] / sqrt(1 - u^2). So q = W / sqrt(1 - u^2) and that times u are all
-        that is needed, and their products with V.
+        dA'/dt / A')] / sqrt(1 - u^2). So only q = W / sqrt(1 - u^2), q u and their
+        products with V are needed.
         """
         of_sf, u = 2.0 * float(np.vdot(W, self._K)), self._u
         for part in self._parts:
@@ -136,14 +135,14 @@ class _NetworkOver:
 
 
 class _PrintedOver:
-    """The kernel as printed, c = 0, over two sets of rows in memory of its own.
+    """Evaluator for c = 0, as printed, over two sets of rows in preallocated memory.
 
-    Its sine is 1 where rows repeat, so the angle comes from the tangent N / D. Of
-    D = sqrt(A A' - N^2) everything that depends on the rows alone is computed once: by
-    Lagrange's identity D^2 = sum_{a<b} (U_a U'_b - U_b U'_a)^2, and with beta and the
-    lengths taken out these are squares of x_a - x'_a and of x_a x'_b - x_b x'_a. The
-    latter is written as x_b (x_a - x'_a) - x_a (x_b - x'_b), so nothing cancels where
-    two rows are close.
+    The sine is 1 for repeated rows, so the angle comes from the tangent N / D with
+    D = sqrt(A A' - N^2). The parts of D that depend only on the rows are computed once:
+    by Lagrange's identity D^2 = sum_{a<b} (U_a U'_b - U_b U'_a)^2, and with beta and
+    the lengths factored out these are squares of x_a - x'_a and x_a x'_b - x_b x'_a.
+    The latter is written as x_b (x_a - x'_a) - x_a (x_b - x'_b), so nothing cancels
+    where two rows are close.
     """
 
     def __init__(
@@ -174,12 +173,12 @@ class _PrintedOver:
                 np.divide(self._N[part], D[part], out=K[part])
             np.arctan(K[part], out=K[part])
             K[part] *= sf2
-        # at repeated inputs the arcsine has its cusp: its slope is set to 0
+        # at repeated inputs the arcsine has a cusp: its slope is set to 0
         D[D == 0.0] = np.inf
         return K, lambda W: self._contract(W, sf2, rows, others)
 
     def _fill_squares(self, theta: Array) -> None:
-        """Put D^2 into the memory of D."""
+        """Write D^2 into the memory of D."""
         inverse = 2.0 * np.exp(-2.0 * theta[1:-1])
         of_pairs = [inverse[a] * inverse[b] for a, b in self._pairs]
         weights = np.concatenate([np.exp(theta[-1]) * inverse, of_pairs])
@@ -192,8 +191,7 @@ class _PrintedOver:
         """Return sum_ij W_ij dK_ij/dtheta.
 
         For any parameter t, dk/dt = sf^2 [dN/dt - N/2 (dA/dt / A + dA'/dt / A')] / D.
-        So W/D and that times N are all that is needed, and their products with U and
-        1/A.
+        So only W/D, W N/D and their products with U and 1/A are needed.
         """
         of_sf = 2.0 * float(np.vdot(W, self._K))
         q = np.divide(W, self._D, out=W)
@@ -205,8 +203,8 @@ class _PrintedOver:
 
 
 def _slopes(of_sf: float, of_shape: Array) -> Array:
-    """Return the slopes in theta from those of log U_0^2 = log beta and of log U_d^2.
+    """Convert slopes in log U_0^2 = log beta and log U_d^2 to slopes in theta.
 
-    U_d^2 ~ l_d^-2, and a sum over U_a stands for twice a slope of log U_a^2.
+    U_d^2 ~ l_d^-2, and a sum over U_a is twice the slope in log U_a^2.
     """
     return np.concatenate([[of_sf], -of_shape[1:], [0.5 * of_shape[0]]])

@@ -1,7 +1,7 @@
-"""One climb to a top of a log density, by L-BFGS-B in a box.
+"""Local maximisation of a log density by L-BFGS-B in a box.
 
-The method of Byrd, Lu, Nocedal and Zhu (1995), SIAM J. Sci. Comput. 16, as SciPy has
-it: a quasi-Newton method with bounds, for few parameters and an expensive slope.
+SciPy's implementation of Byrd, Lu, Nocedal and Zhu (1995), SIAM J. Sci. Comput. 16: a
+quasi-Newton method with bounds, for few parameters and an expensive gradient.
 """
 
 from collections.abc import Callable
@@ -12,23 +12,23 @@ import numpy as np
 from acquisition.errors import SettingsError
 from analysis.data.series import Array
 
-# theta -> value and slope; may raise SettingsError where there is no value
+# theta -> value and slope; raises SettingsError where the density is undefined
 Objective = Callable[[Array], tuple[float, Array]]
 
-# a climb ends where a step gains less than this share of the value
+# a climb ends when a step gains less than this share of the value
 _TOLERANCE = 2e-9
-# where there is no value a climb meets one that is so much below the lowest it has met:
-# low enough to be turned down, and not so low that the next step would be next to none
+# where the density is undefined, the optimiser sees the lowest value so far less this:
+# low enough to be rejected, but not so low that the line search shortens to nothing
 _DROP = 100.0
 
 
 class Climbed(NamedTuple):
-    """Where a climb ended.
+    """Result of a climb.
 
     Attributes:
-        theta: parameters, shape (p,).
-        value: the log density there; -inf where the start has none.
-        evaluations: how often it was evaluated.
+        theta: final parameters, shape (p,).
+        value: log density there; -inf if it is undefined at the start.
+        evaluations: number of evaluations.
     """
 
     theta: Array
@@ -43,16 +43,16 @@ def climb(
     is_known: Callable[[Array, float], bool] = lambda theta, value: False,
     scale: Array | float = 1.0,
 ) -> Climbed:
-    """Return the top that a start leads to.
+    """Climb from a start to a local maximum.
 
     Args:
         objective: theta -> value and slope.
-        start: theta to begin with, shape (p,); clipped into the box. One without a
-            value is where the climb ends.
-        bounds: of theta, shape (p, 2).
-        is_known: theta, value -> whether the climb is left there.
-        scale: in which the density bends alike along every parameter, shape (p,):
-            fewer steps are lost until the method has learnt how it does.
+        start: initial theta, shape (p,); clipped to the box. If the density is
+            undefined there, the climb ends at once.
+        bounds: bounds of theta, shape (p, 2).
+        is_known: theta, value -> whether to stop there.
+        scale: parameter scale that equalises the curvature, shape (p,); saves the
+            steps in which the method would learn it.
     """
     from scipy.optimize import minimize
 
@@ -71,18 +71,18 @@ def climb(
         lowest, has_value = min(lowest, value), True
         return -value, -slope * scale
 
-    def watch(intermediate_result: Any) -> None:  # noqa: ANN401
+    def stop_at_known(intermediate_result: Any) -> None:  # noqa: ANN401
         if is_known(inside(intermediate_result.x), -float(intermediate_result.fun)):
             raise StopIteration
 
-    found = minimize(
+    result = minimize(
         downhill,
         np.clip(start, *bounds.T) / scale,
         jac=True,
         method="L-BFGS-B",
         bounds=(bounds.T / scale).T,
-        callback=watch,
+        callback=stop_at_known,
         options={"ftol": _TOLERANCE},
     )
-    value = -float(found.fun) if has_value else -np.inf
-    return Climbed(inside(found.x), value, int(found.nfev))
+    value = -float(result.fun) if has_value else -np.inf
+    return Climbed(inside(result.x), value, int(result.nfev))

@@ -1,13 +1,12 @@
-"""Covariance functions of Gaussian processes, and how they compose.
+"""Covariance functions of Gaussian processes and their composition.
 
-A kernel over two sets of rows evaluates its matrix once and hands back, with it, a
-function that contracts any weight matrix W with the derivatives: sum_ij W_ij
-dK_ij/dtheta_k. No derivative matrix is ever formed, and a sum or product of kernels
-needs only the contractions of its parts: W for a sum, W times the other's matrix for a
-product.
+A kernel over two sets of rows evaluates its matrix once and returns with it a function
+that contracts any weight matrix W with the derivatives: sum_ij W_ij dK_ij/dtheta_k. No
+derivative matrix is ever formed. A sum or product of kernels needs only the
+contractions of its parts: with W for a sum, W times the other matrix for a product.
 
-A search evaluates the same rows some hundred times. Fresh memory of a few hundred rows
-squared costs as much as what is computed in it, so an `Evaluator` keeps its own.
+A search evaluates the same rows about a hundred times. Allocating a matrix of a few
+hundred rows costs as much as filling it, so an `Evaluator` reuses its memory.
 """
 
 from collections.abc import Callable
@@ -21,27 +20,27 @@ from analysis.data.series import Array
 
 # W -> sum_ij W_ij dK_ij/dtheta_k, shape (p,); W may be overwritten
 Contraction = Callable[[Array], Array]
-# theta -> K and its contraction; both are good until the next call
+# theta -> K and its contraction; both are valid until the next call
 Evaluator = Callable[[Array], tuple[Array, Contraction]]
 
-_STRIP = 40  # rows of a triangle computed at a time
+_STRIP = 40  # rows of the upper triangle computed at a time
 
 
 class Role(Enum):
-    """What a hyperparameter is the logarithm of."""
+    """Quantity of which a hyperparameter is the logarithm."""
 
     SIZE = "size"  # standard deviation of the function, in the unit of y
-    LENGTH = "length"  # of an input, in its unit
-    BIAS = "bias"  # without a unit
+    LENGTH = "length"  # length scale of an input, in its unit
+    BIAS = "bias"  # dimensionless
 
 
 class Hyperparameter(NamedTuple):
     """One hyperparameter of a kernel, a natural logarithm.
 
     Attributes:
-        name: as it is recorded.
-        role: what it is the logarithm of.
-        input: index of the input that a length belongs to.
+        name: name in records.
+        role: quantity of which it is the logarithm.
+        input: index of the input that a length scale belongs to.
     """
 
     name: str
@@ -71,19 +70,19 @@ class Kernel(Protocol):
         ...
 
     def over(self, X: Array, X_other: Array | None = None) -> Evaluator:
-        """Return what gives K, shape (n, m), and its contraction for any theta.
+        """Return the evaluator of K, shape (n, m), and its contraction.
 
         Args:
             X: rows, shape (n, d).
             X_other: other rows, shape (m, d); None for the covariances of X with
-                itself, of which only the upper triangle is good then, and the
-                contraction is asked with upper triangles.
+                itself. Then only the upper triangle of K is valid, and the contraction
+                expects upper-triangular weights.
         """
         ...
 
 
 class Composable:
-    """Gives a kernel names, its matrix, `+` and `*`."""
+    """Mixin that provides names, matrix, `+` and `*` of a kernel."""
 
     __slots__ = ()
 
@@ -125,15 +124,15 @@ class SquaredExponential(Composable):
         return np.full(X.shape[0], np.exp(2.0 * theta[0]))
 
     def over(self, X: Array, X_other: Array | None = None) -> Evaluator:
-        """Return what gives K and its contraction for any theta."""
+        """Return the evaluator of K and its contraction."""
         return _SquaredExponentialOver(X, X_other)
 
 
 class _SquaredExponentialOver:
-    """A squared exponential over two sets of rows, in memory of its own.
+    """Evaluator of a squared exponential over two sets of rows, in reused memory.
 
     The exponent is one matrix product, of (x / l^2, 2 log sf - |x/l|^2/2, -1/2 l^-2)
-    and (x', 1, x' o x'); only the former changes with theta.
+    and (x', 1, x' o x'); only the first factor depends on theta.
     """
 
     def __init__(self, X: Array, X_other: Array | None) -> None:
@@ -148,7 +147,7 @@ class _SquaredExponentialOver:
     def __call__(self, theta: Array) -> tuple[Array, Contraction]:
         """Return K and its contraction.
 
-        What rounding leaves above the largest exponent is cut off.
+        The exponent is clipped at its maximum 2 log sf, which rounding may exceed.
         """
         K, left, highest = self._K, self._left, 2.0 * theta[0]
         inverse = np.exp(-2.0 * theta[1:])
@@ -177,19 +176,19 @@ class _SquaredExponentialOver:
 
 @dataclass(frozen=True, slots=True)
 class _Pair(Composable):
-    """Two kernels in one; theta is the left one's, then the right one's."""
+    """Two kernels; theta holds the left one's hyperparameters, then the right one's."""
 
     left: Kernel
     right: Kernel
 
     @property
     def parameters(self) -> tuple[Hyperparameter, ...]:
-        """The left kernel's, named "a.", and the right one's, named "b."."""
+        """Those of the left kernel, prefixed "a.", and of the right one, "b."."""
         left = (p._replace(name=f"a.{p.name}") for p in self.left.parameters)
         return (*left, *(p._replace(name=f"b.{p.name}") for p in self.right.parameters))
 
     def split(self, theta: Array) -> tuple[Array, Array]:
-        """Return the hyperparameters of both parts."""
+        """Split theta into the hyperparameters of both parts."""
         count = len(self.left.names)
         return theta[:count], theta[count:]
 
@@ -210,7 +209,7 @@ class Sum(_Pair):
         return self.left.diagonal(a, X) + self.right.diagonal(b, X)
 
     def over(self, X: Array, X_other: Array | None = None) -> Evaluator:
-        """Return what gives K and the contractions of both parts with the same W."""
+        """Return the evaluator of K; both parts are contracted with the same W."""
         left, right = self.left.over(X, X_other), self.right.over(X, X_other)
 
         def at(theta: Array) -> tuple[Array, Contraction]:
@@ -232,7 +231,7 @@ class Product(_Pair):
         return self.left.diagonal(a, X) * self.right.diagonal(b, X)
 
     def over(self, X: Array, X_other: Array | None = None) -> Evaluator:
-        """Return what gives K and the contractions, each W weighed by the other's K."""
+        """Return the evaluator of K; W is weighted by the K of the other part."""
         left, right = self.left.over(X, X_other), self.right.over(X, X_other)
 
         def at(theta: Array) -> tuple[Array, Contraction]:
@@ -247,8 +246,8 @@ class Product(_Pair):
 def computed_parts(n: int, m: int, *, is_upper: bool) -> list[tuple[slice, slice]]:
     """Return the parts of an (n, m) matrix that are computed, as (rows, columns).
 
-    That is all of it, or rows from their place on the diagonal: a little more than the
-    upper triangle. Exponentials cost as much as a factorisation.
+    That is the whole matrix, or strips of rows from the diagonal on: slightly more than
+    the upper triangle. All exponentials would cost as much as a factorisation.
     """
     if not is_upper:
         return [(slice(None), slice(None))]
@@ -256,7 +255,7 @@ def computed_parts(n: int, m: int, *, is_upper: bool) -> list[tuple[slice, slice
 
 
 def lengths_of(dimensions: int) -> tuple[Hyperparameter, ...]:
-    """Return one length for each input."""
+    """Return one length-scale hyperparameter per input."""
     return tuple(
         Hyperparameter(f"log_l{d + 1}", Role.LENGTH, d) for d in range(dimensions)
     )

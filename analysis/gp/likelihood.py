@@ -1,4 +1,4 @@
-"""The marginal likelihood of a Gaussian process, as a search evaluates it.
+"""Log marginal likelihood of a Gaussian process and its gradient.
 
 Value and gradient come from one Cholesky factorisation (Rasmussen and Williams, 2006,
 eqs. 2.30 and 5.9). For a few hundred rows most of the time goes into the inverse, and
@@ -22,17 +22,17 @@ from analysis.gp.kernels import Contraction, Kernel
 from analysis.gp.noise import Noise
 from analysis.gp.trial_noise import SharedAt, TrialRows, shared_over
 
-_JITTERS = (0.0, 1e-10, 1e-8, 1e-6)  # times the mean variance; the first that works
+_JITTERS = (0.0, 1e-10, 1e-8, 1e-6)  # times the mean variance; the first that suffices
 _BLAS = frozenset({"syr", "trmm", "trsm"})
-_SMALL = 40  # rows of a triangle that LAPACK inverts as fast as products do
+_SMALL = 40  # rows below which LAPACK inverts a triangle as fast as the block recursion
 
 
 class Factor(NamedTuple):
-    """The covariance C = K + S, factorised.
+    """Cholesky factor of the covariance C = K + S.
 
     Attributes:
         L: lower Cholesky factor, zero above the diagonal.
-        jitter: what had to be added to the diagonal [N^2], mostly 0.
+        jitter: added to the diagonal [N^2], mostly 0.
     """
 
     L: Array
@@ -43,9 +43,9 @@ class Factor(NamedTuple):
         return lapack("potrs")(self.L, r, lower=1)[0]
 
     def half(self, r: Array) -> Array:
-        """Return L^-1 r, of the shape of r: (n, m).
+        """Return L^-1 r, shape (n, m) as r.
 
-        Solved as r' = x' L', so that rows in C's order are taken as they are.
+        Solved as r' = x' L', so that a C-ordered r needs no copy.
         """
         return lapack("trsm")(1.0, self.L, r.T, side=1, lower=1, trans_a=1).T
 
@@ -61,22 +61,22 @@ def factorise(
     memory: Array | None = None,
     blocks: Sequence[tuple[slice, Array]] = (),
 ) -> Factor:
-    """Return the Cholesky factor of K + diag(S), with jitter only if it needs some.
+    """Factorise K + diag(S), with the smallest jitter that suffices.
 
     Args:
         K: covariances, shape (n, n); only the upper triangle is read.
-        S: what is added to the diagonal, shape (n,).
-        blocks: what is added on the diagonal's blocks, as (rows, covariances).
-        memory: where the factor is put, shape (n, n) in Fortran's order; new by
+        S: added to the diagonal, shape (n,).
+        blocks: added to diagonal blocks, as (rows, covariances).
+        memory: output array of the factor, shape (n, n) in Fortran order; allocated by
             default.
 
     Raises:
-        SettingsError: not positive definite with the largest jitter either.
+        SettingsError: not positive definite even with the largest jitter.
     """
     C = np.empty(K.shape, order="F") if memory is None else memory
     for share in _JITTERS:
         jitter = share and share * float(np.mean(np.diagonal(K)))
-        # the upper triangle in C's order is the lower one in Fortran's
+        # the upper triangle in C order is the lower one in Fortran order
         np.copyto(C, K.T)
         C.T.flat[:: S.size + 1] += S + jitter
         for rows, block in blocks:
@@ -90,16 +90,16 @@ def factorise(
     )
 
 
-class _Solved(NamedTuple):
-    """What a likelihood and its gradient share at one theta.
+class _Evaluation(NamedTuple):
+    """Quantities shared by the likelihood and its gradient at one theta.
 
     Attributes:
         lml: log marginal likelihood.
-        factor: the covariance, factorised.
+        factor: Cholesky factor of the covariance.
         alpha: C^-1 r, shape (n,).
-        contract: the kernel's contraction.
-        contract_noise: the noise's, which is given the diagonal of the weight.
-        shared: covariances inside trials, and their contraction.
+        contract: contraction of the kernel.
+        contract_noise: contraction of the noise; takes the diagonal of the weight.
+        shared: covariances within trials, and their contraction.
     """
 
     lml: float
@@ -111,14 +111,14 @@ class _Solved(NamedTuple):
 
 
 class Likelihood:
-    """The log marginal likelihood of outputs, called with theta as often as needed.
+    """Log marginal likelihood of outputs as a function of theta.
 
     Args:
         kernel: covariance function.
-        noise: of the measurements; theta is the kernel's, then the noise's.
+        noise: measurement noise; theta holds the kernel's, then the noise's parameters.
         X: inputs, shape (n, d).
-        r: outputs with the mean function taken off, shape (n,).
-        trials: where the rows come from; None where they share nothing but the kernel.
+        r: outputs minus the mean function, shape (n,).
+        trials: trial of every row; None if rows share nothing but the kernel.
     """
 
     def __init__(
@@ -140,48 +140,48 @@ class Likelihood:
     def __call__(self, theta: Array) -> tuple[float, Array]:
         """Return the likelihood and its gradient in theta.
 
-        The gradient is 1/2 sum_ij (alpha alpha' - C^-1)_ij dC_ij. That weight is
-        symmetric, so the kernel is given its lower triangle with half of the diagonal.
+        The gradient is 1/2 sum_ij (alpha alpha' - C^-1)_ij dC_ij. The weight is
+        symmetric, so the kernel gets its lower triangle with half of the diagonal.
 
         Raises:
             SettingsError: the covariance cannot be factorised.
         """
-        at = self._solved(theta)
+        at = self._evaluate(theta)
         minus = self._minus_weight(at.factor.L, at.alpha)
         on_diagonal = -np.diagonal(minus)
         minus.T.flat[:: at.alpha.size + 1] *= 0.5
         slope_noise = at.contract_noise(on_diagonal)
         if at.shared.blocks:
             slope_noise -= at.shared.contract(minus)
-        # the transpose has K's order of memory, and the triangle of K that is good
+        # the transpose has K's memory order and its valid (upper) triangle
         slope = -at.contract(minus.T)
         return at.lml, np.concatenate([slope, slope_noise])
 
     def value(self, theta: Array) -> float:
-        """Return the likelihood alone, for a third of the cost.
+        """Return the likelihood without its gradient, at a third of the cost.
 
         Raises:
             SettingsError: the covariance cannot be factorised.
         """
-        return self._solved(theta).lml
+        return self._evaluate(theta).lml
 
     def weights(self, theta: Array) -> tuple[Array, float]:
-        """Return C^-1 r, shape (n,), and the jitter that C needs.
+        """Return C^-1 r, shape (n,), and the jitter added to C.
 
         Raises:
             SettingsError: the covariance cannot be factorised.
         """
         if self._last[0] != theta.tobytes():
-            self._solved(theta)
+            self._evaluate(theta)
         return self._last[1:]
 
     def thinned(self, most: int) -> "Likelihood":
-        """Return the likelihood of every so many rows, at most so many."""
+        """Return the likelihood of evenly thinned rows, at most `most` of them."""
         thin = slice(None, None, -(-self.r.size // most))
         trials = None if self.trials is None else self.trials.take(thin)
         return Likelihood(self.kernel, self.noise, self.X[thin], self.r[thin], trials)
 
-    def _solved(self, theta: Array) -> "_Solved":
+    def _evaluate(self, theta: Array) -> "_Evaluation":
         theta_kernel, theta_noise = split(self.kernel, theta)
         K, contract = self._covariance(theta_kernel)
         S, contract_noise = self.noise.evaluate(theta_noise, self.X)
@@ -191,7 +191,7 @@ class Likelihood:
         lml = -0.5 * float(self.r @ alpha) - 0.5 * alpha.size * np.log(2.0 * np.pi)
         lml -= float(np.sum(np.log(np.diagonal(factor.L))))
         self._last = theta.tobytes(), alpha, factor.jitter
-        return _Solved(lml, factor, alpha, contract, contract_noise, shared)
+        return _Evaluation(lml, factor, alpha, contract, contract_noise, shared)
 
     def _minus_weight(self, L: Array, alpha: Array) -> Array:
         """Return the lower triangle of C^-1 - alpha alpha', zero above."""
@@ -201,15 +201,15 @@ class Likelihood:
 
 
 def split(kernel: Kernel, theta: Array) -> tuple[Array, Array]:
-    """Return the kernel's and the noise's part of theta."""
+    """Split theta into the parts of the kernel and of the noise."""
     count = len(kernel.names)
     return theta[:count], theta[count:]
 
 
 def _invert(L: Array, inverse: Array, low: int, high: int) -> None:
-    """Put the inverse of a diagonal block of L, rows `low` to `high`, into `inverse`.
+    """Write the inverse of a diagonal block of L, rows `low` to `high`, to `inverse`.
 
-    [[A, 0], [B, D]]^-1 = [[A^-1, 0], [-D^-1 B A^-1, D^-1]], down to small blocks.
+    Recursive: [[A, 0], [B, D]]^-1 = [[A^-1, 0], [-D^-1 B A^-1, D^-1]].
     """
     if high - low <= _SMALL:
         block = slice(low, high)
@@ -228,6 +228,6 @@ def _invert(L: Array, inverse: Array, low: int, high: int) -> None:
 
 @lru_cache
 def lapack(name: str) -> Callable[..., Any]:
-    """Return a routine of LAPACK or BLAS for double precision, by its bare name."""
+    """Return a double-precision LAPACK or BLAS routine by name without prefix."""
     get: Any = get_blas_funcs if name in _BLAS else get_lapack_funcs
     return get(name, dtype=float)

@@ -1,4 +1,4 @@
-"""Noise of the measurements around a Gaussian process, apart from its covariance."""
+"""Measurement noise of a Gaussian process."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,11 +9,11 @@ import numpy as np
 from analysis.data.series import Array
 
 _START = 0.8  # sn / sd(y) that the search starts with
-_LARGEST_INPUT = 2.0  # standard deviations beyond which the noise changes no more
+_LARGEST_INPUT = 2.0  # standard deviations beyond which the noise stays constant
 
 
 class Noise(Protocol):
-    """A variance for every row, with hyperparameters theta of its own."""
+    """Noise variance of every row, with its own hyperparameters theta."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -31,11 +31,11 @@ class Noise(Protocol):
         ...
 
     def log_prior(self, theta: Array) -> tuple[float, Array]:
-        """Return what the search adds to the likelihood, and its slope in theta."""
+        """Return the log prior of theta and its slope."""
         ...
 
     def start(self, sd_y: float) -> Array:
-        """Return a start of the search: a constant of 0.8 sd(y)."""
+        """Return the start of the search: constant noise of 0.8 sd(y)."""
         ...
 
     def bounds(self, sd_y: float) -> Array:
@@ -64,7 +64,7 @@ class ConstantNoise:
         return S, lambda d: np.array([d @ S])
 
     def log_prior(self, theta: Array) -> tuple[float, Array]:
-        """Return nothing: every sn is as good before the data."""
+        """Return zero: the prior of log sn is flat."""
         return 0.0, np.zeros(theta.size)
 
     def start(self, sd_y: float) -> Array:
@@ -78,10 +78,10 @@ class ConstantNoise:
 
 @dataclass(frozen=True, slots=True)
 class LogLinearNoise:
-    """log sn(x) = w_0 + sum_d w_d z_d, z the standardised inputs held within +-2.
+    """log sn(x) = w_0 + sum_d w_d z_d, z the standardised inputs clipped to +-2.
 
-    theta = (w_0, w_1 ... w_d). The slopes w_1 ... have a prior N(0, 1): 300 rows would
-    otherwise be followed too closely.
+    theta = (w_0, w_1 ... w_d). The slopes w_1 ... have a prior N(0, 1), because 300
+    rows would otherwise be overfitted.
 
     Attributes:
         dimensions: number of inputs d.
@@ -107,7 +107,7 @@ class LogLinearNoise:
         return S, lambda d: H.T @ (d * S)
 
     def log_prior(self, theta: Array) -> tuple[float, Array]:
-        """Return -1/2 sum_d w_d^2 and its slope; w_0 is free."""
+        """Return -1/2 sum_d w_d^2 and its slope; the prior of w_0 is flat."""
         slope = -theta
         slope[0] = 0.0
         return 0.5 * float(slope @ theta), slope

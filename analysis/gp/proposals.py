@@ -1,8 +1,7 @@
-"""Where a search of hyperparameters begins, where it may jump, and its bounds.
+"""Starting points, moves and bounds of a hyperparameter search.
 
-A kernel says which hyperparameters it has (`Hyperparameter`), and that is enough to
-search it. What more is known of where the tops of a kernel lie is registered here, by
-its class.
+The hyperparameters that a kernel declares (`Hyperparameter`) suffice to search it.
+Further knowledge of where the optima of a kernel lie is registered here by its class.
 """
 
 from collections.abc import Sequence
@@ -15,38 +14,38 @@ from analysis.data.series import Array
 from analysis.gp.arcsine import Arcsine
 from analysis.gp.kernels import Kernel, Product, Role, Sum
 
-_LONGER = 3.0  # are the lengths of a second part, or equal parts would stay equal
-_STRETCHES = (0.1, 0.35, 1.0, 3.5)  # l / sd(x) that a search may start with
-_ENDLESS = 10.0  # more in a logarithm than a search goes: to its bound
-_LENGTHS = (-2.5, -1.2, 1.2, 2.5, _ENDLESS)  # moves of log l; the last: not used
-_BIASES = (20.0, 0.05)  # beta that a search may start with
+_LONGER = 3.0  # factor on the lengths of a second part; equal parts would stay equal
+_STRETCHES = (0.1, 0.35, 1.0, 3.5)  # initial values of l / sd(x)
+_ENDLESS = 10.0  # step in a logarithm that reaches the bound from anywhere
+_LENGTHS = (-2.5, -1.2, 1.2, 2.5, _ENDLESS)  # moves of log l; the last disables it
+_BIASES = (20.0, 0.05)  # initial values of beta
 _SCALES = (-2.5, -1.2, 0.0, 1.2, 2.5)  # moves of log sf and all log l
-_BIAS_STEPS = (-4.0, 0.0, 4.0)  # moves of log beta that go with them
-_BIAS_TO_LENGTH = 2.5  # move of all log l that makes up for the bias from end to end
-# Of log sf - log sd(y), log l - log sd(x), and log beta.
+_BIAS_STEPS = (-4.0, 0.0, 4.0)  # moves of log beta combined with them
+_BIAS_TO_LENGTH = 2.5  # move of all log l that offsets a full sweep of the bias
+# Bounds of log sf - log sd(y), log l - log sd(x), and log beta.
 _SPANS = {Role.SIZE: (-6.0, 4.0), Role.LENGTH: (-4.0, 6.0), Role.BIAS: (-6.0, 6.0)}
 
 
 @singledispatch
 def initial_points(kernel: Kernel, sd_y: float, sd_x: Array) -> Sequence[Array]:
-    """Return points that a search may start with, each of shape (p,).
+    """Return candidate starting points of a search, each of shape (p,).
 
-    Of any kernel: sf = sd(y)/2 with every pair of lengths, and no other scale.
+    For any kernel: sf = sd(y)/2 with every pair of lengths.
 
     Args:
-        kernel: whose hyperparameters are sought.
+        kernel: kernel to search.
         sd_y: standard deviation of the outputs.
-        sd_x: of the inputs, shape (d,).
+        sd_x: standard deviations of the inputs, shape (d,).
     """
     return [_point(kernel, 0.5 * sd_y, lengths, 1.0) for lengths in _length_pairs(sd_x)]
 
 
 @initial_points.register
 def _(kernel: Arcsine, sd_y: float, sd_x: Array) -> Sequence[Array]:
-    """Return those of any kernel, with a large bias and with a small one.
+    """Return the general points, each with a large and with a small bias.
 
-    Short lengths with a large bias, and long ones with next to none, are optima of
-    their own.
+    Short lengths with a large bias and long lengths with a small one are separate
+    optima.
     """
     return [
         _point(kernel, 0.5 * sd_y, lengths, bias)
@@ -57,8 +56,8 @@ def _(kernel: Arcsine, sd_y: float, sd_x: Array) -> Sequence[Array]:
 
 @initial_points.register
 def _(kernel: Sum, sd_y: float, sd_x: Array) -> Sequence[Array]:
-    """Return those of both parts alongside, the right ones with longer lengths."""
-    return _alongside(
+    """Pair the points of both parts, the right ones with longer lengths."""
+    return _paired(
         initial_points(kernel.left, sd_y, sd_x),
         initial_points(kernel.right, sd_y, _LONGER * sd_x),
     )
@@ -66,8 +65,8 @@ def _(kernel: Sum, sd_y: float, sd_x: Array) -> Sequence[Array]:
 
 @initial_points.register
 def _(kernel: Product, sd_y: float, sd_x: Array) -> Sequence[Array]:
-    """Return those of both; the right part is dimensionless with sf = 1."""
-    return _alongside(
+    """Pair the points of both parts; the right part is dimensionless with sf = 1."""
+    return _paired(
         initial_points(kernel.left, sd_y, sd_x),
         initial_points(kernel.right, 2.0, _LONGER * sd_x),
     )
@@ -75,11 +74,11 @@ def _(kernel: Product, sd_y: float, sd_x: Array) -> Sequence[Array]:
 
 @singledispatch
 def moves(kernel: Kernel, theta: Array) -> Sequence[Sequence[Array]]:
-    """Return points that may belong to another top than theta, each (p,).
+    """Return points that may belong to another optimum than theta, each (p,).
 
-    They come in kinds. A search climbs from the likeliest of every kind in turn, of
-    those that are not near to what it has reached by then. Of any kernel: theta with
-    one length changed, twice, so that the two likeliest are taken.
+    The points are grouped by kind. A search climbs in turn from the likeliest point of
+    every kind that is not near an optimum already reached. For any kernel: theta with
+    one length changed; the kind appears twice, so that the two likeliest are tried.
     """
     lengths = np.eye(theta.size)[_indices(kernel, Role.LENGTH)]
     changed = [theta + size * length for length in lengths for size in _LENGTHS]
@@ -88,12 +87,12 @@ def moves(kernel: Kernel, theta: Array) -> Sequence[Sequence[Array]]:
 
 @moves.register
 def _(kernel: Arcsine, theta: Array) -> Sequence[Sequence[Array]]:
-    """Return theta with another scale, the other end of bias, an input not used.
+    """Return theta with another scale, with the opposite bias, or without an input.
 
-    Where the arcsine is nearly linear, twice the size with twice the lengths is nearly
-    the same function: these change together, and with the bias. The bias makes up for
-    a single length that changes, so no such move leads far. Much bias goes with short
-    lengths, none of it with long ones.
+    Where the arcsine is nearly linear, doubling the size and all lengths gives nearly
+    the same function, so these are changed together and with the bias. The bias can
+    offset a change of a single length, so such moves are useless. A large bias is
+    combined with short lengths, a small one with long lengths.
     """
     size, *lengths, bias = np.eye(theta.size)
     every = np.sum(lengths, axis=0)
@@ -117,7 +116,7 @@ def _(kernel: Arcsine, theta: Array) -> Sequence[Sequence[Array]]:
 
 @moves.register
 def _(kernel: Sum | Product, theta: Array) -> Sequence[Sequence[Array]]:
-    """Return the moves of one part while the other stays."""
+    """Return the moves of each part with the other part fixed."""
     a, b = kernel.split(theta)
     of_left = [[np.concatenate([m, b]) for m in kind] for kind in moves(kernel.left, a)]
     of_right = [
@@ -146,7 +145,7 @@ def _(kernel: Product, sd_y: float, sd_x: Array) -> Array:
 
 
 def _point(kernel: Kernel, size: float, lengths: Array, bias: float) -> Array:
-    """Return theta with this size, these lengths of the inputs and this bias."""
+    """Return theta for a size, length scales of the inputs and a bias."""
     values = {Role.SIZE: np.full_like(lengths, size), Role.LENGTH: lengths}
     values[Role.BIAS] = np.full_like(lengths, bias)
     return np.log([values[p.role][p.input] for p in kernel.parameters])
@@ -157,15 +156,15 @@ def _indices(kernel: Kernel, role: Role) -> list[int]:
 
 
 def _length_pairs(sd_x: Array) -> list[Array]:
-    """Return lengths of d inputs, each of shape (d,), from rough to smooth.
+    """Return length scales of d inputs, each of shape (d,), from rough to smooth.
 
-    Two inputs get every pair of four lengths; further ones take turns with these two.
+    Two inputs get every pair of four lengths; further inputs repeat those alternately.
     """
     return [np.resize(pair, sd_x.size) * sd_x for pair in product(_STRETCHES, repeat=2)]
 
 
-def _alongside(left: Sequence[Array], right: Sequence[Array]) -> list[Array]:
-    """Return pairs of points; those of the shorter list are used again."""
+def _paired(left: Sequence[Array], right: Sequence[Array]) -> list[Array]:
+    """Concatenate points pairwise; the shorter list is repeated."""
     count = max(len(left), len(right))
     return [
         np.concatenate([left[k % len(left)], right[k % len(right)]])

@@ -1,6 +1,6 @@
-"""Fits that begin where another fit ended: what is so alike needs no whole search.
+"""Warm-started fits: similar problems need no full search.
 
-Other outputs over the same rows, another noise, other rows of the same terrain.
+Used for other outputs over the same rows or another noise model.
 """
 
 from dataclasses import replace
@@ -14,7 +14,7 @@ from analysis.gp.regression import GaussianProcess
 from analysis.gp.search import climb_from, distinct_tops
 
 _SIZES = frozenset({"sf", "sn", "sc"})  # in the unit of the outputs
-_VANISHED = 2.0  # below where a search begins: a spread there has no slope to leave by
+_VANISHED = 2.0  # log units below the usual start at which a spread has no gradient
 
 
 def refit_gp(
@@ -22,38 +22,39 @@ def refit_gp(
     y: Array,
     noise: Noise | None = None,
 ) -> GaussianProcess:
-    """Return a process of other outputs or noise over the same rows.
+    """Refit a process to other outputs or another noise over the same rows.
 
-    For what is so alike that its tops are nearly known: the search climbs from where
-    the starts of `process` ended.
+    For problems so similar that the optima are nearly known: the search climbs from
+    the optima of `process`.
 
     Args:
-        process: what to begin with.
+        process: fitted process to start from.
         y: training outputs, shape (n,).
-        noise: by default that of `process`; parameters that it does not share with it
-            begin where they do in any search.
+        noise: by default that of `process`; parameters that `process` lacks start from
+            their default.
     """
-    wanted = noise or process.noise
+    noise_model = noise or process.noise
     names = (*process.kernel.names, *process.noise.names)
-    own = dict(zip(wanted.names, wanted.start(float(np.std(y))).tolist(), strict=True))
+    initial = noise_model.start(float(np.std(y))).tolist()
+    defaults = dict(zip(noise_model.names, initial, strict=True))
     starts = []
     for theta in distinct_tops(process.kernel, process.starts):
-        known = own | dict(zip(names, theta.tolist(), strict=True))
-        for name, value in own.items():
+        values = defaults | dict(zip(names, theta.tolist(), strict=True))
+        for name, value in defaults.items():
             if name.rpartition("_")[2] in _SIZES:
-                known[name] = max(known[name], value - _VANISHED)
-        order = (*process.kernel.names, *wanted.names)
-        starts.append(np.array([known[name] for name in order]))
+                values[name] = max(values[name], value - _VANISHED)
+        order = (*process.kernel.names, *noise_model.names)
+        starts.append(np.array([values[name] for name in order]))
     offset = float(y.mean()) if process.offset else 0.0
     likelihood = Likelihood(
-        process.kernel, wanted, process.X, y - offset, process.trials
+        process.kernel, noise_model, process.X, y - offset, process.trials
     )
-    # another noise may have its best top elsewhere
+    # another noise may have its global optimum elsewhere
     optimum = climb_from(likelihood, starts, is_searched=noise is not None)
     alpha, jitter = likelihood.weights(optimum.theta)
     return replace(
         process,
-        noise=wanted,
+        noise=noise_model,
         theta=optimum.theta,
         alpha=alpha,
         offset=offset,

@@ -1,4 +1,4 @@
-"""Gaussian process regression: the likeliest hyperparameters, and prediction.
+"""Gaussian process regression: fit of the hyperparameters, and prediction.
 
 Equations 6 and 7 of the traction paper.
 """
@@ -19,7 +19,7 @@ from analysis.gp.trial_noise import TrialRows, shared_over
 
 MINIMUM_ROWS = 20
 
-_BLOCK = 500  # rows predicted at a time: their matrix stays in the cache
+_BLOCK = 500  # rows predicted at a time, so that their matrix stays in the cache
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,14 +32,14 @@ class GaussianProcess:
         theta: logarithms of the kernel's, then the noise's hyperparameters.
         X: standardised training inputs, shape (n, d).
         alpha: C^-1 (y - offset), shape (n,).
-        offset: what was taken off the training outputs: their mean, or nothing.
+        offset: subtracted from the training outputs: their mean, or 0.
         centre: mean of the training inputs, shape (d,).
         scale: standard deviation of the training inputs, shape (d,); 1 if constant.
         lml: log marginal likelihood of the training outputs, noise prior included.
-        starts: where every start of the search ended.
-        jitter: what the factorisation needed on the diagonal.
-        at_bound: hyperparameters at the edge of the search.
-        trials: where the training rows come from, for noise that trials share.
+        starts: result of every start of the search.
+        jitter: added to the diagonal for the factorisation.
+        at_bound: hyperparameters at a bound of the search.
+        trials: trial of every training row, for noise shared within trials.
     """
 
     kernel: Kernel
@@ -68,22 +68,22 @@ class GaussianProcess:
         return self.offset + np.concatenate([np.zeros(0), *blocks])
 
     def at(self, F_n: Array, v_t: Array, further: Array | None = None) -> Array:
-        """Return inputs side by side, shape (m, d).
+        """Stack inputs as columns, shape (m, d).
 
-        Further ones that are not given stand at the mean of the training rows.
+        Further inputs that are not given are set to the mean of the training rows.
 
         Args:
             F_n: normal force [N], shape (m,).
             v_t: slip velocity [m/s], shape (m,).
             further: other inputs, shape (m, d - 2).
         """
-        means = self.centre[2:]  # of inputs beside these two
+        means = self.centre[2:]  # of the further inputs
         if further is None and means.size:
             further = np.broadcast_to(means, (F_n.size, means.size))
         return inputs_of(F_n, v_t, further)
 
     def factor(self) -> Factor:
-        """Return the factor of the covariance of the training rows."""
+        """Factorise the covariance of the training rows."""
         return _factor(self.kernel, self.noise, self.theta, self.X, self.trials)
 
     def describe(self) -> dict[str, Any]:
@@ -102,14 +102,14 @@ class GaussianProcess:
     def given(
         self, inputs: Array, y: Array, trials: TrialRows | None = None
     ) -> "GaussianProcess":
-        """Return the process with these hyperparameters, given other training rows.
+        """Condition the process on other training rows with the same hyperparameters.
 
-        Standardisation and offset stay those of the rows it was fitted to.
+        Standardisation and offset remain those of the original rows.
 
         Args:
             inputs: training inputs in their units, shape (n, d).
             y: training outputs, shape (n,).
-            trials: where these rows come from.
+            trials: trial of every row.
         """
         _, theta_noise = split(self.kernel, self.theta)
         X, r = (inputs - self.centre) / self.scale, y - self.offset
@@ -129,8 +129,8 @@ class GaussianProcess:
 
         Args:
             inputs: rows in the units of the training inputs.
-            include_noise: variance of a measurement; False gives eq. (7), that of the
-                function itself.
+            include_noise: variance of a measurement; False gives eq. (7), the variance
+                of the function itself.
 
         Returns:
             Mean and variance, each of shape (m,).
@@ -151,19 +151,19 @@ class GaussianProcess:
 
 
 class LeaveOut:
-    """A process that is asked what it would predict without some of its rows.
+    """Predictions of a process without some of its training rows.
 
-    Its hyperparameters, standardisation and offset stay. With P = C^-1 of all rows and
-    b those left out, the inverse of the others' covariance is, in their places,
-    P - P_.b P_bb^-1 P_b. (a partitioned inverse; for one row Rasmussen and Williams
-    2006, eq. 5.12). With k the covariances of a new row and A = P_b. k that makes
+    Hyperparameters, standardisation and offset are kept. With P = C^-1 of all rows and
+    b the rows left out, the inverse covariance of the others is
+    P - P_.b P_bb^-1 P_b. (partitioned inverse; for one row Rasmussen and Williams
+    2006, eq. 5.12). With k the covariances of a new row and A = P_b. k this gives
 
         mean = k'alpha - A'P_bb^-1 alpha_b,  variance = k** - k'P k + A'P_bb^-1 A
 
-    where the parts of rows b cancel, whatever their covariance with the new row is.
+    where rows b cancel, whatever their covariance with the new row is.
 
     Args:
-        process: fitted to the rows in `process.X`.
+        process: process fitted to the rows in `process.X`.
     """
 
     def __init__(self, process: GaussianProcess) -> None:
@@ -175,8 +175,8 @@ class LeaveOut:
         """Return mean and variance of measurements at `inputs` without some rows.
 
         Args:
-            rows: training rows that are left out.
-            inputs: in the units of the training inputs, shape (m, d).
+            rows: training rows to leave out.
+            inputs: rows in the units of the training inputs, shape (m, d).
 
         Returns:
             Mean and variance, noise included, each of shape (m,).
@@ -199,7 +199,7 @@ class LeaveOut:
 def _factor(
     kernel: Kernel, noise: Noise, theta: Array, X: Array, trials: TrialRows | None
 ) -> Factor:
-    """Return the factor of the covariance of training rows."""
+    """Factorise the covariance of training rows."""
     theta_kernel, theta_noise = split(kernel, theta)
     S, _ = noise.evaluate(theta_noise, X)
     blocks = shared_over(noise, trials)(theta_noise).blocks
@@ -216,16 +216,16 @@ def fit_gp(
     is_centred: bool = True,
     trials: TrialRows | None = None,
 ) -> GaussianProcess:
-    """Return a Gaussian process fitted to `y`.
+    """Fit a Gaussian process to `y`.
 
     Args:
         inputs: training inputs, shape (n, d); standardised here.
         y: training outputs, shape (n,).
         kernel: covariance function, by default squared exponential.
         noise: noise of the measurements, by default constant.
-        is_centred: take the mean of `y` off first; False where another mean function
-            already was.
-        trials: where the rows come from, for noise that trials share.
+        is_centred: subtract the mean of `y` first; False if another mean function was
+            subtracted already.
+        trials: trial of every row, for noise shared within trials.
 
     Raises:
         SettingsError: fewer than 20 rows, or outputs that do not vary.

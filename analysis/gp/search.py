@@ -1,16 +1,17 @@
-"""The likeliest hyperparameters of a Gaussian process: a good start, and then moves.
+"""Search for the hyperparameters with the largest marginal likelihood.
 
-Sought is the largest log marginal likelihood, noise prior included,
+The objective is the log marginal likelihood with the noise prior,
 
     log p(y | X, theta) + log p(theta)
 
-(Rasmussen and Williams 2006, section 5.4.1). It has several tops, each another reading
-of the rows: a short length and little noise, or a long one and much. One climb misses
-the best of them in every fourth fit or so. The first begins at the best of the points
-that the kernel offers, by the likelihood of a part of the rows. From the best top
-reached, the search then moves to where another top may be, and climbs again, a few
-times: the likeliest of the kernel's moves is taken, by the likelihood of all rows, as
-the noise is known by then. A climb that comes beside a known top is left there.
+(Rasmussen and Williams 2006, section 5.4.1). It has several local optima, each a
+different interpretation of the data: a short length scale with little noise, or a long
+one with much. A single climb misses the best one in about every fourth fit. The first
+climb starts at the best of the kernel's starting points by the likelihood of a part of
+the rows. From the best optimum so far, the search then moves to where another one may
+be and climbs again, a few times: it takes the likeliest of the kernel's moves by the
+likelihood of all rows, because the noise is known by then. A climb that approaches a
+known optimum is stopped.
 """
 
 from collections.abc import Sequence
@@ -27,26 +28,26 @@ from analysis.gp.noise import Noise
 from analysis.gp.proposals import bounds, initial_points, moves
 from analysis.gp.trial_noise import TrialRows
 
-_DESIGN_ROWS = 150  # rows by whose likelihood the first start is chosen
-_SAME_TOP = (0.2, 0.1)  # in theta and likelihood: a climb so near to a top is left
-_LEAST_MOVE = 1.0  # in theta: a move that ends nearer to a known top leads back to it
-_ASIDE = 0.3  # in theta: how near to a top another one may be
-_BARELY = 0.1  # log likelihood that is lost on the way from one to the other
-_PROMISING = 5.0  # log likelihood that a move may be below the best top it leaves
-_NEIGHBOURS = 0.5  # in theta: of two tops that are nearer, one is enough to begin with
-_LOSING = 5.0  # log likelihood below the best top at which another will not become it
+_DESIGN_ROWS = 150  # rows used to choose the first start
+_SAME_OPTIMUM = (0.2, 0.1)  # in theta and likelihood: a climb this near is stopped
+_LEAST_MOVE = 1.0  # in theta: a shorter move leads back to the known optimum
+_PROBE = 0.3  # in theta: distance at which a close second optimum is probed
+_BARELY = 0.1  # log likelihood that may be lost between the two
+_PROMISING = 5.0  # log likelihood that a move may be below the optimum it starts from
+_NEIGHBOURS = 0.5  # in theta: of two optima nearer than this, one start suffices
+_LOSING = 5.0  # log likelihood below the best at which an optimum cannot win any more
 _UNUSED = 4.0  # logarithm of a length or bias beyond which it makes no difference
-_NOISE_SCALE = 0.2  # of a logarithm of the noise, which every row tells, to a length's
-_AT_BOUND = 1e-3  # in theta: a hyperparameter as near to a bound lies on it
+_NOISE_SCALE = 0.2  # scale of log noise, which every row determines, to that of log l
+_AT_BOUND = 1e-3  # in theta: distance from a bound that counts as on it
 
 
 class Start(NamedTuple):
-    """One start of a search and what it reached.
+    """Result of one start of a search.
 
     Attributes:
-        theta: hyperparameters at its end: a top, or beside the top of another.
+        theta: final hyperparameters: an optimum, or close to one already known.
         lml: log marginal likelihood there, priors included.
-        evaluations: how often the likelihood was evaluated.
+        evaluations: number of likelihood evaluations.
     """
 
     theta: tuple[float, ...]
@@ -55,14 +56,14 @@ class Start(NamedTuple):
 
 
 class Optimum(NamedTuple):
-    """The best hyperparameters found and every start's result.
+    """The best hyperparameters and the result of every start.
 
     Attributes:
         theta: hyperparameters of largest likelihood.
         lml: log marginal likelihood there, priors included.
-        starts: where every start ended.
-        began: where it began.
-        at_bound: hyperparameters at the edge of the search.
+        starts: result of every start.
+        began: initial theta of every start.
+        at_bound: hyperparameters at a bound of the search.
     """
 
     theta: Array
@@ -73,10 +74,10 @@ class Optimum(NamedTuple):
 
 
 class Posterior:
-    """The log likelihood with the log prior of the noise: what a search climbs.
+    """Log likelihood plus log prior of the noise: the objective of a search.
 
     Args:
-        likelihood: of the rows.
+        likelihood: likelihood of the rows.
     """
 
     def __init__(self, likelihood: Likelihood) -> None:
@@ -85,7 +86,7 @@ class Posterior:
         self._values: dict[bytes, float] = {}
 
     def __call__(self, theta: Array) -> tuple[float, Array]:
-        """Return it and its slope in theta.
+        """Return the log posterior and its slope in theta.
 
         Raises:
             SettingsError: the covariance cannot be factorised.
@@ -96,9 +97,9 @@ class Posterior:
         return lml + prior, slope
 
     def value(self, theta: Array) -> float:
-        """Return it alone, for a third of the cost; -inf where there is none.
+        """Return the log posterior without slope; -inf where it is undefined.
 
-        Values are kept: moves from one top are asked for again.
+        Values are cached, because moves from one optimum are evaluated repeatedly.
         """
         key = theta.tobytes()
         if key not in self._values:
@@ -111,10 +112,10 @@ class Posterior:
 
 
 class Search:
-    """A search of the best top: where it has been, and where to go next.
+    """Search for the best optimum, with the climbs made so far.
 
     Args:
-        likelihood: of the rows.
+        likelihood: likelihood of the rows.
     """
 
     def __init__(self, likelihood: Likelihood) -> None:
@@ -134,12 +135,12 @@ class Search:
         self._reached: list[Climbed] = []
 
     def designed_start(self) -> Array:
-        """Return the likeliest of the kernel's starts, by a part of the rows."""
+        """Return the likeliest of the kernel's starts by a part of the rows."""
         rough = Posterior(self._likelihood.thinned(_DESIGN_ROWS))
         return max(self._design, key=rough.value)
 
     def climb(self, start: Array) -> None:
-        """Climb from a start to its top, or beside one that is known."""
+        """Climb from a start to its optimum, or until close to a known one."""
         self._began.append(start)
         reached = climb(
             self._posterior, start, self._bounds, self._is_known, scale=self._scale
@@ -147,42 +148,42 @@ class Search:
         self._reached.append(reached)
 
     def move(self) -> None:
-        """Climb from the likeliest move of every kind, each from the best top so far.
+        """Climb from the likeliest move of every kind, each from the best optimum.
 
-        The points of the design are the last kind. The likelihood is that of all rows,
-        with the noise of that top. Moves that end near what is known lead back to it,
-        and are left out; so is a kind that promises too little.
+        The kernel's starting points are the last kind. Moves are rated by the
+        likelihood of all rows with the noise of that optimum. Moves that end near a
+        known optimum are skipped, and so is a kind whose best move is too unlikely.
         """
         for kind in range(len(self._moves_of(self._best.theta))):
             best = self._best
-            known = [*self._began, *(top.theta for top in self._reached)]
+            visited = [*self._began, *(optimum.theta for optimum in self._reached)]
             rated = [
                 (self._posterior.value(theta), k, theta)
                 for k, theta in enumerate(self._moves_of(best.theta)[kind])
-                if _distance(self._kernel, theta, known) >= _LEAST_MOVE
+                if _distance(self._kernel, theta, visited) >= _LEAST_MOVE
             ]
             if rated and max(rated)[0] > best.value - _PROMISING:
                 self.climb(max(rated)[2])
 
     def step_aside(self) -> None:
-        """Climb from beside the best top where the likelihood hardly falls.
+        """Climb from a point near the best optimum where the likelihood hardly falls.
 
-        Two tops may be nearer to each other than any move goes. What leads back to the
-        top that it left is left soon; along what makes no difference nothing is sought.
+        Two optima may be closer to each other than any move reaches. A climb that
+        returns to the known optimum is stopped early; unused lengths are not probed.
         """
         best = self._best
         used = [k for k in _shape_of(self._kernel) if best.theta[k] < _UNUSED]
-        aside = [
+        probes = [
             np.clip(best.theta + size * np.eye(best.theta.size)[k], *self._bounds.T)
             for k in used
-            for size in (-_ASIDE, _ASIDE)
+            for size in (-_PROBE, _PROBE)
         ]
-        rated = [(self._posterior.value(theta), k) for k, theta in enumerate(aside)]
+        rated = [(self._posterior.value(theta), k) for k, theta in enumerate(probes)]
         if rated and max(rated)[0] > best.value - _BARELY:
-            self.climb(aside[max(rated)[1]])
+            self.climb(probes[max(rated)[1]])
 
     def optimum(self) -> Optimum:
-        """Return the best of what was reached."""
+        """Return the best optimum reached."""
         best = self._best
         is_edge = np.abs(self._bounds - best.theta[:, None]).min(axis=1) < _AT_BOUND
         names = (*self._kernel.names, *self._noise.names)
@@ -196,10 +197,10 @@ class Search:
 
     @property
     def _best(self) -> Climbed:
-        return max(self._reached, key=lambda top: top.value)
+        return max(self._reached, key=lambda optimum: optimum.value)
 
     def _moves_of(self, theta: Array) -> list[list[Array]]:
-        """Return moves from theta in the box, kind by kind, with its noise."""
+        """Return moves from theta, clipped to the box, by kind; the noise is kept."""
         count = len(self._kernel.names)
         kinds = [
             *moves(self._kernel, theta[:count]),
@@ -214,10 +215,10 @@ class Search:
         ]
 
     def _is_known(self, theta: Array, value: float) -> bool:
-        near, low = _SAME_TOP
+        near, low = _SAME_OPTIMUM
         return any(
-            abs(top.value - value) < low and np.abs(top.theta - theta).max() < near
-            for top in self._reached
+            abs(known.value - value) < low and np.abs(known.theta - theta).max() < near
+            for known in self._reached
         )
 
 
@@ -233,12 +234,12 @@ def likeliest(likelihood: Likelihood) -> Optimum:
 def climb_from(
     likelihood: Likelihood, starts: Sequence[Array], *, is_searched: bool = False
 ) -> Optimum:
-    """Return the best top that starts lead to: for where tops are nearly known.
+    """Return the best optimum reached from starts close to the optima.
 
     Args:
-        likelihood: of the rows.
-        starts: thetas to begin with.
-        is_searched: make moves, too: the best top may be none of those known.
+        likelihood: likelihood of the rows.
+        starts: initial thetas.
+        is_searched: also make moves, because the best optimum may be a new one.
     """
     search = Search(likelihood)
     for start in starts:
@@ -261,19 +262,19 @@ def posterior_search(
 
 
 def distinct_tops(kernel: Kernel, reached: Sequence[Start]) -> list[Array]:
-    """Return the tops that starts reached, best first; no two of them are neighbours.
+    """Return the distinct optima that starts reached, best first.
 
-    Tops too far below the best one are left out.
+    Optima too far below the best one are left out.
     """
-    tops: list[Array] = []
+    optima: list[Array] = []
     ranked = sorted(reached, key=lambda start: -start.lml)
     for start in ranked:
         theta = np.array(start.theta)
         if ranked[0].lml - start.lml > _LOSING:
             break
-        if not tops or _distance(kernel, theta, tops) >= _NEIGHBOURS:
-            tops.append(theta)
-    return tops
+        if not optima or _distance(kernel, theta, optima) >= _NEIGHBOURS:
+            optima.append(theta)
+    return optima
 
 
 def spread(X: Array) -> Array:
@@ -283,12 +284,12 @@ def spread(X: Array) -> Array:
 
 
 def _shape_of(kernel: Kernel) -> list[int]:
-    """Return which hyperparameters are lengths and biases."""
+    """Return the indices of the lengths and biases."""
     return [k for k, p in enumerate(kernel.parameters) if p.role is not Role.SIZE]
 
 
 def _distance(kernel: Kernel, theta: Array, others: Sequence[Array]) -> float:
-    """Return how far theta is from the nearest of others, in lengths and biases."""
+    """Return the distance from theta to the nearest other, in lengths and biases."""
     shape = _shape_of(kernel)
-    held = np.minimum(np.vstack([theta, *others])[:, shape], _UNUSED)
-    return float(np.abs(held[1:] - held[0]).max(axis=1, initial=0.0).min())
+    points = np.minimum(np.vstack([theta, *others])[:, shape], _UNUSED)
+    return float(np.abs(points[1:] - points[0]).max(axis=1, initial=0.0).min())

@@ -1,18 +1,18 @@
-"""How much trials differ in level: from the residuals of all of them.
+"""Spread between the levels of trials, estimated from all residuals.
 
 The residual of row i of trial q at time t_i is
 
     r_qi = u_q + e_qi + n_qi,    u_q ~ N(0, sc^2),    n_qi ~ N(0, sn^2)
     cov(e_qi, e_qj) = so^2 exp(-|t_i - t_j| / tau)
 
-Two ways to the spread between trials sc, both linear in the number of rows:
+Two estimates of the spread between trials sc, both linear in the number of rows:
 
-* moments: two rows of a trial farther apart than the residual remembers share the level
-  only, so sc^2 is the mean of their products. Neither a distribution nor tau is
-  assumed. Sums per trial are sufficient: one is taken out for nothing.
+* moments: two rows of a trial further apart than the correlation time share only the
+  level, so sc^2 is the mean of their products. Neither a distribution nor tau is
+  assumed. Sums per trial suffice, so leaving out a trial costs nothing.
 * the restricted likelihood (Patterson and Thompson 1971), by a scalar Kalman filter of
-  e along every trial that carries the residual and a constant: with their innovations
-  a, h and variance v,  A = sum h^2/v,  B = sum h a/v,  C = sum a^2/v,  k = 1 + sc^2 A,
+  e along every trial, applied to the residual and to a constant: with innovations a, h
+  and variance v,  A = sum h^2/v,  B = sum h a/v,  C = sum a^2/v,  k = 1 + sc^2 A,
 
       -2 lml = sum_q [sum log v + log k + C - sc^2 B^2/k] - (sum B/k)^2 / sum A/k
                + log sum A/k
@@ -26,22 +26,22 @@ import numpy as np
 
 from analysis.data.series import Array
 
-FEW = 30  # trials below which the restricted likelihood answers, not the moments
-APART = 0.1  # s between two rows of a trial that are taken
-REMEMBERED = 4.0  # times tau, beyond which two rows share the level only
+FEW = 30  # trials below which the restricted likelihood is used, not the moments
+APART = 0.1  # s, smallest spacing of the rows used
+REMEMBERED = 4.0  # multiple of tau beyond which two rows share only the level
 _TAUS = (0.02, 20.0)  # s
 _START_TAU = 0.5  # s
-_STEP = 1e-5  # of a logarithm, over which a slope is taken
-_WIDE = 1e-3  # of a logarithm, over which a curvature is taken
-_LEAST_CURVATURE = 1e-3  # of the largest
-_LEAST_PAIRS = 10  # pairs of rows far apart, below which moments say nothing
+_STEP = 1e-5  # finite-difference step of a logarithm for slopes
+_WIDE = 1e-3  # finite-difference step of a logarithm for curvatures
+_LEAST_CURVATURE = 1e-3  # relative to the largest curvature
+_LEAST_PAIRS = 10  # pairs of distant rows below which the moments are unusable
 
 
 class TrialResiduals:
-    """Residuals of trials with their times, a row for every trial.
+    """Residuals and times of trials as padded arrays, one row per trial.
 
     Args:
-        trials: of every trial the times [s], increasing, and the residuals, (n,) each.
+        trials: increasing times [s] and residuals of every trial, each of shape (n,).
     """
 
     def __init__(self, trials: Sequence[tuple[Array, Array]]) -> None:
@@ -61,18 +61,18 @@ class TrialResiduals:
         return int(self.counts.size)
 
     def within(self) -> float:
-        """Return the pooled variance of rows around the mean of their trial."""
-        far = np.where(self.is_row, self.r - self.means[:, None], 0.0)
+        """Return the pooled variance of rows around their trial mean."""
+        deviation = np.where(self.is_row, self.r - self.means[:, None], 0.0)
         rows = int(self.counts.sum()) - self.count
-        return float((far**2).sum()) / max(rows, 1)
+        return float((deviation**2).sum()) / max(rows, 1)
 
 
 @dataclass(frozen=True, slots=True)
 class LevelSums:
-    """What the moments need of every trial, each of shape (J,).
+    """Sums over every trial for the moment estimate, each of shape (J,).
 
     Attributes:
-        pairs: number of pairs of rows farther apart than the residual remembers.
+        pairs: number of pairs of rows further apart than the correlation lasts.
         products: sum of the products of their residuals.
         sums: sum of the sums of their residuals.
         means: mean residual of the trial.
@@ -85,7 +85,7 @@ class LevelSums:
 
     @classmethod
     def of(cls, residuals: TrialResiduals, gap: float) -> "LevelSums":
-        """Return the sums of pairs of rows more than `gap` [s] apart."""
+        """Sum over pairs of rows more than `gap` [s] apart."""
         columns = np.zeros((3, residuals.count))
         for k, count in enumerate(residuals.counts):
             t, r = residuals.t[k, :count], residuals.r[k, :count]
@@ -101,20 +101,20 @@ class LevelSums:
 
     def without_each(self) -> Array:
         """Return sc^2 without each of the trials, shape (J,)."""
-        rest = [part.sum() - part for part in self._parts()]
-        return _variance(rest, self.means.size - 1)
+        others = [part.sum() - part for part in self._parts()]
+        return _variance(others, self.means.size - 1)
 
     def drawn(self, weight: Array) -> Array:
-        """Return sc^2 of trials drawn again, not below 0, shape (d,).
+        """Return sc^2 of bootstrap draws of the trials, not below 0, shape (d,).
 
         Args:
-            weight: how often each trial was drawn, shape (d, J).
+            weight: number of times each trial was drawn, shape (d, J).
         """
         parts = [weight @ part for part in self._parts()]
         return _variance(parts, self.means.size)
 
     def error(self) -> float:
-        """Return the standard error of sc^2 over the trials, by the jackknife."""
+        """Return the jackknife standard error of sc^2 over the trials."""
         each, J = self.without_each(), self.means.size
         return float(np.sqrt((J - 1) / J * ((each - each.mean()) ** 2).sum()))
 
@@ -123,22 +123,22 @@ class LevelSums:
 
 
 def _variance(parts: Sequence[Array], J: int) -> Array:
-    """Return sc^2 of sums over J trials, in the order of `LevelSums`."""
+    """Return sc^2 from sums over J trials, in the order of `LevelSums`."""
     pairs, products, sums, means, squares = parts
     R = means / J
     shared = (products - R * sums + R**2 * pairs) / np.maximum(pairs, 1.0)
-    taken = (squares - J * R**2) / max(J - 1, 1) / J  # by the mean of the trials
-    return np.maximum(shared + taken, 0.0)
+    correction = (squares - J * R**2) / max(J - 1, 1) / J  # for the estimated mean
+    return np.maximum(shared + correction, 0.0)
 
 
 class LevelComponents(NamedTuple):
-    """Standard deviations of what a residual is made of.
+    """Standard deviations of the components of a residual.
 
     Attributes:
-        between: of the level of a trial, sc.
-        within: of the residual along a trial, so.
-        tau: its correlation time [s].
-        measurement: of single rows, sn.
+        between: spread of the levels of trials, sc.
+        within: correlated part along a trial, so.
+        tau: correlation time of that part [s].
+        measurement: independent noise of single rows, sn.
     """
 
     between: float
@@ -153,17 +153,17 @@ class LevelComponents(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class TrialLevels:
-    """How far trials differ in level, and each trial's own.
+    """Spread between the levels of trials, and the level of each.
 
     Attributes:
         between: sc, the spread between trials, in the unit of the residuals.
-        error: standard error of sc by the moments; None where they say nothing.
+        error: standard error of sc by the moments; None if they are unusable.
         is_by_moments: sc is by moments, else by the restricted likelihood.
-        other: sc by the other of the two; None where it could not be found.
+        other: sc by the other of the two; None if unavailable.
         within: pooled standard deviation of rows within a trial.
-        mean: of the levels.
-        components: by the restricted likelihood.
-        levels: of the trials, drawn towards 0 by what is known of them, shape (J,).
+        mean: mean level.
+        components: components by the restricted likelihood.
+        levels: shrunken levels of the trials (best linear predictors), shape (J,).
     """
 
     between: float
@@ -177,14 +177,14 @@ class TrialLevels:
 
     @property
     def do_differ(self) -> bool:
-        """Whether the two ways differ by more than twice the standard error."""
+        """Whether the two estimates differ by more than twice the standard error."""
         if self.other is None or self.error is None:
             return False
         return abs(self.other - self.between) > 2.0 * self.error
 
 
 def levels_of(residuals: TrialResiduals) -> TrialLevels:
-    """Return how far trials differ, from all their residuals.
+    """Estimate the spread between trials and their levels from all residuals.
 
     Raises:
         ValueError: fewer than two trials.
@@ -213,12 +213,12 @@ def levels_of(residuals: TrialResiduals) -> TrialLevels:
 
 
 class RestrictedLikelihood:
-    """The restricted likelihood of residuals for any theta.
+    """Restricted likelihood of residuals as a function of theta.
 
     theta holds the logarithms of sn, sc, so and tau.
 
     Args:
-        residuals: of all trials.
+        residuals: residuals of all trials.
     """
 
     def __init__(self, residuals: TrialResiduals) -> None:
@@ -230,11 +230,11 @@ class RestrictedLikelihood:
         self._sd = max(float(rows.std()), 1e-9)
 
     def likeliest(self, start: Array | None = None, *, is_level: bool = True) -> Array:
-        """Return theta of the largest restricted likelihood.
+        """Return the theta that maximises the restricted likelihood.
 
         Args:
-            start: where the search begins.
-            is_level: sc is sought, too; else it stays that of the start.
+            start: initial theta.
+            is_level: estimate sc, too; otherwise it stays at the start.
         """
         from scipy.optimize import minimize
 
@@ -260,7 +260,7 @@ class RestrictedLikelihood:
         ).x
 
     def costs(self, theta: Array) -> Array:
-        """Return minus the restricted log likelihood, without its constant, (p,).
+        """Return minus the restricted log likelihood up to a constant, shape (p,).
 
         Args:
             theta: hyperparameters, shape (p, 4).
@@ -273,17 +273,17 @@ class RestrictedLikelihood:
         return 0.5 * (each.sum(axis=1) - sums**2 / precision + np.log(precision))
 
     def drawn(self, theta: Array, weight: Array) -> Array:
-        """Return theta without sc for trials drawn again, one Newton step away, (d, 3).
+        """Return theta without sc for bootstrap draws by one Newton step, shape (d, 3).
 
         Args:
-            theta: where the likelihood of all trials is largest.
-            weight: how often each trial was drawn, shape (d, J).
+            theta: optimum for all trials.
+            weight: number of times each trial was drawn, shape (d, J).
         """
         free, _, mean = [0, 2, 3], *self.levels(theta, float(np.exp(theta[1])))
         steps = _WIDE * np.eye(4)[free]
         at = [theta, *(theta + s for s in steps), *(theta - s for s in steps)]
-        both = [theta + a + b for a in steps for b in steps]
-        costs = self._each(np.array([*at, *both]), mean)
+        pairs = [theta + a + b for a in steps for b in steps]
+        costs = self._trial_costs(np.array([*at, *pairs]), mean)
         slopes = (costs[1:4] - costs[4:7]).T / (2.0 * _WIDE)
         total = costs.sum(axis=1)
         mixed = total[7:].reshape(3, 3) - total[1:4, None] - total[1:4] + total[0]
@@ -293,8 +293,8 @@ class RestrictedLikelihood:
         inverse = vectors / np.maximum(values, least) @ vectors.T
         return theta[free] - (weight - 1.0) @ slopes @ inverse
 
-    def _each(self, theta: Array, mean: float) -> Array:
-        """Return the cost of every trial around a known mean at p theta, (p, J)."""
+    def _trial_costs(self, theta: Array, mean: float) -> Array:
+        """Return the cost of every trial around a given mean at p thetas, (p, J)."""
         A, B, C, D = self._sums(theta)
         sc2 = np.exp(2.0 * theta[:, 1])[:, None]
         k, around = 1.0 + sc2 * A, B - mean * A
@@ -302,7 +302,7 @@ class RestrictedLikelihood:
         return 0.5 * (D + np.log(k) + squares - sc2 * around**2 / k)
 
     def gain(self, theta: Array) -> float:
-        """Return the log likelihood that a level of every trial gains."""
+        """Return the gain in log likelihood from a level per trial."""
         without = theta.copy()
         without[1] = np.log(self._sd) - 6.0
         fixed = self.likeliest(start=without, is_level=False)
@@ -310,17 +310,20 @@ class RestrictedLikelihood:
         return max(0.0, float(costs[0] - costs[1]))
 
     def levels(self, theta: Array, between: float) -> tuple[Array, float]:
-        """Return the level of every trial around their mean, (J,), and that mean."""
+        """Return the level of every trial about the mean, shape (J,), and the mean."""
         A, B = self._sums(theta[None, :])[:2, 0]
         k = 1.0 + between**2 * A
         mean = float((B / k).sum() / (A / k).sum())
         return between**2 * (B - A * mean) / k, mean
 
     def _sums(self, theta: Array) -> Array:
-        """Return A, B, C and D of every trial at p theta, shape (4, p, J)."""
+        """Return A, B, C and D of every trial at p thetas, shape (4, p, J).
+
+        A scalar Kalman filter runs along all trials at once; D = sum log v.
+        """
         sn2, _, so2, _ = np.exp(2.0 * theta.T)[:, :, None]
         tau, shape = np.exp(theta[:, 3:]), (theta.shape[0], self._residuals.count)
-        # mean of e given what came before: of the residual, and of a constant
+        # predicted mean of e for the residual and for a constant input
         mean, variance = np.zeros((2, *shape)), np.broadcast_to(so2, shape)
         sums = np.zeros((4, *shape))
         for r, gap, is_row in self._columns:
@@ -342,7 +345,7 @@ class RestrictedLikelihood:
 
 
 def _error_of_root(error: float, root: float) -> float:
-    """Return the standard error of a root whose square has the given one."""
+    """Convert the standard error of a square to that of its root (delta method)."""
     return error / max(2.0 * root, float(np.sqrt(error)), 1e-12)
 
 
@@ -352,7 +355,7 @@ def _components(theta: Array) -> LevelComponents:
 
 
 def _thinned(t: Array, r: Array) -> tuple[Array, Array]:
-    """Return rows 0.1 s apart or more."""
+    """Thin rows to one per 0.1 s."""
     number = np.floor((t - t[0]) / APART + 1e-6)
     rows = np.flatnonzero(np.diff(number, prepend=-1.0) > 0.0)
     return t[rows], r[rows]

@@ -1,14 +1,14 @@
-"""What the rows of one trial share: the variance component of a random effect.
+"""Variance component shared by the rows of one trial (random effect).
 
-To the covariance of rows i, j of the same trial (E_ij = 1, otherwise 0) is added
+The covariance of rows i, j of the same trial (E_ij = 1, otherwise 0) is increased by
 
     sc^2 E_ij           a level of its own in every trial
 
 (a mixed model, Laird and Ware 1982; Rasmussen and Williams 2006, section 2.7, for
-components in the covariance). A new trial shares nothing with the rows fitted to: its
+components in the covariance). A new trial shares no level with the training rows: its
 predicted mean is that of the kernel alone, and the component adds to its variance.
 
-It is a `Noise`: theta is that of the noise within a trial, then log sc.
+`TrialNoise` is a `Noise`: theta holds the noise within a trial, then log sc.
 """
 
 from collections.abc import Callable, Sequence
@@ -21,37 +21,37 @@ import numpy as np
 from analysis.data.series import Array, Indices
 from analysis.gp.noise import ConstantNoise, Noise
 
-_EFFECT = 0.3  # sc over sd(y) that a search starts with
-_SPAN = (-6.0, 1.0)  # of the logarithm of sc over sd(y)
+_EFFECT = 0.3  # initial sc / sd(y) of a search
+_SPAN = (-6.0, 1.0)  # bounds of log(sc / sd(y))
 
 
 class TrialRows(NamedTuple):
-    """Where rows come from; those of one trial stand together.
+    """Trial of every row; rows of one trial are contiguous.
 
     Attributes:
-        trial: number of the trial of every row, shape (n,).
+        trial: trial index of every row, shape (n,).
     """
 
     trial: Indices
 
     def take(self, rows: slice) -> "TrialRows":
-        """Return a part of the rows."""
+        """Return the trials of a slice of the rows."""
         return TrialRows(self.trial[rows])
 
     def blocks(self) -> list[slice]:
-        """Return the rows of every trial."""
+        """Return the slice of rows of every trial."""
         starts = np.flatnonzero(np.diff(self.trial)) + 1
         ends = np.concatenate([[0], starts, [self.trial.size]])
         return [slice(int(a), int(b)) for a, b in pairwise(ends)]
 
 
 class SharedAt(NamedTuple):
-    """Covariances inside the trials at one theta.
+    """Covariances within trials at one theta.
 
     Attributes:
-        blocks: rows and their covariance, trial by trial.
-        contract: W -> 1/2 sum_ij W_ij dC_ij/dtheta_k of a symmetric W that is given as
-            its lower triangle with half of the diagonal; shape (p,).
+        blocks: rows and covariance of every trial.
+        contract: W -> 1/2 sum_ij W_ij dC_ij/dtheta_k, shape (p,), for a symmetric W
+            passed as its lower triangle with half of the diagonal.
     """
 
     blocks: Sequence[tuple[slice, Array]]
@@ -60,7 +60,7 @@ class SharedAt(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class TrialNoise:
-    """Noise within a trial, and the level that its rows share.
+    """Noise within a trial plus the level shared by its rows.
 
     Attributes:
         within: noise of single rows.
@@ -70,11 +70,11 @@ class TrialNoise:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the hyperparameters: those within, then that of the level."""
+        """Names of the hyperparameters: noise within a trial, then the level."""
         return (*self.within.names, "log_sc")
 
     def variance(self, theta: Array, X: Array) -> Array:
-        """Return the variance of a measurement of a new trial around the kernel's mean.
+        """Return the variance of a measurement in a new trial about the kernel's mean.
 
         Args:
             theta: hyperparameters of this noise.
@@ -83,30 +83,30 @@ class TrialNoise:
         return self.within.variance(theta[:-1], X) + self.level_variance(theta)
 
     def level_variance(self, theta: Array) -> float:
-        """Return the part that is the same for a whole trial, sc^2."""
+        """Return the variance of the trial level, sc^2."""
         return float(np.exp(theta[-1])) ** 2
 
     def evaluate(
         self, theta: Array, X: Array
     ) -> tuple[Array, Callable[[Array], Array]]:
-        """Return variance and contraction of single rows; nothing for what is shared.
+        """Return variance and contraction of single rows, without the shared level.
 
-        `shared` gives the rest.
+        `shared` gives the covariance from the level.
         """
         S, contract = self.within.evaluate(theta[:-1], X)
         return S, lambda d: np.append(contract(d), 0.0)
 
     def shared(self, trials: TrialRows) -> Callable[[Array], SharedAt]:
-        """Return what gives the covariances inside the trials for any theta.
+        """Return a function theta -> covariances within the trials.
 
         Args:
-            trials: where the rows come from.
+            trials: trial of every row.
         """
         parts = trials.blocks()
         return lambda theta: self._shared_at(theta, parts)
 
     def log_prior(self, theta: Array) -> tuple[float, Array]:
-        """Return the prior of the noise within; the level has none."""
+        """Return the log prior of the noise within a trial; that of sc is flat."""
         prior, slope = self.within.log_prior(theta[:-1])
         return prior, np.append(slope, 0.0)
 
@@ -115,7 +115,7 @@ class TrialNoise:
         return np.append(self.within.start(sd_y), np.log(_EFFECT * sd_y))
 
     def bounds(self, sd_y: float) -> Array:
-        """Return the logarithm of sc within log sd(y) + [-6, 1]."""
+        """Return the bounds; log sc lies in log sd(y) + [-6, 1]."""
         return np.vstack([self.within.bounds(sd_y), np.log(sd_y) + np.array(_SPAN)])
 
     def _shared_at(self, theta: Array, parts: Sequence[slice]) -> SharedAt:
@@ -132,9 +132,9 @@ class TrialNoise:
 
 
 def shared_over(noise: Noise, trials: TrialRows | None) -> Callable[[Array], SharedAt]:
-    """Return what gives the covariances that rows of one trial share, for any theta.
+    """Return a function theta -> covariances shared by rows of one trial.
 
-    There are none unless the noise has such components and the trials are known.
+    There are none unless the noise is a `TrialNoise` and the trials are known.
     """
     if isinstance(noise, TrialNoise) and trials is not None:
         return noise.shared(trials)

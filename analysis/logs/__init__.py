@@ -1,6 +1,6 @@
-"""Logs of other robots: the containers that hold them, and trials made from them.
+"""Import of logs from other robots: file formats, and conversion to trials.
 
-Begin with `request`, which is what a person states, then `importing`, which makes v_t,
-F_n and F_t of it; `opening` reads MCAP, rosbag2 and ROS 1 bags alike, `checks` holds
-what was stated against the log, `suggestions` writes the command line to be edited.
+Begin with `request`, the user's input, then `importing`, which computes v_t, F_n and
+F_t; `opening` reads MCAP, rosbag2 and ROS 1 bags, `checks` compares the input with the
+log, `suggestions` writes a command line to edit.
 """

@@ -1,7 +1,7 @@
-"""ROS 1 bags, record by record, without their index: a bag that was cut is read, too.
+"""ROS 1 bags, read sequentially without the index, so that truncated bags work, too.
 
-Form: the bag format 2.0 of ROS, https://wiki.ros.org/Bags/Format/2.0. A record has a
-header of fields `name=value` and data; chunks hold connections and messages.
+Format: ROS bag 2.0, https://wiki.ros.org/Bags/Format/2.0. A record has a header of
+fields `name=value` and data; chunks hold connections and messages.
 """
 
 from __future__ import annotations
@@ -32,15 +32,15 @@ _Header = dict[bytes, bytes]
 
 
 class BagLog(OneFile):
-    """Implements `analysis.logs.log_file.LogFile`."""
+    """ROS 1 bag; implements `analysis.logs.log_file.LogFile`."""
 
     format = "ROS 1 bag"
 
     def __init__(self, path: Path) -> None:
-        """Look at the file once for its topics.
+        """Scan the file once for its topics.
 
         Raises:
-            SettingsError: a name is too long, or there are too many.
+            SettingsError: a name is too long, or there are too many topics.
         """
         super().__init__(path)
         self._connections: dict[int, str] = {}
@@ -48,7 +48,7 @@ class BagLog(OneFile):
             pass
 
     def messages(self, topics: Collection[str]) -> Iterator[LogMessage]:
-        """Give every message of `topics`, in the order of the file."""
+        """Yield every message of `topics` in file order."""
         self.losses.clear()
         yield from self._records(set(topics))
 
@@ -68,7 +68,7 @@ class BagLog(OneFile):
                         yield from self._of_record(header, data, wanted)
                 except (DamageError, struct.error, KeyError, IndexError) as error:
                     why = str(error) or "a record is damaged"
-                    self.losses[:] = [f"nothing is read behind byte {offset}: {why}"]
+                    self.losses[:] = [f"nothing is read after byte {offset}: {why}"]
                     return
                 offset = file.tell()
 
@@ -126,30 +126,30 @@ def _part(file: BinaryIO, head: bytes) -> bytes:
 
 
 def _record_at(records: bytes, at: int) -> tuple[_Header, bytes, int]:
-    """Return header and data of a record in a chunk, and where the next one begins."""
+    """Return header and data of a record in a chunk, and the offset of the next one."""
     parts: list[bytes] = []
     for _ in range(2):
         (size,) = _SIZE.unpack_from(records, at)
         at += _SIZE.size
         if size > len(records) - at:
-            raise DamageError("a record leads out of its chunk")
+            raise DamageError("a record exceeds its chunk")
         parts.append(records[at : at + size])
         at += size
     return _fields(parts[0]), parts[1], at
 
 
 def _fields(header: bytes) -> _Header:
-    """Return the fields of a header by name."""
+    """Parse the fields of a header by name."""
     fields: _Header = {}
     at = 0
     while at < len(header):
         (size,) = _SIZE.unpack_from(header, at)
         at += _SIZE.size
         if size > len(header) - at:
-            raise DamageError("a field leads out of its header")
+            raise DamageError("a field exceeds its header")
         name, mark, value = header[at : at + size].partition(b"=")
         if not mark:
-            raise DamageError("a header holds what is no field")
+            raise DamageError("a header has an invalid field")
         fields[name] = value
         at += size
     return fields

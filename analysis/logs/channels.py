@@ -1,6 +1,6 @@
-"""Joints and wrench of a log over time: which topics they are, and when it was.
+"""Joint and wrench channels of a log: topics, values and times.
 
-Nothing is repaired. A message that cannot be used is counted and named with its cause.
+Nothing is repaired. Unusable messages are counted and reported with their cause.
 """
 
 from __future__ import annotations
@@ -24,33 +24,33 @@ from analysis.logs.messages import (
 )
 
 By = Literal["stamp", "receipt"]
-FASTEST_JOINT = 30.0  # rad/s, m/s; faster is a jump of the numbers
-_ABSURD = 1e9  # N, N m, rad: what is beyond was never measured
-_DISTINCT = 0.9  # share of the messages whose times differ
-_AWAY = 0.02  # rad, m from both neighbours of a row of zeros
-_FEW = 0.01  # of the messages may lack a stamp: they are left out
-_STUCK = 0.2  # s of one and the same reading
-_TIMES = 20.0  # the usual time of one reading, that no chance exceeds
+FASTEST_JOINT = 30.0  # rad/s, m/s; a faster change is a jump in the data
+_ABSURD = 1e9  # N, N m, rad beyond which a value cannot be a measurement
+_DISTINCT = 0.9  # smallest share of messages with distinct times
+_AWAY = 0.02  # rad, m between a row of zeros and its neighbours
+_FEW = 0.01  # largest share of messages without stamp that are dropped
+_STUCK = 0.2  # s of an unchanged reading
+_TIMES = 20.0  # multiple of the mean duration of a reading
 _NS = 1e-9
-_LISTED = 12  # names in a refusal
+_LISTED = 12  # names listed in a message
 
 
 @dataclass(frozen=True, slots=True)
 class Clocked:
-    """When the messages of a topic were, and what became of those that are not used.
+    """Times of the messages of a topic, and counts of unused messages.
 
     Attributes:
-        times_ns: of every message that is used [ns], increasing, shape (n,).
-        by: "stamp" or "receipt".
-        read: messages of the topic.
-        left_out: how many are not used, by cause.
-        repeated: of the used ones with the time of another one.
-        overtaken: of them that stand behind a later one; they are put in order.
-        rate_by_stamp: of the messages by their stamps [Hz]; nan where they have none.
-        rate_by_receipt: of the messages by their receipt [Hz], from the median.
-        late: receipt less stamp in the median and at most [s]; nan without stamps.
+        times_ns: times of the used messages [ns], increasing, shape (n,).
+        by: clock of these times: "stamp" or "receipt".
+        read: number of messages of the topic.
+        left_out: number of unused messages by cause.
+        repeated: messages dropped because their time is a duplicate.
+        overtaken: messages out of order; they are sorted.
+        rate_by_stamp: median rate by stamps [Hz]; NaN without stamps.
+        rate_by_receipt: median rate by receipt [Hz].
+        late: median and maximum of receipt minus stamp [s]; NaN without stamps.
         widest: longest time between two messages [s].
-        fit: of receipt less stamp; None without stamps.
+        fit: line fit of receipt minus stamp; None without stamps.
     """
 
     times_ns: Nanoseconds
@@ -67,23 +67,23 @@ class Clocked:
 
     @property
     def text(self) -> str:
-        """What was read, used and left out, for people."""
+        """Counts of read, used and dropped messages in words."""
         causes = [f"{count} {cause}" for cause, count in self.left_out.items() if count]
         if self.repeated:
-            causes.append(f"{self.repeated} with the time of another one")
+            causes.append(f"{self.repeated} with a duplicate time")
         about = f"; left out: {', '.join(causes)}" if causes else ""
         return f"{self.read} messages, {len(self.times_ns)} used{about}"
 
 
 @dataclass(frozen=True, slots=True)
 class JointChannel:
-    """The joints of a robot over time.
+    """Joint positions of a robot over time.
 
     Attributes:
-        topic: where they come from.
-        clock: when it was.
-        q: positions [rad, m], shape (n, joints), in the order asked for.
-        warnings: what a person should know of them.
+        topic: source topic.
+        clock: times.
+        q: positions [rad, m], shape (n, joints), in the requested order.
+        warnings: warnings for the user.
     """
 
     topic: LogTopic
@@ -94,14 +94,14 @@ class JointChannel:
 
 @dataclass(frozen=True, slots=True)
 class WrenchChannel:
-    """The wrench of a sensor over time.
+    """Wrench of a sensor over time.
 
     Attributes:
-        topic: where it comes from.
-        frame_id: what its header names; empty in many logs.
-        clock: when it was.
-        wrench: as recorded [N, N m], shape (n, 6).
-        stuck: first and last time [ns] of one and the same reading for too long.
+        topic: source topic.
+        frame_id: frame in the message header; empty in many logs.
+        clock: times.
+        wrench: raw readings [N, N m], shape (n, 6).
+        stuck: first and last time [ns] of every reading unchanged for too long.
     """
 
     topic: LogTopic
@@ -114,13 +114,14 @@ class WrenchChannel:
 def choose_topic(
     log: LogFile, type_name: str, named: str | None, option: str
 ) -> LogTopic:
-    """The topic of a type: the one that is named, or the only one.
+    """Choose the topic of a type: the named one, or the only one.
 
     Raises:
-        SettingsError: there is none, or several and none is named, or another type.
+        SettingsError: there is none, there are several and none is named, or the named
+            one has another type.
     """
-    found = [topic for topic in log.topics.values() if topic.type_name == type_name]
-    names = ", ".join(topic.name for topic in found[:_LISTED]) or "none"
+    matches = [topic for topic in log.topics.values() if topic.type_name == type_name]
+    names = ", ".join(topic.name for topic in matches[:_LISTED]) or "none"
     if named is not None:
         topic = log.topics.get(named)
         what = "is not in the log" if topic is None else f"is a {topic.type_name[:80]}"
@@ -130,15 +131,15 @@ def choose_topic(
                 hint=f"Topics of {type_name}: {names}.",
             )
         return topic
-    if len(found) != 1:
-        loss = "".join(f" Of the log {each}." for each in log.losses[:1])
+    if len(matches) != 1:
+        loss = "".join(f" Of the log {text}." for text in log.losses[:1])
         raise SettingsError(
-            f"{log.path}: {len(found) or 'no'} topics of {type_name}.{loss}",
+            f"{log.path}: {len(matches) or 'no'} topics of {type_name}.{loss}",
             hint=f"Name one by {option}: {names}."
-            if found
+            if matches
             else "Record joints and wrench into one log; --list shows its topics.",
         )
-    return found[0]
+    return matches[0]
 
 
 def read_channels(
@@ -148,18 +149,18 @@ def read_channels(
     wrench: LogTopic,
     clock: By | None,
 ) -> tuple[JointChannel, WrenchChannel]:
-    """Both channels in one pass through a log.
+    """Read both channels in one pass through a log.
 
     Args:
-        log: it is read once.
+        log: the log.
         joints: topic of the joints.
-        names: of the joints, in the order wanted.
+        names: names of the joints in the desired order.
         wrench: topic of the wrench.
-        clock: as stated; None = the stamps.
+        clock: clock to use; None = the stamps.
 
     Raises:
-        SettingsError: a message is damaged, there are too many, or the clock that is
-            asked for is none.
+        SettingsError: a message is damaged, there are too many, or the requested clock
+            is unusable.
     """
     of_joints, of_wrench = _JointRows(joints, names), _WrenchRows(wrench)
     readers: dict[str, _Rows] = {joints.name: of_joints, wrench.name: of_wrench}
@@ -170,7 +171,7 @@ def read_channels(
 
 @dataclass
 class _Rows:
-    """Gathers the rows of one topic: times and a few numbers a message."""
+    """Collects the rows of one topic: times and a few numbers per message."""
 
     topic: LogTopic
     width: int = 0
@@ -181,7 +182,7 @@ class _Rows:
     values: array[float] = field(default_factory=lambda: array("d"))
 
     def take(self, log: LogFile, message: LogMessage) -> None:
-        """Decode a message and keep its row; raises SettingsError."""
+        """Decode a message and store its row; raises SettingsError."""
         self.read += 1
         if self.read > MOST_MESSAGES:
             raise SettingsError(
@@ -192,12 +193,12 @@ class _Rows:
             stamp_ns, row, cause = self.row(message)
         except MessageError as error:
             raise SettingsError(
-                f"{log.path}: message {self.read} of {self.topic.name} is not as its "
-                f"type says ({error}).",
+                f"{log.path}: message {self.read} of {self.topic.name} does not match "
+                f"its type ({error}).",
                 hint="Was it recorded with another version of the type?",
             ) from error
         if not -(2**63) <= message.received_ns < 2**63:
-            cause = "with a time of receipt that is none"
+            cause = "with an invalid time of receipt"
         if cause:
             self.leave_out(cause)
             return
@@ -206,15 +207,15 @@ class _Rows:
         self.values.extend(row.tolist())
 
     def row(self, message: LogMessage) -> tuple[int, Array, str]:
-        """Stamp, numbers and why they cannot be used; "" where they can."""
+        """Return stamp, numbers and the reason why they are unusable ("" = none)."""
         raise NotImplementedError
 
     def leave_out(self, cause: str) -> None:
-        """Count a message that is not used."""
+        """Count an unused message by cause."""
         self.left_out[cause] = self.left_out.get(cause, 0) + 1
 
     def clocked(self, log: LogFile, clock: By | None) -> tuple[Array, Clocked]:
-        """The rows in order, and when they were; raises SettingsError."""
+        """Return the rows in time order with their times; raises SettingsError."""
         name, count = self.topic.name, len(self.received)
         if count < 3:
             causes = [f"{n} {cause}" for cause, n in self.left_out.items()]
@@ -244,7 +245,7 @@ class _Rows:
         if _share_distinct(times) < _DISTINCT:
             raise SettingsError(
                 f"{log.path}: {name} was received at {len(np.unique(times))} times for "
-                f"{count} messages: they tell no messages apart.",
+                f"{count} messages, which does not distinguish the messages.",
                 hint="Record it again; without times there is no velocity.",
             )
         order = np.argsort(times, kind="stable")
@@ -283,7 +284,7 @@ def _require_stamps(log: LogFile, name: str, stamps: Nanoseconds, unset: int) ->
 
 
 class _JointRows(_Rows):
-    """The joints of the leg, by name."""
+    """Rows of the joints of the leg, selected by name."""
 
     def __init__(self, topic: LogTopic, names: Sequence[str]) -> None:
         super().__init__(topic, len(names))
@@ -295,9 +296,9 @@ class _JointRows(_Rows):
     def row(self, message: LogMessage) -> tuple[int, Array, str]:
         joints = read_joints(message.data, self.topic.serialization)
         if joints.names != self._seen:
-            places = {name: k for k, name in enumerate(joints.names)}
-            found = [places.get(name, -1) for name in self._wanted]
-            self._seen, self._order = joints.names, [] if -1 in found else found
+            index = {name: k for k, name in enumerate(joints.names)}
+            order = [index.get(name, -1) for name in self._wanted]
+            self._seen, self._order = joints.names, [] if -1 in order else order
         stamp_ns = joints.header.stamp_ns
         if not self._order:
             return stamp_ns, joints.position, "without a joint of the leg"
@@ -305,11 +306,11 @@ class _JointRows(_Rows):
             return (
                 stamp_ns,
                 joints.position,
-                "with a position for another count of names",
+                "with different numbers of names and positions",
             )
         row = joints.position[self._order]
         if not _is_measured(row):
-            return stamp_ns, row, "with positions that are no numbers"
+            return stamp_ns, row, "with invalid positions"
         if len(joints.velocity) and not _is_measured(joints.velocity):
             self._without_velocity += 1
         return stamp_ns, row, ""
@@ -319,8 +320,8 @@ class _JointRows(_Rows):
         name, warnings = self.topic.name, list[str]()
         if self._without_velocity:
             warnings.append(
-                f"{name}: {self._without_velocity} messages with velocities that are "
-                "no numbers; velocities follow from the positions in any case"
+                f"{name}: {self._without_velocity} messages with invalid velocities; "
+                "velocities are computed from the positions in any case"
             )
         is_zero = _lone_zeros(q)
         if is_zero.any():
@@ -328,8 +329,8 @@ class _JointRows(_Rows):
             at = (times[is_zero] - times[0]).astype(np.float64) * _NS
             shown = ", ".join(f"{t:.3f}" for t in at[:_LISTED])
             warnings.append(
-                f"{name}: {len(at)} messages with all joints at zero, away from those "
-                f"before and after them, are left out: at {shown} s of the log"
+                f"{name}: {len(at)} messages with all joints at zero, unlike those "
+                f"before and after them, are dropped: at {shown} s of the log"
             )
             clocked.left_out["with all joints at zero"] = len(at)
             clocked = replace(clocked, times_ns=times[~is_zero])
@@ -338,7 +339,7 @@ class _JointRows(_Rows):
 
 
 def _lone_zeros(q: Array) -> NDArray[np.bool_]:
-    """Rows of exact zeros that are far from the last and the next other row."""
+    """Return the rows of exact zeros that are far from the adjacent other rows."""
     is_zero = (q == 0.0).all(axis=1)
     others = np.flatnonzero(~is_zero)
     if not is_zero.any() or len(others) < 2:
@@ -349,21 +350,21 @@ def _lone_zeros(q: Array) -> NDArray[np.bool_]:
     for side, exists in ((after - 1, after > 0), (after, after < len(others))):
         near = np.abs(q[others[np.clip(side, 0, len(others) - 1)]]).max(axis=1)
         is_far &= ~exists | (near > _AWAY)
-    found = np.zeros(len(q), bool)
-    found[rows[is_far]] = True
-    return found
+    is_lone = np.zeros(len(q), bool)
+    is_lone[rows[is_far]] = True
+    return is_lone
 
 
 def require_no_jump(channel: JointChannel) -> None:
-    """Refuse joints that move faster than any does.
+    """Refuse joints that move impossibly fast.
 
     Raises:
-        SettingsError: they jump; the sentence says when, and from where to where.
+        SettingsError: a joint jumps; the message states time and positions.
     """
     times, q, name = channel.clock.times_ns, channel.q, channel.topic.name
     steps = np.diff(times).astype(np.float64)[:, None] * _NS
-    ways = np.abs(np.diff(q, axis=0))
-    speed = np.where(ways > _AWAY, ways / steps, 0.0)
+    changes = np.abs(np.diff(q, axis=0))
+    speed = np.where(changes > _AWAY, changes / steps, 0.0)
     if len(speed) and float(speed.max()) > FASTEST_JOINT:
         row, joint = np.unravel_index(int(speed.argmax()), speed.shape)
         at = float(times[row] - times[0]) * _NS
@@ -377,7 +378,7 @@ def require_no_jump(channel: JointChannel) -> None:
 
 
 class _WrenchRows(_Rows):
-    """Force and torque."""
+    """Rows of force and torque."""
 
     def __init__(self, topic: LogTopic) -> None:
         super().__init__(topic, 6)
@@ -386,7 +387,7 @@ class _WrenchRows(_Rows):
     def row(self, message: LogMessage) -> tuple[int, Array, str]:
         header, wrench = read_wrench(message.data, self.topic.serialization)
         self._frame_id = self._frame_id or header.frame_id
-        cause = "" if _is_measured(wrench) else "with readings that are no numbers"
+        cause = "" if _is_measured(wrench) else "with invalid readings"
         return header.stamp_ns, wrench, cause
 
     def channel(self, log: LogFile, clock: By | None) -> WrenchChannel:
@@ -396,10 +397,10 @@ class _WrenchRows(_Rows):
 
 
 def _stuck_spans(times: Nanoseconds, wrench: Array) -> list[tuple[int, int]]:
-    """First and last time [ns] of one and the same reading for too long.
+    """Return first and last time [ns] of readings unchanged for too long.
 
-    Too long is 0.2 s and 20 times as long as readings usually stay: a driver that
-    repeats each of them, or a simulation without noise, sticks nowhere.
+    The limit is 0.2 s and 20 times the mean duration of a reading, so that a driver
+    that repeats every reading, or a simulation without noise, is not reported.
     """
     is_new = (np.diff(wrench, axis=0) != 0.0).any(axis=1)
     first = np.concatenate([[0], np.flatnonzero(is_new) + 1])
@@ -411,7 +412,7 @@ def _stuck_spans(times: Nanoseconds, wrench: Array) -> list[tuple[int, int]]:
 
 
 def _is_measured(values: Array) -> bool:
-    return bool((np.abs(values) < _ABSURD).all())  # nan is not, either
+    return bool((np.abs(values) < _ABSURD).all())  # False for NaN
 
 
 def _share_distinct(times: Nanoseconds) -> float:
@@ -419,7 +420,7 @@ def _share_distinct(times: Nanoseconds) -> float:
 
 
 def _rate(times: Nanoseconds) -> float:
-    """Messages a second by the median time between two [Hz]."""
+    """Return the message rate by the median time between two messages [Hz]."""
     steps = np.diff(times)
     step = float(np.median(steps[steps > 0])) if (steps > 0).any() else np.nan
     return 1.0 / (step * _NS)

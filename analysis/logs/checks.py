@@ -1,4 +1,4 @@
-"""What was stated beside what the log shows; a check never changes a number."""
+"""Comparison of the user's input with the log; a check never changes a number."""
 
 from __future__ import annotations
 
@@ -37,26 +37,26 @@ from analysis.logs.signs import (
 from ft_sensor.payload import Payload
 from wam.model.constants import GRAVITY
 
-FREE_FORCE = 0.5  # N that a free foot may read, and a tare may drift
+FREE_FORCE = 0.5  # N, limit of the force of a free foot and of the drift of a tare
 LARGEST_MASS_ERROR = 0.02  # kg
-_ON_GROUND = 0.001  # m above its lowest place at which a foot is not free
-_TURN_TOLD = 2.0  # degrees of turn under load from which a mass of 0 is named
-_LITTLE = 0.1  # kg
+_ON_GROUND = 0.001  # m above its lowest position below which a foot is not free
+_LEAST_TURN = 2.0  # degrees of turn under load above which a mass of 0 is reported
+_MASS_STEP = 0.1  # kg, unit of mass in that warning
 _OPTIONS = "check --sensor, --acts, --tare, --along, --normal and the URDF"
 
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One thing that was stated beside what the log shows of it.
+    """Comparison of one stated quantity with the log.
 
     Attributes:
-        name: what it is.
-        stated: numbers in `unit`; empty where nothing was stated.
-        unit: of the numbers; "" where there is none.
-        shown: by the log, the same; empty where it shows nothing.
-        spread: how well it is shown; `how` names its unit.
-        how: by what it is shown, or why it is not.
-        warning: what to say where the two disagree; "" where they do not.
+        name: name of the quantity.
+        stated: stated values in `unit`; empty if nothing was stated.
+        unit: unit of the values; "" if dimensionless.
+        shown: values from the log; empty if it does not show them.
+        spread: uncertainty of these values; `how` names its unit.
+        how: method, or reason why there are no values.
+        warning: warning if the two disagree; otherwise "".
     """
 
     name: str
@@ -69,7 +69,7 @@ class Check:
 
     @property
     def text(self) -> str:
-        """The check in one line, for people."""
+        """The check in one line."""
         stated = f"{_numbers(self.stated)} {self.unit} stated; " if self.stated else ""
         if not self.shown:
             return f"{self.name}: {stated}not shown: {self.how}"
@@ -84,15 +84,15 @@ def _numbers(values: Sequence[float]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """An import of which everything stated was applied, to be held against the log.
+    """An import with all user input applied, ready for the checks.
 
     Attributes:
-        record: what was read.
-        spans: (first, end) of every trial.
+        record: joints, wrench and foot path.
+        spans: (first, end) rows of every trial.
         axes: rows x_T, y_T, z_T in the base, shape (3, 3).
         payload: tare and mass.
-        raw: readings at the times of the joints [N, N m], shape (n, 6).
-        force: of the ground on the foot in the base [N], shape (n, 3).
+        raw: raw readings at the times of the joints [N, N m], shape (n, 6).
+        force: force of the ground on the foot in the base frame [N], shape (n, 3).
         values: v_t [m/s], F_t [N], F_n [N], shape (n, 3).
     """
 
@@ -106,7 +106,7 @@ class Judged:
 
     @property
     def in_trials(self) -> Bools:
-        """Whether a row lies in a trial, shape (n,)."""
+        """Whether each row lies in a trial, shape (n,)."""
         rows = np.zeros(len(self.values), bool)
         for first, end in self.spans:
             rows[first:end] = True
@@ -114,12 +114,12 @@ class Judged:
 
     @property
     def height(self) -> Array:
-        """Place of the foot along the normal [m], shape (n,)."""
+        """Position of the foot along the normal [m], shape (n,)."""
         return self.record.path.foot @ self.axes[2]
 
 
 def checks_of(judged: Judged, request: ImportRequest) -> list[Check]:
-    """Every check of what was stated, in the order of the options."""
+    """Check everything that was stated, in the order of the options."""
     quiet = find_quiet(judged.record.t, judged.raw, judged.height)
     return [
         tare_check(judged, quiet),
@@ -132,22 +132,22 @@ def checks_of(judged: Judged, request: ImportRequest) -> list[Check]:
 
 
 def sign_checks(judged: Judged, doubts: Sequence[str]) -> list[Check]:
-    """The signs of the forces in the trials.
+    """Check the signs of the forces in the trials.
 
     Args:
         judged: the import.
-        doubts: of what was stated; they lead where to look.
+        doubts: warnings of other checks, which help to find the cause.
 
     Raises:
-        SettingsError: no ground has these forces.
+        SettingsError: the forces cannot come from the ground.
     """
     rows = judged.in_trials
     lateral = judged.force @ judged.axes[1]
     try:
         figures = sign_figures(judged.values[rows], lateral[rows])
     except SettingsError as error:
-        seen = "".join(f"{doubt}. " for doubt in doubts)
-        raise SettingsError(error.message, hint=f"{seen}{error.hint}") from error
+        context = "".join(f"{doubt}. " for doubt in doubts)
+        raise SettingsError(error.message, hint=f"{context}{error.hint}") from error
     return [
         Check(figure.name, (), "", (figure.value,), (), f"limit {figure.limit}")
         for figure in figures
@@ -155,10 +155,10 @@ def sign_checks(judged: Judged, doubts: Sequence[str]) -> list[Check]:
 
 
 def tare_check(judged: Judged, quiet: Bools) -> Check:
-    """The force that the quiet free foot reads with the tare as stated."""
+    """Check the tare by the force of the quiet free foot."""
     stated = tuple(judged.payload.bias[:3].tolist())
     if not quiet.any():
-        how = "the foot is nowhere quiet 10 mm above its lowest place"
+        how = "the foot is never quiet 10 mm above its lowest position"
         return Check("tare", stated, "N", (), (), how)
     rest = judged.force[quiet]
     mean = float(np.linalg.norm(rest.mean(axis=0)))
@@ -174,85 +174,86 @@ def tare_check(judged: Judged, quiet: Bools) -> Check:
 
 
 def mass_check(judged: Judged, request: ImportRequest, quiet: Bools) -> Check:
-    """The mass that readings of the turning free foot show."""
+    """Check the mass by readings of the free foot in several orientations."""
     sensor = judged.record.path.sensor
-    found = find_mass(judged.raw[quiet, :3], sensor[quiet], request.sign)
+    estimate = find_mass(judged.raw[quiet, :3], sensor[quiet], request.sign)
     warning = ""
-    if found.value:
-        (mass,), (error,) = found.value, found.spread
+    if estimate.value:
+        (mass,), (error,) = estimate.value, estimate.spread
         if abs(mass - request.mass) > max(LARGEST_MASS_ERROR, 3.0 * error):
             warning = (
                 f"--tool-mass {request.mass:g} kg, the free foot shows {mass:.2f} kg"
             )
-    return _check("mass", (request.mass,), "kg", found, warning)
+    return _check("mass", (request.mass,), "kg", estimate, warning)
 
 
 def lag_check(judged: Judged, request: ImportRequest) -> Check:
-    """The lag that starts and stops of the foot show beside the one stated."""
+    """Check the lag by starts and stops of the foot."""
     motion = judged.record.motion
-    left = find_lag(motion.t, motion.step, judged.values)  # beyond the stated lag
-    found = Estimate(
-        tuple((request.lag + x) * 1e3 for x in left.value),
-        tuple((request.lag + x) * 1e3 for x in left.spread),
-        left.how,
+    further = find_lag(motion.t, motion.step, judged.values)  # beyond the stated lag
+    estimate = Estimate(
+        tuple((request.lag + x) * 1e3 for x in further.value),
+        tuple((request.lag + x) * 1e3 for x in further.spread),
+        further.how,
     )
     warning, stated = "", request.lag * 1e3
-    if found.value:
-        low, high = found.spread
+    if estimate.value:
+        low, high = estimate.spread
         if not low - SURE * 1e3 <= stated <= high + SURE * 1e3:
             warning = (
                 f"--lag {stated:.0f} ms; starts and stops show {low:.0f} to "
                 f"{high:.0f} ms"
             )
-    return _check("lag", (stated,), "ms", found, warning)
+    return _check("lag", (stated,), "ms", estimate, warning)
 
 
 def clock_check(record: LegRecord) -> Check:
-    """How far the clocks of both topics are apart; delays are a part of it."""
-    fits = [each.clock.fit for each in (record.joints, record.wrench)]
+    """Estimate the offset between the clocks of both topics, delays included."""
+    fits = [channel.clock.fit for channel in (record.joints, record.wrench)]
     shown = lag_by_receipts(fits[0], fits[1])
     how = "; ".join(
-        f"{each.topic.name}: {'no stamps' if fit is None else fit.text}"
-        for each, fit in zip((record.joints, record.wrench), fits, strict=True)
+        f"{channel.topic.name}: {'no stamps' if fit is None else fit.text}"
+        for channel, fit in zip((record.joints, record.wrench), fits, strict=True)
     )
     value = () if shown is None else (shown * 1e3,)
     return Check("clocks apart", (), "ms", value, (), how)
 
 
 def normal_check(judged: Judged) -> Check:
-    """The normal that the way of the pressed foot shows."""
+    """Check the normal by the path of the pressed foot."""
     pressed = judged.in_trials & (judged.values[:, 2] > PRESSED_FORCE)
-    found = find_normal(judged.record.path.foot[pressed])
-    return _check("normal", tuple(judged.axes[2].tolist()), "", found)
+    estimate = find_normal(judged.record.path.foot[pressed])
+    return _check("normal", tuple(judged.axes[2].tolist()), "", estimate)
 
 
 def direction_check(judged: Judged) -> Check:
-    """The direction that the way of the foot in the trials shows."""
+    """Check the direction by the path of the foot in the trials."""
     foot = judged.record.path.foot
-    found = find_direction(foot, judged.spans, judged.axes[2])
-    return _check("direction", tuple(judged.axes[0].tolist()), "", found)
+    estimate = find_direction(foot, judged.spans, judged.axes[2])
+    return _check("direction", tuple(judged.axes[0].tolist()), "", estimate)
 
 
 def _check(
     name: str,
     stated: tuple[float, ...],
     unit: str,
-    found: Estimate,
+    estimate: Estimate,
     warning: str = "",
 ) -> Check:
-    return Check(name, stated, unit, found.value, found.spread, found.how, warning)
+    value, spread = estimate.value, estimate.spread
+    return Check(name, stated, unit, value, spread, estimate.how, warning)
 
 
 def warnings_of(judged: Judged) -> list[str]:
-    """What a person should look at in forces, moments and ways of the trials."""
+    """Collect warnings on forces, moments and paths of the trials."""
     rows = judged.in_trials
     values, lateral = judged.values[rows], (judged.force @ judged.axes[1])[rows]
     foot = judged.record.path.foot
     return [
-        *_of_weight(judged),
+        *_weight_warnings(judged),
         *side_warnings(values, lateral),
-        *_of_moments(judged),
-        *_of_channels(judged),
+        *_moment_warnings(judged),
+        *_channel_warnings(judged),
         *(
             text
             for first, end in judged.spans
@@ -262,66 +263,67 @@ def warnings_of(judged: Judged) -> list[str]:
 
 
 def tare_warnings(judged: Judged, request: ImportRequest) -> list[str]:
-    """What speaks against the window of a tare."""
+    """Collect warnings on the window of a tare."""
     if not isinstance(request.tare, tuple):
         return []
     rows = rows_within(judged.record.t, judged.raw, request.tare)
-    found: list[str] = []
+    warnings: list[str] = []
     above = float(judged.height[rows].min() - np.nanmin(judged.height))
     if above < _ON_GROUND:
-        found.append(
-            "within the window of --tare the foot is at its lowest place of the log: "
-            "where it stands on the ground, the tare takes its load away"
+        warnings.append(
+            "within the window of --tare the foot is at its lowest position of the "
+            "log: if it stands on the ground, the tare removes its load"
         )
     raw = judged.raw[rows, :3]
     half = len(raw) // 2
     drift = float(np.linalg.norm(raw[:half].mean(axis=0) - raw[half:].mean(axis=0)))
     if half and drift > FREE_FORCE:
-        found.append(
+        warnings.append(
             f"the halves of the window of --tare differ by {drift:.1f} N (limit "
             f"{FREE_FORCE:g})"
         )
-    return found
+    return warnings
 
 
-def _of_weight(judged: Judged) -> list[str]:
-    """Name a mass of 0 where the sensor turns under load."""
+def _weight_warnings(judged: Judged) -> list[str]:
+    """Warn of a mass of 0 if the sensor turns under load."""
     turned = turn_deg(judged.record.path.sensor[judged.in_trials])
-    if judged.payload.mass or turned <= _TURN_TOLD:
+    if judged.payload.mass or turned <= _LEAST_TURN:
         return []
-    most = 2.0 * math.sin(math.radians(min(turned, 180.0)) / 2.0) * GRAVITY * _LITTLE
+    swing = 2.0 * math.sin(math.radians(min(turned, 180.0)) / 2.0)
+    largest = swing * GRAVITY * _MASS_STEP
     return [
         f"--tool-mass 0, and the sensor turns by {turned:.0f} degrees in the trials: "
-        f"every {_LITTLE:g} kg of weight that is not stated is {most:.2f} N"
+        f"every {_MASS_STEP:g} kg of mass that is not stated is {largest:.2f} N"
     ]
 
 
-def _of_moments(judged: Judged) -> list[str]:
-    """Hold the moments against the lever of the foot, in the sensor's axes."""
+def _moment_warnings(judged: Judged) -> list[str]:
+    """Compare the moments with the lever of the foot, in the sensor's axes."""
     path = judged.record.path
     wrench = judged.payload.contact(judged.raw, path.sensor)
     force, moment = wrench[:, :3], wrench[:, 3:]
     sliding = judged.in_trials & (judged.values[:, 0] > SLOWEST)
     sliding &= judged.values[:, 2] > PRESSED_FORCE
     doubts = free_moment(force[sliding], moment[sliding])
-    found = [replace(doubt, remedy=_OPTIONS).text for doubt in doubts]
-    return [*found, *moment_warnings(moment, path.lever, force)]
+    warnings = [replace(doubt, remedy=_OPTIONS).text for doubt in doubts]
+    return [*warnings, *moment_warnings(moment, path.lever, force)]
 
 
-def _of_channels(judged: Judged) -> list[str]:
-    """Judge each channel of the sensor while the foot slides."""
-    t, record, found = judged.record.t, judged.record, list[str]()
+def _channel_warnings(judged: Judged) -> list[str]:
+    """Check each channel of the sensor while the foot slides."""
+    t, record, warnings = judged.record.t, judged.record, list[str]()
     for first, end in judged.spans:
         is_in = (record.wrench_t >= t[first]) & (record.wrench_t < t[end - 1])
         channels = frozen_channels(record.wrench_t[is_in], record.wrench.wrench[is_in])
-        found += [f"{channel.text} while the foot slides" for channel in channels]
-    return found
+        warnings += [f"{channel.text} while the foot slides" for channel in channels]
+    return warnings
 
 
 def series_warnings(series: TractionSeries) -> list[str]:
-    """Why velocity and forces of a trial cannot be right."""
-    found: list[str] = []
+    """Check velocity and forces of a trial for plausibility."""
+    warnings: list[str] = []
     for doubt in doubts_of(prepare_trial(series, PrepareOptions())):
         remedy = "check --lag" if doubt.name == "lag" else _OPTIONS
-        found.append(f"{series.name}: {replace(doubt, remedy=remedy).text}")
-    return found
+        warnings.append(f"{series.name}: {replace(doubt, remedy=remedy).text}")
+    return warnings

@@ -1,11 +1,11 @@
-"""Clocks of a log: stamps of the senders, and the recorder's receipts beside them.
+"""Clocks of a log: stamps of the senders compared with receipt times of the recorder.
 
-Stamps are the clock. Receipt less stamp is a delay and what the two clocks differ by:
+The stamps are used by default. Receipt minus stamp is delay plus clock difference:
 
     receipt - stamp = offset + drift (receipt - first receipt) + delay,   delay >= 0
 
-so the line lies below the messages that arrived fastest. What it shows beyond 20 ms or
-50 ppm has to be decided by a person, because a log does not say which clock is right.
+so the line is the lower envelope, through the fastest messages. The user must decide on
+differences beyond 20 ms or 50 ppm, because a log does not say which clock is right.
 """
 
 from dataclasses import dataclass
@@ -17,12 +17,12 @@ from acquisition.errors import SettingsError
 from analysis.data.series import Array
 
 Nanoseconds = NDArray[np.int64]
-LARGEST_OFFSET = 0.020  # s between the clocks of two topics, and of a step
+LARGEST_OFFSET = 0.020  # s, limit between the clocks of two topics, and of a step
 LARGEST_DRIFT = 50e-6  # s/s
-_LEAST_DRIFTED = 0.002  # s over the log: less is no more than delays vary
+_LEAST_DRIFTED = 0.002  # s over the log; smaller drifts are within the delay variation
 _MOST_BINS, _FEWEST_IN_BIN = 50, 20
-_LASTING = 3  # bins on both sides of a step: one late bin is a stall of the network
-_SLOWEST = 0.01  # of the recorder's clock; stamps that run slower are none
+_LASTING = 3  # bins on both sides of a step; a single late bin is a network stall
+_SLOWEST = 0.01  # rate relative to the recorder's clock below which stamps are invalid
 _NS = 1e-9
 _WAY_OUT = (
     "--clock stamp takes the stamps as they are, --clock receipt the recorder's times."
@@ -31,15 +31,15 @@ _WAY_OUT = (
 
 @dataclass(frozen=True, slots=True)
 class ClockLine:
-    """The line through receipt less stamp of the messages that arrived fastest.
+    """Line fit of receipt minus stamp through the fastest messages.
 
     Attributes:
-        offset: at the first message [s].
-        drift: of the stamps against the recorder's clock [s/s]; > 0 = they run fast.
+        offset: offset at the first message [s].
+        drift: drift of the stamps relative to the recorder's clock [s/s]; > 0 = fast.
         sure: 95 % interval of the drift [s/s].
-        span: of the messages by receipt [s].
-        step: largest jump of the stamps against the line [s].
-        step_at: when, since the first receipt [s].
+        span: duration of the messages by receipt [s].
+        step: largest lasting step of the stamps relative to the line [s].
+        step_at: time of the step since the first receipt [s].
     """
 
     offset: float
@@ -51,37 +51,37 @@ class ClockLine:
 
     @property
     def is_drifting(self) -> bool:
-        """The drift is beyond its limit, and not by chance."""
+        """Whether the drift is significantly beyond its limit."""
         low, high = self.sure
         is_beyond = low > LARGEST_DRIFT or high < -LARGEST_DRIFT
         return is_beyond and abs(self.drift) * self.span > _LEAST_DRIFTED
 
     @property
     def has_step(self) -> bool:
-        """The stamps jump against the recorder's clock by more than the limit."""
+        """Whether the stamps jump relative to the recorder's clock beyond the limit."""
         return abs(self.step) > LARGEST_OFFSET
 
     @property
     def text(self) -> str:
-        """Offset, drift and the largest step, for people."""
+        """Offset, drift and largest step in words."""
         return (
             f"receipt less stamp {self.offset * 1e3:.1f} ms, {_rate_text(self.drift)}, "
             f"largest step {self.step * 1e3:.1f} ms"
         )
 
     def recorder_times(self, stamps: Nanoseconds, received: Nanoseconds) -> Nanoseconds:
-        """Stamps moved onto the recorder's clock by the line [ns], shape (n,)."""
+        """Convert stamps to the recorder's clock by the line [ns], shape (n,)."""
         first = int(received.min())
         late = (stamps - first).astype(np.float64) * _NS + self.offset
         return first + np.rint(late / (1.0 + self.drift) / _NS).astype(np.int64)
 
 
 def fit_clock(stamps: Nanoseconds, received: Nanoseconds) -> ClockLine | None:
-    """Fit receipt less stamp; None for fewer than 60 messages or a span of nothing.
+    """Fit receipt minus stamp; None with fewer than 60 messages or no duration.
 
     Args:
-        stamps: [ns], shape (n,).
-        received: [ns], shape (n,).
+        stamps: stamps [ns], shape (n,).
+        received: receipt times [ns], shape (n,).
     """
     from scipy.stats import theilslopes
 
@@ -99,7 +99,7 @@ def fit_clock(stamps: Nanoseconds, received: Nanoseconds) -> ClockLine | None:
     slope, offset, low, high = np.asarray(theilslopes(late[rows], t[rows])).tolist()
     if 1.0 - slope < _SLOWEST:
         return None
-    # a step tilts the line, but not the middle one of the slopes from bin to bin
+    # a step tilts the line, but not the median of the slopes from bin to bin
     pace = float(np.median(np.diff(late[rows]) / np.diff(t[rows])))
     step, row = _largest_step(late[rows] - pace * t[rows])
     return ClockLine(
@@ -112,12 +112,12 @@ def fit_clock(stamps: Nanoseconds, received: Nanoseconds) -> ClockLine | None:
     )
 
 
-def _largest_step(rest: Array) -> tuple[float, int]:
-    """Largest jump of a level that lasts, and the row at which it begins."""
-    width = min(_LASTING, len(rest) // 2)
+def _largest_step(residual: Array) -> tuple[float, int]:
+    """Return the largest lasting step in level and the row at which it begins."""
+    width = min(_LASTING, len(residual) // 2)
     jumps = [
-        float(np.median(rest[k : k + width]) - np.median(rest[k - width : k]))
-        for k in range(width, len(rest) - width + 1)
+        float(np.median(residual[k : k + width]) - np.median(residual[k - width : k]))
+        for k in range(width, len(residual) - width + 1)
     ]
     worst = int(np.abs(jumps).argmax())
     return jumps[worst], worst + width
@@ -134,27 +134,27 @@ def _rate_text(drift: float) -> str:
 
 
 def doubts_of_clock(topic: str, fit: ClockLine) -> list[str]:
-    """Sentences on a step and a drift of one topic that are beyond the limits."""
-    found: list[str] = []
+    """Return warnings for a step or drift of one topic beyond the limits."""
+    doubts: list[str] = []
     if fit.has_step:
-        found.append(
+        doubts.append(
             f"the stamps of {topic} jump by {fit.step * 1e3:.0f} ms against the "
             f"recorder's clock, {fit.step_at:.1f} s after its first message (limit "
             f"{LARGEST_OFFSET * 1e3:.0f} ms)"
         )
     if fit.is_drifting:
-        found.append(
+        doubts.append(
             f"the clock of {topic} is not the recorder's: {_rate_text(fit.drift)}, "
             f"{abs(fit.drift) * fit.span * 1e3:.0f} ms over the log (limit "
             f"{LARGEST_DRIFT * 1e6:.0f} ppm)"
         )
-    return found
+    return doubts
 
 
 def lag_by_receipts(joints: ClockLine | None, wrench: ClockLine | None) -> float | None:
-    """How late the wrench is stamped by both offsets [s]; None where one is unknown.
+    """Return the lag of the wrench stamps by both offsets [s]; None if one is unknown.
 
-    The delays of both topics are a part of it.
+    The lag includes the delays of both topics.
     """
     if joints is None or wrench is None:
         return None
@@ -162,9 +162,10 @@ def lag_by_receipts(joints: ClockLine | None, wrench: ClockLine | None) -> float
 
 
 def doubts_of_lag(shown: float | None, lag: float) -> list[str]:
-    """Sentence on clocks that are apart by more than the lag that is stated [s].
+    """Return a warning if the clocks differ by more than the stated lag [s].
 
-    A lag that receipts do not show is no doubt: a filter may be late before the stamp.
+    A stated lag that the receipts do not show is accepted: a filter may delay the
+    readings before they are stamped.
     """
     if shown is None or min(abs(shown), abs(shown - lag)) <= LARGEST_OFFSET:
         return []
@@ -177,10 +178,10 @@ def doubts_of_lag(shown: float | None, lag: float) -> list[str]:
 
 
 def require_no_doubt(doubts: list[str], log: object, shown: float | None) -> None:
-    """Refuse clocks that a person has to decide on.
+    """Refuse clocks on which the user has to decide.
 
     Raises:
-        SettingsError: there is a doubt.
+        SettingsError: there is at least one doubt.
     """
     if doubts:
         lag = "" if shown is None else f" Or state --lag {shown * 1e3:.0f}."

@@ -1,8 +1,8 @@
-"""What the numbers of a log show by themselves: quiet spans, weight, lag, ground.
+"""Estimates from a log alone: quiet spans, weight, lag, ground.
 
-Nothing here is applied: an import prints each beside what was stated, and `--list`
-offers them as a command line to be read and edited. Where nothing can be found, an
-`Estimate` has no value and says what was looked at.
+The estimates are never applied: an import prints them next to the stated values, and
+`--list` offers them as a command line to edit. If there is no estimate, `Estimate` has
+no value and states why.
 """
 
 from __future__ import annotations
@@ -23,35 +23,35 @@ from wam.model.constants import GRAVITY
 Bools = NDArray[np.bool_]
 
 # unloaded
-LIFTED = 0.010  # m above the lowest place of the foot
+LIFTED = 0.010  # m above the lowest position of the foot
 SHORTEST_REST = 0.5  # s
-_QUIET = 4.0  # times the noise that a mean of 50 ms may wander
+_QUIET = 4.0  # limit of the change of a 50 ms mean as a multiple of the noise
 _MEAN = 0.05  # s
 # weight
-SMALLEST_TURN = 20.0  # degrees of orientation, unloaded
+SMALLEST_TURN = 20.0  # degrees between orientations, unloaded
 # lag
-LONGEST_LAG = 0.1  # s that are looked at
-_RISING = 0.001  # m/s: friction has turned round at this velocity
+LONGEST_LAG = 0.1  # s, largest lag that is searched
+_RISING = 0.001  # m/s, velocity scale of the reversal of friction
 _EVENT = 0.15  # s before and after a start or stop
-_APART = 0.1  # s between two events
+_SPACING = 0.1  # s, smallest time between two events
 FEWEST_EVENTS = 3
-_EXPLAINED = 0.5  # of the ratio F_t/F_n around starts and stops
-_FLAT = 0.002  # of it, below the best, within which lags are as good
-SURE = 0.005  # s: no lag is known better, the maximum is flat
+_EXPLAINED = 0.5  # least explained share of the variance of F_t/F_n around events
+_FLAT = 0.002  # difference in that share within which lags are equally good
+SURE = 0.005  # s, lower limit of the uncertainty, because the maximum is flat
 # ground
-SHORTEST_WAY = 0.1  # m in the plane
-_WIDE = 0.02  # m across the way, from which a plane can be told
-_SPAN = 3.5  # standard deviations from end to end of an even distribution
+SHORTEST_WAY = 0.1  # m of path in the plane
+_WIDE = 0.02  # m of width of the path from which a plane can be fitted
+_SPAN = 3.5  # width of a uniform distribution in standard deviations
 
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """One thing that the numbers show.
+    """Estimate of one quantity.
 
     Attributes:
-        value: in the unit of what it is an estimate of; empty where nothing is shown.
-        spread: how well it is known, in the unit that `how` names.
-        how: how it was found, or why it was not.
+        value: estimate in the unit of the quantity; empty if unavailable.
+        spread: uncertainty in the unit that `how` names.
+        how: method, or reason why there is no estimate.
     """
 
     value: tuple[float, ...]
@@ -60,19 +60,19 @@ class Estimate:
 
 
 def nothing(why: str) -> Estimate:
-    """An estimate that the log does not show."""
+    """Make an estimate without value."""
     return Estimate((), (), why)
 
 
 def find_quiet(t: Array, wrench: Array, height: Array) -> Bools:
-    """Rows of all spans of half a second in which a lifted foot is quiet.
+    """Return the rows of all spans of at least 0.5 s in which a lifted foot is quiet.
 
-    A sensor that stands otherwise in another of them shows the weight that it carries.
+    Different orientations of the sensor in these spans reveal the weight it carries.
 
     Args:
         t: time [s], shape (n,).
-        wrench: raw [N, N m], shape (n, 6).
-        height: of the foot along the normal of the ground [m], shape (n,).
+        wrench: raw readings [N, N m], shape (n, 6).
+        height: position of the foot along the normal [m], shape (n,).
     """
     is_lifted = height > np.nanmin(height) + LIFTED
     step = float(np.median(np.diff(t)))
@@ -85,7 +85,7 @@ def find_quiet(t: Array, wrench: Array, height: Array) -> Bools:
 
 
 def _is_quiet(force: Array, width: int) -> Bools:
-    """Return where forces do not wander from those of the rows around them."""
+    """Return where the mean force does not change."""
     if len(force) <= 2 * width:
         return np.zeros(len(force), bool)
     noise = np.nanmedian(np.abs(np.diff(force, axis=0)), axis=0) / 0.9539
@@ -95,35 +95,35 @@ def _is_quiet(force: Array, width: int) -> Bools:
     for axis, sd in enumerate(noise):
         mean = np.convolve(filled[:, axis], kernel, "same")
         ahead, behind = np.roll(mean, -width), np.roll(mean, width)
-        wander = np.abs(ahead - behind)
-        is_quiet &= wander <= _QUIET * max(float(sd), 1e-6)
+        change = np.abs(ahead - behind)
+        is_quiet &= change <= _QUIET * max(float(sd), 1e-6)
     is_quiet[:width] = is_quiet[-width:] = False
     return is_quiet
 
 
 def runs(flags: Bools) -> list[tuple[int, int]]:
-    """Return (first, end) of every stretch of true rows."""
+    """Return (first, end) of every run of true rows."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]])))
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def find_mass(force: Array, rotation: Array, sign: float) -> Estimate:
-    """Mass below the gauges [kg] by readings of the free foot in several orientations.
+    """Estimate the mass below the gauges [kg] from the free foot in several poses.
 
-    raw = b + s m R^T g_w + noise, b and m free.
+    raw = b + s m R^T g_w + noise, with b and m fitted.
 
     Args:
-        force: raw [N], shape (n, 3).
+        force: raw force [N], shape (n, 3).
         rotation: sensor to base, shape (n, 3, 3).
-        sign: +1 where the sensor reads the load on it.
+        sign: +1 if the sensor reads the load on it.
     """
     if not len(force):
-        return nothing("the foot is nowhere quiet in the air")
+        return nothing("the foot is never quiet in the air")
     turned = turn_deg(rotation)
     if turned < SMALLEST_TURN:
         return nothing(
             f"the quiet foot turned by {turned:.0f} degrees, {SMALLEST_TURN:.0f} "
-            "show it"
+            "are needed"
         )
     down = gravity_in(rotation, sign)
     centred, y = down - down.mean(axis=0), force - force.mean(axis=0)
@@ -136,7 +136,7 @@ def find_mass(force: Array, rotation: Array, sign: float) -> Estimate:
 
 
 def gravity_in(rotation: Array, sign: float) -> Array:
-    """Weight of a kilogram as the sensor reads it [N], shape (n, 3)."""
+    """Return the weight of 1 kg in the sensor's axes and sign [N], shape (n, 3)."""
     return -GRAVITY * sign * rotation[:, 2, :]
 
 
@@ -147,16 +147,16 @@ def turn_deg(rotation: Array) -> float:
 
 
 def find_lag(t: Array, step: float, values: Array) -> Estimate:
-    """How late the forces are [s] by starts and stops of the foot; spread: from, to.
+    """Estimate the lag of the forces [s] from starts and stops; spread: from, to.
 
-    F_t / F_n = a + b tanh(v_t / v_0), v_0 = 1 mm/s: friction turns round with the
-    motion, whatever its size. Around starts and stops that is fitted at every lag, and
-    the best fit is the lag; both sides are smoothed alike before. Where friction does
-    not turn round so, the foot's inertia decides (`analysis.data.lag`).
+    F_t / F_n = a + b tanh(v_t / v_0), v_0 = 1 mm/s: friction reverses with the motion,
+    whatever its magnitude. This is fitted around starts and stops at every lag, and the
+    best fit is the lag; both sides are smoothed equally before. If friction does not
+    reverse in this way, the foot's inertia is used (`analysis.data.lag`).
 
     Args:
-        t: time, even [s], shape (n,).
-        step: between two rows [s].
+        t: evenly spaced time [s], shape (n,).
+        step: time step [s].
         values: v_t, smoothed [m/s], F_t and F_n by their stamps [N], shape (n, 3).
     """
     sound = np.isfinite(values).all(axis=1)
@@ -169,13 +169,14 @@ def find_lag(t: Array, step: float, values: Array) -> Estimate:
     by_events = _lag_by_events(t, v_t, F_n, F_t, step, sure)
     if by_events.value:
         return by_events
-    found = force_lag(t, v_t, F_t)
-    if found is None:
+    by_inertia = force_lag(t, v_t, F_t)
+    if by_inertia is None:
         return nothing(f"{by_events.how}; nor does the foot's inertia")
     return Estimate(
-        (found.seconds,),
-        (found.seconds - sure, found.seconds + sure),
-        f"inertia of the foot explains {found.explained:.0%} of the force; from, to",
+        (by_inertia.seconds,),
+        (by_inertia.seconds - sure, by_inertia.seconds + sure),
+        f"inertia of the foot explains {by_inertia.explained:.0%} of the force; from, "
+        "to",
     )
 
 
@@ -187,43 +188,43 @@ def _lag_by_events(
     inside = [k for k in events if half + most < k < len(t) - half - most]
     if len(inside) < FEWEST_EVENTS:
         return nothing(
-            f"{len(inside)} starts and stops of the pressed foot do not show it, "
-            f"{FEWEST_EVENTS} do"
+            f"{len(inside)} starts and stops of the pressed foot are too few, "
+            f"{FEWEST_EVENTS} are needed"
         )
     ratio = F_t / np.maximum(F_n, PRESSED)
     basis = np.tanh(v_t / _RISING)
     windows = [np.arange(k - half, k + half) for k in inside]
     shifts = np.arange(-most, most + 1)
-    every = np.array([_sums(ratio, basis, w, shifts) for w in windows])
-    explained = _explained(every.sum(axis=0))
+    sums = np.array([_sums(ratio, basis, w, shifts) for w in windows])
+    explained = _explained(sums.sum(axis=0))
     best = int(explained.argmax())
     count = f"at {len(inside)} starts and stops"
     if explained[best] < _EXPLAINED:
         return nothing(
             f"the motion explains {explained[best]:.0%} of F_t/F_n {count}, "
-            f"{_EXPLAINED:.0%} would show it"
+            f"{_EXPLAINED:.0%} are needed"
         )
     if best in (0, len(shifts) - 1):
         return nothing(
             f"F_t/F_n {count} fits best at {shifts[best] * step * 1e3:.0f} ms, the "
-            "end of what is looked at"
+            "end of the search range"
         )
-    each = np.float64(step) * shifts[[int(_explained(one).argmax()) for one in every]]
+    lags = np.float64(step) * shifts[[int(_explained(s).argmax()) for s in sums]]
     flat = np.float64(step) * shifts[explained >= explained[best] - _FLAT]
     value = float(shifts[best] * step)
-    low, high = np.quantile(each, (0.25, 0.75))
+    low, high = np.quantile(lags, (0.25, 0.75))
     return Estimate(
         (value,),
         (
             float(min(low, flat[0], value - sure)),
             float(max(high, flat[-1], value + sure)),
         ),
-        f"F_t/F_n turns with the motion {count}; from, to",
+        f"F_t/F_n reverses with the motion {count}; from, to",
     )
 
 
 def _events(t: Array, v_t: Array, F_n: Array) -> list[int]:
-    """Return the rows at which a pressed foot starts or stops to slide forward."""
+    """Return the rows at which a pressed foot starts or stops sliding forward."""
     crossings = np.flatnonzero(np.diff((v_t > _RISING).astype(int)))
     step = float(np.median(np.diff(t)))
     half = round(_EVENT / step)
@@ -232,7 +233,7 @@ def _events(t: Array, v_t: Array, F_n: Array) -> list[int]:
         near = slice(max(0, k - half), k + half)
         is_sliding = bool((v_t[near] > SLOWEST).any())
         is_pressed = bool((F_n[near] > PRESSED).all())
-        is_new = not events or t[k] - t[events[-1]] > _APART
+        is_new = not events or t[k] - t[events[-1]] > _SPACING
         if is_sliding and is_pressed and is_new:
             events.append(k)
     return events
@@ -241,7 +242,7 @@ def _events(t: Array, v_t: Array, F_n: Array) -> list[int]:
 def _sums(
     ratio: Array, basis: Array, rows: NDArray[np.intp], shifts: NDArray[np.intp]
 ) -> Array:
-    """Return the sums of a line fit of the ratio at every shift, shape (shifts, 6)."""
+    """Return the sums for a line fit of the ratio at every shift, shape (shifts, 6)."""
     x = basis[rows]
     y = ratio[rows[None, :] + shifts[:, None]]
     ones = np.ones(len(shifts))
@@ -258,7 +259,7 @@ def _sums(
 
 
 def _explained(sums: Array) -> Array:
-    """Return the share of the variance that the line explains, shape (shifts,)."""
+    """Return the share of the variance explained by the line, shape (shifts,)."""
     n, x, xx, y, xy, yy = sums.T
     s_xx, s_xy, s_yy = xx - x * x / n, xy - x * y / n, yy - y * y / n
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -267,10 +268,10 @@ def _explained(sums: Array) -> Array:
 
 
 def find_normal(foot: Array) -> Estimate:
-    """Normal of the ground in the base by the way of the pressed foot.
+    """Estimate the ground normal in the base frame from the path of the pressed foot.
 
     Args:
-        foot: its positions in the base, pressed [m], shape (n, 3).
+        foot: positions of the pressed foot in the base frame [m], shape (n, 3).
     """
     if len(foot) < 3:
         return nothing("the foot is never pressed")
@@ -280,18 +281,18 @@ def find_normal(foot: Array) -> Estimate:
     if extents[0] < SHORTEST_WAY:
         return nothing(
             f"the pressed foot moves {extents[0] * 1e3:.0f} mm, "
-            f"{SHORTEST_WAY * 1e3:.0f} mm show it"
+            f"{SHORTEST_WAY * 1e3:.0f} mm are needed"
         )
     is_plane = extents[1] >= _WIDE
     if is_plane:
-        normal, how = axes[2], "plane of the pressed foot's way"
+        normal, how = axes[2], "plane of the pressed foot's path"
     else:
         up = np.array([0.0, 0.0, 1.0])
         normal = up - (up @ axes[0]) * axes[0]
-        how = "across a straight way, taken as level sideways"
+        how = "normal to a straight path, assumed level sideways"
     size = float(np.linalg.norm(normal))
     if size < _WIDE:
-        return nothing("the pressed foot's way is upright")
+        return nothing("the pressed foot's path is vertical")
     normal = normal / size * (1.0 if normal[2] >= 0.0 else -1.0)
     misfit = float(np.sqrt(np.mean((centred @ normal) ** 2)))
     angle = float(np.degrees(np.arctan2(_SPAN * misfit, extents[1 if is_plane else 0])))
@@ -302,41 +303,41 @@ def find_normal(foot: Array) -> Estimate:
 def find_direction(
     foot: Array, strokes: Sequence[tuple[int, int]], normal: Array
 ) -> Estimate:
-    """Direction of the slip in the plane of the ground by the chords of the strokes.
+    """Estimate the slip direction in the ground plane from the chords of the strokes.
 
     Args:
-        foot: its positions [m], shape (n, 3).
-        strokes: (first, end) of the stretches in which it is pressed.
-        normal: of the ground, shape (3,).
+        foot: positions of the foot [m], shape (n, 3).
+        strokes: (first, end) rows of the stretches in which it is pressed.
+        normal: normal of the ground, shape (3,).
     """
-    ways = [foot[first:end] - foot[first] for first, end in strokes if end > first]
-    chord = np.sum([way[-1] for way in ways] or [np.zeros(3)], axis=0)
+    paths = [foot[first:end] - foot[first] for first, end in strokes if end > first]
+    chord = np.sum([path[-1] for path in paths] or [np.zeros(3)], axis=0)
     flat = chord - (chord @ normal) * normal
     size = float(np.linalg.norm(flat))
     if size < SHORTEST_WAY / 2.0:
         return nothing(
             f"the pressed foot ends {size * 1e3:.0f} mm from where it began, "
-            f"{SHORTEST_WAY / 2.0 * 1e3:.0f} mm show it"
+            f"{SHORTEST_WAY / 2.0 * 1e3:.0f} mm are needed"
         )
     direction = flat / size
     across = np.cross(normal, direction)
-    aside = max(float(np.std(way @ across)) for way in ways)
-    length = max(float(np.ptp(way @ direction)) for way in ways)
+    aside = max(float(np.std(path @ across)) for path in paths)
+    length = max(float(np.ptp(path @ direction)) for path in paths)
     spread = float(np.degrees(np.arctan2(_SPAN * aside, length)))
-    how = "chord of the pressed foot's way; +- degrees"
+    how = "chord of the pressed foot's path; +- degrees"
     return Estimate(tuple(direction.tolist()), (spread,), how)
 
 
 def pressed_stretches(
     t: Array, F_n: Array, threshold: float, join: float
 ) -> Sequence[tuple[int, int]]:
-    """Return (first, end) of the stretches in which the foot is pressed.
+    """Return (first, end) rows of the stretches in which the foot is pressed.
 
     Args:
         t: time [s], shape (n,).
         F_n: normal force [N], shape (n,).
-        threshold: above which it is pressed [N].
-        join: shorter lifts are none [s].
+        threshold: normal force above which it is pressed [N].
+        join: lifts shorter than this are ignored [s].
     """
     merged: list[tuple[int, int]] = []
     for first, end in runs(F_n > threshold):

@@ -1,12 +1,12 @@
-"""From a log, a URDF and what a person states to trials: v_t, F_t and F_n over time.
+"""Computation of v_t, F_t and F_n from a log, a URDF and the user's input.
 
-F = force of the ground on the foot in the axes of the base; x_T the direction of the
+F is the force of the ground on the foot in the base frame, x_T the direction of the
 slip, z_T the normal of the ground:
 
     F = R (s (f_raw - b) - m R^T g_w),   v_t = v . x_T,  F_t = -F . x_T,  F_n = F . z_T
 
-Everything that changes a number is stated in an `ImportRequest`. What the log shows of
-it is computed in `checks` and applied nowhere.
+Everything that affects a number is stated in an `ImportRequest`. Estimates from the log
+are computed in `checks` and never applied.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ from ft_sensor.payload import Payload, traction
 
 SLOWEST_RATE, USUAL_RATE = 50.0, 100.0  # Hz
 LARGEST_LAG = 10.0  # s
-_UPRIGHT = 0.1  # of a direction in the ground: nearly along its normal
+_UPRIGHT = 0.1  # smallest share of a direction that lies in the ground plane
 _FEWEST_ROWS = 3
 
 
@@ -60,16 +60,16 @@ class ImportedTrial:
     """One trial of a log, at the rate of the joints.
 
     Attributes:
-        name: e.g. T01.
-        start: of it, in seconds of the log.
+        name: name, e.g. T01.
+        start: start time [s of the log].
         t: time since its first row [s], shape (n,).
         q: positions of the joints [rad, m], shape (n, joints).
-        raw: wrench as recorded, at the time of the joints [N, N m], shape (n, 6).
-        foot: position in the base [m], shape (n, 3).
-        velocity: of the foot in the base [m/s], shape (n, 3).
-        force: of the ground on the foot in the base [N], shape (n, 3).
+        raw: raw wrench at the times of the joints [N, N m], shape (n, 6).
+        foot: position of the foot in the base frame [m], shape (n, 3).
+        velocity: velocity of the foot in the base frame [m/s], shape (n, 3).
+        force: force of the ground on the foot in the base frame [N], shape (n, 3).
         traction: v_t [m/s], F_t [N], F_n [N], shape (n, 3).
-        series: the same as the models take it.
+        series: the trial as input of the models.
     """
 
     name: str
@@ -86,20 +86,20 @@ class ImportedTrial:
 
 @dataclass(frozen=True, slots=True)
 class ImportedLog:
-    """What came of a log.
+    """Result of the import of a log.
 
     Attributes:
-        request: what was stated.
-        format: of the log, in words.
+        request: the user's input.
+        format: format of the log in words.
         urdf: the robot.
-        joints: the channel of the joints.
-        wrench: the channel of the wrench.
-        joint_names: of the joints between the base and the foot.
-        checks: what was stated beside what the log shows.
+        joints: channel of the joints.
+        wrench: channel of the wrench.
+        joint_names: names of the joints between the base and the foot.
+        checks: comparisons of the input with the log.
         trials: the trials.
-        warnings: what a person should know.
-        losses: what could not be read of the log.
-        is_simulated: the log says that its devices were simulated.
+        warnings: warnings for the user.
+        losses: parts of the log that could not be read.
+        is_simulated: the log states that its devices were simulated.
     """
 
     request: ImportRequest
@@ -116,10 +116,10 @@ class ImportedLog:
 
 
 def import_log(request: ImportRequest) -> ImportedLog:
-    """Read a log and return its trials.
+    """Import the trials of a log.
 
     Raises:
-        SettingsError: log or URDF cannot be used, or what is stated cannot be.
+        SettingsError: the log, the URDF or the input is unusable.
     """
     if abs(request.lag) > LARGEST_LAG:
         raise SettingsError(
@@ -172,7 +172,7 @@ def import_log(request: ImportRequest) -> ImportedLog:
 
 
 def _axes(along: Array, normal: Array) -> Array:
-    """Rows x_T, y_T, z_T in the base, shape (3, 3); raises SettingsError."""
+    """Return the rows x_T, y_T, z_T in the base, shape (3, 3); raises SettingsError."""
     z_T = normal / np.linalg.norm(normal)
     flat = along - (along @ z_T) * z_T
     size = float(np.linalg.norm(flat))
@@ -186,8 +186,9 @@ def _axes(along: Array, normal: Array) -> Array:
 
 
 def _clock_warnings(record: LegRecord, request: ImportRequest) -> list[str]:
-    """What receipts say of the stamps; raises SettingsError where it is not decided."""
-    clocks = {each.topic.name: each.clock for each in (record.joints, record.wrench)}
+    """Compare stamps and receipts; raises SettingsError if the user must decide."""
+    channels = (record.joints, record.wrench)
+    clocks = {channel.topic.name: channel.clock for channel in channels}
     fits = {name: clock.fit for name, clock in clocks.items()}
     if request.clock == "receipt":
         return [
@@ -209,7 +210,7 @@ def _clock_warnings(record: LegRecord, request: ImportRequest) -> list[str]:
 
 
 def _rate_warnings(record: LegRecord, request: ImportRequest) -> list[str]:
-    found: list[str] = []
+    warnings: list[str] = []
     for channel in (record.joints, record.wrench):
         step = float(np.median(np.diff(channel.clock.times_ns))) * 1e-9
         name, rate = channel.topic.name, 1.0 / step
@@ -220,41 +221,43 @@ def _rate_warnings(record: LegRecord, request: ImportRequest) -> list[str]:
                 hint="--slow takes it, for means only.",
             )
         if rate < USUAL_RATE * 0.99:
-            found.append(f"{name} has {rate:.1f} Hz: slips are not seen, means are")
-    return found
+            warnings.append(f"{name} has {rate:.1f} Hz: slips are not seen, means are")
+    return warnings
 
 
 def _channel_warnings(
     record: LegRecord, request: ImportRequest, log: LogFile
 ) -> list[str]:
-    """What the channels lack."""
-    found = [
-        f"{each.topic.name}: {each.clock.text}"
-        for each in (record.joints, record.wrench)
-        if each.clock.left_out or each.clock.repeated
+    """Collect warnings on the channels."""
+    warnings = [
+        f"{channel.topic.name}: {channel.clock.text}"
+        for channel in (record.joints, record.wrench)
+        if channel.clock.left_out or channel.clock.repeated
     ]
-    found += record.joints.warnings
+    warnings += record.joints.warnings
     if record.motion.dropped:
-        found.append(f"{record.motion.dropped} rows lie in gaps of the joints")
+        warnings.append(f"{record.motion.dropped} rows lie in gaps of the joints")
     frame = record.wrench.frame_id
     if frame and frame != request.sensor:
-        found.append(
+        warnings.append(
             f"the wrench names the frame {frame[:60]!r}; {request.sensor!r} is used"
         )
     if request.is_estimated:
-        found.append("the wrench is estimated by the robot, not measured at the foot")
+        warnings.append(
+            "the wrench is estimated by the robot, not measured at the foot"
+        )
     for first, last in record.wrench.stuck:
         begin = (first - int(record.joints.clock.times_ns[0])) * 1e-9
-        found.append(
-            f"{record.wrench.topic.name}: one and the same reading for "
+        warnings.append(
+            f"{record.wrench.topic.name}: unchanged reading for "
             f"{(last - first) * 1e-9:.2f} s from {begin:.2f} s on; its rows in a trial "
-            "are left out"
+            "are dropped"
         )
-    return [*found, *log.losses]
+    return [*warnings, *log.losses]
 
 
 def _stuck_rows(record: LegRecord, request: ImportRequest) -> Bools:
-    """Whether a row lies in a trial, and its reading is one that never changes."""
+    """Return the rows in trials whose reading is stuck."""
     is_stuck = np.zeros(len(record.t), bool)
     origin_ns = int(record.joints.clock.times_ns[0])
     at = record.t + request.lag
@@ -268,7 +271,7 @@ def _stuck_rows(record: LegRecord, request: ImportRequest) -> Bools:
 
 
 def _payload(request: ImportRequest, record: LegRecord, raw: Array) -> Payload:
-    """Tare and weight as stated; raises SettingsError."""
+    """Make the payload from the stated tare and weight; raises SettingsError."""
     tare, weightless = (
         request.tare,
         Payload(request.mass, np.zeros(3), np.eye(3), request.sign, np.zeros(6)),
@@ -285,14 +288,14 @@ def _payload(request: ImportRequest, record: LegRecord, raw: Array) -> Payload:
                 "readings.",
                 hint=f"The log goes from 0 to {record.t[-1]:.1f} s.",
             )
-        # of a foot that touches nothing: what is left is the bias
-        rest = weightless.contact(raw[rows], record.path.sensor[rows])
-        bias = request.sign * rest.mean(axis=0)
+        # the foot touches nothing, so the reading minus the weight is the bias
+        residual = weightless.contact(raw[rows], record.path.sensor[rows])
+        bias = request.sign * residual.mean(axis=0)
     return Payload(request.mass, np.zeros(3), np.eye(3), request.sign, bias)
 
 
 def _trial_rows(request: ImportRequest, t: Array) -> list[tuple[int, int]]:
-    """(first, end) of every trial; raises SettingsError."""
+    """Return (first, end) rows of every trial; raises SettingsError."""
     spans: list[tuple[int, int]] = []
     for begin, end in request.trials:
         rows = int(np.searchsorted(t, begin)), int(np.searchsorted(t, end, "right"))

@@ -1,4 +1,4 @@
-"""Joints, wrench and URDF together: where the foot was, what the sensor read."""
+"""Combination of joints, wrench and URDF: foot path and sensor readings."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ _OWN = "traction_msgs/Cycle"
 
 @dataclass(frozen=True, slots=True)
 class LegRecord:
-    """What a log and a URDF give before anything is stated of tare, lag and ground.
+    """Data from a log and a URDF before tare, lag and ground are applied.
 
     Attributes:
-        joints: the channel of the joints.
-        wrench: the channel of the wrench.
+        joints: channel of the joints.
+        wrench: channel of the wrench.
         motion: joints on an even grid.
-        path: foot and sensor along it.
-        wrench_t: time of the readings [s of the log], shape (m,).
+        path: foot and sensor at every row.
+        wrench_t: times of the readings [s of the log], shape (m,).
     """
 
     joints: JointChannel
@@ -53,19 +53,19 @@ class LegRecord:
         return self.motion.t
 
     def raw(self, lag: float) -> Array:
-        """Readings at the times of the joints [N, N m], shape (n, 6); NaN in gaps.
+        """Return the readings at the times of the joints [N, N m], (n, 6); NaN in gaps.
 
         Raises:
-            SettingsError: joints and wrench share no time.
+            SettingsError: joints and wrench do not overlap in time.
         """
         at, step = self.motion.t + lag, self.motion.step
         raw = mean_around(self.wrench_t, self.wrench.wrench, at, step)
         if not np.isfinite(raw).any():
             first, last = self.wrench_t[[0, -1]] - lag
             raise SettingsError(
-                f"Joints and wrench share no time: the joints go from 0 to "
+                f"Joints and wrench do not overlap in time: the joints go from 0 to "
                 f"{self.t[-1]:.1f} s, the wrench from {first:.1f} to {last:.1f} s.",
-                hint="State --clock receipt where the clocks differ, or another --lag.",
+                hint="State --clock receipt if the clocks differ, or another --lag.",
             )
         return raw
 
@@ -78,7 +78,7 @@ def record_of_leg(
     clock: By | None,
 ) -> LegRecord:
     """Read both topics of a log; raises SettingsError."""
-    if any(each.type_name == _OWN for each in log.topics.values()):
+    if any(topic.type_name == _OWN for topic in log.topics.values()):
         raise SettingsError(
             f"{log.path}: this is a trial of Traction: report, fit and export read it.",
             hint="Write: traction export SESSION --to DIR, then traction fit DIR.",
@@ -98,5 +98,5 @@ def record_of_leg(
 
 
 def rows_within(t: Array, raw: Array, span: tuple[float, float]) -> Bools:
-    """Rows within a span [s] that have a reading, shape (n,)."""
+    """Return the rows within a time span [s] that have a reading, shape (n,)."""
     return (t >= span[0]) & (t <= span[1]) & np.isfinite(raw).all(axis=1)

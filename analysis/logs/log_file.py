@@ -1,4 +1,4 @@
-"""What a log holds, whatever its format: topics, and their messages in file order."""
+"""Common interface of logs: topics, and their messages in file order."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from acquisition.errors import SettingsError
 from acquisition.files import UnfitFileError, open_regular
 from acquisition.trial_file.unpacking import Unpacker
 
-LARGEST_LOG = 2 * 10**9  # bytes on the disk
-LARGEST_PART = 64 * 2**20  # bytes of a record, and of a chunk unpacked
-LARGEST_RATIO = 100  # of a part unpacked to the same part packed
-MOST_MESSAGES = 10**7  # of the topics that are read
-LONGEST_NAME = 4096  # bytes of a topic, a type, a frame or a joint
+LARGEST_LOG = 2 * 10**9  # bytes on disk
+LARGEST_PART = 64 * 2**20  # bytes of a record or an unpacked chunk
+LARGEST_RATIO = 100  # unpacked to packed size of a part
+MOST_MESSAGES = 10**7  # per topic that is read
+LONGEST_NAME = 4096  # bytes of a topic, type, frame or joint name
 MOST_TOPICS = 5_000
 _BLOCK = 2**20  # bytes copied at a time
 
@@ -27,9 +27,9 @@ class LogTopic:
     """One topic of a log.
 
     Attributes:
-        name: e.g. /joint_states.
+        name: name, e.g. /joint_states.
         type_name: package and type, e.g. sensor_msgs/JointState.
-        serialization: how its messages are written.
+        serialization: serialisation of its messages.
     """
 
     name: str
@@ -38,12 +38,12 @@ class LogTopic:
 
 
 class LogMessage(NamedTuple):
-    """One message as it is stored.
+    """One stored message.
 
     Attributes:
         topic: name of its topic.
-        received_ns: when it was received [UTC ns].
-        data: its bytes.
+        received_ns: time of receipt [UTC ns].
+        data: serialised content.
     """
 
     topic: str
@@ -52,15 +52,15 @@ class LogMessage(NamedTuple):
 
 
 class LogFile(Protocol):
-    """A log of one format.
+    """A log of any format.
 
     Attributes:
         path: the file.
-        format: what it is, in words.
-        topics: by name.
-        losses: what could not be read, in words; complete after `messages` ended.
-        unread: types and encodings of topics that cannot be read, by name.
-        is_simulated: its own metadata says that the devices were simulated.
+        format: format in words.
+        topics: topics by name.
+        losses: unreadable parts in words; complete once `messages` has ended.
+        unread: types and encodings of unreadable topics by name.
+        is_simulated: the metadata state that the devices were simulated.
     """
 
     path: Path
@@ -71,19 +71,19 @@ class LogFile(Protocol):
     is_simulated: bool
 
     def messages(self, topics: Collection[str]) -> Iterator[LogMessage]:
-        """Give every message of `topics`, in the order of the file.
+        """Yield every message of `topics` in file order.
 
         Raises:
-            SettingsError: the log is damaged where nothing behind it can be read.
+            SettingsError: the log is damaged so that the rest cannot be read.
         """
         ...
 
 
 class OneFile:
-    """What every reader of one file begins with; see `LogFile`."""
+    """Base class of readers of a single file; see `LogFile`."""
 
     def __init__(self, path: Path) -> None:
-        """Nothing of it is known yet.
+        """Initialise an empty log.
 
         Args:
             path: the file.
@@ -93,18 +93,18 @@ class OneFile:
         self.losses: list[str] = []
         self.unread: dict[str, str] = {}
         self.unpacker = Unpacker(LARGEST_PART, LARGEST_RATIO)
-        self.is_simulated = False  # some formats have no metadata that could say so
+        self.is_simulated = False  # default for formats without metadata
 
 
 def damaged(path: Path, what: str, hint: str = "") -> SettingsError:
-    """Return a refusal of a log."""
+    """Make the error for an unusable log."""
     return SettingsError(
         f"{path}: {what}.", hint=hint or "Was the log copied completely?"
     )
 
 
 def short_type(name: str) -> str:
-    """Return a type without the folder that ROS 2 puts into its name.
+    """Return a type name without the "msg" folder of ROS 2.
 
     sensor_msgs/msg/JointState and sensor_msgs/JointState are the same type.
     """
@@ -113,7 +113,7 @@ def short_type(name: str) -> str:
 
 
 def checked_name(path: Path, name: bytes | str, what: str) -> str:
-    """Return a name of a log as text; raises SettingsError where it is too long."""
+    """Return a name from a log as text; raises SettingsError if it is too long."""
     size = len(name if isinstance(name, bytes) else name.encode(errors="replace"))
     if size > LONGEST_NAME:
         raise damaged(path, f"{what} of {size} bytes, the limit is {LONGEST_NAME}")
@@ -121,7 +121,7 @@ def checked_name(path: Path, name: bytes | str, what: str) -> str:
 
 
 def first_byte(path: Path) -> bytes:
-    """First byte of a file beside a log; b"" where there is none, or nothing in it."""
+    """Return the first byte of a companion file; b"" if it is missing or empty."""
     try:
         with open_regular(path, is_link_followed=True) as file:
             return file.read(1)
@@ -132,12 +132,12 @@ def first_byte(path: Path) -> bytes:
 
 
 def copy_bounded(sources: Sequence[Path], copies: Sequence[Path]) -> None:
-    """Copy files whose size together is within the limit of a log.
+    """Copy files whose total size is within the limit of a log.
 
     Raises:
-        SettingsError: they are too large, or one cannot be read or written.
+        SettingsError: the files are too large, or cannot be read or written.
     """
-    left = LARGEST_LOG
+    remaining = LARGEST_LOG
     for source, copy in zip(sources, copies, strict=True):
         try:
             with (
@@ -145,16 +145,16 @@ def copy_bounded(sources: Sequence[Path], copies: Sequence[Path]) -> None:
                 copy.open("wb") as new,
             ):
                 while block := old.read(_BLOCK):
-                    left -= len(block)
-                    if left < 0:
-                        raise too_large(source, LARGEST_LOG - left)
+                    remaining -= len(block)
+                    if remaining < 0:
+                        raise too_large(source, LARGEST_LOG - remaining)
                     new.write(block)
         except (UnfitFileError, OSError) as error:
             raise damaged(source, f"cannot be copied ({error})") from error
 
 
 def too_large(path: Path, size: int) -> SettingsError:
-    """Return the refusal of a log of over 2 GB."""
+    """Make the error for a log of over 2 GB."""
     return damaged(
         path,
         f"{size / 1e9:.1f} GB, the limit is {LARGEST_LOG / 1e9:.0f} GB",

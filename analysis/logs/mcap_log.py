@@ -1,6 +1,6 @@
-"""MCAP logs of ROS 1 and ROS 2, record by record, without their index.
+"""MCAP logs of ROS 1 and ROS 2, read sequentially without the index.
 
-What is cut or damaged ends the reading there; what came before is sound by its
+Reading ends at a truncated or damaged record; everything before it is verified by
 checksums.
 """
 
@@ -37,32 +37,32 @@ from analysis.logs.log_file import (
     short_type,
 )
 
-_MESSAGE = Opcode.MESSAGE.value  # most records are: a plain number compares faster
+_MESSAGE = Opcode.MESSAGE.value  # most frequent; a plain integer compares faster
 _SERIALIZATIONS: dict[str, Serialization] = {"cdr": "cdr", "ros1": "ros1"}
-_SIMULATED = ("simulated", "true")  # in metadata
+_SIMULATED = ("simulated", "true")  # metadata entry
 
 
 class McapLog(OneFile):
-    """Implements `analysis.logs.log_file.LogFile`."""
+    """MCAP log; implements `analysis.logs.log_file.LogFile`."""
 
     format = "MCAP"
 
     def __init__(self, path: Path) -> None:
-        """Look at the file once for its topics.
+        """Scan the file once for its topics.
 
         Raises:
-            SettingsError: a name is too long, or there are too many.
+            SettingsError: a name is too long, or there are too many topics.
         """
         super().__init__(path)
         for _ in self.messages(()):
             pass
 
     def messages(self, topics: Collection[str]) -> Iterator[LogMessage]:
-        """Give every message of `topics`, in the order of the file."""
+        """Yield every message of `topics` in file order."""
         self.losses.clear()
         wanted, sound_to = set(topics), len(MAGIC)
         definitions = _Definitions(self)
-        known = definitions.topics
+        readable = definitions.topics
         with open_regular(self.path, is_link_followed=True) as file:
             file.read(len(MAGIC))
             try:
@@ -72,17 +72,17 @@ class McapLog(OneFile):
                             definitions.take(opcode, body)
                         elif wanted:
                             channel, _, log_ns, _ = MESSAGE.unpack_from(body)
-                            topic = known.get(channel)
+                            topic = readable.get(channel)
                             if topic in wanted:
                                 content = bytes(body[MESSAGE.size :])
                                 yield LogMessage(topic, log_ns, content)
                     sound_to = raw.end
             except DAMAGE as error:
                 why = str(error) or type(error).__name__
-                self.losses[:] = [f"nothing is read behind byte {sound_to}: {why}"]
+                self.losses[:] = [f"nothing is read after byte {sound_to}: {why}"]
 
     def _opened(self, raw: RawRecord) -> Iterable[RawRecord]:
-        """Return the records of a chunk whose checksum is right; any other as it is."""
+        """Unpack a chunk and verify its checksum; other records are passed through."""
         if raw.opcode != Opcode.CHUNK:
             return (raw,)
         chunk = parse_chunk(raw.body, LARGEST_PART)
@@ -90,16 +90,16 @@ class McapLog(OneFile):
 
 
 class _Definitions:
-    """What one pass through the file has told of its channels.
+    """Channel definitions collected in one pass through the file.
 
     Attributes:
-        topics: that can be read, by the number of their channel.
+        topics: readable topics by channel number.
     """
 
     def __init__(self, log: McapLog) -> None:
         self.topics: dict[int, str] = {}
         self._log = log
-        self._types: dict[int, str] = {}  # by the number of their schema
+        self._types: dict[int, str] = {}  # by schema number
 
     def take(self, opcode: int, body: memoryview) -> None:
         if opcode == Opcode.SCHEMA:
@@ -107,7 +107,7 @@ class _Definitions:
         elif opcode == Opcode.CHANNEL:
             self._take_channel(parse(Channel, body))
         elif opcode == Opcode.METADATA:
-            with suppress(*DAMAGE):  # no message depends on it
+            with suppress(*DAMAGE):  # not needed to read messages
                 metadata = parse(Metadata, body).metadata
                 self._log.is_simulated |= _SIMULATED in metadata.items()
 

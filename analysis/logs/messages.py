@@ -1,9 +1,9 @@
-"""The two messages that an import reads: JointState and WrenchStamped.
+"""Decoding of the two message types of an import: JointState and WrenchStamped.
 
-Their layout is that of the ROS packages; a definition inside a file is neither read nor
-executed. CDR aligns every number to its own size, counted from behind the four bytes
-that state the byte order (plain CDR of DDS-XTypes 1.3, 7.4.3); ROS 1 aligns nothing, is
-little-endian, and its header begins with a counter.
+The layout is that of the ROS packages; definitions inside a file are ignored. CDR
+aligns every number to its own size, counted after the four bytes that state the byte
+order (plain CDR of DDS-XTypes 1.3, 7.4.3); ROS 1 does not align, is little-endian, and
+its header begins with a counter.
 """
 
 import struct
@@ -22,16 +22,16 @@ _NS = 10**9
 
 
 class MessageError(ValueError):
-    """A message is not what its type says; the text says where."""
+    """A message does not match its type; the text says where."""
 
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """When and in which frame.
+    """Message header.
 
     Attributes:
-        stamp_ns: [UTC ns]; 0 where the sender set none.
-        frame_id: as stated; may be empty.
+        stamp_ns: time stamp [UTC ns]; 0 if not set.
+        frame_id: frame; may be empty.
     """
 
     stamp_ns: int
@@ -40,13 +40,13 @@ class Header:
 
 @dataclass(frozen=True, slots=True)
 class JointMessage:
-    """A sensor_msgs/JointState.
+    """Content of a sensor_msgs/JointState.
 
     Attributes:
-        header: its header.
-        names: of the joints.
-        position: [rad, m], shape (joints,); empty where the message has none.
-        velocity: [rad/s, m/s], shape (joints,); empty where the message has none.
+        header: header.
+        names: names of the joints.
+        position: positions [rad, m], shape (joints,); empty if the message has none.
+        velocity: velocities [rad/s, m/s], shape (joints,); empty if there are none.
     """
 
     header: Header
@@ -56,15 +56,15 @@ class JointMessage:
 
 
 def read_header(data: bytes, serialization: Serialization) -> Header:
-    """Header of a message that begins with one; raises MessageError."""
+    """Decode the header of a stamped message; raises MessageError."""
     return _Cursor(data, serialization).header()
 
 
 def read_joints(data: bytes, serialization: Serialization) -> JointMessage:
-    """A JointState from its bytes.
+    """Decode a JointState.
 
     Raises:
-        MessageError: it is too short, or states an absurd count.
+        MessageError: the message is too short, or states an absurd count.
     """
     cursor = _Cursor(data, serialization)
     header, count = cursor.header(), cursor.count(4)
@@ -73,17 +73,17 @@ def read_joints(data: bytes, serialization: Serialization) -> JointMessage:
 
 
 def read_wrench(data: bytes, serialization: Serialization) -> tuple[Header, Array]:
-    """Header, and force [N] and torque [N m], shape (6,), of a WrenchStamped.
+    """Decode a WrenchStamped: header, and force [N] and torque [N m], shape (6,).
 
     Raises:
-        MessageError: it is too short.
+        MessageError: the message is too short.
     """
     cursor = _Cursor(data, serialization)
     return cursor.header(), cursor.doubles(6)
 
 
 class _Cursor:
-    """Reads the fields of a message from its begin on."""
+    """Reads the fields of a message in sequence."""
 
     def __init__(self, data: bytes, serialization: Serialization) -> None:
         self._data, self._is_cdr = data, serialization == "cdr"
@@ -101,7 +101,7 @@ class _Cursor:
         return Header(seconds * _NS + nanoseconds, self.text())
 
     def count(self, size: int) -> int:
-        """How many elements of at least `size` bytes follow; never more than fit."""
+        """Read an element count, limited to elements of `size` bytes that can fit."""
         count = self._integer()
         if count > MOST_JOINTS or count * size > len(self._data) - self._at:
             raise MessageError(f"it states {count} elements")
@@ -123,9 +123,9 @@ class _Cursor:
         self._align(8)
         if count * 8 > len(self._data) - self._at:
             raise MessageError("it is shorter than its type")
-        found = np.frombuffer(self._data, f"{self._order}f8", count, self._at)
+        values = np.frombuffer(self._data, f"{self._order}f8", count, self._at)
         self._at += 8 * count
-        return found.astype(np.float64)
+        return values.astype(np.float64)
 
     def _integer(self) -> int:
         self._align(4)

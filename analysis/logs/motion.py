@@ -1,4 +1,4 @@
-"""Joints and wrench on one even grid of time, and the velocities of the joints."""
+"""Resampling of joints and wrench to an even time grid, and joint velocities."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from analysis.data.series import Array
 from analysis.logs.channels import JointChannel
 
 _ORDER = 2  # of the local polynomial
-_SPAN = PrepareOptions().smoothing / RATE_HZ  # s: that of the moving average
-LONGEST_GAP = 3.5  # steps that a line may bridge, as in analysis.data.prepare
+_SPAN = PrepareOptions().smoothing / RATE_HZ  # s, as the moving average
+LONGEST_GAP = 3.5  # steps bridged by interpolation, as in analysis.data.prepare
 _NS = 1e-9
-_LITTLE = 1e-6  # of a step: rounding of times
+_ROUNDING = 1e-6  # tolerance of times [steps]
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,12 +26,12 @@ class JointMotion:
     """Joints on an even grid.
 
     Attributes:
-        t: time since the first message of the joints [s], shape (n,), even but for
-            gaps, where it jumps.
-        step: between two rows [s].
+        t: time since the first joint message [s], shape (n,), evenly spaced except for
+            gaps.
+        step: time step [s].
         q: positions, shape (n, joints).
         qd: velocities by a local polynomial of the positions, shape (n, joints).
-        dropped: rows of the grid that lie in gaps.
+        dropped: number of rows of the grid that lie in gaps.
     """
 
     t: Array
@@ -42,17 +42,17 @@ class JointMotion:
 
 
 def joint_motion(channel: JointChannel) -> JointMotion:
-    """Return positions and velocities on the grid of the joints' own rate.
+    """Resample positions to the rate of the joints and compute velocities.
 
-    A gap of over 3.5 steps stays one.
+    Gaps of over 3.5 steps are not bridged.
     """
     times = seconds_since(channel.clock.times_ns, int(channel.clock.times_ns[0]))
     step = float(np.median(np.diff(times)))
     longest = LONGEST_GAP * step
-    # only where there are messages: a log may pause for hours
+    # only where there are messages, because a log may pause for hours
     parts = [
         np.arange(
-            np.ceil(first / step - _LITTLE), np.floor(last / step + _LITTLE) + 1.0
+            np.ceil(first / step - _ROUNDING), np.floor(last / step + _ROUNDING) + 1.0
         )
         for first, last in _covered_spans(times, longest)
     ]
@@ -74,37 +74,37 @@ def _covered_spans(times: Array, longest: float) -> list[tuple[float, float]]:
 
 
 def rows_averaged(step: float) -> int:
-    """Return how many rows of a grid the 22 ms of the moving average are; odd."""
+    """Return the width of a 22 ms moving average in rows of a grid; odd."""
     return 2 * max(0, round((_SPAN / step - 1.0) / 2.0)) + 1
 
 
 def seconds_since(times_ns: NDArray[np.int64], origin_ns: int) -> Array:
-    """Return times since an instant [s]."""
+    """Convert times to seconds since an origin."""
     return (times_ns - origin_ns).astype(np.float64) * _NS
 
 
 def interpolated(at: Array, times: Array, values: Array) -> Array:
-    """Return columns on lines between their rows, shape (len(at), columns)."""
+    """Interpolate columns linearly, shape (len(at), columns)."""
     return np.column_stack([np.interp(at, times, column) for column in values.T])
 
 
 def covered(times: Array, at: Array, longest: float) -> NDArray[np.bool_]:
-    """Return where instants lie between two messages that are near enough."""
+    """Return which times lie between two messages at most `longest` [s] apart."""
     after = np.clip(np.searchsorted(times, at, "right"), 1, len(times) - 1)
     is_within = (at >= times[0] - 1e-9) & (at <= times[-1] + 1e-9)
     return is_within & (times[after] - times[after - 1] <= longest)
 
 
 def mean_around(times: Array, values: Array, at: Array, span: float) -> Array:
-    """Return the mean of columns over `span` around instants; NaN beside gaps.
+    """Return the mean of columns over `span` around times; NaN next to gaps.
 
-    The mean is that of the lines between the messages, so faster and slower messages
-    are served alike.
+    The mean is that of the linear interpolation, so it works for messages faster or
+    slower than `span`.
 
     Args:
-        times: of the messages [s], shape (n,).
-        values: shape (n, columns).
-        at: instants [s], shape (m,).
+        times: times of the messages [s], shape (n,).
+        values: values of the messages, shape (n, columns).
+        at: times of the means [s], shape (m,).
         span: width of the mean [s].
     """
     steps = np.diff(times)[:, None]
@@ -124,7 +124,7 @@ def mean_around(times: Array, values: Array, at: Array, span: float) -> Array:
 
 
 def _area_until(times: Array, values: Array, areas: Array, at: Array) -> Array:
-    """Return the integral of the lines between messages up to instants."""
+    """Integrate the linear interpolation up to the times `at`."""
     k = np.clip(np.searchsorted(times, at, "right") - 1, 0, len(times) - 2)
     beyond = at - times[k]
     width = times[k + 1] - times[k]
@@ -133,16 +133,16 @@ def _area_until(times: Array, values: Array, areas: Array, at: Array) -> Array:
 
 
 def _stretches(t: Array, step: float) -> list[tuple[int, int]]:
-    """Return the stretches of a grid without missing rows."""
+    """Return (first, end) of the stretches of a grid without missing rows."""
     if len(t) < 2:
         return [(0, len(t))]
     breaks = np.flatnonzero(np.diff(t) > 1.5 * step) + 1
-    edges = [0, *(int(each) for each in breaks), len(t)]
+    edges = [0, *(int(row) for row in breaks), len(t)]
     return list(pairwise(edges))
 
 
 def _slope(q: Array, step: float) -> Array:
-    """Return the velocities of a stretch by a local polynomial of 22 ms."""
+    """Compute the velocities of a stretch by a local polynomial of 22 ms."""
     width = max(rows_averaged(step), 3)
     if len(q) < max(width, _ORDER + 1):
         return np.gradient(q, step, axis=0) if len(q) > 1 else np.zeros_like(q)

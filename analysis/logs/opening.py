@@ -1,4 +1,4 @@
-"""A log by its path: a file, or a folder of rosbag2 with one or more files."""
+"""Opening of a log: a file, or a rosbag2 folder with one or more files."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ _FORMATS = "Give an .mcap, a folder or .db3 of rosbag2, or a ROS 1 .bag."
 
 @contextmanager
 def open_log(path: Path) -> Iterator[LogFile]:
-    """Give the log at `path`.
+    """Open the log at `path`.
 
     Raises:
-        SettingsError: it is missing, no log, too large, or damaged.
+        SettingsError: the log is missing, unknown, too large or damaged.
     """
     files = _files(path)
     with tempfile.TemporaryDirectory(prefix="traction-import-") as scratch:
@@ -48,11 +48,11 @@ def open_log(path: Path) -> Iterator[LogFile]:
 
 
 class LogOfParts:
-    """The files of one log one behind another; implements `LogFile`."""
+    """Several files of one log in sequence; implements `LogFile`."""
 
     def __init__(self, path: Path, files: list[Path], parts: list[LogFile]) -> None:
         self.path = path
-        self._names = [file.name for file in files]  # a packed part lies elsewhere
+        self._names = [file.name for file in files]  # unpacked parts have other paths
         self.format = f"{parts[0].format}, {len(parts)} files"
         self.losses: list[str] = []
         self.topics: dict[str, LogTopic] = {}
@@ -64,7 +64,7 @@ class LogOfParts:
         self._parts = parts
 
     def messages(self, topics: Collection[str]) -> Iterator[LogMessage]:
-        """Give every message of `topics`, in the order of the files.
+        """Yield every message of `topics` in the order of the files.
 
         Raises:
             SettingsError: two files hold the same messages.
@@ -83,16 +83,16 @@ class LogOfParts:
                 raise damaged(
                     self.path,
                     f"{first} and {name} hold the same {count} messages: the "
-                    "recording is there twice",
+                    "recording is duplicated",
                     "Give one of the two files.",
                 )
 
 
 def log_files(path: Path) -> list[Path]:
-    """Return the files that a log at `path` consists of; raises SettingsError."""
+    """List the files of the log at `path`; raises SettingsError."""
     files = _files(path)
-    beside = [wal_of(file) for file in files]
-    return [*files, *(wal for wal in beside if first_byte(wal))]
+    wals = [wal_of(file) for file in files]
+    return [*files, *(wal for wal in wals if first_byte(wal))]
 
 
 def _files(path: Path) -> list[Path]:
@@ -122,7 +122,7 @@ def _opened(path: Path, scratch: Path) -> LogFile:
         return BagLog(path)
     if start.startswith(b"#ROSBAG V1"):
         raise damaged(path, "a bag of format 1", "Convert it: rosbag migrate.")
-    raise damaged(path, "no log that is known", _FORMATS)
+    raise damaged(path, "not a known log format", _FORMATS)
 
 
 def _first_bytes(path: Path) -> bytes:
@@ -142,7 +142,7 @@ def _first_bytes(path: Path) -> bytes:
 
 
 def _unpack_file(path: Path, scratch: Path) -> None:
-    """Write the content of a packed file into `scratch`."""
+    """Unpack a compressed file to `scratch`."""
     most = min(LARGEST_LOG, max(2**20, LARGEST_RATIO * path.stat().st_size))
     try:
         with (

@@ -1,4 +1,4 @@
-"""`import.json`: what a data package of imported trials was made from, and how."""
+"""`import.json`: provenance of a data package of imported trials."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ class _Part(BaseModel):
 
 
 class ImportedFile(_Part):
-    """One file that was read.
+    """One file read by an import.
 
     Attributes:
         what: "log", "urdf" or "tare".
         path: name of the file.
-        bytes: its size.
-        sha256: its digest.
+        bytes: size.
+        sha256: digest.
     """
 
     what: _Text
@@ -45,23 +45,23 @@ class ImportedFile(_Part):
 
 
 class ImportedTopic(_Part):
-    """One topic that was read.
+    """One topic read by an import.
 
     Attributes:
         what: "joints" or "wrench".
-        name: of the topic.
-        type: of its messages.
-        frame_id: that its header names.
-        times: "stamp" or "receipt".
-        read: messages of the topic.
-        used: of them that became readings.
-        dropped: incomplete ones, and those with numbers that are not finite.
-        repeated: with the time of another one.
-        overtaken: that stood behind a later one.
-        rate_by_stamp: [Hz].
-        rate_by_receipt: [Hz].
-        late_ms: receipt less stamp, median and at most [ms].
-        longest_gap_ms: between two that are used [ms].
+        name: name of the topic.
+        type: type of its messages.
+        frame_id: frame in its header.
+        times: clock: "stamp" or "receipt".
+        read: number of messages.
+        used: number of used messages.
+        dropped: incomplete messages and those with invalid numbers.
+        repeated: messages with a duplicate time.
+        overtaken: messages out of order.
+        rate_by_stamp: rate by stamps [Hz].
+        rate_by_receipt: rate by receipt [Hz].
+        late_ms: receipt minus stamp, median and maximum [ms].
+        longest_gap_ms: longest time between two used messages [ms].
     """
 
     what: _Text
@@ -81,15 +81,15 @@ class ImportedTopic(_Part):
 
 
 class ImportedFigure(_Part):
-    """One thing that was stated, or that the log shows.
+    """Comparison of one stated quantity with the log.
 
     Attributes:
-        name: what it is.
-        value: as stated, in `unit`; empty for what was not stated.
-        unit: of the numbers.
-        shown: by the log, in `unit`; empty where it shows nothing.
-        spread: how well it is shown; `how` names its unit.
-        how: by what it is shown, why it is not, or the limit of a check.
+        name: name of the quantity.
+        value: stated value in `unit`; empty if not stated.
+        unit: unit of the values.
+        shown: value from the log in `unit`; empty if unavailable.
+        spread: uncertainty of that value; `how` names its unit.
+        how: method, reason why there is no value, or limit of a check.
     """
 
     name: _Text
@@ -101,23 +101,23 @@ class ImportedFigure(_Part):
 
 
 class ImportRecord(_Part):
-    """The content of `import.json`.
+    """Content of `import.json`.
 
     Attributes:
-        format: of this file.
-        version: of this form.
-        log_format: of the log, in words.
+        format: format of this file.
+        version: version of this format.
+        log_format: format of the log in words.
         robot: name of the robot in its URDF.
-        joints: between its base and the foot.
-        is_estimated: the robot estimated the wrench.
-        files: that were read.
-        topics: that were read.
-        arguments: of the command, by option.
-        checks: what was stated beside what the log shows.
-        trials: seconds of the log, by name of the trial.
-        warnings: word for word.
-        losses: what of the log could not be read.
-        versions: of program and packages.
+        joints: joints between base and foot.
+        is_estimated: the wrench was estimated by the robot.
+        files: files read.
+        topics: topics read.
+        arguments: command-line arguments by option.
+        checks: comparisons of the input with the log.
+        trials: start and end [s of the log] by trial name.
+        warnings: warnings, verbatim.
+        losses: unreadable parts of the log.
+        versions: versions of program and packages.
     """
 
     format: Literal["traction-import"] = "traction-import"
@@ -136,15 +136,15 @@ class ImportRecord(_Part):
     versions: Entries[str, _Text]
 
     def text(self) -> str:
-        """Return it as JSON."""
+        """Serialise the record as JSON."""
         return self.model_dump_json(indent=1) + "\n"
 
 
 def read_record(folder: Path) -> ImportRecord | None:
-    """Return what a folder says of its import; None where it says nothing.
+    """Read the import record of a folder; None without one.
 
     Raises:
-        SettingsError: its `import.json` cannot be read.
+        SettingsError: `import.json` cannot be read.
     """
     path = folder / RECORD
     try:
@@ -157,6 +157,6 @@ def read_record(folder: Path) -> ImportRecord | None:
         raise SettingsError(f"{path}: cannot be read ({error.strerror}).") from error
     except ValidationError as error:
         raise SettingsError(
-            f"{path}: it is no record of an import ({first_problem(error)}).",
+            f"{path}: it is not a record of an import ({first_problem(error)}).",
             hint="Make the package again: traction import LOG --to DIR.",
         ) from error

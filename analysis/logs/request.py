@@ -1,4 +1,4 @@
-"""What a person states of a log: everything that changes a number of its trials."""
+"""User input of an import: everything that affects the numbers of its trials."""
 
 from __future__ import annotations
 
@@ -17,29 +17,29 @@ Tare = tuple[float, float] | Array | Literal["none"]
 
 @dataclass(frozen=True, slots=True)
 class ImportRequest:
-    """What is stated.
+    """User input of an import.
 
     Attributes:
-        log: file or folder.
-        urdf: of the robot.
-        foot: link of the URDF, the centre of the sole.
-        sensor: link of the URDF in whose axes the wrench is.
-        acts: what the numbers of the wrench are.
+        log: log file or folder.
+        urdf: URDF of the robot.
+        foot: URDF link at the centre of the sole.
+        sensor: URDF link in whose axes the wrench is given.
+        acts: sign convention of the wrench.
         tare: (start, end) [s of the log] in which the foot is free, six numbers
-            [N, N m], or "none" for a sensor that is tared.
-        mass: of everything below the gauges [kg].
-        along: direction of the slip in the base, shape (3,).
-        normal: of the ground in the base, shape (3,).
-        lag: how late the wrench is stamped against the joints [s].
-        trials: (start, end) [s of the log], a trial each.
-        joints: topic; None = the only one.
-        wrench: topic; None = the only one.
-        clock: "stamp" or "receipt"; None = stamps, refused where they disagree with
-            the recorder's clock.
+            [N, N m], or "none" for a tared sensor.
+        mass: mass of everything below the gauges [kg].
+        along: direction of the slip in the base frame, shape (3,).
+        normal: normal of the ground in the base frame, shape (3,).
+        lag: lag of the wrench stamps relative to the joints [s].
+        trials: (start, end) [s of the log] of every trial.
+        joints: topic of the joints; None = the only one.
+        wrench: topic of the wrench; None = the only one.
+        clock: "stamp" or "receipt"; None = stamps, refused if they disagree with the
+            recorder's clock.
         terrain: name of the terrain.
-        factors: what else is known of terrain and foot, by name.
-        is_slow: rates below 50 Hz are taken.
-        is_estimated: the wrench is not measured but estimated by the robot.
+        factors: further properties of terrain and foot by name.
+        is_slow: accept rates below 50 Hz.
+        is_estimated: the wrench is estimated by the robot, not measured.
     """
 
     log: Path
@@ -63,5 +63,5 @@ class ImportRequest:
 
     @property
     def sign(self) -> float:
-        """+1 where the numbers of the wrench are the ground's force on the foot."""
+        """+1 if the wrench is the ground's force on the foot, otherwise -1."""
         return 1.0 if self.acts == "ground-on-foot" else -1.0

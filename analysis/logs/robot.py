@@ -1,9 +1,9 @@
 # pyright: basic, reportMissingImports=false
-"""A robot by its URDF: where foot and sensor are at positions of the joints.
+"""Forward kinematics of foot and sensor from a URDF.
 
-Only the joints between the base and the two frames are kept: from what a URDF says of
-them a plain one is written, without meshes, masses and extensions, and Pinocchio reads
-that. The file is taken as hostile: no entities, bounded, a tree of finite numbers.
+Only the joints between the base and the two frames are kept: they are rewritten as a
+plain URDF without meshes, masses and extensions, which Pinocchio reads. The file is
+untrusted: no entities, bounded size, a tree with finite numbers.
 """
 
 from __future__ import annotations
@@ -27,29 +27,29 @@ from analysis.data.series import Array
 
 LARGEST_URDF = 2_000_000  # bytes
 MOST_LINKS = 500
-_DEEPEST = 64  # elements within elements
+_DEEPEST = 64  # nesting depth of elements
 _MOST_ELEMENTS = 100_000
 _FARTHEST = 1_000.0  # m between two joints
 _LONGEST_NAME = 200
 _MOVING = ("revolute", "prismatic", "continuous")
 _FIXED = "fixed"
-_NEAREST = 10  # names in a refusal
+_NEAREST = 10  # names listed in a message
 _ENCODING = re.compile(rb"<\?xml[^>]{0,200}?\sencoding\s*=\s*[\"']([\w.-]{1,40})[\"']")
 _ENCODINGS = ("utf-8", "utf8", "us-ascii", "ascii", "iso-8859-1", "latin-1", "latin1")
 
 
 @dataclass(frozen=True, slots=True)
 class UrdfJoint:
-    """One joint of a URDF, checked.
+    """One validated joint of a URDF.
 
     Attributes:
-        name: of the joint.
+        name: name of the joint.
         kind: "fixed", "revolute", ...
-        parent: link.
-        child: link.
-        xyz: of the child in the parent [m].
-        rpy: the same, turned [rad].
-        axis: of the joint in the child.
+        parent: parent link.
+        child: child link.
+        xyz: position of the child in the parent [m].
+        rpy: orientation of the child in the parent, roll, pitch, yaw [rad].
+        axis: joint axis in the child frame.
         mimics: name of the joint that it follows; "" for none.
     """
 
@@ -65,13 +65,13 @@ class UrdfJoint:
 
 @dataclass(frozen=True, slots=True)
 class Urdf:
-    """What a URDF says of links and joints.
+    """Links and joints of a URDF.
 
     Attributes:
         path: the file.
-        name: of the robot.
-        links: their names.
-        joints: by child link.
+        name: name of the robot.
+        links: names of the links.
+        joints: joints by child link.
     """
 
     path: Path
@@ -81,14 +81,14 @@ class Urdf:
 
     @property
     def joint_names(self) -> list[str]:
-        """The joints that move, by name."""
+        """Names of the moving joints."""
         return [j.name for j in self.joints.values() if j.kind != _FIXED]
 
     def chain(self, frame: str, what: str) -> list[UrdfJoint]:
         """Return the joints from the base to a link.
 
         Raises:
-            SettingsError: there is no such link, or a joint on the way cannot be used.
+            SettingsError: there is no such link, or a joint in the chain is unusable.
         """
         if frame not in self.links:
             near = get_close_matches(frame, self.links, _NEAREST, 0.0)
@@ -106,10 +106,10 @@ class Urdf:
 
 
 def read_urdf(path: Path) -> Urdf:
-    """Return the links and joints of a URDF.
+    """Read the links and joints of a URDF.
 
     Raises:
-        SettingsError: it is missing, too large, no URDF, or no tree.
+        SettingsError: the file is missing, too large, not a URDF, or not a tree.
     """
     try:
         data = read_regular(path, LARGEST_URDF, is_link_followed=True)
@@ -121,13 +121,13 @@ def read_urdf(path: Path) -> Urdf:
 
 
 def parse_urdf(path: Path, data: bytes) -> Urdf:
-    """Return the links and joints of a URDF's text; `path` names it in messages.
+    """Parse the text of a URDF; `path` names it in messages.
 
     Raises:
         SettingsError: as for `read_urdf`.
     """
     root = _parsed(path, data)
-    links = tuple(_name(path, each) for each in root.findall("link"))
+    links = tuple(_name(path, link) for link in root.findall("link"))
     elements = root.findall("joint")
     if not 0 < len(links) <= MOST_LINKS or len(elements) > MOST_LINKS:
         counts = f"{len(links)} links and {len(elements)} joints"
@@ -136,11 +136,11 @@ def parse_urdf(path: Path, data: bytes) -> Urdf:
     for element in elements:
         joint = _joint(path, element)
         if joint.child in joints or not {joint.child, joint.parent} <= {*links}:
-            raise _refused(path, f"joint {joint.name}: its links make no tree")
+            raise _refused(path, f"joint {joint.name}: its links do not form a tree")
         joints[joint.child] = joint
     names = [joint.name for joint in joints.values()]
     if len({*links}) < len(links) or len({*names}) < len(names):
-        raise _refused(path, "a name is there twice")
+        raise _refused(path, "a name occurs twice")
     _check_tree(path, links, joints)
     return Urdf(path, root.get("name", "")[:_LONGEST_NAME], links, joints)
 
@@ -177,7 +177,7 @@ def _parsed(path: Path, data: bytes) -> ET.Element:
                     raise _refused(path, f"elements over {_DEEPEST} deep")
         parser.close()
     except (ET.ParseError, ValueError, LookupError) as error:
-        raise _refused(path, f"it is no XML ({error})") from error
+        raise _refused(path, f"it is not XML ({error})") from error
     if root is None:
         raise _refused(path, "it has no element")
     for element in root.iter():
@@ -216,8 +216,8 @@ def _name(path: Path, element: ET.Element) -> str:
 
 
 def _link_of(path: Path, element: ET.Element, which: str) -> str:
-    found = element.find(which)
-    return "" if found is None else found.get("link", "")
+    child = element.find(which)
+    return "" if child is None else child.get("link", "")
 
 
 def _three(
@@ -227,7 +227,7 @@ def _three(
     key: str,
     default: tuple[float, float, float],
 ) -> tuple[float, float, float]:
-    """Return three numbers of an attribute."""
+    """Parse three numbers of an attribute."""
     text = None if element is None else element.get(key)
     if text is None:
         return default
@@ -241,7 +241,7 @@ def _three(
 
 
 def _check_tree(path: Path, links: Sequence[str], joints: dict[str, UrdfJoint]) -> None:
-    """Refuse links that go round in a circle, and more than one base."""
+    """Refuse loops of links and more than one base."""
     bases = [link for link in links if link not in joints]
     if len(bases) != 1:
         raise _refused(path, f"{len(bases)} links without a parent, one is the base")
@@ -270,7 +270,7 @@ def _check_use(path: Path, joint: UrdfJoint) -> None:
 
 _OTHER_JOINTS = (
     "Fixed, revolute, continuous and prismatic joints may lie between the base and the "
-    "foot: one number of a JointState places each."
+    "foot: each has one position in a JointState."
 )
 
 
@@ -280,13 +280,13 @@ def _refused(path: Path, why: str, hint: str = "") -> SettingsError:
 
 @dataclass(frozen=True, slots=True)
 class FramePath:
-    """Foot and sensor along a log, in the axes of the base.
+    """Foot and sensor at every row, in the base frame.
 
     Attributes:
         foot: position of the foot [m], shape (n, 3).
-        velocity: of the foot [m/s], shape (n, 3).
+        velocity: velocity of the foot [m/s], shape (n, 3).
         sensor: orientation, sensor to base, shape (n, 3, 3).
-        lever: from the sensor's origin to the foot, in its axes [m], shape (n, 3).
+        lever: sensor origin to foot, in the sensor's axes [m], shape (n, 3).
     """
 
     foot: Array
@@ -296,18 +296,18 @@ class FramePath:
 
 
 class RobotLeg:
-    """The kinematics from a base that stands still to foot and sensor.
+    """Kinematics from a fixed base to foot and sensor.
 
     Attributes:
-        joints: names of the joints that move, in the order of positions.
+        joints: names of the moving joints, in the order of positions.
         base: name of the base link.
     """
 
     def __init__(self, urdf: Urdf, foot: str, sensor: str) -> None:
-        """Take the joints to both frames.
+        """Build the model of the joints to both frames.
 
         Raises:
-            SettingsError: a frame is missing, or a joint on the way cannot be used.
+            SettingsError: a frame is missing, or a joint in the chain is unusable.
         """
         to_foot, to_sensor = urdf.chain(foot, "foot"), urdf.chain(sensor, "sensor")
         used = {joint.child: joint for joint in (*to_foot, *to_sensor)}
@@ -322,7 +322,7 @@ class RobotLeg:
         self.joints = list(self._model.names)[1:]
 
     def along(self, q: Array, qd: Array) -> FramePath:
-        """Return foot and sensor at every row of positions.
+        """Compute foot and sensor at every row of positions.
 
         Args:
             q: positions in the order of `joints` [rad, m], shape (n, joints).
@@ -339,20 +339,20 @@ class RobotLeg:
             sensor[k] = data.oMf[self._sensor].rotation
             lever[k] = data.oMf[self._sensor].actInv(data.oMf[self._foot]).translation
             jacobian = pin.getFrameJacobian(model, data, self._foot, axes)
-            jacobian = np.reshape(jacobian, (6, -1))  # a single joint has a vector
+            jacobian = np.reshape(jacobian, (6, -1))  # a vector for a single joint
             velocity[k] = jacobian[:3] @ qd[k]
         return FramePath(foot, velocity, sensor, lever)
 
 
 def _plain_urdf(base: str, joints: Iterable[UrdfJoint]) -> str:
-    """Return a URDF of `joints` alone: links, origins and axes."""
+    """Write a URDF of `joints` only: links, origins and axes."""
     lines = [f'<robot name="robot"><link name={quoteattr(base)}/>']
     for joint in joints:
         xyz, rpy, axis = (
             " ".join(map(repr, numbers))
             for numbers in (joint.xyz, joint.rpy, joint.axis)
         )
-        # one number places a continuous joint, too: Pinocchio would take two
+        # Pinocchio uses two numbers for a continuous joint; here it has one
         kind = "revolute" if joint.kind == "continuous" else joint.kind
         lines.append(
             f"<link name={quoteattr(joint.child)}/>"

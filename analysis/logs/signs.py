@@ -1,4 +1,4 @@
-"""Whether a force can be that of the ground: its signs while the foot is pressed."""
+"""Checks that a force can come from the ground: its signs while the foot is pressed."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from analysis.data.plausibility import (
 )
 from analysis.data.series import Array
 
-PRESSED_FORCE = 2.0  # N; below it a foot is in the air
-LEAST_PRESSING = 0.95  # share of pressed samples with F_n > 0
-LEAST_BRAKING = 0.80  # share of sliding samples with F_t v_t > 0
-USUAL_ASIDE = 0.3  # of the force along the way; more is named
+PRESSED_FORCE = 2.0  # N below which a foot is in the air
+LEAST_PRESSING = 0.95  # least share of pressed samples with F_n > 0
+LEAST_BRAKING = 0.80  # least share of sliding samples with F_t v_t > 0
+USUAL_ASIDE = 0.3  # lateral over traction force above which a warning is given
 _LEAST_MOMENT = 0.02  # N m rms
-_MIRRORED = -0.3  # of the moment that a force at the foot has
-MOST_ASIDE = 1.0  # of the force along the way
+_MIRRORED = -0.3  # gain of the moments below which axes are mirrored
+MOST_ASIDE = 1.0  # lateral over traction force above which the log is refused
 
 
 @dataclass(frozen=True, slots=True)
 class SignFigure:
-    """One figure that the signs of the forces are judged by.
+    """One criterion for the signs of the forces.
 
     Attributes:
-        name: what was looked at.
-        value: what was found.
-        limit: what it may be at least or at most, in words.
+        name: name of the criterion.
+        value: measured value.
+        limit: lower or upper limit in words.
     """
 
     name: str
@@ -42,11 +42,11 @@ class SignFigure:
 
 
 def side_warnings(values: Array, lateral: Array) -> list[str]:
-    """Return that a force across the way tells of a sensor that is turned.
+    """Warn if the lateral force indicates a rotated sensor.
 
     Args:
         values: v_t [m/s], F_t [N], F_n [N], shape (n, 3).
-        lateral: force across the way [N], shape (n,).
+        lateral: lateral force [N], shape (n,).
     """
     v_t, F_t, F_n = values.T
     sliding = (F_n > PRESSED_FORCE) & (v_t > SLOWEST)
@@ -57,22 +57,22 @@ def side_warnings(values: Array, lateral: Array) -> list[str]:
         return []
     angle = float(np.degrees(np.arctan2(aside, along)))
     return [
-        f"{aside:+z.1f} N across the way, {along:.1f} N along it: are axes exchanged, "
+        f"{aside:+z.1f} N across the path, {along:.1f} N along it: are axes exchanged, "
         f"or is the sensor turned by {angle:+z.0f} degrees about the normal? Check "
         "--sensor, the URDF and --along"
     ]
 
 
 def moment_warnings(moment: Array, lever: Array, force: Array) -> list[str]:
-    """Return that the moments are those of mirrored axes.
+    """Warn if the moments indicate mirrored axes.
 
-    A force at the foot has the moment r x F about the sensor's origin. Two exchanged
-    axes are a mirror: forces may still look right, moments then have the other sign.
+    A force at the foot has the moment r x F about the sensor's origin. Exchanging two
+    axes is a reflection: forces may still look right, but moments change sign.
 
     Args:
-        moment: of the ground about the sensor's origin [N m], shape (n, 3).
-        lever: from there to the foot, same axes [m], shape (n, 3).
-        force: of the ground, same axes [N], shape (n, 3).
+        moment: moment of the ground about the sensor's origin [N m], shape (n, 3).
+        lever: vector from there to the foot, same axes [m], shape (n, 3).
+        force: force of the ground, same axes [N], shape (n, 3).
     """
     expected = np.cross(lever, force)
     sound = np.isfinite(expected).all(axis=1) & np.isfinite(moment).all(axis=1)
@@ -91,7 +91,7 @@ def moment_warnings(moment: Array, lever: Array, force: Array) -> list[str]:
 
 
 def way_warnings(way: Array, axes: Array) -> list[str]:
-    """Return that a stroke goes elsewhere than its direction and ground say.
+    """Warn if the path of a stroke deviates from the stated direction or plane.
 
     Args:
         way: positions of the pressed foot in one stroke [m], shape (n, 3).
@@ -101,30 +101,31 @@ def way_warnings(way: Array, axes: Array) -> list[str]:
     length = float(np.ptp(ahead))
     if length < SHORTEST:
         return []
-    found: list[str] = []
+    warnings: list[str] = []
     for option, limit, other in (
         ("--along or --heading", HEADING, aside),
         ("--normal or --incline", INCLINE, above),
     ):
         angle = float(np.degrees(np.arctan(np.polyfit(ahead, other, 1)[0])))
-        beside = length * np.tan(np.radians(abs(angle)))
-        if abs(angle) > limit and beside > UNEVEN:
-            found.append(
-                f"the foot's way is {angle:+z.1f} degrees off {option} "
+        deviation = length * np.tan(np.radians(abs(angle)))
+        if abs(angle) > limit and deviation > UNEVEN:
+            warnings.append(
+                f"the foot's path is {angle:+z.1f} degrees off {option} "
                 f"(limit {limit:g})"
             )
-    return found
+    return warnings
 
 
 def sign_figures(values: Array, lateral: Array) -> list[SignFigure]:
-    """What the signs of the forces in the trials are.
+    """Check the signs of the forces in the trials.
 
     Args:
         values: v_t [m/s], F_t [N], F_n [N], shape (n, 3).
         lateral: force across the way [N], shape (n,).
 
     Raises:
-        SettingsError: no ground that carries and slows a foot has these forces.
+        SettingsError: the forces cannot come from ground that supports and slows the
+            foot.
     """
     v_t, F_t, F_n = values.T
     size = np.sqrt(F_t**2 + F_n**2 + lateral**2)
@@ -142,25 +143,25 @@ def sign_figures(values: Array, lateral: Array) -> list[SignFigure]:
     pressing = float(np.mean(F_n[pressed] > 0.0))
     braking = float(np.mean((F_t * v_t)[sliding] > 0.0))
     aside, along = (float(np.median(np.abs(x[sliding]))) for x in (lateral, F_t))
-    said = (
+    shares = (
         f"F_n > 0 in {pressing:.0%} of the pressed rows (limit {LEAST_PRESSING:.0%}), "
         f"F_t against the motion in {braking:.0%} of the sliding ones (limit "
         f"{LEAST_BRAKING:.0%})"
     )
     if pressing < 1.0 - LEAST_PRESSING and braking < 1.0 - LEAST_BRAKING:
         raise SettingsError(
-            f"Normal and traction force have the other sign: {said}.",
+            f"Normal and traction force have the opposite sign: {shares}.",
             hint="Give the other --acts; or is --sensor another frame?",
         )
     if not (pressing >= LEAST_PRESSING and braking >= LEAST_BRAKING):
         raise SettingsError(
-            f"No ground carries and slows a foot so: {said}.",
+            f"These forces cannot come from the ground: {shares}.",
             hint="Check the axes of the wrench: --sensor, the URDF, --normal, --along; "
             "then --acts and --tare.",
         )
     if aside > MOST_ASIDE * along:
         raise SettingsError(
-            f"The force across the way is {aside:.1f} N, along it {along:.1f} N.",
+            f"The force across the path is {aside:.1f} N, along it {along:.1f} N.",
             hint="Check the axes of the wrench: --sensor, the URDF and --along.",
         )
     return [

@@ -1,4 +1,4 @@
-"""rosbag2 logs in SQLite (.db3), never written to; no view or trigger runs."""
+"""rosbag2 logs in SQLite (.db3), opened read-only without views or triggers."""
 
 from __future__ import annotations
 
@@ -29,20 +29,20 @@ _CACHE_KB = 16_000
 
 
 class SqliteLog(OneFile):
-    """Implements `analysis.logs.log_file.LogFile`."""
+    """rosbag2 log in SQLite; implements `analysis.logs.log_file.LogFile`."""
 
     format = "rosbag2, SQLite"
 
     def __init__(self, path: Path, scratch: Path) -> None:
-        """Read which topics there are.
+        """Read the list of topics.
 
         Args:
             path: the database.
-            scratch: for a copy with its write-ahead log, where it has one.
+            scratch: folder for a copy with the write-ahead log, if there is one.
 
         Raises:
-            SettingsError: it is no log of rosbag2, damaged, or a transaction in it was
-                cut off.
+            SettingsError: the file is not a rosbag2 log, is damaged, or has an
+                unfinished transaction.
         """
         super().__init__(path)
         self._uri = _uri_of(path, scratch)
@@ -58,13 +58,13 @@ class SqliteLog(OneFile):
             if not {"topics", "messages"} <= tables:
                 raise damaged(
                     path,
-                    "no log of rosbag2: the tables topics and messages are missing",
+                    "not a rosbag2 log: the tables topics and messages are missing",
                     "Give a bag folder, an .mcap, a .db3 or a .bag.",
                 )
             self._take_topics(database)
 
     def messages(self, topics: Collection[str]) -> Iterator[LogMessage]:
-        """Give every message of `topics`, in the order of the file."""
+        """Yield every message of `topics` in file order."""
         self.losses.clear()
         with self._opened() as database:
             rows = database.execute("SELECT topic_id, timestamp, data FROM messages")
@@ -78,11 +78,11 @@ class SqliteLog(OneFile):
                     if topic not in topics:
                         continue
                     if not (isinstance(received_ns, int) and isinstance(data, bytes)):
-                        raise DamageError("a message is no bytes")
+                        raise DamageError("a message is not bytes")
                     if data.startswith(ZSTD_MAGIC):
                         data = self.unpacker.unpack(data, "zstd")
                 except (sqlite3.Error, DamageError, OverflowError) as error:
-                    self.losses[:] = [f"nothing is read behind a message: {error}"]
+                    self.losses[:] = [f"nothing is read after a message: {error}"]
                     return
                 yield LogMessage(topic, received_ns, data)
 
@@ -106,7 +106,7 @@ class SqliteLog(OneFile):
 
     @contextmanager
     def _opened(self) -> Iterator[sqlite3.Connection]:
-        """Give the database; what SQLite refuses becomes a SettingsError."""
+        """Open the database; SQLite errors become SettingsError."""
         try:
             with closing(sqlite3.connect(self._uri, uri=True)) as database:
                 database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST_PART)
@@ -124,21 +124,22 @@ class SqliteLog(OneFile):
 
 
 def wal_of(path: Path) -> Path:
-    """Name of the write-ahead log of a database."""
+    """Return the path of the write-ahead log of a database."""
     return path.with_name(f"{path.name}-wal")
 
 
 def _uri_of(path: Path, scratch: Path) -> str:
-    """What SQLite opens: the database itself, or a copy with its write-ahead log.
+    """Return the URI to open: the database, or a copy with its write-ahead log.
 
-    A hot journal is never rolled back: it may name files that SQLite would delete.
+    A hot journal is never rolled back, because it may name files that SQLite would
+    delete.
     """
     journal, wal = path.with_name(f"{path.name}-journal"), wal_of(path)
     if first_byte(journal) not in (b"", b"\0"):
         raise damaged(
             path,
-            f"beside it stands {journal.name}, of a transaction that has not ended: "
-            "its messages may be half written",
+            f"{journal.name} shows a transaction that has not ended: its messages may "
+            "be half written",
             f"Roll it back in a copy of the folder: sqlite3 {path.name} .schema",
         )
     if not first_byte(wal):
@@ -150,4 +151,4 @@ def _uri_of(path: Path, scratch: Path) -> str:
 
 
 def _as_texts(row: Any) -> list[str]:  # noqa: ANN401
-    return [each if isinstance(each, str) else str(each)[:100] for each in row]
+    return [cell if isinstance(cell, str) else str(cell)[:100] for cell in row]

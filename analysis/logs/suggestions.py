@@ -1,7 +1,7 @@
-"""What a log and a URDF hold, and a command line to be read and edited.
+"""Listing of a log and a URDF, with a suggested command line to edit.
 
-Each value of the command line is what `checks` will show; none of them is applied
-before a person states it.
+The suggested values are the estimates that `checks` will show; none is applied unless
+the user states it.
 """
 
 from __future__ import annotations
@@ -41,26 +41,26 @@ from analysis.logs.signs import PRESSED_FORCE
 from ft_sensor.payload import Payload, traction
 
 _NS = 1e-9
-_MOST = 200  # topics and names that are shown
-_JOIN = 0.3  # s; a shorter lift parts no stroke
-_LEAST_WAY = 0.02  # m forward that make a stroke a trial
-_INSIDE = 0.05  # s from the ends of a quiet span
+_MOST = 200  # topics and names listed
+_JOIN = 0.3  # s; a shorter lift does not end a stroke
+_LEAST_TRAVEL = 0.02  # m forward needed for a stroke to be a trial
+_INSIDE = 0.05  # s cut from both ends of a quiet span
 _UP = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True, slots=True)
 class ListRequest:
-    """What is known before the first import.
+    """User input of a listing.
 
     Attributes:
-        log: file or folder.
-        urdf: of the robot; None = only the topics are listed.
+        log: log file or folder.
+        urdf: URDF of the robot; None = list only the topics.
         foot: link of the sole; None = no values are suggested.
         sensor: link of the wrench; None = no values are suggested.
-        acts: what the numbers of the wrench are; None = no values are suggested.
-        joints: topic; None = the only one.
-        wrench: topic; None = the only one.
-        clock: as stated.
+        acts: sign convention of the wrench; None = no values are suggested.
+        joints: topic of the joints; None = the only one.
+        wrench: topic of the wrench; None = the only one.
+        clock: clock to use.
     """
 
     log: Path
@@ -74,10 +74,10 @@ class ListRequest:
 
 
 def listing(request: ListRequest) -> Iterator[str]:
-    """Give topics, types, counts, rates and frames, the robot's links, a command line.
+    """Yield the topics with types, counts, rates and frames, links, and a command line.
 
     Raises:
-        SettingsError: a file is missing, or no log or URDF.
+        SettingsError: a file is missing or not a log or URDF.
     """
     yield from _topics(request.log)
     urdf = None if request.urdf is None else read_urdf(request.urdf)
@@ -103,8 +103,8 @@ def listing(request: ListRequest) -> Iterator[str]:
 
 
 def _command(request: ListRequest, shown: dict[str, str]) -> Iterator[str]:
-    """Give the command line with every option that has to be stated."""
-    known = {
+    """Yield the command line with every required option."""
+    stated = {
         name: str(value)
         for name in ("urdf", "joints", "wrench", "foot", "sensor", "acts", "clock")
         if (value := getattr(request, name)) is not None
@@ -121,10 +121,10 @@ def _command(request: ListRequest, shown: dict[str, str]) -> Iterator[str]:
         "lag": "MS",
         "trials": "T0:T1,..",
     }
-    options = blanks | known | {name: text for name, text in shown.items() if text}
+    options = blanks | stated | {name: text for name, text in shown.items() if text}
     yield f"traction import {quote(str(request.log))} --to DIR \\"
     lines = [
-        # a value that begins with a minus would be taken for an option
+        # a value that begins with a minus would be parsed as an option
         f"    --{name}{'=' if text.startswith('-') else ' '}"
         f"{text if text == blanks.get(name) else quote(text)}"
         for name, text in options.items()
@@ -136,7 +136,7 @@ def _command(request: ListRequest, shown: dict[str, str]) -> Iterator[str]:
 def _shown(
     request: ListRequest, urdf: Urdf
 ) -> Iterator[tuple[str, tuple[str, Estimate]]]:
-    """Give (option, its value as text, what shows it); raises SettingsError."""
+    """Yield (option, (value as text, estimate)); raises SettingsError."""
     leg = RobotLeg(urdf, str(request.foot), str(request.sensor))
     with open_log(request.log) as log:
         record = record_of_leg(
@@ -171,7 +171,7 @@ def _shown(
 def _tare(t: Array, quiet: Bools) -> tuple[str, Estimate]:
     spans = [(float(t[a]), float(t[b - 1])) for a, b in runs(quiet)]
     if not spans:
-        why = "the foot is nowhere quiet 10 mm above its lowest place"
+        why = "the foot is never quiet 10 mm above its lowest position"
         return "", Estimate((), (), why)
     first, last = max(spans, key=lambda span: span[1] - span[0])
     text = f"{first + _INSIDE:.2f}:{last - _INSIDE:.2f}"
@@ -184,32 +184,32 @@ def _payload(
     free = Payload(mass, np.zeros(3), np.eye(3), sign, np.zeros(6))
     if not quiet.any():
         return free
-    rest = free.contact(raw[quiet], record.path.sensor[quiet])
-    return Payload(mass, np.zeros(3), np.eye(3), sign, sign * rest.mean(axis=0))
+    residual = free.contact(raw[quiet], record.path.sensor[quiet])
+    return Payload(mass, np.zeros(3), np.eye(3), sign, sign * residual.mean(axis=0))
 
 
 def _strokes(record: LegRecord, load: Array) -> Sequence[tuple[int, int]]:
-    """(first, end) of the stretches in which something presses the foot."""
+    """Return (first, end) of the stretches in which the foot is pressed."""
     width = rows_averaged(record.motion.step)
     filled = moving_average(np.where(np.isfinite(load), load, 0.0), width)
-    found = pressed_stretches(record.t, filled, PRESSED_FORCE, _JOIN)
-    return [(first, end) for first, end in found if end - first > max(width, 3)]
+    spans = pressed_stretches(record.t, filled, PRESSED_FORCE, _JOIN)
+    return [(first, end) for first, end in spans if end - first > max(width, 3)]
 
 
 def _lag(record: LegRecord, values: Array) -> tuple[str, Estimate]:
-    """By starts and stops, else by the receipts."""
-    found = find_lag(record.t, record.motion.step, values)
+    """Estimate the lag by starts and stops, otherwise by the receipts."""
+    estimate = find_lag(record.t, record.motion.step, values)
     milliseconds = Estimate(
-        tuple(x * 1e3 for x in found.value),
-        tuple(x * 1e3 for x in found.spread),
-        found.how,
+        tuple(x * 1e3 for x in estimate.value),
+        tuple(x * 1e3 for x in estimate.spread),
+        estimate.how,
     )
     if milliseconds.value:
         return f"{milliseconds.value[0]:.0f}", milliseconds
     late = lag_by_receipts(record.joints.clock.fit, record.wrench.clock.fit)
     if late is None:
         return "", milliseconds
-    how = f"{found.how}; receipt less stamp of both topics, delays included"
+    how = f"{estimate.how}; receipt minus stamp of both topics, delays included"
     return f"{late * 1e3:.0f}", Estimate((late * 1e3,), (), how)
 
 
@@ -218,7 +218,7 @@ def _trials(record: LegRecord, values: Array) -> tuple[str, Estimate]:
     strokes = _strokes(record, values[:, 2])
     for first, end in strokes:
         v_t = values[first:end, 0]
-        if float(np.clip(v_t, 0.0, None).sum()) * record.motion.step >= _LEAST_WAY:
+        if float(np.clip(v_t, 0.0, None).sum()) * record.motion.step >= _LEAST_TRAVEL:
             spans.append(f"{record.t[first]:.2f}:{record.t[end - 1]:.2f}")
     how = f"{len(spans)} of {len(strokes)} pressed stretches go forward by 20 mm"
     return ",".join(spans), Estimate((), (), how)
@@ -234,12 +234,12 @@ class _Times(NamedTuple):
 
 
 def _topics(path: Path) -> Iterator[str]:
-    """Give a line for every topic of a log."""
+    """Yield a line for every topic of a log."""
     with open_log(path) as log:
         times = {name: _Times(array("q"), array("q")) for name in log.topics}
         frames: dict[str, str] = {}
         for message in log.messages(log.topics):
-            topic, each = log.topics[message.topic], times[message.topic]
+            topic, of_topic = log.topics[message.topic], times[message.topic]
             stamp_ns = 0
             if topic.type_name in STAMPED:
                 try:
@@ -248,8 +248,8 @@ def _topics(path: Path) -> Iterator[str]:
                     continue
                 stamp_ns = header.stamp_ns
                 frames.setdefault(message.topic, header.frame_id)
-            each.stamps.append(stamp_ns)
-            each.received.append(message.received_ns)
+            of_topic.stamps.append(stamp_ns)
+            of_topic.received.append(message.received_ns)
         yield f"{path}: {log.format}, {len(log.topics)} topics"
         for name, topic in list(log.topics.items())[:_MOST]:
             parts = [f"  {name}  {topic.type_name}", *_rates(times[name])]
@@ -272,7 +272,7 @@ def _rates(times: _Times) -> Iterator[str]:
 
 
 def _rate(times: NDArray[np.int64]) -> float | None:
-    """Messages a second by the median step of sorted times [Hz]."""
+    """Return the message rate by the median step of sorted times [Hz]."""
     steps = np.diff(np.sort(times))
     steps = steps[steps > 0]
     return None if not steps.size else 1.0 / (float(np.median(steps)) * _NS)

@@ -1,6 +1,6 @@
-"""The report: what the sections show of a study, and the page that they stand on.
+"""The report of a study: an HTML page with tables and figures.
 
-Begin with `results`, which is what sections share, then `sections`, a module or package
-for each heading with its own numbers; `findings` puts them into fits.json, `drawing`
-makes the figures, `page` writes the folder.
+Begin with `results`, the data shared by all sections, then `sections`, with a module or
+package per heading; `findings` writes their numbers to fits.json, `drawing` makes the
+figures, `page` writes the folder.
 """

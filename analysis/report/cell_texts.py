@@ -1,4 +1,4 @@
-"""Numbers as the text of a cell: with errors, bounds and p-values."""
+"""Formatting of table cells: errors, bounds and p-values."""
 
 from collections.abc import Sequence
 
@@ -14,20 +14,20 @@ from analysis.tustin.model import TustinBounds
 
 
 def interval_text(bounds: TustinBounds, key: str, interval: Interval) -> str:
-    """Return an interval as text, its ends on a bound as inequalities."""
+    """Format an interval; ends on a bound become inequalities."""
     low, high = (bounded_text(bounds, key, end) for end in interval)
     return low if low == high else f"{low} to {high}"
 
 
 def bounded_text(bounds: TustinBounds, key: str, value: float) -> str:
-    """Return a parameter as text, one on a bound of the search as an inequality."""
+    """Format a parameter; on a bound of the search it becomes an inequality."""
     side = bounds.reached(key, value)
     mark = {"lower": "≤ ", "upper": "≥ "}[side] if side else ""
     return f"{mark}{value:.3g}"
 
 
 def with_error(values: Sequence[float | None], form: str = ".3f") -> str:
-    """Return the mean over trials ± its standard error as text."""
+    """Format the mean over trials ± its standard error."""
     mean, error = mean_of(values), standard_error(values)
     if mean is None:
         return "–"
@@ -35,7 +35,7 @@ def with_error(values: Sequence[float | None], form: str = ".3f") -> str:
 
 
 def paired_cells(pairs: Sequence[PairedComparison | None]) -> list[str]:
-    """Return the comparisons of one table as text, p of each and for all together."""
+    """Format the comparisons of one table, with raw and adjusted p values."""
     adjusted = iter(adjusted_by_holm([pair.p for pair in pairs if pair is not None]))
     return [
         paired_cell(pair, None if pair is None else next(adjusted)) for pair in pairs
@@ -43,7 +43,7 @@ def paired_cells(pairs: Sequence[PairedComparison | None]) -> list[str]:
 
 
 def paired_cell(paired: PairedComparison | None, adjusted: float | None = None) -> str:
-    """Return a comparison as text, with p for all comparisons together if given."""
+    """Format a comparison, with the adjusted p value if given."""
     if paired is None:
         return "–"
     error = "" if paired.standard_error is None else f" ± {paired.standard_error:.3f}"
@@ -52,7 +52,7 @@ def paired_cell(paired: PairedComparison | None, adjusted: float | None = None) 
 
 
 def holm_note(pairs: Sequence[PairedComparison | None]) -> str:
-    """Return how p is adjusted for all comparisons of a table."""
+    """Explain how p is adjusted for the comparisons of a table."""
     present = [pair for pair in pairs if pair is not None]
     return (
         f"Holm: p adjusted for the {len(present)} comparisons of this table; only "
@@ -62,5 +62,5 @@ def holm_note(pairs: Sequence[PairedComparison | None]) -> str:
 
 
 def number_text(value: float | None, digits: int = 2) -> str:
-    """Return a number with so many decimals as text; a dash for None."""
+    """Format a number with this many decimals; a dash for None."""
     return "–" if value is None else f"{value:.{digits}f}"

@@ -1,7 +1,7 @@
-"""The figures of a report, drawn once for the same numbers and the same code.
+"""Drawing and caching of the figures of a report.
 
-Drawing takes longer than all else of a report whose fits are kept, so its figures may
-be kept, too. They are known by all that they show and by the code that draws them.
+Drawing takes longer than everything else in a report with cached fits, so figures can
+be cached, too. They are keyed by the numbers they show and the code that draws them.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from analysis.study.store import ResultStore
 from analysis.study.study import Study
 from analysis.study.tasks import run_tasks
 
-_MOST_DRAWING = 4  # processes
+_MOST_DRAWING = 4  # drawing processes
 _SLOWEST_FIRST = tuple(FIGURES)[::-1]
-_MANY_TERRAINS = 2  # from which on they pay: the workers are there, of the fits
+_MANY_TERRAINS = 2  # terrains from which several processes pay off
 
 
 def report_figures(shown: ShownNumbers) -> list[ReportFigure]:
-    """Return every figure that there are numbers for, in the order of the page.
+    """Draw every figure that has numbers, in the order of the page.
 
-    Processes that draw share no figure, so pictures are the same by any number of them.
+    Every figure is drawn by one process, so the number of processes does not matter.
     """
     count = _processes(shown.results.study)
     shares = [FigureTask(shown, _SLOWEST_FIRST[k::count]) for k in range(count)]
@@ -38,11 +38,11 @@ def report_figures(shown: ShownNumbers) -> list[ReportFigure]:
 
 @dataclass(frozen=True, slots=True)
 class FigureTask:
-    """Figures to draw.
+    """Figures to draw in one process.
 
     Attributes:
-        shown: what they show.
-        keys: which.
+        shown: numbers that they show.
+        keys: keys of the figures.
     """
 
     shown: ShownNumbers
@@ -50,7 +50,7 @@ class FigureTask:
 
 
 def draw_figures(task: FigureTask) -> list[ReportFigure]:
-    """Return those of the figures that there are numbers for."""
+    """Draw those of the figures that have numbers."""
     drawn = (_draw(key, task.shown) for key in task.keys)
     return [figure for figure in drawn if figure is not None]
 
@@ -73,24 +73,24 @@ def _draw(key: str, shown: ShownNumbers) -> ReportFigure | None:
 
 
 def kept_figures(shown: ShownNumbers, store: ResultStore | None) -> list[ReportFigure]:
-    """Return every figure that there are numbers for, from the store or drawn anew.
+    """Return every figure that has numbers, from the cache or newly drawn.
 
     Args:
-        shown: what they show.
-        store: figures of earlier reports; None = they are drawn every time.
+        shown: numbers that they show.
+        store: cache of figures; None = always draw.
     """
     if store is None:
         return report_figures(shown)
-    kept = store.get(report_figures, shown)
-    if isinstance(kept, tuple) and all(isinstance(k, ReportFigure) for k in kept):
-        return list(kept)
+    cached = store.get(report_figures, shown)
+    if isinstance(cached, tuple) and all(isinstance(f, ReportFigure) for f in cached):
+        return list(cached)
     drawn = report_figures(shown)
     store.put(report_figures, shown, drawn)
     return drawn
 
 
 def _processes(study: Study) -> int:
-    """Return how many processes draw; few panels cost less than starting one."""
+    """Return the number of drawing processes; one for few panels."""
     if len(study.terrains) < _MANY_TERRAINS:
         return 1
     return min(study.options.n_jobs or available_cores(), _MOST_DRAWING)

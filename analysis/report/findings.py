@@ -1,4 +1,4 @@
-"""The numbers of all sections as plain values: for fits.json and fits.csv."""
+"""Numbers of all sections as plain values for fits.json and fits.csv."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -31,7 +31,8 @@ def plain_findings(results: StudyResults) -> dict[str, Any]:
         if results.identification is None
         else results.identification.numbers(),
         "break_away": {
-            n: found.numbers() for n, found in results.of(break_away_findings).items()
+            n: terrain.numbers()
+            for n, terrain in results.of(break_away_findings).items()
         },
         "noise": {
             summary.terrain: summary.numbers()

@@ -1,8 +1,8 @@
-"""What a report holds of a recorded trial: the arrays of its file are let go.
+"""Reduced form of a recorded trial for reports, without the arrays of its file.
 
-A trial in arrays has 660 bytes for each of its cycles, a report of hundreds of trials
-needs 32 of them: time, velocity and two forces. All else that needs the arrays is found
-while they are there, and they are read again where something is asked for later.
+A loaded trial takes 660 bytes per cycle; a report of hundreds of trials needs only 32:
+time, velocity and two forces. Everything else that needs the arrays is computed while
+they are loaded; they are read again when something needs them later.
 """
 
 from collections.abc import Iterator, Sequence
@@ -25,11 +25,11 @@ class HeldTrial:
         path: the file.
         metadata: metadata by name.
         series: velocity and forces over time.
-        frame: where the container stood.
-        payload: calibration and tare that were applied.
-        bracket: the tares before and after it; None where one is not known.
-        doubts: why it cannot be that of a foot that is pushed along x_T.
-        health: of the rig, without what the tares of its session tell.
+        frame: pose of the container.
+        payload: applied calibration and tare.
+        bracket: tares before and after the trial; None if one is not known.
+        doubts: results of the plausibility checks of the recording.
+        health: health of the rig, without the results from the session's tares.
     """
 
     path: Path
@@ -53,7 +53,7 @@ class HeldTrial:
 
     @classmethod
     def of(cls, trial: RecordedTrial) -> "HeldTrial":
-        """Return what is held of a trial."""
+        """Reduce a trial."""
         return cls(
             path=trial.path,
             metadata=trial.metadata,
@@ -67,11 +67,11 @@ class HeldTrial:
 
 
 class TrialFiles:
-    """Recorded trials on disk: one after the other is read, every time anew."""
+    """Iterable over recorded trials that reads each from disk on every pass."""
 
     def __init__(self, trials: Sequence[HeldTrial]) -> None:
         self._paths = [trial.path for trial in trials]
 
     def __iter__(self) -> Iterator[RecordedTrial]:
-        """Give every trial in arrays."""
+        """Load every trial."""
         return map(load_trial, self._paths)

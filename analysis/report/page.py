@@ -1,4 +1,4 @@
-"""The report: one HTML file that needs nothing else, and every number beside it.
+"""Writing of the report: a self-contained HTML file, and all numbers in files.
 
 The only module that imports jinja2.
 """
@@ -39,7 +39,7 @@ _NO_RIG = "External data have no record of the rig: health and limits are unknow
 
 
 def write_report(study: Study, out_dir: Path, context: ReportContext) -> Path:
-    """Write the report of a study and return the path of its page.
+    """Write the report of a study; returns the path of its page.
 
     Below `out_dir`: report/index.html, fits.json, fits.csv and figures/*.png, with
     `context.with_pdf` *.pdf; each file is replaced whole,
@@ -62,7 +62,7 @@ def write_report(study: Study, out_dir: Path, context: ReportContext) -> Path:
 
 
 def _file_figures(folder: Path, shown: Sequence[ReportFigure]) -> None:
-    """Write the files of the figures; remove those of a report that stood there."""
+    """Write the files of the figures and remove those of an earlier report."""
     files = {f"{figure.picture.key}.png": figure.picture.png for figure in shown}
     files |= {f"{figure.picture.key}.pdf": figure.picture.pdf for figure in shown}
     for name, content in files.items():
@@ -75,7 +75,7 @@ def _file_figures(folder: Path, shown: Sequence[ReportFigure]) -> None:
 
 
 def all_numbers(results: StudyResults, context: ReportContext) -> dict[str, Any]:
-    """Return everything that the report shows as plain values, for fits.json."""
+    """Return all numbers of the report as plain values for fits.json."""
     tables = [
         asdict(table) | {"section": table.section.value} for table in context.tables
     ]
@@ -106,13 +106,13 @@ def html_page(
     warnings: Sequence[str],
     notes: Sequence[str] = (),
 ) -> str:
-    """Return a page as HTML; every text is escaped, every picture embedded.
+    """Render a page as HTML; texts are escaped and pictures embedded.
 
     Args:
-        context: its heading.
-        shown: its sections.
-        warnings: what stands first.
-        notes: what could not be done.
+        context: title and origin of the report.
+        shown: sections of the page.
+        warnings: caveats at the top.
+        notes: analyses that were not completed.
     """
     environment = Environment(
         loader=PackageLoader("analysis.report"),
@@ -133,7 +133,7 @@ def html_page(
 def sections(
     results: StudyResults, shown: Sequence[ReportFigure], context: ReportContext
 ) -> list[PageSection]:
-    """Return the sections that have something to show, in the order of the page."""
+    """Return the non-empty sections in the order of the page."""
     every = [
         PageSection(
             section.heading,

@@ -1,4 +1,4 @@
-"""What stands on the page of a report: tables and figures, each in its section."""
+"""Data model of the page of a report: sections, tables and figures."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -17,18 +17,18 @@ _NOTHING = {"", "–", "-"}
 
 
 def cell_text(text: str) -> str:
-    """Return a cell as it is shown: with true minus signs, unbroken at ±."""
+    """Typeset a cell: true minus signs, no line break at ±."""
     return _MINUS.sub("\u2212", text).replace(" ± ", "\u00a0±\u00a0")
 
 
 def number_columns(table: ReportTable) -> list[bool]:
-    """Return of each column whether it holds numbers, which are aligned right."""
-    found: list[bool] = []
+    """Return which columns hold only numbers and are therefore aligned right."""
+    is_numeric: list[bool] = []
     for column in zip(*table.rows, strict=True):
         filled = [cell for cell in column if cell not in _NOTHING]
         is_number = all(_NUMBER.fullmatch(cell) for cell in filled)
-        found.append(bool(filled) and is_number)
-    return found
+        is_numeric.append(bool(filled) and is_number)
+    return is_numeric
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,10 +36,10 @@ class ReportFigure:
     """A figure of the report.
 
     Attributes:
-        section: where it stands.
+        section: section that it belongs to.
         title: its name, after the paper's figure where there is one.
-        alt: what the picture shows, for those who cannot see it.
-        caption: what is seen in it.
+        alt: alternative text of the picture.
+        caption: caption with numbers.
         picture: its files.
     """
 
@@ -52,11 +52,11 @@ class ReportFigure:
 
 @dataclass(frozen=True, slots=True)
 class ShownNumbers:
-    """All that the figures of a report follow from.
+    """Input of the figures of a report.
 
     Attributes:
-        results: of the study.
-        with_pdf: figures are wanted as PDF, too.
+        results: results of the study.
+        with_pdf: also make PDF files.
     """
 
     results: StudyResults
@@ -65,13 +65,13 @@ class ShownNumbers:
 
 @dataclass(frozen=True, slots=True)
 class PageSection:
-    """One section of the page with everything in it.
+    """One section of the page with its content.
 
     Attributes:
-        heading: which one.
-        sentences: what stands first.
-        tables: its tables, before the figures.
-        figures: its figures.
+        heading: heading of the section.
+        sentences: list of statements at the top.
+        tables: tables, before the figures.
+        figures: figures.
     """
 
     heading: ReportSection
@@ -82,21 +82,21 @@ class PageSection:
 
 @dataclass(frozen=True, slots=True)
 class ReportContext:
-    """What a report shows beyond the study itself.
+    """Content of a report beyond the study itself.
 
     Attributes:
         title: heading of the page.
         subtitle: line below it.
         is_simulated: the trials were simulated; marks the page.
-        is_foreign: the tables come from elsewhere, not from this rig.
+        is_foreign: the data come from elsewhere, not from this rig.
         generated_utc: when the report was made, as text.
         tables: further tables, each for its section.
         warnings: further warnings, shown first.
         rig: health of the rig by trial.
         further_numbers: further plain values for fits.json, by name.
-        with_pdf: figures are filed as PDF, too.
-        results: what follows from the study; None = it is computed.
-        store: results of earlier reports; None = everything is computed.
+        with_pdf: also write figures as PDF.
+        results: results of the study; None = compute them.
+        store: cache of earlier reports; None = compute everything.
     """
 
     title: str
@@ -126,13 +126,13 @@ def _nothing(*_: object) -> Sequence[Any]:
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """A section of the report.
+    """Definition of a section of the report.
 
     Attributes:
-        heading: which one.
-        tables: its tables, of the results and of what else the page shows.
-        figures: its figures, in their order.
-        sentences: what stands first.
+        heading: heading of the section.
+        tables: function of results and context that returns its tables.
+        figures: its figures in order.
+        sentences: function that returns the statements at the top.
     """
 
     heading: ReportSection

@@ -1,8 +1,8 @@
-"""A drawn figure as files, and its pixels as a PNG of few colours.
+"""Image files of a figure, and compression of its pixels to a palette PNG.
 
-A palette takes a third of the bytes and looks the same. The most frequent colours of a
-drawing, its white and its lines, are kept as they are; the many shades at the edges of
-letters share the rest of the palette.
+A palette needs a third of the bytes and looks the same. The most frequent colours of a
+drawing, background and lines, are exact; the many anti-aliasing shades share the
+remaining entries.
 """
 
 import io
@@ -13,11 +13,11 @@ import numpy as np
 
 Pixels = np.ndarray[Any, np.dtype[np.uint8]]
 
-_COLOURS = 256  # of a palette
-_EXACT = 128  # of them that are kept as they are
-_MOST_WEIGHT = 64  # pixels of one shade that count
+_COLOURS = 256  # entries of a palette
+_EXACT = 128  # entries for exact colours
+_MOST_WEIGHT = 64  # largest weight of one shade [pixels]
 _WHITE = 0xFFFFFF
-_LEVEL = 7  # of the compression: 9 takes five times as long for a tenth fewer bytes
+_LEVEL = 7  # compression level; 9 takes five times as long and saves a tenth
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,10 +27,10 @@ class Picture:
     Attributes:
         key: name of its files, e.g. "fig4_excerpts".
         png: the figure as PNG.
-        pdf: the figure as vector PDF; empty = it was not asked for.
-        width: at which a page shows it [pixels of CSS].
-        svg: the figure as an element of a page, which says where its axes are; empty =
-            it is shown as PNG.
+        pdf: the figure as vector PDF; empty if not requested.
+        width: width on the page [CSS pixels].
+        svg: the figure as an SVG element with the positions of its axes; empty = shown
+            as PNG.
     """
 
     key: str
@@ -41,24 +41,24 @@ class Picture:
 
 
 def png_of_few_colours(pixels: Pixels, dpi: int) -> bytes:
-    """Return opaque pixels as PNG with a palette.
+    """Encode opaque pixels as PNG with a palette.
 
     Args:
         pixels: red, green, blue and opacity, shape (rows, columns, 4).
-        dpi: pixels per inch, for the file.
+        dpi: pixels per inch recorded in the file.
     """
     from PIL import Image
 
     packed = np.ascontiguousarray(pixels).view("<u4")[..., 0] & _WHITE
     flat = packed.ravel()
     begins = np.flatnonzero(flat[1:] != flat[:-1]) + 1
-    starts = np.concatenate([[0], begins])  # of runs of one colour, a tenth of a figure
+    starts = np.concatenate([[0], begins])  # runs of one colour: a tenth of the pixels
     lengths = np.diff(starts, append=flat.size)
     inks = flat[starts].astype(np.intp)
-    seen = np.zeros(_WHITE + 1, dtype=np.bool_)
-    seen[inks] = True
-    colours = np.flatnonzero(seen)
-    number = np.empty(seen.size, dtype=np.intp)
+    is_used = np.zeros(_WHITE + 1, dtype=np.bool_)
+    is_used[inks] = True
+    colours = np.flatnonzero(is_used)
+    number = np.empty(is_used.size, dtype=np.intp)
     number[colours] = np.arange(colours.size)
     numbers = number[inks]
     counts = np.bincount(numbers, weights=lengths).astype(np.intp)
@@ -73,11 +73,11 @@ def png_of_few_colours(pixels: Pixels, dpi: int) -> bytes:
 
 
 def _palette(shades: Pixels, counts: np.ndarray) -> tuple[Pixels, Pixels]:
-    """Return at most 256 colours, shape (k, 3), and the index of every shade in them.
+    """Choose at most 256 colours, shape (k, 3), and map every shade to one of them.
 
     Args:
-        shades: different colours, shape (n, 3).
-        counts: pixels that have them, shape (n,).
+        shades: distinct colours, shape (n, 3).
+        counts: number of pixels of each, shape (n,).
     """
     if len(shades) <= _COLOURS:
         return shades, np.arange(len(shades), dtype=np.uint8)

@@ -1,7 +1,7 @@
-"""A study and what every section of a report shares of it.
+"""Results of a study shared by all sections of a report.
 
-A section computes its own numbers from `StudyResults`; `of` keeps them, so that table,
-figure, caption and fits.json state the same.
+A section computes its own numbers from `StudyResults`; `of` caches them, so that table,
+figure, caption and fits.json agree.
 """
 
 from collections.abc import Callable, Sequence
@@ -28,16 +28,16 @@ Numbers = TypeVar("Numbers")
 
 @dataclass(frozen=True, eq=False)
 class StudyResults:
-    """A study and what follows from it for more than one section.
+    """A study and derived results used by more than one section.
 
     Attributes:
         study: the study.
-        identification: how well the terrains can be told apart; None for one terrain.
-        axes: of the surfaces.
-        surfaces: of the Gaussian process.
-        edges: of the cells of `coverage`.
-        coverage: of velocity and load by the samples.
-        rig: health of the rig by trial; empty for tables from elsewhere.
+        identification: terrain classification; None for one terrain.
+        axes: axes of the surfaces.
+        surfaces: surfaces of the Gaussian process.
+        edges: cell edges of `coverage`.
+        coverage: coverage of velocity and load by the samples.
+        rig: health of the rig by trial; empty for external data.
     """
 
     study: Study
@@ -49,21 +49,21 @@ class StudyResults:
     rig: Sequence[RigTrial]
 
     def of(self, compute: "Callable[[StudyResults], Numbers]") -> Numbers:
-        """A section's numbers: what `compute` gives of these results, computed once."""
+        """Return `compute` of these results, computed once and cached."""
         if compute not in self._computed:
             from threadpoolctl import threadpool_limits
 
-            with threadpool_limits(1):  # small matrices: more threads lose time
+            with threadpool_limits(1):  # threads are slower for small matrices
                 self._computed[compute] = compute(self)
         return self._computed[compute]
 
     @cached_property
-    def _computed(self) -> dict[Callable[..., Any], Any]:  # no field: it follows
+    def _computed(self) -> dict[Callable[..., Any], Any]:  # not a field: derived
         return {}
 
 
 def compute_results(study: Study, rig: Sequence[RigTrial] = ()) -> StudyResults:
-    """Return what follows from a study; no model is fitted.
+    """Compute the shared results of a study without fitting models.
 
     Args:
         study: the study.
@@ -71,7 +71,7 @@ def compute_results(study: Study, rig: Sequence[RigTrial] = ()) -> StudyResults:
     """
     from threadpoolctl import threadpool_limits
 
-    with threadpool_limits(1):  # small matrices: more threads lose time
+    with threadpool_limits(1):  # threads are slower for small matrices
         axes, edges = surface_axes(study), cell_edges(study)
         return StudyResults(
             study=study,

@@ -1,7 +1,7 @@
-"""What the sections of a report are made of: their headings, tables and figures.
+"""Building blocks of report sections: headings, tables and figures.
 
-A figure is drawn from `StudyResults`; what else a page holds, as tables of sessions,
-joins the section that it names.
+A figure is drawn from `StudyResults`; other content, such as tables of sessions, names
+the section it belongs to.
 """
 
 from collections.abc import Callable, Sequence
@@ -13,7 +13,7 @@ from analysis.report.style import Figure
 
 
 class ReportSection(Enum):
-    """A section of the report; the value is its heading, the order that of the page."""
+    """Sections of the report in the order of the page; the values are the headings."""
 
     SUMMARY = "Summary"
     CHANGED = "Sensitivity to analysis choices"
@@ -26,7 +26,7 @@ class ReportSection(Enum):
 
     @property
     def anchor(self) -> str:
-        """Name of the section in links."""
+        """Link target of the section."""
         return self.name.lower()
 
 
@@ -35,11 +35,11 @@ class ReportTable:
     """A table of the report.
 
     Attributes:
-        name: its heading.
+        name: heading of the table.
         header: names of the columns, with units.
         rows: cells as text, each row as long as the header.
-        note: a remark below it; empty for none.
-        section: where it stands.
+        note: remark below the table; empty for none.
+        section: section that it belongs to.
     """
 
     name: str
@@ -51,15 +51,15 @@ class ReportTable:
 
 @dataclass(frozen=True, slots=True)
 class FigureSpec:
-    """A figure of the report.
+    """Definition of a figure of the report.
 
     Attributes:
         key: name of its files, e.g. "fig4_excerpts".
         title: its name, after the paper's figure where there is one.
-        alt: what the picture shows, for those who cannot see it.
-        draw: draws it; None where there are no numbers for it.
-        caption: states what is seen in it, with numbers.
-        is_vector: the page shows it as SVG, to be enlarged and read.
+        alt: alternative text of the picture.
+        draw: function that draws it; None if there are no numbers for it.
+        caption: function that states its numbers.
+        is_vector: shown as interactive SVG on the page.
     """
 
     key: str

@@ -1,10 +1,9 @@
-"""Style, colours, watermark and files of every figure.
+"""Style, colours, watermark and rendering of figures.
 
-The only module that imports matplotlib, and only to draw: a section computes its
-numbers where matplotlib is not installed. Colours are Okabe and Ito's, safe for
-colour-blind readers, and never the only sign of a difference. Figures are drawn on
-`Figure` objects of their own, so that nothing is shared between them and no screen is
-needed.
+The only module that imports matplotlib, and only for drawing: sections compute their
+numbers without it. Colours are Okabe and Ito's, safe for colour-blind readers, and
+never the only distinction. Figures are separate `Figure` objects without pyplot, so
+they share no state and need no display.
 """
 
 import io
@@ -29,9 +28,9 @@ if TYPE_CHECKING:
     from matplotlib.colors import LogNorm
     from matplotlib.figure import Figure
 else:
-    Axes = Figure = LogNorm = Any  # matplotlib is loaded by what draws
+    Axes = Figure = LogNorm = Any  # matplotlib is imported only for drawing
 
-WIDTH = 7.16  # inches, both columns of a paper's page
+WIDTH = 7.16  # inches, two columns of a paper
 ONE_COLUMN = 3.45  # inches
 FORCE_LABEL = "traction $F_t$ [N]"
 SPEED_LABEL = "slip velocity $v_t$ [m/s]"
@@ -54,10 +53,10 @@ MODEL_COLOURS = (
 MODEL_HATCHES = ("", "///", "...", "xxx", "---")
 MODEL_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 _DPI = 320
-_SHOWN = 160  # pixels of a page per inch
-_MOST_TICKS = 5  # below a small panel
+_SHOWN = 160  # CSS pixels per inch
+_MOST_TICKS = 5  # ticks of a small panel
 _MOST_COLUMNS = 4  # panels side by side
-_MARK = 6.0  # points of the watermark per inch of the figure's width
+_MARK = 6.0  # font size of the watermark [points per inch of figure width]
 _KIND_COLOURS = {
     SMALL: ("#08306b", "#2f79b5", "#9dc7e6"),
     BIG: ("#7f2704", "#d9690f", "#fdb97d"),
@@ -75,17 +74,17 @@ _STYLE: dict[Any, Any] = {
     "grid.linewidth": 0.6,
     "legend.frameon": False,
     "legend.fontsize": 7.5,
-    "pdf.fonttype": 42,  # letters stay letters
+    "pdf.fonttype": 42,  # text remains text
     "svg.fonttype": "none",
 }
 MAP_ROW = 1.75  # inches
-COLOUR_MAP = "cividis"  # the same to every kind of colour sight
+COLOUR_MAP = "cividis"  # safe for all kinds of colour vision
 FIRST_COLOUR, SECOND_COLOUR = "#0072B2", "#D55E00"
 
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """Draw with the project's style inside the block, whatever the user's is."""
+    """Use the project's style inside the block, regardless of the user's settings."""
     require_matplotlib()
     import matplotlib as mpl
 
@@ -96,14 +95,14 @@ def styled() -> Iterator[None]:
 
 
 def require_matplotlib() -> None:
-    """Load matplotlib; a backend of the user that is not installed is passed over.
+    """Import matplotlib; an unavailable user-selected backend is ignored.
 
     Raises:
-        MissingLibraryError: it is not installed.
+        MissingLibraryError: matplotlib is not installed.
     """
     if "matplotlib.figure" in sys.modules:
         return
-    backend = os.environ.pop("MPLBACKEND", None)  # matplotlib fails where it is unknown
+    backend = os.environ.pop("MPLBACKEND", None)  # an unknown one fails the import
     try:
         import matplotlib.figure
     except ModuleNotFoundError as error:
@@ -116,7 +115,7 @@ def require_matplotlib() -> None:
 
 @cache
 def _notebook_figure() -> type[Figure]:
-    """Return the type of figures that a notebook shows as they are, without pyplot."""
+    """Return a Figure class that notebooks display without pyplot."""
     require_matplotlib()
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -131,7 +130,7 @@ def _notebook_figure() -> type[Figure]:
 
 
 def new_figure(height: float, width: float = WIDTH) -> Figure:
-    """Return an empty figure of so many inches, by default as wide as both columns.
+    """Create an empty figure [inches], by default two columns wide.
 
     Raises:
         MissingLibraryError: matplotlib is not installed.
@@ -140,7 +139,7 @@ def new_figure(height: float, width: float = WIDTH) -> Figure:
 
 
 def log_norm(low: float, high: float) -> LogNorm:
-    """Return a logarithmic scale of colours from `low` to `high`."""
+    """Return a logarithmic colour scale from `low` to `high`."""
     from matplotlib.colors import LogNorm
 
     return LogNorm(low, high)
@@ -163,31 +162,31 @@ def mark_simulated(figure: Figure) -> None:
 
 
 def panel_grid(count: int, height: float) -> tuple[Figure, list[Axes]]:
-    """Return a figure of `count` panels that share their axes, row by row.
+    """Create a figure of `count` panels with shared axes, row by row.
 
-    One panel alone is as wide as one column of a paper.
+    A single panel is one column wide.
 
     Args:
         count: number of panels.
-        height: of one row [inches].
+        height: height of one row [inches].
     """
     columns = min(_MOST_COLUMNS, count)
     rows = -(-count // columns)
     figure = new_figure(height * rows + 0.7, ONE_COLUMN if count == 1 else WIDTH)
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     axes = list(grid.flat)
-    axes[0].locator_params(axis="x", nbins=_MOST_TICKS)  # of all: they share it
+    axes[0].locator_params(axis="x", nbins=_MOST_TICKS)  # applies to all shared axes
     for spare in axes[count:]:
         spare.set_visible(False)
-        # the panel above it is the lowest of its column
+        # the panel above it is now the lowest of its column
         axes[axes.index(spare) - columns].xaxis.set_tick_params(labelbottom=True)
     return figure, axes[:count]
 
 
 def shade_table(ax: Axes, table: Sequence[Sequence[float]], top: float) -> None:
-    """Draw a table of numbers as shaded cells, the first row above.
+    """Draw a table of numbers as shaded cells, the first row at the top.
 
-    Cells that are not a number stay white. Unlike an image, cells stay vectors.
+    NaN cells are white. Unlike an image, the cells are vector graphics.
     """
     values = np.ma.masked_invalid(np.asarray(table, dtype=np.float64))
     ax.pcolormesh(values, cmap="YlOrBr", vmin=0.0, vmax=top or 1.0, edgecolors="none")
@@ -203,14 +202,14 @@ def render(
     is_vector: bool = False,
     with_pdf: bool = False,
 ) -> Picture:
-    """Return the finished figure as files, watermarked if simulated.
+    """Render a figure to image files, with a watermark if simulated.
 
     Args:
         key: name of the files.
         figure: the figure.
-        is_simulated: its data were.
-        is_vector: a page shows it as SVG, which can be enlarged and read.
-        with_pdf: it is wanted as PDF, too; embedding fonts takes its time.
+        is_simulated: the data were simulated.
+        is_vector: also render as SVG for the page.
+        with_pdf: also render as PDF; embedding fonts takes time.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
@@ -218,14 +217,14 @@ def render(
         mark_simulated(figure)
     pdf = io.BytesIO()
     with warnings.catch_warnings():
-        # a terrain may be named in a script the font does not have
+        # names of terrains may contain characters missing in the font
         warnings.filterwarnings("ignore", message="Glyph")
-        # canvases of their own draw once; savefig would draw twice for each format
+        # separate canvases draw once; savefig would draw twice per format
         figure.set_dpi(_DPI)
         canvas = FigureCanvasAgg(figure)
         canvas.draw()
         png = png_of_few_colours(np.asarray(canvas.buffer_rgba()), _DPI)
-        figure.set_layout_engine("none")  # the layout is found; do not search again
+        figure.set_layout_engine("none")  # keep the computed layout
         if with_pdf:
             from matplotlib.backends.backend_pdf import FigureCanvasPdf
 
@@ -235,10 +234,10 @@ def render(
 
 
 def _svg(key: str, figure: Figure) -> str:
-    """Return the figure as an element of a page.
+    """Render the figure as an SVG element for the page.
 
-    Its identifiers begin with `key`: a page holds several. "data-axes" lists where its
-    axes are, in the unit of the drawing, with their limits and labels.
+    Its identifiers are prefixed by `key`, because a page has several figures.
+    "data-axes" lists position, in drawing units, and limits of the axes.
     """
     import matplotlib as mpl
     from matplotlib.backends.backend_svg import FigureCanvasSVG
@@ -259,48 +258,48 @@ def _svg(key: str, figure: Figure) -> str:
 
 
 def _axes_of(figure: Figure) -> str:
-    """Return position, limits and labels of the axes that are shown, as JSON."""
+    """Return position and limits of the visible linear axes as JSON."""
     width, height = 72.0 * figure.get_size_inches()
-    found: list[dict[str, Any]] = []
+    entries: list[dict[str, Any]] = []
     for ax in figure.axes:
         if not ax.get_visible() or "log" in (ax.get_xscale(), ax.get_yscale()):
             continue
         box = ax.get_position()
         left, right = width * box.x0, width * box.x1
         top, bottom = height * (1.0 - box.y1), height * (1.0 - box.y0)
-        found.append(
+        entries.append(
             {
                 "box": [round(v, 2) for v in (left, top, right, bottom)],
                 "x": [float(v) for v in ax.get_xlim()],
                 "y": [float(v) for v in ax.get_ylim()],
             }
         )
-    return json.dumps(found, separators=(",", ":"))
+    return json.dumps(entries, separators=(",", ":"))
 
 
 def terrain_colours(kinds: Mapping[str, str]) -> dict[str, str]:
-    """Return a colour for every terrain; one family of shades per kind.
+    """Assign a colour to every terrain, with one family of shades per kind.
 
     Args:
-        kinds: kind by name of the terrain.
+        kinds: kind by terrain name.
     """
     used: dict[str, int] = {}
     colours = {}
     for terrain, kind in kinds.items():
         family = _KIND_COLOURS.get(kind, _OTHER_COLOURS)
-        shades = kind if kind in _KIND_COLOURS else ""  # all others share one family
+        shades = kind if kind in _KIND_COLOURS else ""  # all other kinds share a family
         colours[terrain] = family[used.get(shades, 0) % len(family)]
         used[shades] = used.get(shades, 0) + 1
     return colours
 
 
 def plain(text: str) -> str:
-    """Return text without meaning for matplotlib's mathematics."""
+    """Escape text for matplotlib's mathtext."""
     return text.replace("$", r"\$")
 
 
 def name_ticks(ax: Axes, terrains: list[str], shift: float = 0.0) -> None:
-    """Put the names of terrains under the axis, slanted if they are long."""
+    """Label the axis with terrain names, rotated if they are long."""
     longest = max(map(len, terrains))
     is_long = longest > 6 and len(terrains) > 3
     ax.set_xticks(
@@ -312,12 +311,12 @@ def name_ticks(ax: Axes, terrains: list[str], shift: float = 0.0) -> None:
 
 
 def name_load_axes(figure: Figure) -> None:
-    """Label a figure over velocity and normal force."""
+    """Label the axes of a figure over velocity and normal force."""
     figure.supxlabel(SPEED_LABEL, fontsize=8)
     figure.supylabel(LOAD_LABEL, fontsize=8)
 
 
 def shade_slip(ax: Axes, start: float, stop: float, *, is_named: bool) -> None:
-    """Shade a slip from `start` to `stop` along the axis; one of them is named."""
+    """Shade a slip from `start` to `stop`; `is_named` adds a legend entry."""
     label = "slip" if is_named else None
     ax.axvspan(start, stop, color="#F0E442", alpha=0.55, lw=0, label=label)

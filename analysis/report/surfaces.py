@@ -1,4 +1,4 @@
-"""Mean and variance of a model over velocity and load, and where samples lie there."""
+"""Mean and variance of a model over velocity and load, and sample coverage."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,18 +13,18 @@ from analysis.study.terrain_fit import TerrainResult
 
 _POINTS = 41  # along each axis of a surface
 _CELLS = 20  # along each axis of a coverage map
-_LOAD_QUANTILE = 0.995  # quantile of F_n that the load axis ends at
+_LOAD_QUANTILE = 0.995  # quantile of F_n at which the load axis ends
 
 
 @dataclass(frozen=True, slots=True)
 class Surface:
-    """A fitted model over (v_t, F_n), with the samples it was made for.
+    """Fitted model over (v_t, F_n) and the samples of the terrain.
 
     Attributes:
-        terrain: its terrain.
+        terrain: name of the terrain.
         data: kept samples of the terrain.
         mean: predicted F_t [N], shape (loads, velocities).
-        variance: of a measurement, noise included [N^2], same shape.
+        variance: variance of a measurement, noise included [N^2], same shape.
     """
 
     terrain: str
@@ -35,10 +35,10 @@ class Surface:
 
 @dataclass(frozen=True, slots=True)
 class CoverageMap:
-    """How many kept samples of a terrain lie in every cell of velocity and load.
+    """Number of kept samples of a terrain in every cell of velocity and load.
 
     Attributes:
-        terrain: its terrain.
+        terrain: name of the terrain.
         counts: samples, shape (loads, velocities).
         outside: samples beyond the load axis.
     """
@@ -50,7 +50,7 @@ class CoverageMap:
 
 @dataclass(frozen=True, slots=True)
 class SurfaceAxes:
-    """Axes shared by all terrains, so that surfaces can be compared by eye.
+    """Axes shared by all terrains, so that surfaces can be compared visually.
 
     Attributes:
         v_t: slip velocities [m/s], increasing.
@@ -72,7 +72,7 @@ def cell_edges(study: Study) -> SurfaceAxes:
 
 
 def surfaces(study: Study, model: str, axes: SurfaceAxes) -> list[Surface]:
-    """Return the surface of the first fold of `model` for every terrain with one."""
+    """Evaluate the first fold of `model` for every terrain that has it."""
     v, load = (grid.ravel() for grid in np.meshgrid(axes.v_t, axes.F_n))
     shape = (axes.F_n.size, axes.v_t.size)
     grids = []
@@ -92,7 +92,7 @@ def surfaces(study: Study, model: str, axes: SurfaceAxes) -> list[Surface]:
 
 
 def coverages(study: Study, edges: SurfaceAxes) -> list[CoverageMap]:
-    """Return the coverage of every terrain that has kept samples."""
+    """Return the coverage of every terrain with kept samples."""
     return [
         _coverage(result, edges) for result in study.terrains.values() if result.kept
     ]
@@ -128,11 +128,11 @@ def _axes(study: Study, count: int) -> SurfaceAxes:
     )
 
 
-_DIGITS = 5  # of the surfaces in fits.json
+_DIGITS = 5  # significant digits of surfaces in fits.json
 
 
 def plain_surfaces(shown: Sequence[Surface], axes: SurfaceAxes) -> dict[str, Any]:
-    """Return the surfaces as plain values, for fits.json."""
+    """Convert the surfaces to plain values for fits.json."""
     return {
         "F_n": _short(axes.F_n),
         "v_t": _short(axes.v_t),
@@ -144,7 +144,7 @@ def plain_surfaces(shown: Sequence[Surface], axes: SurfaceAxes) -> dict[str, Any
 
 
 def plain_coverage(shown: Sequence[CoverageMap], edges: SurfaceAxes) -> dict[str, Any]:
-    """Return the coverage maps as plain values, for fits.json."""
+    """Convert the coverage maps to plain values for fits.json."""
     return {
         "F_n_edges": _short(edges.F_n),
         "v_t_edges": _short(edges.v_t),
@@ -156,7 +156,7 @@ def plain_coverage(shown: Sequence[CoverageMap], edges: SurfaceAxes) -> dict[str
 
 
 def _short(values: np.ndarray) -> Any:  # noqa: ANN401
-    """Return an array as nested lists of few digits."""
+    """Convert an array to nested lists with few digits."""
     if values.ndim > 1:
         return [_short(row) for row in values]
     return [float(f"{value:.{_DIGITS}g}") for value in values.tolist()]

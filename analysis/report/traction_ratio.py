@@ -8,22 +8,22 @@ from analysis.study.terrain_fit import TerrainResult
 
 
 def trial_ratio(trial: PreparedTrial) -> float:
-    """Return the mean of F_t over the mean of F_n of a trial."""
-    # a ratio of means: single samples may have F_n near zero
+    """Return the ratio of mean F_t to mean F_n of a trial."""
+    # not the mean of ratios, because single samples may have F_n near zero
     load = float(trial.F_n.mean())
     return float(trial.F_t.mean()) / load if load > 0 else float("nan")
 
 
 def ratios_of(result: TerrainResult) -> Array:
-    """Return F_t/F_n of the trials of a terrain, the ratio of the means of each."""
+    """Return the ratio of mean F_t to mean F_n of every trial of a terrain."""
     ratios = np.array([trial_ratio(trial) for trial in result.trials if trial.kept])
     return ratios[np.isfinite(ratios)]
 
 
 def traction_ratio(result: TerrainResult) -> str:
-    """Return F_t/F_n of a terrain as text: mean of its trials ± their deviation.
+    """Format F_t/F_n of a terrain: mean over its trials ± standard deviation.
 
-    Of a trial it is the ratio of its means. A dash where there is none.
+    The value of a trial is its ratio of means. A dash without trials.
     """
     ratios = ratios_of(result)
     if not ratios.size:

@@ -1,4 +1,4 @@
-"""Models over velocity: curves at low, median and high load, a panel a terrain."""
+"""Models over velocity at low, median and high load, one panel per terrain."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -22,19 +22,19 @@ from analysis.study.study import Study
 from analysis.study.terrain_fit import TerrainResult
 
 LOADS = (0.1, 0.5, 0.9)  # quantiles of F_n at which curves are drawn
-BAND = (0.05, 0.5, 0.95)  # quantiles of F_t that make a band
-_MOST_POINTS = 1500  # drawn per panel
+BAND = (0.05, 0.5, 0.95)  # quantiles of F_t of a band
+_MOST_POINTS = 1500  # samples drawn per panel
 _CURVE_POINTS = 120
 
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """One fitted model with its terrain's samples, for curves over v_t.
+    """Curves of one fitted model over v_t, with the samples of its terrain.
 
     Attributes:
-        title: of its terrain, with the kind.
-        terrain: its terrain.
-        kind: of its terrain.
+        title: title of the terrain, with the kind.
+        terrain: name of the terrain.
+        kind: kind of the terrain.
         fold: number of the fold drawn, from 1.
         data: samples of the terrain, thinned evenly for drawing.
         v: velocities of the curves [m/s], shape (m,).
@@ -56,12 +56,12 @@ class Panel:
     band: Array
 
     def nearest_load(self) -> Array:
-        """Return for every sample which of the three loads is nearest, shape (n,)."""
+        """Return the index of the nearest of the three loads of every sample, (n,)."""
         return np.argmin(np.abs(self.data.F_n[:, None] - self.loads), axis=1)
 
 
 def panels(study: Study, model: str) -> list[Panel]:
-    """Return the curves of the first fold of `model` for every terrain that has one."""
+    """Compute the curves of the first fold of `model` for every terrain with it."""
     return [
         _panel(result, model)
         for result in study.terrains.values()
@@ -70,7 +70,7 @@ def panels(study: Study, model: str) -> list[Panel]:
 
 
 def force_range(panels: Sequence[Panel]) -> tuple[float, float]:
-    """Return limits of F_t [N] that suit all panels: nearly all samples, all curves."""
+    """Return axis limits of F_t [N] for all panels that include nearly all samples."""
     low = min(float(np.quantile(panel.data.F_t, 0.005)) for panel in panels)
     high = max(float(np.quantile(panel.data.F_t, 0.995)) for panel in panels)
     margin = 0.05 * (high - low) or 1.0
@@ -83,7 +83,7 @@ def _panel(result: TerrainResult, model: str) -> Panel:
     step = max(1, -(-samples.count // _MOST_POINTS))
     loads = np.quantile(samples.F_n, LOADS)
     span = float(samples.v_t.min()), float(samples.v_t.max())
-    # dense at the slow end, where models bend, and fine enough at the fast one
+    # dense at low speed, where models curve, and fine enough at high speed
     v = np.union1d(
         np.geomspace(*span, _CURVE_POINTS), np.linspace(*span, _CURVE_POINTS)
     )
@@ -109,7 +109,7 @@ def _curve(model: FittedModel, load: float, v: Array) -> Distribution:
 def draw_panels(
     chosen: list[Panel], draw: Callable[[Axes, Panel], None]
 ) -> Figure | None:
-    """Return a figure with a panel for each model; None without any."""
+    """Draw a figure with one panel per model; None without any."""
     if not chosen:
         return None
     figure, axes = panel_grid(len(chosen), 2.1)
@@ -186,7 +186,7 @@ def _draw_samples(ax: Axes, panel: Panel) -> None:
 
 
 def note_loads(ax: Axes, drawn: Array) -> None:
-    """Write the loads that curves are drawn at."""
+    """Annotate the loads of the curves."""
     loads = " / ".join(f"{load:.1f}" for load in drawn)
     ax.text(
         0.97,
@@ -201,7 +201,7 @@ def note_loads(ax: Axes, drawn: Array) -> None:
 
 
 def describe_curve(panel: Panel) -> str:
-    """Return the ends of the curve at the median load in words."""
+    """Describe the ends of the curve at the median load."""
     start, end = panel.means[1][[0, -1]]
     return (
         f"F_t goes from {start:.1f} N at {panel.v[0]:.3f} m/s to {end:.1f} N at "

@@ -1,6 +1,6 @@
-"""Models of a study: fitted by name, cross-validated, scored, compared, kept on disk.
+"""Models of a study: fitting, cross-validation, scores, comparison, cached results.
 
-Begin with `study`: it makes independent tasks of terrain, fold and model (`crossval`,
-`models`), which `tasks` runs on processes or a cluster and `store` keeps.
-`break_away_fit` and `slip_risk` say what the ground gives before a foot at rest slips.
+Begin with `study`: it divides the work into independent tasks by terrain and fold
+(`crossval`, `models`), which `tasks` runs on processes or a cluster and `store` caches.
+`break_away_fit` and `slip_risk` model the force at which a foot at rest slips.
 """

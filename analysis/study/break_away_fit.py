@@ -1,9 +1,9 @@
-"""From trials to break-away models: pushes, a censored fit, resampled trials.
+"""Break-away models of terrains: censored fits to pushes, and resampled trials.
 
-Stones share slope and spread, every terrain has its level: they give alike, and ten
-trials of one terrain hold too few slips for a model of its own. Any other terrain has
-its own fit where 15 pushes slipped; where fewer did, the answer is what the foot meets
-in slow motion. A terrain of fewer than three trials has no answer.
+Terrains of stones share slope and spread, and each has its own level: they behave
+alike, and ten trials of one terrain contain too few slips for a separate model. Any
+other terrain has its own fit if 15 pushes slipped; otherwise its model is the traction
+in slow sliding. A terrain with fewer than three trials has no model.
 """
 
 import zlib
@@ -23,22 +23,22 @@ from analysis.study.survival import pit_distance
 
 ROCKY = "rocky"
 LEAST_TRIALS = 3
-LEAST_SLIPS, LEAST_OF_STONES = 15, 5  # alone, and of each that shares its spread
+LEAST_SLIPS, LEAST_OF_STONES = 15, 5  # for a separate fit; for each of a shared fit
 _SLOW, _FAST = 0.005, 0.02  # m/s of sliding
-_SEEN = 1.4  # gain in log likelihood of a trial effect: 5 % on the boundary
+_SEEN = 1.4  # gain in log likelihood of a significant trial effect: 5 %, at a boundary
 _LEAST_VARIANCE = 1e-9  # N^2
 _RANGE = (0.02, 0.98)  # quantiles between which nothing is extrapolated
-_STREAM = 3_000_000  # apart from other draws of the same seed
+_STREAM = 3_000_000  # random stream, distinct from other draws with the same seed
 
 
 @dataclass(frozen=True, slots=True)
 class BreakAwayOptions:
-    """How break-away models are fitted.
+    """Options of the fit of break-away models.
 
     Attributes:
-        v_slip: velocity that makes a slip [m/s].
-        draws: number of times that the trials are resampled for intervals.
-        seed: of the resampling.
+        v_slip: velocity threshold of a slip [m/s].
+        draws: number of bootstrap draws of the trials for intervals.
+        seed: seed of the draws.
     """
 
     v_slip: float = V_SLIP
@@ -48,11 +48,11 @@ class BreakAwayOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TerrainPushes:
-    """The pushes of a terrain's trials, and what its foot met in slow motion.
+    """Pushes of a terrain's trials, and forces in slow sliding.
 
     Attributes:
-        name: of the terrain.
-        pushes: of every trial.
+        name: name of the terrain.
+        pushes: pushes of every trial.
         slow: F_n and F_t [N] of every trial at 0.005 to 0.02 m/s; empty = not known.
     """
 
@@ -73,10 +73,10 @@ class TerrainPushes:
 
 @dataclass(frozen=True, slots=True)
 class BreakAwayTask:
-    """Everything that the fit of all terrains needs.
+    """Input for the fit of all terrains.
 
     Attributes:
-        terrains: their pushes.
+        terrains: pushes of every terrain.
         kinds: kind by terrain: "small" and "big" are stones.
         options: what a slip is, and how many times trials are resampled.
     """
@@ -91,7 +91,7 @@ def plan_break_away(
     kinds: Mapping[str, str],
     options: BreakAwayOptions,
 ) -> BreakAwayTask:
-    """Return the task of fitting prepared trials by terrain; empty ones do not count.
+    """Make the fit task for prepared trials; trials without kept samples are skipped.
 
     Args:
         trials: prepared trials by terrain.
@@ -118,9 +118,9 @@ def fit_break_away(
     kinds: Mapping[str, str],
     options: BreakAwayOptions | None = None,
 ) -> dict[str, BreakAwayModel]:
-    """Return the break-away model of every terrain that has three trials.
+    """Fit the break-away model of every terrain with at least three trials.
 
-    A pure function: the same trials and options give the same bits.
+    Pure: the same trials and options give bitwise equal results.
 
     Args:
         trials: prepared trials by terrain.
@@ -131,14 +131,14 @@ def fit_break_away(
 
 
 def fit_planned(task: BreakAwayTask) -> dict[str, BreakAwayModel]:
-    """Return the models of a task, in the order of its terrains; a pure function."""
+    """Fit the models of a task, in the order of its terrains; pure."""
     options, surface = task.options, groups_of(task.kinds)["surface"]
-    known = [
+    candidates = [
         terrain for terrain in task.terrains if len(terrain.pushes) >= LEAST_TRIALS
     ]
-    stones = [terrain for terrain in known if surface[terrain.name] == ROCKY]
+    stones = [terrain for terrain in candidates if surface[terrain.name] == ROCKY]
     stones = [terrain for terrain in stones if terrain.slips >= LEAST_OF_STONES]
-    others = [terrain for terrain in known if surface[terrain.name] != ROCKY]
+    others = [terrain for terrain in candidates if surface[terrain.name] != ROCKY]
     groups = [stones] if stones else []
     groups += [[terrain] for terrain in others if terrain.slips >= LEAST_SLIPS]
     fitted = {
@@ -146,7 +146,7 @@ def fit_planned(task: BreakAwayTask) -> dict[str, BreakAwayModel]:
         for group in groups
         for name, model in _fit_group(group, options).items()
     }
-    for terrain in known:
+    for terrain in candidates:
         if terrain.name in fitted:
             continue
         if (model := _fit_sliding(terrain, options)) is not None:
@@ -163,7 +163,7 @@ def _random(names: Sequence[str], options: BreakAwayOptions) -> np.random.Genera
 def _fit_group(
     group: Sequence[TerrainPushes], options: BreakAwayOptions
 ) -> dict[str, BreakAwayModel]:
-    """Return the models of terrains that share slope and spread."""
+    """Fit the models of terrains that share slope and spread."""
     table = PushTable.of([(k, p) for k, r in enumerate(group) for p in r.pushes])
     likelihood = CensoredLikelihood(table, len(group))
     best = likelihood.fit()
@@ -182,7 +182,7 @@ def _fit_group(
 
 
 def _resampled(group: Sequence[TerrainPushes], rng: np.random.Generator) -> Array:
-    """Return how often every trial is drawn; each terrain keeps its number of them."""
+    """Draw trials with replacement within each terrain; return their counts."""
     return np.concatenate(
         [
             np.bincount(rng.integers(n, size=n), minlength=n).astype(np.float64)
@@ -192,7 +192,7 @@ def _resampled(group: Sequence[TerrainPushes], rng: np.random.Generator) -> Arra
 
 
 def _trial_gain(likelihood: CensoredLikelihood, best: Array) -> float:
-    """Return what the effect of the trial gains in log likelihood."""
+    """Return the gain in log likelihood from the trial effect."""
     without = likelihood.fit(start=best, has_trials=False)
     gains = likelihood.by_trial(best)[0] - likelihood.by_trial(without)[0]
     return float(gains.sum())
@@ -237,7 +237,7 @@ def _spanned(values: Array) -> tuple[float, float]:
 def _fit_sliding(
     recorded: TerrainPushes, options: BreakAwayOptions
 ) -> BreakAwayModel | None:
-    """Return the law of F_t in slow motion; None with fewer than three such trials."""
+    """Fit the law of F_t in slow sliding; None with fewer than three such trials."""
     slow = recorded.slow
     sums = np.array([_sums(F_n, F_t) for F_n, F_t in slow if F_n.size])
     if len(sums) < LEAST_TRIALS:
@@ -261,19 +261,19 @@ def _fit_sliding(
 
 
 def _sums(x: Array, y: Array) -> Array:
-    """Return count, and mean x, y, x^2, xy, y^2 of a trial, shape (6,)."""
+    """Return count and means of x, y, x^2, xy, y^2 of a trial, shape (6,)."""
     return np.array(
         [x.size, x.mean(), y.mean(), (x * x).mean(), (x * y).mean(), (y * y).mean()]
     )
 
 
 def _line(sums: Array) -> Array:
-    """Return (a, b, s, su) of F_t = a + b F_n by moments, every trial counting alike.
+    """Estimate (a, b, s, su) of F_t = a + b F_n by moments, with equal trial weights.
 
-    su^2 is what the means of the trials scatter beyond the scatter within them.
+    su^2 is the variance of the trial means in excess of that from within the trials.
 
     Args:
-        sums: of every trial, shape (trials, 6).
+        sums: `_sums` of every trial, shape (trials, 6).
     """
     count, x, y, xx, xy, yy = sums.T
     variance = xx.mean() - x.mean() ** 2

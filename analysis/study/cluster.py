@@ -1,8 +1,8 @@
-"""Independent calls on a Dask cluster.
+"""Execution of independent calls on a Dask cluster.
 
-The only module that imports Dask. Calls are handed to Dask itself and not through
-joblib, which waits for ever for a call that Dask has given up: one that ended every
-worker that tried it.
+The only module that imports Dask. Calls go to Dask directly and not through joblib,
+which waits forever for a call that Dask has abandoned because it killed every worker
+that ran it.
 """
 
 from collections.abc import Generator, Iterable
@@ -14,19 +14,19 @@ from urllib.parse import urlsplit
 from acquisition.errors import MissingLibraryError, SettingsError
 from analysis.study.worker_processes import Call, WorkerLostError
 
-_PATIENCE = 10.0  # s to reach a scheduler
+_PATIENCE = 10.0  # s, timeout for reaching a scheduler
 
 
 def run_on_cluster(calls: Iterable[Call], address: str) -> Generator[Any]:
-    """Yield what calls return, as soon as each is done.
+    """Yield the results of calls as they complete.
 
     Args:
         calls: functions that workers can import by name, and their arguments.
-        address: of the scheduler.
+        address: address of the scheduler.
 
     Raises:
         SettingsError: the scheduler does not answer, or is reached without TLS.
-        WorkerLostError: workers ended, one after the other, in the middle of a call.
+        WorkerLostError: workers ended one after the other during the same call.
         MissingLibraryError: Dask is not installed.
     """
     try:
@@ -34,14 +34,14 @@ def run_on_cluster(calls: Iterable[Call], address: str) -> Generator[Any]:
     except ImportError as error:
         raise MissingLibraryError("distributed", "cluster") from error
 
-    left = iter(calls)
+    pending = iter(calls)
     with _client(address) as client:
 
         def submitted(running: int) -> list[Any]:
-            """Return calls that keep all workers busy, those that have come since."""
+            """Submit enough calls to keep all workers busy, including new workers."""
             ahead = 2 * max(1, sum(client.nthreads().values()))
-            further = islice(left, max(0, ahead - running))
-            return [client.submit(*call, pure=False) for call in further]
+            batch = islice(pending, max(0, ahead - running))
+            return [client.submit(*call, pure=False) for call in batch]
 
         running = as_completed(submitted(0), loop=client.loop, with_results=True)
         try:
@@ -53,10 +53,10 @@ def run_on_cluster(calls: Iterable[Call], address: str) -> Generator[Any]:
 
 
 def is_guarded(address: str) -> bool:
-    """Return whether nobody can answer in the place of the scheduler at `address`.
+    """Return whether the scheduler at `address` cannot be impersonated.
 
-    Dask carries pickled objects: who can write into the connection can execute
-    anything here. It has to be authenticated by TLS, or stay on this machine.
+    Dask transfers pickled objects: whoever can write to the connection can execute code
+    here. The connection must be authenticated by TLS or stay on this machine.
     """
     scheme, _, netloc = address.rpartition("://")
     if scheme not in {"", "tcp", "tls"}:
@@ -70,14 +70,14 @@ def is_guarded(address: str) -> bool:
 
 
 def _client(address: str) -> Any:  # noqa: ANN401
-    """Return a connection to the Dask scheduler at `address`."""
+    """Connect to the Dask scheduler at `address`."""
     from distributed import Client
 
     if not is_guarded(address):
         raise SettingsError(
             f"The Dask scheduler {address} is neither on this machine nor reached by "
             "TLS.",
-            hint="What comes back from it is executed here. Name tls://HOST:PORT with "
+            hint="Its replies can execute code here. Name tls://HOST:PORT with "
             "certificates in Dask's configuration, or leave --scheduler out.",
         )
     try:

@@ -1,14 +1,14 @@
-"""Does a further column tell of F_t what F_n and v_t do not?
+"""Test whether a further column explains F_t beyond F_n and v_t.
 
 Trials are left out in up to ten groups. The others are fitted twice, by the model of a
-new trial over F_n and v_t, and over these and the column; the gain is the difference of
-the log densities of the trials left out, per sample. Its interval is Student's over the
-trials.
+new trial over F_n and v_t, and over these and the column; the gain is the difference in
+log density per sample of the held-out trials, with Student's interval over the trials.
 
-A gain alone does not make a column one of the ground. What is pushed by F_t, as the
-tilt of a sole on a compliant arm or the moment about the wrist, repeats it: of its
-changes over 0.2 s within a trial a large share is that of F_t, whatever F_n and v_t do.
-A property of the ground does not follow F_t from one moment to the next.
+A gain alone does not show that a column is a property of the ground. A quantity driven
+by F_t, such as the tilt of a sole on a compliant arm or the moment about the wrist,
+merely repeats it: a large share of its changes over 0.2 s within a trial is explained
+by those of F_t, given F_n and v_t. A property of the ground does not follow F_t from
+one moment to the next.
 """
 
 import zlib
@@ -30,26 +30,26 @@ from analysis.study.new_trial import NewTrialFit
 from analysis.study.store import ResultStore
 from analysis.study.tasks import Workers, run_tasks
 
-WAY = "way"  # since the last drop: from F_t and v_t of any trial
-SPAN = 0.2  # s over which changes are held against those of F_t
-REPEATED = 0.3  # share of the changes that is that of F_t, from which on it repeats it
+WAY = "way"  # travel since the last drop, computed from F_t and v_t
+SPAN = 0.2  # s over which changes are compared with those of F_t
+REPEATED = 0.3  # share of the changes explained by F_t from which a column repeats it
 FEWEST = 3  # trials
 LEAST_GAIN = 0.05  # nat
 
 _STONES_DROP, _PLATE_DROP = 1.5, 0.4  # N between two extremes of the force
 _FOLDS = 10
-_STREAM = 4_000_000  # apart from folds, terrain fits, components
-_LEVEL = 0.975  # one end of a 95 % interval
-_NEAR = 0.3  # of the span, that two rows may be nearer or farther apart
+_STREAM = 4_000_000  # random stream, distinct from folds, terrain fits, components
+_LEVEL = 0.975  # upper end of a 95 % interval
+_NEAR = 0.3  # tolerance of the time between two rows, relative to the span
 
 
 @dataclass(frozen=True, slots=True)
 class CovariateRows:
-    """Kept samples of a trial with the columns that are tested.
+    """Kept samples of a trial with the columns to test.
 
     Attributes:
-        rows: the samples, with the inputs that all models have.
-        columns: shape (n, k).
+        rows: the samples, with the inputs common to all models.
+        columns: columns to test, shape (n, k).
         t: time [s], shape (n,).
     """
 
@@ -61,13 +61,13 @@ class CovariateRows:
     def of(
         cls, trial: PreparedTrial, names: Sequence[str], least: float
     ) -> "CovariateRows":
-        """Return the samples of a trial whose further inputs hold the columns.
+        """Take the samples of a trial whose further inputs include the columns.
 
         Args:
             trial: a prepared trial.
-            names: of the columns; `WAY` is computed, inputs of other names are those
-                of all models.
-            least: fall of force [N] that makes a drop.
+            names: names of the columns; `WAY` is computed. Other inputs are common to
+                all models.
+            least: decrease in force [N] that counts as a drop.
         """
         smooth, kept = trial.smooth, trial.indices
         inputs = [x[kept] for n, x in smooth.further.items() if n not in names]
@@ -83,24 +83,24 @@ class CovariateRows:
         )
 
     def with_column(self, k: int | None) -> SampleTable:
-        """Return the samples with one of the columns as an input more, None = none."""
+        """Return the samples with column `k` as an additional input, None = without."""
         if k is None:
             return self.rows
         own, column = self.rows.further, self.columns[:, [k]]
-        beside = column if own is None else np.column_stack([own, column])
-        return SampleTable(self.rows.F_n, self.rows.v_t, self.rows.F_t, beside)
+        further = column if own is None else np.column_stack([own, column])
+        return SampleTable(self.rows.F_n, self.rows.v_t, self.rows.F_t, further)
 
 
 @dataclass(frozen=True, slots=True)
 class CovariateTask:
-    """Everything one fold of the test needs.
+    """Input of one fold of the test.
 
     Attributes:
         terrain: its name.
-        columns: names of what is tested.
-        trials: those with kept samples.
-        left_out: numbers of those that nothing is fitted to.
-        options: how to fit.
+        columns: names of the columns to test.
+        trials: trials with kept samples.
+        left_out: numbers of the held-out trials.
+        options: options of the fits.
     """
 
     terrain: str
@@ -111,26 +111,26 @@ class CovariateTask:
 
 
 class CovariateFold(NamedTuple):
-    """What columns gain in one fold.
+    """Gains of the columns in one fold.
 
     Attributes:
-        gains: log density per sample [nat] of every trial left out, by column.
+        gains: gain in log density per sample [nat] of every held-out trial, by column.
     """
 
     gains: Mapping[str, tuple[float, ...]]
 
 
 class CovariateResult(NamedTuple):
-    """What a column tells of F_t on a terrain.
+    """Result of the test of a column on a terrain.
 
     Attributes:
         terrain: its name.
         column: name of the column.
-        trials: number of trials left out.
-        gain: of log density per sample [nat], mean over the trials.
-        lower: end of its 95 % interval,
-        upper: and the other one.
-        repeated: share of its changes over 0.2 s that is that of F_t.
+        trials: number of held-out trials.
+        gain: gain in log density per sample [nat], mean over the trials.
+        lower: lower end of the 95 % interval of the gain.
+        upper: upper end of that interval.
+        repeated: share of the column's changes over 0.2 s explained by F_t.
     """
 
     terrain: str
@@ -143,14 +143,14 @@ class CovariateResult(NamedTuple):
 
     @property
     def verdict(self) -> str:
-        """What it is, in two words."""
+        """Verdict in two words."""
         if self.repeated >= REPEATED:
             return "repeats F_t"
         return "gain" if self.lower > 0.0 and self.gain >= LEAST_GAIN else "no gain"
 
     @property
     def sentence(self) -> str:
-        """What it is, for people."""
+        """Verdict with its numbers in one sentence."""
         ends = (
             f"{self.gain:+z.2f} nat per sample, "
             f"{self.lower:+z.2f} to {self.upper:+z.2f}"
@@ -164,7 +164,7 @@ class CovariateResult(NamedTuple):
         return f"{where} ({ends})."
 
     def numbers(self) -> dict[str, Any]:
-        """Return it as plain values."""
+        """Return the result as plain values."""
         return self._asdict() | {"verdict": self.verdict}
 
 
@@ -175,14 +175,14 @@ def covariate_results(
     workers: Workers | int | None = None,
     store: ResultStore | None = None,
 ) -> list[CovariateResult]:
-    """Return what every column tells on every terrain with three trials or more.
+    """Test every column on every terrain with at least three trials.
 
     Args:
-        trials: those with kept samples, by terrain.
-        columns: names of theirs.
-        options: how to fit.
-        workers: where.
-        store: results of earlier runs.
+        trials: trials with kept samples, by terrain.
+        columns: names of the columns.
+        options: options of the fits.
+        workers: processes that run the fits.
+        store: cache of earlier results.
     """
     tasks = [
         CovariateTask(name, tuple(columns), tuple(rows), group, options)
@@ -195,17 +195,17 @@ def covariate_results(
     for task, fold in zip(tasks, folds, strict=True):
         for column, values in fold.gains.items():
             gains.setdefault((task.terrain, column), []).extend(values)
-    found: list[CovariateResult] = []
+    results: list[CovariateResult] = []
     for (terrain, column), values in gains.items():
         share = repeated(trials[terrain], columns.index(column))
-        found.append(_result(terrain, column, values, share))
-    return found
+        results.append(_result(terrain, column, values, share))
+    return results
 
 
 def judge_covariates(task: CovariateTask) -> CovariateFold:
-    """Return what columns gain on the trials left out; a pure function of the task.
+    """Compute the gains of columns on the held-out trials; pure.
 
-    A column that no model can be fitted with is missing.
+    A column with which no model can be fitted is omitted.
     """
     try:
         without = _densities(task, None)
@@ -214,15 +214,15 @@ def judge_covariates(task: CovariateTask) -> CovariateFold:
     gains: dict[str, tuple[float, ...]] = {}
     for k, column in enumerate(task.columns):
         try:
-            found = _densities(task, k)
+            densities = _densities(task, k)
         except TractionError:
             continue
-        gains[column] = tuple(b - a for a, b in zip(without, found, strict=True))
+        gains[column] = tuple(b - a for a, b in zip(without, densities, strict=True))
     return CovariateFold(gains)
 
 
 def _densities(task: CovariateTask, column: int | None) -> list[float]:
-    """Return the log density per sample of trials left out."""
+    """Return the log density per sample of the held-out trials."""
     tables = [rows.with_column(column) for rows in task.trials]
     fitted = [rows for k, rows in enumerate(tables) if k not in task.left_out]
     joined, options = SampleTable.joined(fitted), task.options
@@ -255,21 +255,21 @@ def _result(
 
 
 def repeated(trials: Sequence[CovariateRows], column: int) -> float:
-    """Return the share of a column's changes over 0.2 s that is that of F_t.
+    """Return the share of a column's changes over 0.2 s explained by F_t.
 
-    Partial R^2 of its changes within trials on those of F_t, beside those of F_n and
+    Partial R^2 of its changes within trials on those of F_t, given those of F_n and
     v_t.
     """
     changes = [_changes(rows, column) for rows in trials]
     every = np.concatenate([np.zeros((0, 4)), *changes])
     if len(every) <= every.shape[1]:
         return 0.0
-    known, own = every[:, 1:], every[:, 0]
-    left = [
+    predictors, own = every[:, 1:], every[:, 0]
+    squares = [
         float(np.sum((own - X @ np.linalg.lstsq(X, own, rcond=None)[0]) ** 2))
-        for X in (known[:, :2], known)
+        for X in (predictors[:, :2], predictors)
     ]
-    return 1.0 - left[1] / left[0] if left[0] > 0.0 else 0.0
+    return 1.0 - squares[1] / squares[0] if squares[0] > 0.0 else 0.0
 
 
 def _changes(rows: CovariateRows, column: int) -> Array:
@@ -286,38 +286,38 @@ def _changes(rows: CovariateRows, column: int) -> Array:
 
 
 def way_since_drop(trial: PreparedTrial, least: float) -> Array:
-    """Return the way since the last drop of force at the kept samples [m], (m,).
+    """Return the travel since the last drop in force at the kept samples [m], (m,).
 
-    A drop is known once the force has fallen by `least` [N] below its peak; before the
-    first one it is the way since the trial began.
+    A drop is detected once the force is `least` [N] below its peak; before the first
+    one, the travel is counted from the start of the trial.
     """
     F, v = trial.smooth.F_t, np.maximum(trial.smooth.v_t, 0.0)
     steps = 0.5 * (v[1:] + v[:-1]) * np.diff(trial.smooth.t)
     x = np.concatenate([[0.0], np.cumsum(steps)])
     peaks, floors = falls(F, least)
-    known = [
+    detected = [
         peak + int(np.argmax(F[peak : floor + 1] <= F[peak] - least))
         for peak, floor in zip(peaks, floors, strict=True)
     ]
     last = np.zeros(x.size)
-    last[known] = x[known]
+    last[detected] = x[detected]
     return (x - np.maximum.accumulate(last))[trial.indices]
 
 
 def least_drop(kind: str) -> float:
-    """Return the fall of force [N] that makes a drop on a kind of terrain."""
+    """Return the decrease in force [N] that counts as a drop on a kind of terrain."""
     return _PLATE_DROP if kind == FLAT else _STONES_DROP
 
 
 def falls(F: Array, least: float) -> tuple[Indices, Indices]:
-    """Return peak and floor of every fall between alternating extremes.
+    """Find peak and floor of every drop between alternating extremes.
 
     Args:
         F: forces [N], shape (T,).
-        least: between two extremes [N].
+        least: smallest difference between two extremes [N].
 
     Returns:
-        Samples of the peaks and of the floors, each of shape (number of falls,).
+        Rows of the peaks and of the floors, each of shape (number of drops,).
     """
     steps = np.sign(np.diff(F))
     turning = np.flatnonzero(steps[1:] * steps[:-1] <= 0.0) + 1

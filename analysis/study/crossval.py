@@ -1,4 +1,4 @@
-"""Leave one trial out: every model is tested on a trial it never saw.
+"""Leave-one-trial-out cross-validation.
 
 Samples of one trial are correlated over tenths of a second, so a fold is a whole trial.
 A terrain has at most 50 folds: of more trials each fold leaves out a group, trials k,
@@ -21,25 +21,25 @@ from analysis.data.series import Indices
 from analysis.study.metrics import Score, score
 from analysis.study.models import TITLES, FitOptions, FittedModel, ModelFitter
 
-MOST_FOLDS = 50  # of a terrain
-_MOST_ROWS = 50_000  # of the training that its error is told of, at most twice as many
+MOST_FOLDS = 50  # per terrain
+_MOST_ROWS = 50_000  # training rows for the training error; at most twice as many
 Prepared = Mapping[str, Sequence[PreparedTrial]]
 Tables = Mapping[str, Mapping[int, SampleTable]]  # by terrain and number of the trial
 
 
 @dataclass(frozen=True, slots=True)
 class FoldTask:
-    """Everything one fold needs; `run_fold` is a pure function of it.
+    """Input of one fold; `run_fold` is a pure function of it.
 
-    Tasks share the tables of the trials, so that all of them grow with the trials.
+    Tasks share the tables of the trials, so that memory grows linearly with the trials.
 
     Attributes:
         terrain: terrain of the models.
-        left_out: numbers of the trials left out, from 0.
+        left_out: numbers of the held-out trials, from 0.
         training_trials: kept samples of every other trial.
-        test_trials: kept samples of every trial left out.
-        others: for every other terrain the trials this fold is tested on.
-        options: how to fit.
+        test_trials: kept samples of every held-out trial.
+        others: trials of every other terrain that this fold is tested on.
+        options: options of the fits.
     """
 
     terrain: str
@@ -51,12 +51,12 @@ class FoldTask:
 
     @property
     def fold(self) -> int:
-        """Number of the fold: that of the first trial left out."""
+        """Number of the fold: that of the first held-out trial."""
         return self.left_out[0]
 
     @property
     def training(self) -> SampleTable:
-        """What models are fitted to, trial by trial."""
+        """Training rows, trial by trial."""
         return SampleTable.joined(self.training_trials)
 
     @property
@@ -71,9 +71,9 @@ class ModelFold:
 
     Attributes:
         model: the fitted model.
-        scores: its errors on every trial left out.
-        train_rmse: root mean square error on the training rows [N], of more than
-            100,000 on every n-th.
+        scores: errors on every held-out trial.
+        train_rmse: root mean square error on the training rows [N]; on every n-th if
+            there are more than 100,000.
         cross: mean absolute errors [N] on trials of other terrains.
     """
 
@@ -84,7 +84,7 @@ class ModelFold:
 
     @property
     def score(self) -> Score:
-        """Its errors, means over the trials left out."""
+        """Errors averaged over the held-out trials."""
         return Score(*np.mean(self.scores, axis=0).tolist())
 
 
@@ -94,12 +94,12 @@ class FoldResult:
 
     Attributes:
         terrain: terrain of the models.
-        left_out: numbers of the trials left out, from 0.
-        models: results by the name of the model; one that failed is missing.
-        gp_rows: training rows that the Gaussian processes were given.
-        constant_mae: error [N] of the training rows' median F_t, for scale, mean over
-            the trials left out.
-        notes: what could not be done, and why.
+        left_out: numbers of the held-out trials, from 0.
+        models: results by model name; failed models are missing.
+        gp_rows: training rows used by the Gaussian processes.
+        constant_mae: error [N] of the training rows' median F_t as a reference, mean
+            over the held-out trials.
+        notes: failures with their reasons.
     """
 
     terrain: str
@@ -111,19 +111,19 @@ class FoldResult:
 
     @property
     def fold(self) -> int:
-        """Number of the fold, from 0: that of the first trial left out."""
+        """Number of the fold, from 0: that of the first held-out trial."""
         return self.left_out[0]
 
 
 def plan_folds(
     trials: Prepared, options: FitOptions, targets: Prepared | None = None
 ) -> tuple[list[FoldTask], list[str]]:
-    """Return the folds of a study and notes on what cannot be folded.
+    """Plan the folds of a study, with notes on trials that cannot be used.
 
     Args:
-        trials: what models are fitted to.
-        options: how to fit.
-        targets: the same trials as models are tested on them; None = as fitted to.
+        trials: trials that models are fitted to.
+        options: options of the fits.
+        targets: the same trials as prepared for testing; None = as for fitting.
     """
     targets = trials if targets is None else targets
     usable = {
@@ -177,33 +177,33 @@ def _paired(
 ) -> dict[str, tuple[SampleTable, ...]]:
     """Return the trials of every other terrain that a fold is tested on."""
     own = list(test[terrain])
-    met = {
+    paired = {
         other: {k for fold in group for k in paired_trials(fold, own, list(trials))}
         for other, trials in test.items()
         if other != terrain
     }
     return {
         other: tuple(test[other][k] for k in sorted(numbers))
-        for other, numbers in met.items()
+        for other, numbers in paired.items()
     }
 
 
 def fold_groups(trials: Sequence[int], most: int = MOST_FOLDS) -> list[tuple[int, ...]]:
-    """Return which trials each fold of a terrain leaves out.
+    """Divide the trials of a terrain into the groups that folds leave out.
 
     Args:
-        trials: their numbers; each by itself up to `most` of them.
-        most: folds.
+        trials: numbers of the trials; up to `most` of them, each is a group.
+        most: largest number of folds.
     """
     count = min(len(trials), most)
     return [tuple(trials[k::count]) for k in range(count)]
 
 
 def notes_on_groups(trials: Mapping[str, Sequence[int]]) -> list[str]:
-    """Return where folds leave out groups of trials.
+    """Return a note for every terrain whose folds leave out groups of trials.
 
     Args:
-        trials: numbers of those that are left out, by terrain.
+        trials: numbers of the held-out trials, by terrain.
     """
     return [
         f"{terrain}: {len(numbers)} trials in {MOST_FOLDS} folds. Each leaves out a "
@@ -215,7 +215,7 @@ def notes_on_groups(trials: Mapping[str, Sequence[int]]) -> list[str]:
 
 
 def run_fold(task: FoldTask) -> FoldResult:
-    """Return the models of one fold and their errors."""
+    """Fit the models of one fold and score them."""
     training, chosen = task.training, choose_rows(task)
     fitter = ModelFitter(TrainingSet(training, task.lengths, chosen), task.options)
     models: dict[str, ModelFold] = {}
@@ -242,10 +242,10 @@ def run_fold(task: FoldTask) -> FoldResult:
 
 
 def choose_rows(task: FoldTask) -> Indices:
-    """Return the training rows for Gaussian processes: random, without replacement.
+    """Draw the training rows for Gaussian processes at random, without replacement.
 
-    Seeded by (seed, terrain, fold), so that they depend on no other terrain and every
-    variant gets the same rows.
+    Seeded by (seed, terrain, fold), so that they do not depend on other terrains and
+    every variant uses the same rows.
     """
     key = (task.options.seed, zlib.crc32(task.terrain.encode()), task.fold)
     count = min(task.options.gp_points, task.training.count)
@@ -253,10 +253,10 @@ def choose_rows(task: FoldTask) -> Indices:
 
 
 def paired_trials(fold: int, models: Sequence[int], tests: Sequence[int]) -> list[int]:
-    """Return the trials of another terrain that the model of a fold meets, in order.
+    """Return the trials of another terrain that the model of a fold is tested on.
 
-    Fold k meets trial k where both exist. A fold or trial left over is paired by
-    wrapping round the other list, so that each is used at least once.
+    Fold k is tested on trial k if both exist. Remaining folds or trials are paired by
+    wrapping around the other list, so that each is used at least once.
 
     Args:
         fold: one of `models`.
@@ -265,9 +265,9 @@ def paired_trials(fold: int, models: Sequence[int], tests: Sequence[int]) -> lis
     """
     if not tests:
         return []
-    own, known = fold if fold in tests else tests[fold % len(tests)], set(models)
-    left = (k for k in tests if k not in known)
-    return sorted([own, *(k for k in left if models[k % len(models)] == fold)])
+    own, folds = fold if fold in tests else tests[fold % len(tests)], set(models)
+    unpaired = (k for k in tests if k not in folds)
+    return sorted([own, *(k for k in unpaired if models[k % len(models)] == fold)])
 
 
 def _notes_on_gaps(trials: Prepared, usable: Mapping[str, list[int]]) -> list[str]:
@@ -288,7 +288,7 @@ def _examine(model: FittedModel, task: FoldTask) -> ModelFold:
     if (step := training.count // _MOST_ROWS) > 1:
         training = training.take(np.arange(0, training.count, step))
     tested = SampleTable.joined([training, *foreign])
-    # one call for all rows: small ones cost more than they compute
+    # one call for all rows: the overhead of small calls exceeds their computation
     error = np.abs(model.mean(tested.F_n, tested.v_t, tested.further) - tested.F_t)
     ends = np.cumsum([training.count, *(rows.count for rows in foreign)])
     on_training, *on_foreign = np.split(error, ends[:-1])
@@ -296,8 +296,8 @@ def _examine(model: FittedModel, task: FoldTask) -> ModelFold:
     return ModelFold(
         model=model,
         scores=tuple(
-            score(one.F_t, model.predict(one.F_n, one.v_t, one.further))
-            for one in task.test_trials
+            score(rows.F_t, model.predict(rows.F_n, rows.v_t, rows.further))
+            for rows in task.test_trials
         ),
         train_rmse=float(np.sqrt(np.mean(on_training**2))),
         cross={

@@ -1,4 +1,4 @@
-"""Every number of a study as plain values: fits.json and fits.csv."""
+"""Export of all numbers of a study: fits.json and fits.csv."""
 
 import csv
 import io
@@ -40,14 +40,14 @@ _OTHER_UNITS = {
 
 
 class CsvRow(NamedTuple):
-    """One line of fits.csv; an empty cell stands for all.
+    """One line of fits.csv; an empty cell means all.
 
     Attributes:
         terrain: its name.
         model: name of the model.
-        fold: number of the trial left out, from 1; what a fold of several has in common
-            stands with the first of them.
-        quantity: what the value is.
+        fold: number of the held-out trial, from 1; values of a fold of several trials
+            are listed with the first of them.
+        quantity: name of the quantity.
         value: the number.
         unit: its unit.
     """
@@ -61,7 +61,7 @@ class CsvRow(NamedTuple):
 
 
 def to_fits(study: Study) -> dict[str, Any]:
-    """Return the study as a dictionary that is valid JSON: a missing number is None."""
+    """Convert a study to a JSON-compatible dictionary; missing numbers are None."""
     fits = {
         "schema": SCHEMA,
         "simulated": study.simulated,
@@ -83,7 +83,7 @@ def to_csv(study: Study, further: Iterable[CsvRow] = ()) -> str:
 
     Args:
         study: the study.
-        further: more lines.
+        further: additional lines.
     """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -95,12 +95,12 @@ def to_csv(study: Study, further: Iterable[CsvRow] = ()) -> str:
                 of_fold = {"train_rmse": outcome.train_rmse}
                 if model == TUSTIN:
                     of_fold, units = of_fold | outcome.model.describe(), units | UNITS
-                scores = (one._asdict() for one in outcome.scores)
+                scores = (score._asdict() for score in outcome.scores)
                 values = [*zip(fold.left_out, scores, strict=True)]
                 writer.writerows(
                     [_safe(name), model, k + 1, key, repr(value), units[key]]
-                    for k, each in [*values, (fold.fold, of_fold)]
-                    for key, value in each.items()
+                    for k, quantities in [*values, (fold.fold, of_fold)]
+                    for key, value in quantities.items()
                 )
     writer.writerows(
         [
@@ -114,7 +114,7 @@ def to_csv(study: Study, further: Iterable[CsvRow] = ()) -> str:
 
 
 def tustin_medians(result: TerrainResult) -> dict[str, float | None]:
-    """Return the median over folds of each Tustin parameter by itself (Table I)."""
+    """Return the median over folds of each Tustin parameter separately (Table I)."""
     folds = [fold.model.describe() for fold in result.models(TUSTIN)]
     return {
         name: float(np.median([fold[name] for fold in folds])) if folds else None
@@ -183,7 +183,7 @@ def _whole_fit(fit: TustinFit) -> dict[str, Any]:
 
 
 def _paired(result: TerrainResult, models: Sequence[str]) -> list[dict[str, Any]]:
-    """Return every pair of models compared over the trials, by MAE and by NLPD."""
+    """Compare every pair of models over the trials, by MAE and by NLPD."""
     return [
         {"models": [first, second], "measure": key, **outcome._asdict()}
         for first, second in combinations(models, 2)
@@ -205,7 +205,7 @@ def _processes(result: TerrainResult, model: str) -> dict[str, Any]:
 
 
 def to_plain(value: Any) -> Any:  # noqa: ANN401
-    """Return `value` with tuples as lists and numbers that are not finite as None."""
+    """Convert tuples to lists and non-finite numbers to None, recursively."""
     if isinstance(value, dict):
         return {str(key): to_plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -216,5 +216,5 @@ def to_plain(value: Any) -> Any:  # noqa: ANN401
 
 
 def _safe(text: str) -> str:
-    """Return text that a spreadsheet will not take for a formula."""
+    """Escape text that a spreadsheet would interpret as a formula."""
     return "'" + text if text[:1] in "=+-@" else text

@@ -1,4 +1,4 @@
-"""How well predictions met measurements."""
+"""Scores of predictions, and comparison of models."""
 
 from collections.abc import Sequence
 from itertools import product
@@ -9,15 +9,15 @@ import numpy as np
 from analysis.data.series import Array
 from analysis.study.distribution import Distribution, checked_shares
 
-_SMALLEST_SD = 1e-6  # N; a fit without any error is scored as if it had this one
+_SMALLEST_SD = 1e-6  # N, lower limit for scoring an exact fit
 
 
 class Prediction(NamedTuple):
-    """A predicted F_t with its uncertainty.
+    """Predicted F_t with a symmetric distribution.
 
     Attributes:
         mean: predicted F_t [N], shape (n,).
-        sd: standard deviation of a measurement around it [N], noise included, (n,).
+        sd: standard deviation of a measurement [N], noise included, shape (n,).
         nu: degrees of freedom of Student's t, above 2; infinite for a normal.
     """
 
@@ -27,7 +27,7 @@ class Prediction(NamedTuple):
 
     @property
     def scale(self) -> Array:
-        """Scale of Student's t with this standard deviation [N]; sd for a normal."""
+        """Scale of Student's t for this standard deviation [N]; sd for a normal."""
         factor = 1.0 if np.isinf(self.nu) else np.sqrt((self.nu - 2.0) / self.nu)
         return factor * np.maximum(self.sd, _SMALLEST_SD)
 
@@ -44,11 +44,11 @@ class Prediction(NamedTuple):
         return ndtr(z) if np.isinf(self.nu) else stdtr(self.nu, z)
 
     def quantiles(self, shares: Sequence[float] | Array) -> Array:
-        """Return the forces [N] that are not reached with these shares, (q, n)."""
+        """Return the quantiles [N] at these probabilities, shape (q, n)."""
         from scipy.special import ndtri, stdtrit
 
-        wanted = checked_shares(shares)
-        z = ndtri(wanted) if np.isinf(self.nu) else stdtrit(self.nu, wanted)
+        p = checked_shares(shares)
+        z = ndtri(p) if np.isinf(self.nu) else stdtrit(self.nu, p)
         return self.mean + np.outer(z, self.scale)
 
     def log_density(self, F_t: Array) -> Array:
@@ -85,9 +85,9 @@ class Score(NamedTuple):
 
 
 def score(F_t: Array, prediction: Distribution) -> Score:
-    """Return the errors of a prediction of F_t [N], shape (n,) with n >= 1.
+    """Score a prediction of F_t [N], shape (n,) with n >= 1.
 
-    The absolute error is that of the median, the squared one that of the mean.
+    The absolute error uses the median, the squared error the mean.
     """
     return Score(
         mae=float(np.abs(F_t - prediction.point).mean()),
@@ -102,7 +102,7 @@ def score(F_t: Array, prediction: Distribution) -> Score:
 
 
 def coverage(F_t: Array, prediction: Distribution, share: float) -> float:
-    """Return how many of F_t [N] lie in the central band that should hold `share`."""
+    """Return the fraction of F_t [N] inside the central band of probability `share`."""
     return float(np.mean(np.abs(2.0 * prediction.cdf(F_t) - 1.0) <= share))
 
 
@@ -138,17 +138,17 @@ def ranked_probability(F_t: Array, prediction: Prediction) -> Array:
 
 
 _EXACT = 14  # trials up to which every pattern of signs is tried
-_PATTERNS = 20_000  # random ones beyond that
+_PATTERNS = 20_000  # random patterns for more trials
 
 
 class PairedComparison(NamedTuple):
     """A paired comparison over trials.
 
     Attributes:
-        difference: mean of the second minus the first.
-        standard_error: of that mean; None for one trial.
+        difference: mean of second minus first.
+        standard_error: standard error of that mean; None for one trial.
         p: probability of a mean difference this large if the models were equal.
-        trials: number of trials with both.
+        trials: number of trials with both values.
     """
 
     difference: float
@@ -160,10 +160,11 @@ class PairedComparison(NamedTuple):
 def compare(
     first: Sequence[float | None], second: Sequence[float | None]
 ) -> PairedComparison | None:
-    """Return the comparison of two models' errors per trial, None without a pair.
+    """Compare the errors of two models per trial; None without a pair.
 
-    The trial is the independent unit. Under equality the sign of every difference is a
-    toss: p is the share of all patterns of signs with a mean at least as large.
+    Paired permutation test with the trial as independent unit. If the models are equal,
+    the sign of every difference is random: p is the share of all sign patterns with a
+    mean at least as large.
     """
     pairs = [
         (a, b)
@@ -175,17 +176,17 @@ def compare(
     difference = np.array([b - a for a, b in pairs])
     count, mean = difference.size, float(difference.mean())
     error = float(difference.std(ddof=1) / np.sqrt(count)) if count > 1 else None
-    tossed = _signs(count) @ np.abs(difference) / count
-    # rounding must not part a pattern from its mirror image
-    is_as_large = np.abs(tossed) >= abs(mean) * (1.0 - 1e-12)
+    permuted = _signs(count) @ np.abs(difference) / count
+    # tolerance, so that rounding cannot separate a pattern from its mirror image
+    is_as_large = np.abs(permuted) >= abs(mean) * (1.0 - 1e-12)
     return PairedComparison(mean, error, float(np.mean(is_as_large)), count)
 
 
 def clearly_best(nlpd: Array, least: float = 0.0) -> int:
-    """Return which column of NLPD, (trials, k), is least, or 0 where that is not clear.
+    """Return the column of NLPD, (trials, k), that is clearly smallest; 0 if none is.
 
-    Another than the first must be better by one standard error over the trials, and by
-    `least` [nat].
+    A column other than the first must be better by one standard error over the trials
+    and by `least` [nat].
     """
     gain = nlpd[:, :1] - nlpd
     error = gain.std(axis=0, ddof=1) / np.sqrt(len(gain)) if len(gain) > 1 else 0.0
@@ -196,11 +197,10 @@ def clearly_best(nlpd: Array, least: float = 0.0) -> int:
 
 
 def adjusted_by_holm(p_values: Sequence[float]) -> list[float]:
-    """Return p values that hold for all comparisons together, in the order given.
+    """Adjust p values for multiple comparisons by Holm's method, in the order given.
 
-    Holm's step-down: the k-th smallest of m is multiplied by m - k + 1 and never falls
-    below a smaller one's. Below 0.05, the chance of a single false one among all m is
-    below 0.05.
+    Step-down: the k-th smallest of m is multiplied by m - k + 1, monotonically. At the
+    level 0.05 the probability of any false positive among all m is below 0.05.
     """
     order = sorted(range(len(p_values)), key=p_values.__getitem__)
     adjusted, highest = [0.0] * len(p_values), 0.0
@@ -211,17 +211,17 @@ def adjusted_by_holm(p_values: Sequence[float]) -> list[float]:
 
 
 def smallest_adjusted(pairs: Sequence[PairedComparison]) -> float:
-    """Return the smallest p that Holm's adjustment can give so many comparisons.
+    """Return the smallest p value that Holm's adjustment can give for these pairs.
 
-    Of n trials the pattern with all signs alike has p = 2/2^n: with ten trials no more
-    than 25 comparisons can show a single one below 0.05.
+    With n trials the pattern with all signs equal has p = 2/2^n: with ten trials, at
+    most 25 comparisons leave a chance of any adjusted p below 0.05.
     """
     trials = min((pair.trials for pair in pairs), default=0)
     return min(1.0, len(pairs) * 2.0 ** (1 - trials))
 
 
 def standard_error(values: Sequence[float | None]) -> float | None:
-    """Return the standard error of the mean over trials, None below two of them."""
+    """Return the standard error of the mean over trials; None with fewer than two."""
     present = [value for value in values if value is not None]
     if len(present) < 2:
         return None

@@ -1,7 +1,7 @@
-"""The models of a study by name, each fitted to the same rows.
+"""Models of a study by name, all fitted to the same rows.
 
 The five of Fig. 9 are the default; others go beyond the paper: a Gaussian process whose
-noise is chosen per fold, and processes whose bands are those of a new trial.
+noise model is chosen per fold, and processes with predictive bands for a new trial.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -40,20 +40,20 @@ REPORTED = (*PAPER_MODELS, GP_SE_NOISE, GP_SE_TRIAL)  # by default
 
 @dataclass(frozen=True, slots=True)
 class FitOptions:
-    """How models are fitted.
+    """Options of the model fits.
 
     Attributes:
         bounds: box of the Tustin fit.
         gp_points: number of training rows of a Gaussian process.
-        seed: seed of the choice of those rows.
+        seed: random seed for the choice of those rows.
         models: names of the models, by default the five of Fig. 9.
         form: variant and loss of the Tustin fit.
         is_nn_as_printed: eq. (5) as printed, c = 0, for the NN kernel.
-        draws: mixtures of trials for the intervals of Tustin parameters, and of the
-            components of a trial (100 at most); 0 for none.
+        draws: bootstrap draws for the intervals of the Tustin parameters and of the
+            variance components (100 at most); 0 for none.
 
     Raises:
-        SettingsError: an unknown model, or fewer than one point.
+        SettingsError: unknown model, or fewer than one point.
     """
 
     bounds: TustinBounds = field(default_factory=TustinBounds)
@@ -75,11 +75,11 @@ class FitOptions:
 
 
 class FittedModel(Protocol):
-    """A model of F_t over (F_n, v_t), fitted."""
+    """Fitted model of F_t over (F_n, v_t)."""
 
     @property
     def flags(self) -> tuple[str, ...]:
-        """What a reader must know before believing its parameters."""
+        """Warnings about its parameters."""
         ...
 
     def mean(self, F_n: Array, v_t: Array, further: Array | None = None) -> Array:
@@ -88,15 +88,14 @@ class FittedModel(Protocol):
         Args:
             F_n: normal force [N], shape (n,).
             v_t: slip velocity [m/s], shape (n,).
-            further: other inputs that the model was fitted with, shape (n, k); None:
-                at their means.
+            further: other inputs of the model, shape (n, k); None = their means.
         """
         ...
 
     def predict(
         self, F_n: Array, v_t: Array, further: Array | None = None
     ) -> Distribution:
-        """Return what is predicted of F_t [N] at n points; see `mean`."""
+        """Return the predictive distribution of F_t [N] at n points; see `mean`."""
         ...
 
     def describe(self) -> dict[str, Any]:
@@ -106,7 +105,7 @@ class FittedModel(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class TustinModel:
-    """The Tustin curve with the constant spread of its residual."""
+    """Tustin curve with a constant residual standard deviation."""
 
     fit: TustinFit
 
@@ -133,13 +132,13 @@ class TustinModel:
 
 @dataclass(frozen=True, slots=True)
 class GpModel:
-    """A Gaussian process over (F_n, v_t), alone or around a Tustin curve.
+    """Gaussian process over (F_n, v_t), with or without a Tustin mean function.
 
     Attributes:
-        process: the process of F_t, or of its residual around the curve.
+        process: process of F_t, or of its residual about the curve.
         curve: Tustin fit that is its mean function.
-        tails: Student's t in the place of the normal noise.
-        choice: how its noise was chosen.
+        tails: Student's t noise instead of normal noise.
+        choice: record of the choice of noise.
     """
 
     process: GaussianProcess
@@ -149,21 +148,21 @@ class GpModel:
 
     @property
     def flags(self) -> tuple[str, ...]:
-        """Hyperparameters at the edge of the search; a long length = input unused."""
+        """Hyperparameters at a bound of the search; a long length = input unused."""
         jitter = ("jitter added",) if self.process.jitter else ()
         return tuple(f"{name} at bound" for name in self.process.at_bound) + jitter
 
     def mean(self, F_n: Array, v_t: Array, further: Array | None = None) -> Array:
         """Return the predictive mean [N]."""
         mean = self.process.mean(self.process.at(F_n, v_t, further))
-        return self._around(mean, F_n, v_t)
+        return self._plus_curve(mean, F_n, v_t)
 
     def predict(
         self, F_n: Array, v_t: Array, further: Array | None = None
     ) -> Prediction:
         """Return the predictive mean and standard deviation [N], noise included."""
         mean, variance = self.process.predict(self.process.at(F_n, v_t, further))
-        normal = Prediction(self._around(mean, F_n, v_t), np.sqrt(variance))
+        normal = Prediction(self._plus_curve(mean, F_n, v_t), np.sqrt(variance))
         return normal if self.tails is None else self.tails.applied_to(normal)
 
     def describe(self) -> dict[str, Any]:
@@ -174,16 +173,16 @@ class GpModel:
             "noise": None if self.choice is None else self.choice._asdict(),
         }
 
-    def _around(self, mean: Array, F_n: Array, v_t: Array) -> Array:
+    def _plus_curve(self, mean: Array, F_n: Array, v_t: Array) -> Array:
         return mean if self.curve is None else mean + self.curve.mean(F_n, v_t)
 
 
 class ModelFitter:
-    """Fits models by name to one training set; they share what they have in common.
+    """Fits models by name to one training set and shares common parts.
 
     Args:
-        training: rows that the models are fitted to.
-        options: how they are fitted.
+        training: training data.
+        options: options of the fits.
     """
 
     def __init__(self, training: TrainingSet, options: FitOptions) -> None:
@@ -192,7 +191,7 @@ class ModelFitter:
         self._processes: dict[Kernel, GpModel] = {}
 
     def curve(self) -> TustinFit:
-        """Return the Tustin fit of all training rows; the first call makes it.
+        """Return the Tustin fit to all training rows; computed once.
 
         Raises:
             SettingsError: fewer than 20 rows.
@@ -205,10 +204,10 @@ class ModelFitter:
         return self._curve
 
     def fit(self, name: str) -> FittedModel:
-        """Return the model `name` fitted to the training rows.
+        """Fit the model `name` to the training rows.
 
         Raises:
-            SettingsError: no such model, or rows that it cannot be fitted to.
+            SettingsError: no such model, or it cannot be fitted to these rows.
         """
         if name not in MODELS:
             raise SettingsError(
@@ -218,16 +217,16 @@ class ModelFitter:
         return MODELS[name].fit(self)
 
     def gp(self, kernel: Kernel) -> GpModel:
-        """Return a Gaussian process with constant noise on the chosen rows."""
+        """Fit a Gaussian process with constant noise to the chosen rows."""
         if kernel not in self._processes:
             subset = self.training.subset
             self._processes[kernel] = GpModel(fit_gp(subset.inputs, subset.F_t, kernel))
         return self._processes[kernel]
 
     def gp_around_tustin(self, kernel: Kernel) -> GpModel:
-        """Return the Tustin curve with a zero-mean process on its residuals.
+        """Fit a Tustin curve and a zero-mean process to its residuals.
 
-        The curve comes from all rows, the residuals from the chosen ones.
+        The curve is fitted to all rows, the process to the chosen ones.
         """
         curve, subset = self.curve(), self.training.subset
         residual = subset.F_t - curve.mean(subset.F_n, subset.v_t)
@@ -235,7 +234,7 @@ class ModelFitter:
         return GpModel(process, curve)
 
     def gp_with_chosen_noise(self) -> GpModel:
-        """Return a Gaussian process whose noise is chosen among the training trials."""
+        """Fit a Gaussian process whose noise model is chosen by the training trials."""
         training, constant = self.training, self.gp(self.se_kernel)
         outputs = training.subset.F_t
         changing = refit_gp(
@@ -252,18 +251,18 @@ class ModelFitter:
     def new_trial(
         self, kernel: Kernel, *, is_around_tustin: bool = False
     ) -> NewTrialModel:
-        """Return the model of a new trial, around the Tustin curve or a constant."""
+        """Fit the model of a new trial with a Tustin or constant mean function."""
         curve = self.curve() if is_around_tustin else None
         return NewTrialFit(self.training, curve).fit(kernel)
 
     @property
     def se_kernel(self) -> SquaredExponential:
-        """The squared exponential of eq. (4), a length for every input."""
+        """Squared exponential kernel of eq. (4), one length per input."""
         return SquaredExponential(self._dimensions)
 
     @property
     def nn_kernel(self) -> Arcsine:
-        """The neural-network kernel of eq. (5), by the options as printed."""
+        """Neural-network kernel of eq. (5); as printed if the options say so."""
         return Arcsine(self._dimensions, as_printed=self.options.is_nn_as_printed)
 
     @property
@@ -274,13 +273,13 @@ class ModelFitter:
 
 @dataclass(frozen=True, slots=True)
 class ModelKind:
-    """A model that a study knows by name.
+    """A kind of model in the registry.
 
     Attributes:
-        title: as figures and tables show it.
-        fit: fits it to the training rows of a `ModelFitter`.
-        is_compared: tables and figures have it beside the others; not what has its own.
-        is_of_new_trial: its bands are those of a trial to come.
+        title: title in figures and tables.
+        fit: function that fits it to the training rows of a `ModelFitter`.
+        is_compared: included in the common tables and figures, without its own.
+        is_of_new_trial: its bands hold for a new trial.
     """
 
     title: str
@@ -289,8 +288,8 @@ class ModelKind:
     is_of_new_trial: bool = False
 
 
-# Everything that goes by a model follows from its line here: titles, choices of the
-# commands, cross-validation, tables, figures and the results that are kept.
+# The registry of models: titles, command options, cross-validation, tables, figures and
+# cached results all follow from an entry here.
 MODELS: Mapping[str, ModelKind] = {
     TUSTIN: ModelKind("Tustin", lambda fitter: TustinModel(fitter.curve())),
     GP_SE: ModelKind("GP (SE)", lambda fitter: fitter.gp(fitter.se_kernel)),
@@ -335,20 +334,20 @@ NEW_TRIAL = frozenset(name for name, kind in MODELS.items() if kind.is_of_new_tr
 
 
 def compared(models: Sequence[str]) -> tuple[str, ...]:
-    """Return those of `models` that tables and figures have beside each other."""
+    """Return those of `models` that are compared in common tables and figures."""
     return tuple(name for name in models if MODELS[name].is_compared)
 
 
 def parse_models(text: str) -> tuple[str, ...]:
-    """Return the models of "tustin,gp_se".
+    """Parse a list of models such as "tustin,gp_se".
 
     Raises:
-        SettingsError: there is no such model, or one is named twice.
+        SettingsError: a model does not exist or is named twice.
     """
     names = tuple(name.strip() for name in text.split(",") if name.strip())
     unknown = [name for name in names if name not in MODELS]
     if unknown or not names or len(set(names)) < len(names):
-        what = f"no model {', '.join(unknown)}" if unknown else "no list of models"
+        what = f"no model {', '.join(unknown)}" if unknown else "not a list of models"
         raise SettingsError(
             f"--models {text}: {what}.",
             hint=f"Name each once, with commas between: {', '.join(MODELS)}.",

@@ -1,13 +1,11 @@
-"""Models whose bands hold for a new trial: a level of its own, and empirical residuals.
+"""Models with predictive bands for a new trial: trial level and empirical residuals.
 
-The noise within a trial changes with the inputs, every trial has a level of its own,
-and the shape of the distribution is that of residuals of training trials, each left out
-in turn: the hyperparameters stay, its rows are taken out and the rest is factorised
-again.
+The noise within a trial depends on the inputs, every trial has its own level, and the
+shape of the distribution comes from the residuals of training trials, each left out in
+turn with fixed hyperparameters.
 
-The function comes from at most 30 trials, a row of each from stretches of equal length:
-more rows of a process cost the cube of their number, and a trial of which it has a row
-or none shows no level.
+The function is fitted to evenly spaced rows of at most 30 trials: the cost of a process
+is cubic in the number of rows, and a trial with one row or none cannot show its level.
 """
 
 from collections.abc import Sequence
@@ -30,21 +28,21 @@ from analysis.study.distribution import (
 )
 from analysis.tustin.model import TustinFit
 
-MOST_TRIALS = 30  # that the function is fitted to
+MOST_TRIALS = 30  # trials that the function is fitted to
 _TINY = 1e-12  # N^2
-_THIN = 5  # of the rows of a trial left out every fifth is judged
+_THIN = 5  # every fifth row of a held-out trial is used
 
 
 @dataclass(frozen=True, slots=True)
 class NewTrialModel:
-    """A model of F_t over (F_n, v_t) that predicts a trial it has not seen.
+    """Model of F_t over (F_n, v_t) that predicts a new trial.
 
     Attributes:
-        process: the process of F_t with the trial's level in its noise.
+        process: process of F_t with the trial level in its noise.
         curve: Tustin fit that is its mean function.
         trials: number of trials that the process was fitted to.
-        residuals: quantiles of what a trial leaves around its level, over its predicted
-            standard deviation, at `SHARES`.
+        residuals: quantiles at `SHARES` of standardised residuals about the level of a
+            trial.
     """
 
     process: GaussianProcess
@@ -59,18 +57,18 @@ class NewTrialModel:
 
     @property
     def flags(self) -> tuple[str, ...]:
-        """Hyperparameters at the edge of the search, and what was added to fit."""
+        """Hyperparameters at a bound of the search, and added jitter."""
         jitter = ("jitter added",) if self.process.jitter else ()
         return (*(f"{name} at bound" for name in self.process.at_bound), *jitter)
 
     def mean(self, F_n: Array, v_t: Array, further: Array | None = None) -> Array:
-        """Return the median [N], the forecast of the smallest absolute error."""
+        """Return the median [N], which minimises the expected absolute error."""
         return self.predict(F_n, v_t, further).point
 
     def predict(
         self, F_n: Array, v_t: Array, further: Array | None = None
     ) -> NewTrialPrediction:
-        """Return the distribution of measurements of a new trial."""
+        """Return the distribution of measurements in a new trial."""
         inputs = self.process.at(F_n, v_t, further)
         mean, variance = self.process.predict(inputs)
         within = variance - _level_variance(self.process)
@@ -108,7 +106,7 @@ class NewTrialFit:
         self._left_out = [np.flatnonzero(trial == k)[::_THIN] for k in np.unique(label)]
 
     def fit(self, kernel: Kernel) -> NewTrialModel:
-        """Return the model around a process with such a kernel.
+        """Fit the model with this kernel.
 
         Raises:
             SettingsError: fewer than 20 rows, or outputs that do not vary.
@@ -118,7 +116,7 @@ class NewTrialFit:
         return NewTrialModel(process, self._curve, len(self._left_out), residuals)
 
     def _process(self, kernel: Kernel) -> GaussianProcess:
-        """Return the process of the chosen rows, its noise changing with the inputs."""
+        """Fit the process to the chosen rows, with input-dependent noise."""
         outputs = self._outputs(self._chosen)
         constant, changing = ConstantNoise(), LogLinearNoise(self._rows.inputs.shape[1])
         has_level = len(self._left_out) > 1
@@ -134,10 +132,10 @@ class NewTrialFit:
         return refit_gp(begin, outputs, noise=noise)
 
     def _held_out(self, process: GaussianProcess) -> list[Array]:
-        """Return what every trial left out leaves around its level, standardised.
+        """Return the standardised residuals of every held-out trial about its level.
 
-        The mean residual of a trial is more than its level. So much of it is taken off
-        that the squares lose the variance between trials, and no more.
+        The mean residual of a trial contains more than its level. It is subtracted only
+        in part, so that the mean square decreases by the variance between trials.
         """
         if len(self._left_out) < 2:
             return []
@@ -150,16 +148,16 @@ class NewTrialFit:
             parts.append((residual, np.sqrt(variance - between)))
         means = np.array([residual.mean() for residual, _ in parts])
         shared = min(between / max(float(np.mean(means**2)), _TINY), 1.0)
-        taken = (1.0 - np.sqrt(1.0 - shared)) * means
-        return [(r - level) / sd for (r, sd), level in zip(parts, taken, strict=True)]
+        levels = (1.0 - np.sqrt(1.0 - shared)) * means
+        return [(r - level) / sd for (r, sd), level in zip(parts, levels, strict=True)]
 
     def _outputs(self, rows: Indices) -> Array:
-        taken = self._training.rows.take(rows)
-        return taken.F_t - _curve(self._curve, taken.inputs)
+        table = self._training.rows.take(rows)
+        return table.F_t - _curve(self._curve, table.inputs)
 
 
 def _level_variance(process: GaussianProcess) -> float:
-    """Return the variance of the level of a trial by a process; 0 without levels."""
+    """Return the variance of the trial level in a process; 0 without levels."""
     if not isinstance(process.noise, TrialNoise):
         return 0.0
     return process.noise.level_variance(process.theta[len(process.kernel.names) :])
@@ -173,21 +171,21 @@ def _curve(curve: TustinFit | None, inputs: Array) -> Array:
 
 
 def _spread_trials(count: int) -> Indices:
-    """Return at most 30 of so many trials, spread evenly over their order."""
-    wanted = min(count, MOST_TRIALS)
-    return np.round(np.linspace(0, count - 1, wanted)).astype(int)
+    """Choose at most 30 of `count` trials, evenly spaced in order."""
+    chosen = min(count, MOST_TRIALS)
+    return np.round(np.linspace(0, count - 1, chosen)).astype(int)
 
 
 def spread_rows(lengths: Sequence[int], count: int) -> Indices:
-    """Return about `count` rows of at most 30 trials, one from stretches alike.
+    """Choose about `count` evenly spaced rows of at most 30 trials.
 
     Args:
         lengths: number of rows of every trial, one trial after the other.
-        count: of rows that are wanted.
+        count: number of rows to choose.
     """
     starts = np.concatenate([[0], np.cumsum(lengths)])
     trials = _spread_trials(len(lengths))
-    each = max(count // trials.size, 1)
-    middles = (np.arange(each) + 0.5) / each
+    per_trial = max(count // trials.size, 1)
+    middles = (np.arange(per_trial) + 0.5) / per_trial
     rows = [starts[k] + np.floor(middles * lengths[k]).astype(int) for k in trials]
     return np.unique(np.concatenate(rows))

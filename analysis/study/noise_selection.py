@@ -1,9 +1,9 @@
-"""Which noise a terrain needs: constant, changing with the inputs, or heavy-tailed too.
+"""Choice of a noise model: constant, input-dependent, or input-dependent Student's t.
 
-"student" is Student's t whose scale changes with the inputs like that of "loglinear".
-Chosen among the training trials only, by the log density of trials that were left out
-of an inner fit, which begins where the fit to all of them ended; the simplest wins
-unless another is clearly better.
+The scale of "student" depends on the inputs like that of "loglinear". The choice uses
+only the training trials, by the log density of trials left out of an inner fit that is
+warm-started from the fit to all of them; the simplest model wins unless another is
+clearly better.
 """
 
 from dataclasses import replace
@@ -21,16 +21,16 @@ NoiseName = Literal["constant", "loglinear", "student"]
 
 NAMES: tuple[NoiseName, ...] = ("constant", "loglinear", "student")
 _GROUPS = 3  # of training trials; each is left out once
-_NU = (2.1, 60.0)  # beyond 60 a normal; without an end the density loses its digits
+_NU = (2.1, 60.0)  # practically normal beyond 60, where the density loses digits
 _SPREAD = (0.2, 5.0)
-_FEWEST = 20  # rows outside the chosen ones that tails can be judged by
-_MOST = 2000  # of them; neighbours in a trial repeat each other
-_SCORED = 200  # rows of a trial left out, at most about twice as many
-_JUDGES = 30  # trials of a group that are scored, at most about twice as many
+_FEWEST = 20  # smallest number of rows outside the chosen ones to estimate tails from
+_MOST = 2000  # largest number of these; neighbours in a trial are redundant
+_SCORED = 200  # rows scored per held-out trial, at most about twice as many
+_JUDGES = 30  # trials scored per group, at most about twice as many
 
 
 class TailedNoise(NamedTuple):
-    """Student's t around the predictions of a process.
+    """Student's t about the predictions of a process.
 
     Attributes:
         nu: degrees of freedom.
@@ -44,10 +44,10 @@ class TailedNoise(NamedTuple):
     def of(
         cls, process: GaussianProcess, training: TrainingSet
     ) -> "TailedNoise | None":
-        """Return the t of largest density on training rows outside the chosen ones.
+        """Fit the t to training rows outside the chosen ones by maximum likelihood.
 
-        None where too few of them are left: the chosen rows pulled the mean to
-        themselves and would make the noise look small.
+        None if there are too few of them. The chosen rows cannot be used: the mean was
+        fitted to them, so the noise would look too small.
         """
         from scipy.optimize import minimize
 
@@ -69,17 +69,17 @@ class TailedNoise(NamedTuple):
         return cls(float(np.exp(optimum.x[0])), float(np.exp(optimum.x[1])))
 
     def applied_to(self, normal: Prediction) -> Prediction:
-        """Return a normal prediction with these tails in its place."""
+        """Replace the normal distribution of a prediction by these tails."""
         widening = self.spread * np.sqrt(self.nu / (self.nu - 2.0))
         return Prediction(normal.mean, widening * normal.sd, self.nu)
 
 
 class NoiseChoice(NamedTuple):
-    """The noise chosen, and why.
+    """The chosen noise and the scores of all candidates.
 
     Attributes:
-        chosen: its name.
-        nlpd: mean negative log predictive density of left-out trials, by name.
+        chosen: name of the noise.
+        nlpd: mean negative log predictive density of held-out trials, by name.
     """
 
     chosen: NoiseName
@@ -92,21 +92,21 @@ def choose_noise(
     changing: GaussianProcess,
     seed: int,
 ) -> NoiseChoice:
-    """Return the noise that predicts left-out training trials best.
+    """Choose the noise that predicts held-out training trials best.
 
-    The trials are left out in up to three groups. Another noise than the constant one
+    The trials are left out in up to three groups. A noise other than the constant one
     must be better by one standard error over the trials.
 
     Args:
-        training: the training trials; the trial a fold is tested on is not among them.
+        training: training trials, without the test trial of the fold.
         constant: process with constant noise, fitted to the chosen rows.
-        changing: the same with noise that changes with the inputs.
-        seed: of the choice of the rows of the inner fits.
+        changing: the same with input-dependent noise.
+        seed: random seed for the rows of the inner fits.
     """
     groups = min(_GROUPS, len(training.lengths))
     if groups < 2:
         return NoiseChoice("constant", {})
-    constant, changing = _at_best(constant), _at_best(changing)
+    constant, changing = _with_best_start(constant), _with_best_start(changing)
     nlpd = np.concatenate(
         [
             _left_out(training, group, constant, changing, seed)
@@ -118,44 +118,44 @@ def choose_noise(
 
 
 def tail_cost(x: Array, z: Array) -> tuple[float, Array]:
-    """Return the mean negative log density of Student's t, and its slope in x.
+    """Return the mean negative log density of Student's t and its slope in x.
 
-    With s the spread and w = z^2 / (nu s^2) that is, but for what depends on z alone,
+    With s the spread and w = z^2 / (nu s^2), up to terms in z alone,
 
         log s + log(nu)/2 + log G(nu/2) - log G((nu + 1)/2) + (nu + 1)/2 log(1 + w)
 
     Args:
         x: (log nu, log s).
-        z: measurements in predicted standard deviations around the mean, shape (n,).
+        z: standardised residuals, shape (n,).
     """
     from scipy.special import digamma, gammaln
 
     nu = float(np.exp(x[0]))
     w = z * z / (nu * np.exp(2.0 * x[1]))
-    far, share = float(np.mean(np.log1p(w))), float(np.mean(w / (1.0 + w)))
+    mean_log, share = float(np.mean(np.log1p(w))), float(np.mean(w / (1.0 + w)))
     cost = x[1] + 0.5 * x[0] + gammaln(0.5 * nu) - gammaln(0.5 * (nu + 1.0))
-    of_nu = digamma(0.5 * nu) - digamma(0.5 * (nu + 1.0)) + far
+    of_nu = digamma(0.5 * nu) - digamma(0.5 * (nu + 1.0)) + mean_log
     slope = [
         0.5 + 0.5 * nu * of_nu - 0.5 * (nu + 1.0) * share,
         1.0 - (nu + 1.0) * share,
     ]
-    return float(cost + 0.5 * (nu + 1.0) * far), np.array(slope)
+    return float(cost + 0.5 * (nu + 1.0) * mean_log), np.array(slope)
 
 
 def thinned(rows: Indices, most: int) -> Indices:
-    """Return every row, or every k-th where there are twice as many as `most`."""
+    """Return every row, or every k-th if there are at least twice as many as `most`."""
     return rows[:: max(1, rows.size // most)]
 
 
 def predict_normal(process: GaussianProcess, rows: SampleTable) -> Prediction:
-    """Return what a process predicts for `rows`, noise included."""
+    """Return the prediction of a process for `rows`, noise included."""
     mean, variance = process.predict(rows.inputs)
     return Prediction(mean, np.sqrt(variance))
 
 
-def _at_best(process: GaussianProcess) -> GaussianProcess:
-    """Return a process that a refit begins with at its best top, and at no other."""
-    return replace(process, starts=(max(process.starts, key=lambda top: top.lml),))
+def _with_best_start(process: GaussianProcess) -> GaussianProcess:
+    """Return a process whose refit starts only from its best optimum."""
+    return replace(process, starts=(max(process.starts, key=lambda start: start.lml),))
 
 
 def _left_out(
@@ -165,7 +165,7 @@ def _left_out(
     changing: GaussianProcess,
     seed: int,
 ) -> Array:
-    """Return the NLPD of the trials of a group under every noise, (trials, 3)."""
+    """Return the NLPD of a group of held-out trials for every noise, (trials, 3)."""
     trial = training.trial_of()
     is_inner = trial % _GROUPS != group
     rows = training.rows.take(np.flatnonzero(is_inner))
@@ -197,7 +197,7 @@ def _nlpds(
     changing: GaussianProcess,
     tails: TailedNoise | None,
 ) -> list[float]:
-    """Return the NLPD of one trial under every noise; without tails a normal's."""
+    """Return the NLPD of one trial for every noise; normal if there are no tails."""
     of_constant = predict_normal(constant, rows)
     of_changing = predict_normal(changing, rows)
     tailed = of_changing if tails is None else tails.applied_to(of_changing)

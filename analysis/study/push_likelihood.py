@@ -1,14 +1,14 @@
-"""Likelihood of peak forces, some right-censored, with an effect of the trial.
+"""Likelihood of right-censored peak forces with a random trial effect.
 
     log P = b_terrain + b1 log(max(F_n, 1)/3.5) + u_trial + s e,   u ~ N(0, su^2)
 
-(accelerated failure) with e of the smallest extreme value distribution: P is Weibull
-with shape 1/s. With z = (log P - mu - u)/s a slip adds z - exp(z) - log s, a push that
-held the logarithm of its survival, -exp(z).
+(accelerated failure model) with e from the smallest extreme value distribution: P is
+Weibull with shape 1/s. With z = (log P - mu - u)/s a slip contributes
+z - exp(z) - log s, a held push the logarithm of its survival, -exp(z).
 
-u is integrated out trial by trial with 15 points of Gauss and Hermite. Slope and spread
-are shared by all terrains, each has its level. Priors hold what few pushes leave open:
-log s ~ N(log 0.35, 0.5), b1 ~ N(0.5, 0.5), su half-normal 0.3.
+u is integrated out per trial by Gauss-Hermite quadrature with 15 points. All terrains
+share slope and spread; each has its own level. Weak priors regularise fits to few
+pushes: log s ~ N(log 0.35, 0.5), b1 ~ N(0.5, 0.5), su half-normal 0.3.
 """
 
 from dataclasses import dataclass
@@ -23,9 +23,9 @@ NODES = 15
 _LOG_SPREAD = (float(np.log(0.35)), 0.5)  # prior of log s: mean, sd
 _SLOPE = (0.5, 0.5)  # prior of b1
 _TRIAL_SD = 0.3  # scale of the half-normal prior of su
-_LARGEST_Z = 300.0  # exp stays finite
-_LEVEL_RANGE = 3.0  # of a level around the mean of log P
-_NO_EFFECT = -7.0  # log su of as good as none
+_LARGEST_Z = 300.0  # keeps exp finite
+_LEVEL_RANGE = 3.0  # bounds of a level about the mean of log P
+_NO_EFFECT = -7.0  # log su that is practically zero
 _BOX = (
     (-1.0, 2.0),
     (float(np.log(0.02)), float(np.log(3.0))),
@@ -36,7 +36,7 @@ _START = (0.5, float(np.log(0.35)), float(np.log(0.1)))
 
 @cache
 def nodes() -> tuple[Array, Array]:
-    """Return points and weights for a mean over a standard normal, shape (15,)."""
+    """Return quadrature points and weights for a standard normal, shape (15,)."""
     points, weights = np.polynomial.hermite.hermgauss(NODES)
     points, weights = np.sqrt(2.0) * points, weights / np.sqrt(np.pi)
     points.setflags(write=False)
@@ -51,13 +51,13 @@ def share_weaker(z: Array) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class CensoredLikelihood:
-    """The likelihood of a table of pushes.
+    """Likelihood of a table of pushes.
 
-    Parameters stand in one vector: a level per terrain, b1, log s, log su.
+    The parameter vector holds a level per terrain, b1, log s, log su.
 
     Attributes:
         table: the pushes.
-        levels: number of terrains, each with a push at least.
+        levels: number of terrains, each with at least one push.
     """
 
     table: PushTable
@@ -70,12 +70,12 @@ class CensoredLikelihood:
         *,
         has_trials: bool = True,
     ) -> Array:
-        """Return the parameters of the largest posterior density, shape (levels + 3,).
+        """Return the parameters with the largest posterior density, (levels + 3,).
 
         Args:
-            counts: how often every trial counts, by its number; once by default.
-            start: where to begin; by default mean log P and the centres of the priors.
-            has_trials: trials have an effect; without, su is as good as 0.
+            counts: weight of every trial by its number; 1 by default.
+            start: initial parameters; by default mean log P and the prior centres.
+            has_trials: include the trial effect; otherwise su is practically 0.
         """
         from scipy.optimize import minimize
 
@@ -84,13 +84,13 @@ class CensoredLikelihood:
         if not has_trials:
             begin[-1] = _NO_EFFECT
             box[-1] = (_NO_EFFECT, _NO_EFFECT)
-        found = minimize(
+        result = minimize(
             self.objective, begin, (counts,), "L-BFGS-B", jac=True, bounds=box
         )
-        return np.asarray(found.x, dtype=np.float64)
+        return np.asarray(result.x, dtype=np.float64)
 
     def objective(self, p: Array, counts: Array | None = None) -> tuple[float, Array]:
-        """Return minus the log posterior density and its gradient by `p`."""
+        """Return minus the log posterior density and its gradient in `p`."""
         by_trial, gradients = self.by_trial(p)
         weights = np.ones(by_trial.size)
         if counts is not None:

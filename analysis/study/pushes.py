@@ -1,15 +1,15 @@
-"""Pushes of a foot: the force rises to a peak, and the ground gives or holds.
+"""Detection of pushes: the force rises to a peak, and the foot slips or holds.
 
-A slip begins where smoothed v_t rises above v_slip and ends where it falls below
+A slip begins when smoothed v_t rises above v_slip and ends when it falls below
 0.03 m/s. Its peak is the largest F_t from 0.6 s before the onset, but not before the
-end of the slip before it, to 0.12 s after. A push that holds is a local maximum of F_t
-that stands out by 1.5 N and by a fifth of itself, does not belong to the loading of a
-slip, and is not the force spike of re-sticking, which comes within 0.15 s of a slip's
-end. Its peak says only that break-away lies above it: it is right-censored.
+end of the previous slip, to 0.12 s after. A held push is a local maximum of F_t with a
+prominence of at least 1.5 N and a fifth of its value that neither belongs to the
+loading of a slip nor is the force spike of re-sticking within 0.15 s of the end of a
+slip. Its peak is right-censored: break-away lies above it.
 
-v_slip decides what counts. At 0.12 m/s, the speed of `analysis.data.events`, most
-pushes that "hold" have crept away at 0.06 to 0.12 m/s; the censoring then depends on
-the strength and every estimate is too high. The default is 0.06 m/s.
+The choice of v_slip matters. At 0.12 m/s, the threshold of `analysis.data.events`, most
+"held" pushes have crept away at 0.06 to 0.12 m/s; the censoring then depends on the
+strength and every estimate is biased high. The default is 0.06 m/s.
 """
 
 from collections.abc import Sequence
@@ -23,14 +23,14 @@ from analysis.data.series import Array, Indices
 
 V_SLIP = 0.06  # m/s
 _END_SPEED = 0.03  # m/s below which a slip has ended
-_LOADING = 0.6  # s before the onset in which the peak is sought
+_LOADING = 0.6  # s before the onset in which the peak is searched
 _RELEASE = 0.12  # s after the onset in which the peak may still come
-_RESTICKING = 0.15  # s after a slip in which a maximum is the force spike of its end
-_PROMINENCE = 1.5  # N by which a held peak stands out
-_PROMINENCE_SHARE = 0.2  # the same as a share of the peak
-_LEAST_PEAK = 0.1  # N; below it a peak is noise of the sensor
+_RESTICKING = 0.15  # s after a slip in which a maximum is the re-sticking spike
+_PROMINENCE = 1.5  # N, least prominence of a held peak
+_PROMINENCE_SHARE = 0.2  # least prominence relative to the peak
+_LEAST_PEAK = 0.1  # N below which a peak is sensor noise
 _REFERENCE_LOAD = 3.5  # N
-_LEAST_LOAD = 1.0  # N; lighter feet count as that
+_LEAST_LOAD = 1.0  # N, lower limit of the load in the logarithm
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,10 +38,10 @@ class FootPush:
     """One push.
 
     Attributes:
-        t: time of its peak [s].
+        t: time of the peak [s].
         peak: largest F_t [N].
         F_n: normal force at the peak [N].
-        is_held: the ground held: break-away lies above `peak`.
+        is_held: the foot did not slip: break-away lies above `peak`.
     """
 
     t: float
@@ -52,7 +52,7 @@ class FootPush:
 
 @dataclass(frozen=True)
 class PushTable:
-    """Pushes of several trials and terrains as columns; a trial's rows are together.
+    """Pushes of several trials and terrains as columns; rows of a trial are contiguous.
 
     Attributes:
         log_peak: logarithm of the peak [nat], shape (n,).
@@ -70,7 +70,7 @@ class PushTable:
 
     @classmethod
     def of(cls, trials: Sequence[tuple[int, Sequence[FootPush]]]) -> "PushTable":
-        """Return the pushes of trials, each with the number of its terrain."""
+        """Tabulate the pushes of trials, each given with its terrain number."""
         rows = [
             (push.peak, push.F_n, push.is_held, terrain, k)
             for k, (terrain, pushes) in enumerate(trials)
@@ -109,13 +109,13 @@ def log_load(F_n: Array) -> Array:
 
 
 def find_pushes(trial: PreparedTrial, v_slip: float = V_SLIP) -> tuple[FootPush, ...]:
-    """Return the pushes of a trial in time order.
+    """Find the pushes of a trial in time order.
 
-    A trial whose rows were prepared before has lost its rests and has none.
+    A trial whose rows were prepared before lacks the times at rest and has no pushes.
 
     Args:
-        trial: its whole smoothed record counts, not only the kept samples.
-        v_slip: velocity that makes a slip [m/s].
+        trial: prepared trial; its whole smoothed record is used.
+        v_slip: velocity threshold of a slip [m/s].
     """
     if trial.is_prepared:
         return ()
@@ -166,12 +166,12 @@ def _slip_peaks(smooth: Smoothed, slips: Sequence[tuple[int, int]]) -> list[int]
 
 
 def _maxima(F_t: Array) -> list[int]:
-    """Return the rows of the local maxima that stand out."""
+    """Return the rows of the prominent local maxima."""
     from scipy.signal import find_peaks
 
     rows, shape = find_peaks(F_t, prominence=_PROMINENCE)
-    stands_out = shape["prominences"] >= _PROMINENCE_SHARE * F_t[rows]
-    return [int(row) for row in rows[stands_out]]
+    is_prominent = shape["prominences"] >= _PROMINENCE_SHARE * F_t[rows]
+    return [int(row) for row in rows[is_prominent]]
 
 
 def _is_held(smooth: Smoothed, row: int, slips: Sequence[tuple[int, int]]) -> bool:

@@ -1,7 +1,7 @@
-"""A terrain's break-away force as a model that answers: risk, and force at a risk.
+"""Break-away model of a terrain: slip risk at a force, and force at a risk.
 
-Two kinds of answer. "break-away": the distribution of the peak of a push, see
-`push_likelihood`. "sliding", where too few pushes slip for that: F_t while the foot
+There are two kinds. "break-away": the distribution of the peak of a push, see
+`push_likelihood`. "sliding", if too few pushes slipped for that: F_t while the foot
 moves at 0.005 to 0.02 m/s, F_t = a + b F_n + u_trial + s e with normal u and e.
 """
 
@@ -20,13 +20,13 @@ from analysis.study.push_likelihood import nodes, share_weaker
 from analysis.study.pushes import log_load
 
 BREAK_AWAY, SLIDING = "break-away", "sliding"
-INTERVAL = (0.05, 0.95)  # of the trial bootstraps: 90 %
-_FAMILIES = {BREAK_AWAY: "weibull", SLIDING: "lognormal"}  # as they are stored
-_HALVINGS = 60  # of an interval of forces
-_WIDE = 40.0  # spreads that it begins with
-_LARGEST_LOG = 50.0  # exp of it is far beyond any force
+INTERVAL = (0.05, 0.95)  # 90 % interval over bootstrap draws of trials
+_FAMILIES = {BREAK_AWAY: "weibull", SLIDING: "lognormal"}  # names in the file
+_HALVINGS = 60  # bisection steps for a force
+_WIDE = 40.0  # half width of the initial bracket [spreads]
+_LARGEST_LOG = 50.0  # limit of a log force, far beyond any force
 _LARGEST_PARAMETER, _LEAST_SPREAD = 1e4, 1e-6
-_DIGITS = 6  # of a stored number
+_DIGITS = 6  # significant digits of a stored number
 _MOST_DRAWS = 2000
 _MOST = 10_000_000  # slips, held pushes or trials
 
@@ -39,16 +39,16 @@ _Law = tuple[_Parameter, _Parameter, _Spread, Annotated[_Parameter, Field(ge=0.0
 
 @dataclass(frozen=True, slots=True)
 class BreakAwayRisk:
-    """The probability that a push slips before it reaches the force that it needs.
+    """Probability that a push slips before it reaches the required force.
 
     Attributes:
-        risk: 0 to 1.
-        low: lower end of the 90 % interval, from resampled trials.
-        high: its upper end.
+        risk: probability, 0 to 1.
+        low: lower end of the 90 % bootstrap interval.
+        high: upper end of that interval.
         kind: "break-away", or "sliding" where too few pushes slipped.
-        v_slip: velocity that made a slip [m/s].
-        slips: pushes that slipped, of those the model was fitted to.
-        held: pushes that held.
+        v_slip: velocity threshold of a slip [m/s].
+        slips: number of fitted pushes that slipped.
+        held: number of fitted pushes that held.
         is_extrapolated: F_n or the force lies outside 2 to 98 % of the pushes.
     """
 
@@ -64,12 +64,12 @@ class BreakAwayRisk:
 
 @dataclass(frozen=True, slots=True)
 class AvailableForce:
-    """The force that may be asked for at a risk.
+    """Force available at a risk.
 
     Attributes:
         force: F_t [N].
-        low: lower end of the 90 % interval [N], from resampled trials.
-        high: its upper end [N].
+        low: lower end of the 90 % bootstrap interval [N].
+        high: upper end of that interval [N].
         is_extrapolated: F_n or the force lies outside 2 to 98 % of the pushes.
     """
 
@@ -81,13 +81,13 @@ class AvailableForce:
 
 @dataclass(frozen=True, slots=True)
 class PushLaw:
-    """Parameters of one terrain's law.
+    """Parameters of the law of one terrain.
 
     Attributes:
         level: b0 [nat] or a [N].
-        slope: b1, by log(F_n / 3.5 N), or b [N/N].
+        slope: b1, coefficient of log(F_n / 3.5 N), or b [N/N].
         spread: s [nat] or [N].
-        trial_sd: standard deviation of the effect of the trial, su [nat] or [N].
+        trial_sd: standard deviation of the trial effect, su [nat] or [N].
     """
 
     level: float
@@ -103,20 +103,20 @@ class PushLaw:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BreakAwayModel:
-    """What a terrain gives before it goes.
+    """Break-away model of a terrain.
 
     Attributes:
         kind: "break-away" or "sliding".
-        law: the fit of all trials.
-        draws: the same for resampled trials, columns as `PushLaw`, shape (n, 4).
-        v_slip: velocity that made a slip [m/s].
+        law: fit to all trials.
+        draws: fits to resampled trials, columns as `PushLaw`, shape (n, 4).
+        v_slip: velocity threshold of a slip [m/s].
         slips: number of pushes that slipped.
         held: number of pushes that held.
         trials: number of trials.
         loads: 2 and 98 % points of F_n of the pushes [N].
         forces: 2 and 98 % points of their peaks [N].
-        distance: of Kaplan and Meier's curve from the model; NaN where sliding.
-        is_trial_seen: the effect of the trial is told apart from none.
+        distance: distance of the model from the Kaplan-Meier curve; NaN for sliding.
+        is_trial_seen: the trial effect is significant.
     """
 
     kind: str
@@ -134,20 +134,21 @@ class BreakAwayModel:
     def slip_risk(self, required: float, F_n: float) -> BreakAwayRisk:
         """Return the probability that a push slips before F_t reaches `required`.
 
-        Of one push from rest, at a place that was not pushed before, in a new trial,
-        with F_n held: the foot moves faster than v_slip before F_t reaches `required`.
-        Not for a foot that slides already, nor for a place that has just held; n such
-        pushes slip at least once with 1 - (1 - risk)^n.
+        Applies to one push from rest at constant F_n, in a new trial, at a location not
+        pushed before: a slip means that v_t exceeds v_slip before F_t reaches
+        `required`. It does not apply to a foot that already slides or to a location
+        that has just held. At least one of n such pushes slips with probability
+        1 - (1 - risk)^n.
 
-        Where `kind` is "sliding" the answer is the probability that F_t at 0.005 to
-        0.02 m/s is less than `required`: what is left once the foot moves.
+        If `kind` is "sliding", the result is the probability that F_t at 0.005 to
+        0.02 m/s is less than `required`: the traction left once the foot moves.
 
         Args:
             required: traction that the push needs [N], >= 0.
             F_n: normal force while pushing [N], >= 0.
 
         Raises:
-            SettingsError: a value is negative or no finite number.
+            SettingsError: a value is negative or not finite.
         """
         _check_forces(required=required, F_n=F_n)
         laws = np.vstack([self.law.values, self.draws])
@@ -165,15 +166,15 @@ class BreakAwayModel:
         )
 
     def available(self, F_n: float, risk: float) -> AvailableForce:
-        """Return the force whose `slip_risk` is `risk`; never below zero.
+        """Return the force at which `slip_risk` equals `risk`; never below zero.
 
         Args:
             F_n: normal force while pushing [N], >= 0.
             risk: probability of a slip, above 0 and below 1.
 
         Raises:
-            SettingsError: a value is not a finite number, F_n is negative or the risk
-                not between 0 and 1.
+            SettingsError: a value is not finite, F_n is negative or the risk is not
+                between 0 and 1.
         """
         _check_forces(F_n=F_n)
         if not 0.0 < risk < 1.0:
@@ -208,7 +209,7 @@ class BreakAwayModel:
         )
 
     def _shares(self, laws: Array, required: Array, F_n: Array | float) -> Array:
-        """Return P(F < required) under every law, trial effect integrated out."""
+        """Return P(F < required) under every law, marginal over the trial effect."""
         if self.kind == SLIDING:
             return _mixed(self.kind, laws, required - self._centre(laws, F_n))
         with np.errstate(divide="ignore"):
@@ -216,7 +217,7 @@ class BreakAwayModel:
         return _mixed(self.kind, laws, logs - self._centre(laws, F_n))
 
     def _forces(self, laws: Array, F_n: Array | float, risk: float) -> Array:
-        """Return the force [N] at which each law's share below it is `risk`."""
+        """Return the quantile [N] at `risk` under every law, by bisection."""
         reach = _WIDE * (laws[:, 2] + laws[:, 3])
         low, high = -reach, reach
         for _ in range(_HALVINGS):
@@ -226,10 +227,10 @@ class BreakAwayModel:
                 np.where(is_under, middle, low),
                 np.where(is_under, high, middle),
             )
-        found = self._centre(laws, F_n) + 0.5 * (low + high)
+        quantile = self._centre(laws, F_n) + 0.5 * (low + high)
         if self.kind == SLIDING:
-            return np.maximum(found, 0.0)
-        return np.exp(np.minimum(found, _LARGEST_LOG))
+            return np.maximum(quantile, 0.0)
+        return np.exp(np.minimum(quantile, _LARGEST_LOG))
 
     def _is_outside(self, F_n: float, force: float) -> bool:
         is_load = self.loads[0] <= F_n <= self.loads[1]
@@ -249,10 +250,10 @@ class BreakAwayModel:
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> "BreakAwayModel":
-        """Return the model of plain values; everything is checked.
+        """Restore a model from plain values; all are validated.
 
         Raises:
-            ValueError: a value is missing or not what it should be.
+            ValueError: a value is missing or invalid.
         """
         file = _BreakAwayFile.model_validate(content)
         values = file.model_dump(exclude={"family"}) | {
@@ -264,7 +265,7 @@ class BreakAwayModel:
 
 
 class _BreakAwayFile(BaseModel):
-    """A model as it is stored."""
+    """Stored form of a model."""
 
     model_config = ConfigDict(allow_inf_nan=False)
 
@@ -317,7 +318,7 @@ def _mixed(kind: str, laws: Array, above: Array) -> Array:
 
 
 def _interval(values: Array) -> tuple[float, float]:
-    """Return the ends of the interval of all but the first value."""
+    """Return the ends of the interval over all values but the first."""
     drawn = values[1:] if values.size > 1 else values
     low, high = np.quantile(drawn, INTERVAL)
     return float(low), float(high)
@@ -328,22 +329,22 @@ def _rounded(values: Sequence[float]) -> tuple[float, ...]:
 
 
 def check_finite(**values: float) -> None:
-    """Refuse a value that nothing can be asked for.
+    """Refuse values that are not finite numbers.
 
     Raises:
-        SettingsError: one is not a finite number.
+        SettingsError: a value is not a finite number.
     """
     for name, value in values.items():
         try:
             is_finite = math.isfinite(value)
-        except (TypeError, OverflowError):  # a word, a column, a number without end
+        except (TypeError, OverflowError):  # text, array, huge integer
             is_finite = False
         if not is_finite:
             raise SettingsError(f"{name} = {value!r:.40} is not a finite number.")
 
 
 def _check_forces(**forces: float) -> None:
-    """Refuse forces that no push can have; raises SettingsError."""
+    """Refuse forces that are negative or not finite; raises SettingsError."""
     check_finite(**forces)
     for name, force in forces.items():
         if force < 0.0:

@@ -1,13 +1,13 @@
-"""Results of a study on disk, by the hash of what they were made from.
+"""Cache of study results on disk, keyed by the hash of task and code.
 
-An interrupted study resumes where it stopped, and a study repeated with one choice
-changed repeats only what that choice touches. A result is known by its task and by the
-code that computed it, so a corrected formula never shows an old number. Beyond its size
-the folder loses what was used longest ago.
+An interrupted study resumes where it stopped, and a study repeated with one changed
+option recomputes only what the option affects. A result is keyed by its task and by the
+code that computed it, so that a corrected formula never shows an old number. When the
+folder exceeds its size limit, the least recently used results are removed.
 
-Values become JSON and come back bit by bit. Nothing is ever unpickled: a file can name
-nothing but dataclasses, named tuples and enumerations of `analysis`, with exactly their
-fields. A file that is damaged or foreign counts as not there.
+Values are stored as JSON without loss. Nothing is ever unpickled: a file can name only
+dataclasses, named tuples and enumerations of `analysis`, with exactly their fields.
+Damaged or foreign files are ignored.
 """
 
 import base64
@@ -32,11 +32,11 @@ from acquisition.files import open_directory, read_regular, replace_file
 
 Function = Callable[..., Any]
 
-MOST_BYTES = 256 * 1024**2  # of all results, at least; a fold has about 60 kB
-LARGEST = 16 * 1024**2  # bytes of one result; a larger file is none
-_KEPT = 0.9  # share of the size that is left when results go
-_ROOT = Path(__file__).parents[2]  # of the sources, or of the installation
-_FIGURES = "analysis.report"  # draws what the other packages compute
+MOST_BYTES = 256 * 1024**2  # size limit of all results; a fold takes about 60 kB
+LARGEST = 16 * 1024**2  # bytes of one result; a larger file is ignored
+_KEPT = 0.9  # share of the size limit that remains after a removal
+_ROOT = Path(__file__).parents[2]  # of the sources or the installation
+_FIGURES = "analysis.report"  # package that only draws figures
 _DTYPES = ("<f8", "<i8", "|b1")  # of arrays: float, int, bool
 
 
@@ -44,44 +44,44 @@ class ResultStore:
     """Keeps one file per task below a folder.
 
     Args:
-        folder: made when the first result is kept; may be deleted at any time.
-        most: bytes that its results may have together.
+        folder: created with the first result; may be deleted at any time.
+        most: size limit of all results [bytes].
     """
 
     def __init__(self, folder: Path, most: int = MOST_BYTES) -> None:
         self._folder = folder
         self._most = most
-        self._bytes: int | None = None  # of the folder, as far as it is known
+        self._bytes: int | None = None  # size of the folder, if known
 
     def get(self, function: Function, task: Any) -> Any | None:  # noqa: ANN401
-        """Return the result of a task done before, None if there is none."""
+        """Return the cached result of a task; None without one."""
         path = self._path(function, task)
         try:
             content = json.loads(read_regular(path, LARGEST))
             is_whole = content["digest"] == _digest(content["result"])
             result = decode(content["result"]) if is_whole else None
-        except Exception:  # whatever a foreign file makes of it, too
+        except Exception:  # a foreign file may raise anything
             return None
-        with suppress(OSError):  # a folder that is only read from
+        with suppress(OSError):  # read-only folder
             os.utime(path)
         return result
 
     def put(self, function: Function, task: Any, result: Any) -> None:  # noqa: ANN401
-        """Keep a result, where the folder can be written.
+        """Store a result if the folder is writable.
 
         Raises:
             TypeError: a value in it has no plain form.
-            ValueError: it could never be read again.
+            ValueError: the value cannot be read back.
         """
         plain = encode(result)
         decode(plain)
         content = {"digest": _digest(plain), "result": plain}
         path, data = self._path(function, task), json.dumps(content).encode()
-        if path.is_dir():  # nobody's result; it is made again every time
+        if path.is_dir():  # name occupied: not cached
             return
         try:
             write_atomic(path, data)
-        except SettingsError:  # it is computed again next time, and no less right
+        except SettingsError:  # not cached; computed again next time
             return
         if self._bytes is not None:
             self._bytes += len(data)
@@ -93,15 +93,15 @@ class ResultStore:
 
 
 def remove_oldest(folder: Path, most: int) -> int:
-    """Remove what was used longest ago if all results together exceed `most` bytes.
+    """Remove the least recently used results if the total exceeds `most` bytes.
 
-    What other processes remove meanwhile is no error. Returns the bytes that are left.
+    Files removed by other processes meanwhile are ignored. Returns the remaining bytes.
     """
     files: list[tuple[int, int, Path]] = []
     for path in (*folder.glob("*.json"), *folder.glob(".*.json.*")):
         with suppress(OSError):
-            found = path.lstat()
-            files.append((found.st_mtime_ns, found.st_size, path))
+            status = path.lstat()
+            files.append((status.st_mtime_ns, status.st_size, path))
     total = sum(size for _, size, _ in files)
     if total <= most:
         return total
@@ -115,10 +115,9 @@ def remove_oldest(folder: Path, most: int) -> int:
 
 
 def task_key(function: Function, task: Any) -> str:  # noqa: ANN401
-    """Return the hash of a task: its data, its options, and the code it is done by.
+    """Return the hash of a task: its data, its options and the code that runs it.
 
-    Equal values have equal keys, whether or not they share objects, which pickles of
-    them would not.
+    Equal values have equal keys whether or not they share objects, unlike pickles.
 
     Raises:
         TypeError: a value in the task has no plain form.
@@ -130,13 +129,12 @@ def task_key(function: Function, task: Any) -> str:  # noqa: ANN401
 
 @cache
 def code_digest(root: Path = _ROOT, *, is_drawn: bool = False) -> str:
-    """Return the SHA-256 of the sources that results follow from, and the libraries.
+    """Return the SHA-256 of the sources and library versions behind the results.
 
     Args:
         root: folder of the project's packages.
-        is_drawn: the results are figures, which follow from all of `analysis` and what
-            it imports; fits follow from `acquisition` and `analysis` but for what
-            draws.
+        is_drawn: the results are figures, which depend on all of `analysis` and its
+            imports; fits depend on `acquisition` and on `analysis` without figures.
     """
     packages = ["acquisition", "analysis"]
     libraries = ["numpy", "scipy"]
@@ -166,15 +164,15 @@ def _base64(content: bytes) -> str:
 
 
 def encode(value: Any, text: Callable[[bytes], str] | None = None) -> Any:  # noqa: ANN401
-    """Return `value` as what JSON can hold; numbers keep every bit.
+    """Convert `value` to JSON types without loss of precision.
 
     Args:
         value: dataclasses, named tuples, enumerations, arrays, mappings, sequences,
             numbers, texts, bytes.
-        text: gives the text that stands for bytes; by default one that `decode` reads.
+        text: function that represents bytes as text; by default readable by `decode`.
 
     Raises:
-        TypeError: a value of a kind that has no plain form.
+        TypeError: a value has no plain form.
     """
     text = text or _base64
     if isinstance(value, np.ndarray) and not value.dtype.hasobject:
@@ -192,8 +190,8 @@ def encode(value: Any, text: Callable[[bytes], str] | None = None) -> Any:  # no
         return value if math.isfinite(value) else {"number": repr(value)}
     names = _field_names(type(value))
     if names is not None:
-        inside = {name: encode(getattr(value, name), text) for name in names}
-        return {"type": _name(type(value)), "fields": inside}
+        plain = {name: encode(getattr(value, name), text) for name in names}
+        return {"type": _name(type(value)), "fields": plain}
     if isinstance(value, list | tuple):
         return [encode(item, text) for item in value]
     if isinstance(value, Mapping):
@@ -203,10 +201,10 @@ def encode(value: Any, text: Callable[[bytes], str] | None = None) -> Any:  # no
 
 
 def decode(plain: Any) -> Any:  # noqa: ANN401
-    """Return the value of `encode`, with tuples for lists.
+    """Invert `encode`; lists become tuples.
 
     Raises:
-        ValueError: not the plain form of such a value.
+        ValueError: not a plain form made by `encode`.
     """
     if isinstance(plain, list):
         return tuple(decode(item) for item in plain)
@@ -243,10 +241,10 @@ def _name(kind: type) -> str:
 
 
 def _type(name: str) -> Any:  # noqa: ANN401
-    """Return a type that a result may hold.
+    """Look up a type that a result may contain.
 
     Raises:
-        ValueError: not a dataclass, a named tuple or an enumeration of `analysis`.
+        ValueError: not a dataclass, named tuple or enumeration of `analysis`.
         ImportError, AttributeError: there is no such type.
     """
     module, _, own = name.rpartition(".")
@@ -256,7 +254,7 @@ def _type(name: str) -> Any:  # noqa: ANN401
     is_value = isinstance(kind, type) and (
         _field_names(kind) is not None or issubclass(kind, Enum)
     )
-    if not is_value or _name(kind) != name:  # else a name that its module imports
+    if not is_value or _name(kind) != name:  # excludes names imported by the module
         raise ValueError(f"{name} is no value of this analysis")
     return kind
 
@@ -273,13 +271,13 @@ def _decode_array(data: str, kind: str, shape: list[int]) -> np.ndarray:
     flat = np.frombuffer(base64.b64decode(data, validate=True), dtype=kind)
     if any(side < 0 for side in shape) or math.prod(shape) != flat.size:
         raise ValueError(f"{flat.size} numbers for an array of shape {shape}")
-    return flat.copy().reshape(shape)  # may be written to
+    return flat.copy().reshape(shape)  # writable
 
 
 def write_atomic(path: Path, content: bytes) -> None:
-    """Write `content` to `path`: a reader sees the old file or the new, never a part.
+    """Write `content` to `path` atomically: readers see the old or the new file.
 
-    Missing folders are made.
+    Missing folders are created.
 
     Raises:
         SettingsError: the folder cannot be written.

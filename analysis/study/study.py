@@ -1,4 +1,4 @@
-"""A study: all terrains prepared, folded, fitted and compared."""
+"""A study: preparation, cross-validation, fits and comparison of all terrains."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -50,24 +50,23 @@ from analysis.study.trial_components import (
     fit_components,
 )
 
-_NAMED = 10  # trials in one warning
-_LOADED = 5.0  # N: below it F_t/F_n says little, whatever the ground
-_PLOUGHING = 1.5  # of F_t/F_n in the upper quarter; stones of one layer stay below
+_NAMED = 10  # trials listed in one warning
+_LOADED = 5.0  # N below which F_t/F_n is uninformative on any ground
+_PLOUGHING = 1.5  # upper quartile of F_t/F_n; a single layer of stones stays below
 
 
 @dataclass(frozen=True, slots=True)
 class StudyOptions:
-    """Every choice of a study.
+    """Options of a study.
 
     Attributes:
         prepare: smoothing, thinning and window.
-        target: the same of the samples that models are tested on; None = those of
-            `prepare`. A study repeated under another smoothing is so held against the
-            same numbers.
+        target: preparation of the test samples; None = as `prepare`. It lets studies
+            with different smoothing be compared on the same test samples.
         fit: bounds, number of points and seed.
-        n_jobs: worker processes; None = one per core. Does not change the results.
-        scheduler: address of a Dask scheduler to work for; None = this machine. Does
-            not change them either.
+        n_jobs: worker processes; None = one per core. Does not affect the results.
+        scheduler: address of a Dask scheduler; None = this machine. Does not affect the
+            results.
     """
 
     prepare: PrepareOptions = field(default_factory=PrepareOptions)
@@ -79,16 +78,15 @@ class StudyOptions:
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """The one result object of an analysis.
+    """Results of an analysis.
 
     Attributes:
         simulated: the trials were simulated.
-        options: every choice that was made.
+        options: options of the study.
         terrains: results by terrain, in the order given.
-        notes: what could not be done, and why.
-        warnings: what a reader should doubt.
-        break_away: what a foot at rest meets, by terrain where it is known; empty where
-            it was not asked for.
+        notes: failures with their reasons.
+        warnings: reasons to doubt results.
+        break_away: break-away models by terrain; empty if not requested.
     """
 
     simulated: bool
@@ -102,12 +100,12 @@ class Study:
 
     @property
     def kinds(self) -> dict[str, str]:
-        """Kind of every terrain, by its name."""
+        """Kind of every terrain by name."""
         return {name: result.kind for name, result in self.terrains.items()}
 
     @property
     def groups(self) -> list[str]:
-        """Where folds leave out groups of trials, a line for every such terrain."""
+        """Notes on terrains whose folds leave out groups of trials."""
         return notes_on_groups(
             {
                 name: [k for fold in result.folds for k in fold.left_out]
@@ -116,7 +114,7 @@ class Study:
         )
 
     def cross(self, model: str) -> dict[str, dict[str, float | None]]:
-        """Return the mean absolute errors [N]: model's terrain -> tested terrain."""
+        """Return mean absolute errors [N] by training terrain and tested terrain."""
         return {
             name: {
                 tested: result.mae(model)
@@ -129,7 +127,7 @@ class Study:
         }
 
     def cross_errors(self, model: str) -> dict[str, dict[str, float | None]]:
-        """Return the standard errors [N] of `cross` over the trials tested."""
+        """Return the standard errors [N] of `cross` over the tested trials."""
         return {
             name: {
                 tested: standard_error(
@@ -153,18 +151,18 @@ def run_study(
     *,
     with_break_away: bool = False,
 ) -> Study:
-    """Return the analysis of all trials.
+    """Analyse all trials.
 
     Args:
         trials: recorded trials by terrain.
-        options: every choice.
+        options: options of the study.
         simulated: the trials were simulated; marks every product.
-        progress: called with (fits done, fits in all).
-        store: results of earlier runs, so that an interrupted study resumes.
-        with_break_away: fit the models of break-away, too.
+        progress: called with (finished fits, all fits).
+        store: cache of earlier results, so that an interrupted study resumes.
+        with_break_away: also fit break-away models.
 
     Raises:
-        SettingsError: there is no trial at all.
+        SettingsError: there is no trial.
     """
     _require_trials(trials)
     prepared = _prepared(trials, options.prepare)
@@ -173,19 +171,21 @@ def run_study(
     further = _further(trials)
     notes += _notes_on_inputs(further)
     components = [] if further else _components(prepared, options.fit)
-    rest = [_break_away(trials, prepared, options)] if with_break_away else []
+    from_rest = [_break_away(trials, prepared, options)] if with_break_away else []
     batches = (
-        Batch(fit_planned, rest),  # first: it takes longer than any other
+        Batch(fit_planned, from_rest),  # first, because it takes longest
         Batch(run_fold, planned),
         Batch(fit_components, components),
         Batch(fit_terrain, _wholes(prepared, options)),
     )
     workers = Workers(options.n_jobs, options.scheduler)
     break_away, folds, fitted, wholes = run_batches(batches, workers, progress, store)
-    apart = {task.terrain: fit for task, fit in zip(components, fitted, strict=True)}
+    by_terrain = {
+        task.terrain: fit for task, fit in zip(components, fitted, strict=True)
+    }
     notes += [note for fold in folds for note in fold.notes]
     results = {
-        name: _result(trials[name], prepared[name], folds, whole, apart.get(name))
+        name: _result(trials[name], prepared[name], folds, whole, by_terrain.get(name))
         for name, whole in zip(prepared, wholes, strict=True)
     }
     doubtful = (*_contradictions(trials), *notes_of_tables(trials))
@@ -219,7 +219,7 @@ def _result(
     whole: PooledTustinFit,
     components: TrialComponents | None,
 ) -> TerrainResult:
-    """Return the result of one terrain; of the folds those that are its own."""
+    """Assemble the result of one terrain, with its own folds."""
     terrain = whole.terrain
     return TerrainResult(
         terrain=terrain,
@@ -236,15 +236,15 @@ def _result(
 
 
 def _factors(recorded: Sequence[TractionSeries]) -> dict[str, Value]:
-    """Return the factors that the recordings of a terrain state alike.
+    """Return the factors of a terrain from its recordings.
 
-    One that they contradict each other in does not apply.
+    Contradictory factors are set to None (does not apply).
     """
-    found: dict[str, Value] = {}
+    factors: dict[str, Value] = {}
     for series in recorded:
         for name, value in series.factors.items():
-            found[name] = value if found.get(name, value) == value else None
-    return found
+            factors[name] = value if factors.get(name, value) == value else None
+    return factors
 
 
 def _require_trials(trials: Mapping[str, Sequence[TractionSeries]]) -> None:
@@ -253,10 +253,10 @@ def _require_trials(trials: Mapping[str, Sequence[TractionSeries]]) -> None:
 
 
 def _further(trials: Mapping[str, Sequence[TractionSeries]]) -> tuple[str, ...]:
-    """Return the names of inputs beside F_n and v_t.
+    """Return the names of inputs in addition to F_n and v_t.
 
     Raises:
-        SettingsError: some trials have others than the rest.
+        SettingsError: the trials differ in their inputs.
     """
     named = {tuple(s.further) for recorded in trials.values() for s in recorded}
     if len(named) > 1:
@@ -274,9 +274,9 @@ def _notes_on_inputs(further: Sequence[str]) -> list[str]:
         return []
     names = ", ".join(further)
     return [
-        f"Inputs beside F_n and v_t: {names}. Curves and surfaces over F_n and v_t "
-        "show them at their means; the constant force and Tustin's law have no place "
-        "for them. Not fitted: the spread of trials."
+        f"Inputs in addition to F_n and v_t: {names}. Curves and surfaces over F_n and "
+        "v_t show them at their means; the constant force and Tustin's law do not use "
+        "them. Not fitted: the spread of trials."
     ]
 
 
@@ -285,7 +285,7 @@ def _prepared(
 ) -> dict[str, tuple[PreparedTrial, ...]]:
     from threadpoolctl import threadpool_limits
 
-    with threadpool_limits(1):  # of two rows a matrix: more threads lose time
+    with threadpool_limits(1):  # the matrices have two rows: threads would lose time
         return {
             terrain: tuple(prepare_trial(series, options) for series in recorded)
             for terrain, recorded in trials.items()
@@ -295,7 +295,7 @@ def _prepared(
 def _components(
     prepared: Mapping[str, Sequence[PreparedTrial]], fit: FitOptions
 ) -> list[ComponentsTask]:
-    """Return a task per terrain, none where no model of a new trial is asked for."""
+    """Return a task per terrain, or none without a model of a new trial."""
     if not NEW_TRIAL & set(fit.models):
         return []
     return [
@@ -338,7 +338,7 @@ def _contradictions(trials: Mapping[str, Sequence[TractionSeries]]) -> list[str]
 
 
 def notes_of_tables(trials: Mapping[str, Sequence[TractionSeries]]) -> list[str]:
-    """Return what was decided when tables were read, a line for each kind."""
+    """Collect the notes from reading tables, one line per note."""
     names: dict[str, list[str]] = {}
     for recorded in trials.values():
         for series in recorded:
@@ -351,7 +351,7 @@ def notes_of_tables(trials: Mapping[str, Sequence[TractionSeries]]) -> list[str]
 
 
 def _doubts(terrains: Iterable[Sequence[PreparedTrial]]) -> list[str]:
-    """Return why trials cannot be what they say they are, a line for each reason."""
+    """Collect the doubts about trials, one line per reason."""
     return summed_up((t.name, doubts_of(t)) for trials in terrains for t in trials)
 
 
@@ -404,9 +404,9 @@ def _warnings(result: TerrainResult, has_container: bool) -> list[str]:
 
 
 def _ploughing(result: TerrainResult) -> list[str]:
-    """Return that a terrain's traction is not that of friction, at loads that count.
+    """Warn if the traction of a terrain at high load exceeds friction.
 
-    Of tables only: on the stones of one's own sessions the report has it in figures.
+    Only for tables: for own sessions on stones the report shows this in figures.
     """
     if not all(trial.is_foreign for trial in result.trials):
         return []

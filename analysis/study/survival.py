@@ -1,4 +1,4 @@
-"""What the pushes show without a model: Kaplan and Meier's curve, and a check by it."""
+"""Kaplan-Meier curve of pushes, and a goodness-of-fit check based on it."""
 
 from dataclasses import dataclass
 
@@ -6,33 +6,33 @@ import numpy as np
 
 from analysis.data.series import Array
 
-_KOLMOGOROV = 1.36  # 95 % point of sqrt(n) times the largest difference
+_KOLMOGOROV = 1.36  # 95 % quantile of sqrt(n) times the largest difference
 
 
 @dataclass(frozen=True, slots=True)
 class SurvivalCurve:
-    """A step curve of Kaplan and Meier.
+    """Kaplan-Meier step curve.
 
     Attributes:
-        at: values at which there is an event, increasing, shape (n,).
-        below: estimated probability of no more than each of them, shape (n,).
+        at: values of the events, increasing, shape (n,).
+        below: estimated probability of at most each value, shape (n,).
     """
 
     at: Array
     below: Array
 
     def share_below(self, values: Array) -> Array:
-        """Return the probability of no more than each of `values`, their shape."""
+        """Return the probability of at most each of `values`, same shape."""
         steps = np.concatenate([[0.0], self.below])
         return steps[np.searchsorted(self.at, values, "right")]
 
 
 def kaplan_meier(values: Array, is_held: np.ndarray) -> SurvivalCurve:
-    """Return the curve of values of which some are right-censored.
+    """Estimate the curve of partly right-censored values.
 
     Args:
         values: peaks, shape (n,).
-        is_held: which are censored, shape (n,); at equal values events come first.
+        is_held: which are censored, shape (n,); events precede censoring at ties.
     """
     at, events = np.unique(values[~is_held], return_counts=True)
     at_risk = values.size - np.searchsorted(np.sort(values), at, "left")
@@ -41,11 +41,11 @@ def kaplan_meier(values: Array, is_held: np.ndarray) -> SurvivalCurve:
 
 
 def pit_distance(pit: Array, is_held: np.ndarray) -> float:
-    """Return how far probability integral transforms are from uniform, 0 to 1.
+    """Return the distance of probability integral transforms from uniform, 0 to 1.
 
-    The transform of a push is the probability that its model gives to a smaller peak.
-    Kaplan and Meier's curve of the transforms is that of uniform numbers where the
-    model is right; the result is the largest difference. NaN without a slip.
+    The transform of a push is the model's probability of a smaller peak. If the model
+    is right, the Kaplan-Meier curve of the transforms is that of uniform numbers; the
+    result is the largest difference. NaN without a slip.
 
     Args:
         pit: transforms, shape (n,).
@@ -55,10 +55,10 @@ def pit_distance(pit: Array, is_held: np.ndarray) -> float:
     if not curve.at.size:
         return float("nan")
     before = np.concatenate([[0.0], curve.below[:-1]])
-    apart = np.maximum(np.abs(curve.below - curve.at), np.abs(before - curve.at))
-    return float(apart.max())
+    distance = np.maximum(np.abs(curve.below - curve.at), np.abs(before - curve.at))
+    return float(distance.max())
 
 
 def pit_limit(slips: int) -> float:
-    """Return the distance that chance exceeds in 5 % of cases."""
+    """Return the distance exceeded by chance in 5 % of cases."""
     return _KOLMOGOROV / float(np.sqrt(max(slips, 1)))

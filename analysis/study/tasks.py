@@ -1,4 +1,4 @@
-"""Independent tasks: what a study consists of, wherever they run."""
+"""Execution of the independent tasks of a study."""
 
 from collections.abc import Callable, Generator, Sequence
 from contextlib import closing
@@ -14,28 +14,28 @@ from analysis.study.worker_processes import Call, run_on_processes, running_work
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 Progress = Callable[[int, int], None]
-TaskIndex = tuple[int, int]  # of a task: number of its batch, and in it
+TaskIndex = tuple[int, int]  # (batch, task in the batch)
 
-_FEW = 3  # tasks that cost less than starting workers
+_FEW = 3  # number of tasks that cost less than starting workers
 
 
 @dataclass(frozen=True, slots=True)
 class Workers:
-    """Where tasks run; never what they return.
+    """Where tasks run; does not affect the results.
 
     Attributes:
-        n_jobs: number of processes; by default one per core, and for three tasks or
-            fewer those that are running.
+        n_jobs: number of processes; by default one per core, or those already running
+            for three tasks or fewer.
         scheduler: address of a Dask scheduler, on this machine or by TLS, e.g.
-            "tcp://127.0.0.1:8786"; None for processes of this one. Its workers need the
-            same version of this project.
+            "tcp://127.0.0.1:8786"; None for local processes. Its workers need the same
+            version of this project.
     """
 
     n_jobs: int | None = None
     scheduler: str | None = None
 
     def count(self, tasks: int) -> int:
-        """Return the number of local processes for so many tasks."""
+        """Return the number of local processes for this many tasks."""
         if self.n_jobs is not None or tasks < 2:
             return min(self.n_jobs or 1, tasks)
         return available_cores() if tasks > _FEW else running_workers()
@@ -47,7 +47,7 @@ class Batch:
 
     Attributes:
         function: pure, importable by name, called with one task.
-        tasks: what to do.
+        tasks: arguments, one per call.
     """
 
     function: Callable[[Any], Any]
@@ -61,18 +61,18 @@ def run_tasks(
     progress: Progress | None = None,
     store: ResultStore | None = None,
 ) -> list[Result]:
-    """Return `function` of every task, in the order of the tasks.
+    """Apply `function` to every task; results are in the order of the tasks.
 
     The function must be pure. Every task runs with one linear-algebra thread, here and
-    in workers: for matrices of a few hundred rows more lose time, and one thread makes
-    results identical, bit by bit, for any number of workers.
+    in workers: more threads are slower for matrices of a few hundred rows, and one
+    thread makes results bitwise equal for any number of workers.
 
     Args:
         function: importable by name, called with one task.
-        tasks: what to do.
-        workers: where, or just the number of processes.
+        tasks: arguments, one per call.
+        workers: where to run, or just the number of processes.
         progress: called with (done, total) after every task.
-        store: results of earlier runs; new ones are kept as soon as they are there.
+        store: cache of earlier results; new ones are stored as they complete.
 
     Raises:
         SettingsError: the scheduler does not answer, or is reached without TLS.
@@ -89,16 +89,16 @@ def run_batches(
     progress: Progress | None = None,
     store: ResultStore | None = None,
 ) -> list[list[Any]]:
-    """Return the results of every batch, as of `run_tasks`.
+    """Return the results of every batch, as `run_tasks` does.
 
-    No core waits between one batch and the next. Progress counts all of them.
+    No core idles between batches. Progress counts the tasks of all batches.
     """
-    keep_memory()  # what is fitted here, beside the tasks, is quicker for it, too
+    keep_memory()  # also speeds up fits in this process
     where = workers if isinstance(workers, Workers) else Workers(workers)
     indices = [
         (k, n) for k, batch in enumerate(batches) for n in range(len(batch.tasks))
     ]
-    results = {} if store is None else _kept(store, batches, indices)
+    results = {} if store is None else _cached(store, batches, indices)
     if progress is not None and results:
         progress(len(results), len(indices))
     calls = [
@@ -106,8 +106,8 @@ def run_batches(
         for k, n in indices
         if (k, n) not in results
     ]
-    with closing(_done(calls, where)) as done:  # what still runs at an error is ended
-        for (k, n), result in done:
+    with closing(_completed(calls, where)) as completed:  # ends running calls on error
+        for (k, n), result in completed:
             results[k, n] = result
             if store is not None:
                 store.put(batches[k].function, batches[k].tasks[n], result)
@@ -119,7 +119,7 @@ def run_batches(
     ]
 
 
-def _kept(
+def _cached(
     store: ResultStore, batches: Sequence[Batch], indices: Sequence[TaskIndex]
 ) -> dict[TaskIndex, Any]:
     results: dict[TaskIndex, Any] = {}
@@ -130,7 +130,9 @@ def _kept(
     return results
 
 
-def _done(calls: Sequence[Call], where: Workers) -> Generator[tuple[TaskIndex, Any]]:
+def _completed(
+    calls: Sequence[Call], where: Workers
+) -> Generator[tuple[TaskIndex, Any]]:
     """Yield (index, result) of every call, in any order."""
     count = where.count(len(calls))
     if where.scheduler is not None and calls:
@@ -146,7 +148,7 @@ def _one_threaded(
     index: TaskIndex,
     task: Any,  # noqa: ANN401
 ) -> tuple[TaskIndex, Any]:
-    # A library is limited only once it is loaded: SciPy brings one of its own.
+    # The limit affects only loaded libraries, and SciPy has its own BLAS: import first.
     import scipy.linalg  # noqa: F401
     from threadpoolctl import threadpool_limits
 

@@ -1,4 +1,4 @@
-"""One terrain of a study: its folds, and the Tustin fit of all its trials."""
+"""Results of one terrain: its folds, and the Tustin fit to all its trials."""
 
 import zlib
 from collections.abc import Callable, Mapping, Sequence
@@ -19,17 +19,17 @@ from analysis.tustin.bootstrap import bootstrap_tustin
 from analysis.tustin.identifiability import Interval
 from analysis.tustin.model import TustinFit, fit_tustin
 
-_STREAM = 1_000_000  # apart from the folds, which have the same kind of seed
+_STREAM = 1_000_000  # random stream, distinct from the folds
 
 
 @dataclass(frozen=True, slots=True)
 class TerrainTask:
-    """Everything the fit of one terrain needs.
+    """Input for the fit of one terrain.
 
     Attributes:
         terrain: its name.
-        trials: kept samples of every trial that has any.
-        options: how to fit.
+        trials: kept samples of every non-empty trial.
+        options: options of the fits.
     """
 
     terrain: str
@@ -43,9 +43,9 @@ class PooledTustinFit:
 
     Attributes:
         terrain: its name.
-        fit: the fit of all trials; None where it was impossible.
-        intervals: 95 % intervals of the parameters from resampled trials; empty with
-            one trial, or where none were asked for.
+        fit: fit to all trials; None if it was impossible.
+        intervals: 95 % bootstrap intervals of the parameters; empty with one trial or
+            if not requested.
     """
 
     terrain: str
@@ -55,20 +55,20 @@ class PooledTustinFit:
 
 @dataclass(frozen=True, slots=True)
 class TerrainResult:
-    """One terrain of a study.
+    """Results of one terrain of a study.
 
     Attributes:
         terrain: its name.
-        kind: "small", "big", "flat", or its own name where that is not known.
-        trials: its prepared trials.
-        slips: the slips of every trial.
-        folds: its folds; a trial without kept samples has none.
-        whole: the Tustin fit of all its trials, with intervals.
-        components: how its trials differ; None where they were not asked for, or for
-            fewer than three of them.
-        incline_deg: along the push, positive downhill [degrees]; None where unknown.
-        factors: what else its recordings state alike, by name.
-        units: of numbers among them, by name.
+        kind: "small", "big", "flat", or its own name if not known.
+        trials: prepared trials.
+        slips: slips of every trial.
+        folds: folds; a trial without kept samples has none.
+        whole: Tustin fit to all trials, with intervals.
+        components: variance components; None if not requested or with fewer than three
+            trials.
+        incline_deg: along the push, positive downhill [degrees]; None if unknown.
+        factors: further factors stated consistently by its recordings, by name.
+        units: units of numeric factors by name.
     """
 
     terrain: str
@@ -84,12 +84,12 @@ class TerrainResult:
 
     @property
     def is_papers(self) -> bool:
-        """Whether it is one of the paper's eight terrains: name, stones and incline."""
+        """Whether name, stones and incline match one of the paper's eight terrains."""
         return is_papers(self.terrain, self.kind, self.incline_deg)
 
     @property
     def title(self) -> str:
-        """Its name and its kind in words, e.g. "S0: small stones"."""
+        """Name and kind in words, e.g. "S0: small stones"."""
         if self.kind == self.terrain:
             return self.terrain
         return f"{self.terrain}: {kind_title(self.kind)}"
@@ -97,7 +97,7 @@ class TerrainResult:
     def per_trial(
         self, model: str, measure: Callable[[ModelFold], float]
     ) -> list[float | None]:
-        """Return a measure of a model's fold for every trial, None where missing."""
+        """Return a measure of a model's fold for every trial; None if missing."""
         values: list[float | None] = [None] * len(self.trials)
         for fold in self.folds:
             if model in fold.models:
@@ -106,7 +106,7 @@ class TerrainResult:
         return values
 
     def scores(self, model: str, key: str) -> list[float | None]:
-        """Return the measure `key` of a model on every trial, None where missing."""
+        """Return the score `key` of a model on every trial; None if missing."""
         values: list[float | None] = [None] * len(self.trials)
         for fold in self.folds:
             if model in fold.models:
@@ -116,9 +116,9 @@ class TerrainResult:
         return values
 
     def left_out(self, model: str) -> list[tuple[int, ModelFold]]:
-        """Return the number of every trial with the model that it was left out of.
+        """Return the number of every held-out trial with the model fitted without it.
 
-        In the order of the folds.
+        The trials are in the order of the folds.
         """
         return [
             (k, fold.models[model])
@@ -128,7 +128,7 @@ class TerrainResult:
         ]
 
     def maes(self, model: str) -> list[float | None]:
-        """Return the mean absolute error [N] on every trial, left out in turn."""
+        """Return the mean absolute error [N] on every held-out trial."""
         return self.scores(model, "mae")
 
     def mae(self, model: str) -> float | None:
@@ -152,7 +152,7 @@ class TerrainResult:
 
     @property
     def pulled_share(self) -> float:
-        """Share of the kept samples with F_n below what a sound sensor shows."""
+        """Share of the kept samples with F_n below the error of a sound sensor."""
         return share_below(self.trials, -PULLED)
 
     def models(self, name: str) -> list[ModelFold]:
@@ -161,13 +161,13 @@ class TerrainResult:
 
 
 def fit_terrain(task: TerrainTask) -> PooledTustinFit:
-    """Return the fit of all trials of a terrain; a pure function of the task."""
+    """Fit the Tustin model to all trials of a terrain; pure."""
     options = task.options
     columns = [(rows.F_n, rows.v_t, rows.F_t) for rows in task.trials]
     try:
         F_n, v_t, F_t = (np.concatenate(c) for c in zip(*columns, strict=True))
         fit = fit_tustin(F_n, v_t, F_t, options.bounds, options.form)
-    except (TractionError, ValueError):  # no trial at all unpacks into no columns
+    except (TractionError, ValueError):  # ValueError: no trials to unpack
         return PooledTustinFit(task.terrain, None, {})
     if len(columns) < 2 or options.draws < 1:
         return PooledTustinFit(task.terrain, fit, {})
@@ -178,6 +178,6 @@ def fit_terrain(task: TerrainTask) -> PooledTustinFit:
 
 
 def mean_of(values: Sequence[float | None]) -> float | None:
-    """Return the mean of the values that exist, None if none does."""
+    """Return the mean of the values that are not None; None if all are."""
     present = [value for value in values if value is not None]
     return float(np.mean(present)) if present else None

@@ -1,12 +1,12 @@
-"""Variance components: how trials of a terrain differ, and how rows repeat.
+"""Variance components of the residuals of a terrain, between and within trials.
 
-Around a Gaussian process of rows of at most 30 trials the residuals of all rows of all
-trials have three parts: a level of every trial (between), an Ornstein-Uhlenbeck
-residual along it (within, with its time tau) and independent noise (measurement); see
-`analysis.gp.trial_level`.
+A Gaussian process is fitted to rows of at most 30 trials. The residuals of all rows of
+all trials have three components: the level of a trial (between), an Ornstein-Uhlenbeck
+process along it (within, with correlation time tau) and independent noise
+(measurement); see `analysis.gp.trial_level`.
 
-Intervals come from trials drawn again with replacement, around the function fitted to
-all of them. With J trials of T seconds the level of a terrain is known to
+Intervals come from a bootstrap over trials about the fixed function. With J trials of T
+seconds the standard error of the level of a terrain is
 
     sqrt((sc^2 + 2 so^2 tau / T) / J)
 """
@@ -35,13 +35,13 @@ from analysis.study.models import FitOptions
 from analysis.study.new_trial import spread_rows
 from analysis.tustin.identifiability import Interval
 
-LEAST_GAIN = 1.4  # log likelihood that a level must gain: 5 % on the edge of its range
+LEAST_GAIN = 1.4  # gain in log likelihood of a significant level: 5 %, at a boundary
 
-_STREAM = 3_000_000  # apart from folds, terrain fits and tables
-_DRAWS = 100  # of trials with replacement, at most
-_ENDS = (2.5, 97.5)  # % of the draws
-_UNSEEN = 2  # rows for each that the function is fitted to, to judge its residuals
-_FEWEST = 3  # trials that a spread between them can be seen in
+_STREAM = 3_000_000  # random stream, distinct from folds, terrain fits and tables
+_DRAWS = 100  # largest number of bootstrap draws
+_ENDS = (2.5, 97.5)  # percentiles of the draws
+_UNSEEN = 2  # rows per fitted row, so that most residuals are out of sample
+_FEWEST = 3  # smallest number of trials
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,18 +62,18 @@ class TimedRows:
 
     @classmethod
     def of(cls, trial: PreparedTrial) -> "TimedRows":
-        """Return the kept samples of a trial."""
+        """Take the kept samples of a trial."""
         return cls(trial.F_n, trial.v_t, trial.F_t, trial.smooth.t[trial.indices])
 
 
 @dataclass(frozen=True, slots=True)
 class ComponentsTask:
-    """Everything the components of one terrain need.
+    """Input for the components of one terrain.
 
     Attributes:
         terrain: its name.
-        trials: those that have kept samples.
-        options: how to fit.
+        trials: trials with kept samples.
+        options: options of the fits.
     """
 
     terrain: str
@@ -83,20 +83,20 @@ class ComponentsTask:
 
 @dataclass(frozen=True, slots=True)
 class TrialComponents:
-    """How trials of a terrain differ, and how the rows of one repeat each other.
+    """Variance components of a terrain.
 
     Attributes:
         trials: number of trials.
-        seconds: mean motion of a trial [s].
+        seconds: mean duration of motion in a trial [s].
         between: standard deviation between trials, sc [N].
-        within: that of the residual along a trial, so [N].
-        tau: its correlation time [s].
+        within: standard deviation of the correlated residual along a trial, so [N].
+        tau: correlation time of that residual [s].
         measurement: standard deviation of single rows, sn [N].
         intervals: 95 % intervals of "between", "within", "tau" and "measurement";
-            none where no draws were asked for.
-        gain: log likelihood that the level of a trial gains.
-        other: sc [N] by the other of the two ways; None where it says nothing.
-        do_differ: the two ways differ by more than twice the standard error.
+            empty without draws.
+        gain: gain in log likelihood from the trial level.
+        other: sc [N] by the other of the two estimates; None if unavailable.
+        do_differ: the two estimates differ by more than twice the standard error.
     """
 
     trials: int
@@ -112,24 +112,24 @@ class TrialComponents:
 
     @property
     def is_distinguishable(self) -> bool:
-        """Whether the spread between trials can be told from none."""
+        """Whether the spread between trials is distinguishable from zero."""
         return self.gain >= LEAST_GAIN
 
     @property
     def independent(self) -> float:
-        """Independent values that the residual of one trial is worth."""
+        """Effective number of independent values in the residual of one trial."""
         return max(1.0, self.seconds / (2.0 * self.tau))
 
     def level_sd(self, trials: int) -> float:
-        """Return how well so many trials show the terrain's level [N]."""
+        """Return the standard error of the terrain's level from `trials` trials [N]."""
         along = self.within**2 / self.independent
         return float(np.sqrt((self.between**2 + along) / trials))
 
 
 def fit_components(task: ComponentsTask) -> TrialComponents | None:
-    """Return the components of a terrain; None with fewer than three trials.
+    """Estimate the components of a terrain; None with fewer than three trials.
 
-    A pure function of the task.
+    Pure.
     """
     if len(task.trials) < _FEWEST:
         return None
@@ -138,7 +138,7 @@ def fit_components(task: ComponentsTask) -> TrialComponents | None:
         for n in ("F_n", "v_t", "F_t")
     )
     inputs, lengths = np.column_stack([F_n, v_t]), [t.t.size for t in task.trials]
-    # residuals of rows that the function is fitted to are too small: most are not
+    # in-sample residuals are too small, so most rows must not be fitted
     chosen = spread_rows(lengths, min(task.options.gp_points, sum(lengths) // _UNSEEN))
     label = np.repeat(np.arange(len(lengths)), lengths)[chosen]
     try:
@@ -151,13 +151,13 @@ def fit_components(task: ComponentsTask) -> TrialComponents | None:
         )
     except TractionError:
         return None
-    left = np.split(F_t - process.mean(inputs), np.cumsum(lengths)[:-1])
+    parts = np.split(F_t - process.mean(inputs), np.cumsum(lengths)[:-1])
     residuals = TrialResiduals(
-        [(trial.t, part) for trial, part in zip(task.trials, left, strict=True)]
+        [(trial.t, part) for trial, part in zip(task.trials, parts, strict=True)]
     )
     levels = levels_of(residuals)
-    found, likelihood = levels.components, RestrictedLikelihood(residuals)
-    theta = found.theta()
+    components, likelihood = levels.components, RestrictedLikelihood(residuals)
+    theta = components.theta()
     draws = min(task.options.draws, _DRAWS)
     key = (task.options.seed, zlib.crc32(task.terrain.encode()), _STREAM)
     rng = np.random.default_rng(key)
@@ -165,9 +165,9 @@ def fit_components(task: ComponentsTask) -> TrialComponents | None:
         trials=len(lengths),
         seconds=float(np.mean([_motion(trial.t) for trial in task.trials])),
         between=levels.between,
-        within=found.within,
-        tau=found.tau,
-        measurement=found.measurement,
+        within=components.within,
+        tau=components.tau,
+        measurement=components.measurement,
         intervals=_intervals(residuals, levels, draws, rng) if draws else {},
         gain=likelihood.gain(theta),
         other=levels.other,
@@ -176,7 +176,7 @@ def fit_components(task: ComponentsTask) -> TrialComponents | None:
 
 
 def _motion(t: Array) -> float:
-    """Return how long the kept samples of a trial last together [s]."""
+    """Return the total duration of the kept samples of a trial [s]."""
     return t.size * float(np.diff(t).min()) if t.size > 1 else 0.0
 
 
@@ -186,23 +186,23 @@ def _intervals(
     draws: int,
     rng: np.random.Generator,
 ) -> dict[str, Interval]:
-    """Return 95 % intervals of all components from trials drawn again.
+    """Return 95 % bootstrap intervals of all components.
 
     Args:
-        residuals: of all trials.
-        levels: found from them.
-        draws: of the trials with replacement.
-        rng: draws them.
+        residuals: residuals of all trials.
+        levels: estimate from all trials.
+        draws: number of bootstrap draws.
+        rng: random generator for the draws.
     """
-    count, found = residuals.count, levels.components
+    count, components = residuals.count, levels.components
     shares = np.full(count, 1.0 / count)
     weight = rng.multinomial(count, shares, size=draws).astype(float)
-    theta = found.theta()
+    theta = components.theta()
     drawn = RestrictedLikelihood(residuals).drawn(theta, weight)
     low, high = np.exp(np.percentile(drawn, _ENDS, axis=0)).tolist()
     names = ("measurement", "within", "tau")
     ends = {n: Interval(*pair) for n, *pair in zip(names, low, high, strict=True)}
-    sums = LevelSums.of(residuals, REMEMBERED * found.tau)
-    moved = np.percentile(sums.drawn(weight) - sums.variance(), _ENDS)
-    around = np.sqrt(np.maximum(levels.between**2 + moved, 0.0)).tolist()
-    return {"between": Interval(*around), **ends}
+    sums = LevelSums.of(residuals, REMEMBERED * components.tau)
+    change = np.percentile(sums.drawn(weight) - sums.variance(), _ENDS)
+    between = np.sqrt(np.maximum(levels.between**2 + change, 0.0)).tolist()
+    return {"between": Interval(*between), **ends}

@@ -1,7 +1,7 @@
-"""Processes for independent calls: those of joblib's loky, which wait for more.
+"""Worker processes for independent calls, kept alive by joblib's loky.
 
-The only module that imports joblib. Workers end with their parent, however that ends,
-and no key of the terminal reaches them. They do not run the user's script again.
+The only module that imports joblib. Workers end with their parent, even if it is
+killed, ignore Ctrl-C, and do not run the user's script again.
 """
 
 import os
@@ -23,16 +23,16 @@ from acquisition.errors import SettingsError
 
 Call = tuple[Callable[..., Any], *tuple[Any, ...]]  # a function and its arguments
 
-_IDLE = 300  # s after which a worker without a call ends
-_LOOK = 1.0  # s between two looks whether the parent is there
+_IDLE = 300  # s after which an idle worker ends
+_LOOK = 1.0  # s between checks that the parent is alive
 _EXIT_CODES = re.compile(r"exit codes of the workers are \{(.+)\}")
 
 
 class WorkerLostError(SettingsError):
-    """A process ended while it worked on a task.
+    """A worker process ended during a task.
 
     Args:
-        how: its signal or exit code; empty where that is not known.
+        how: signal or exit code; empty if not known.
     """
 
     def __init__(self, how: str = "") -> None:
@@ -44,10 +44,10 @@ class WorkerLostError(SettingsError):
 
 
 def warm_workers(modules: Sequence[str]) -> None:
-    """Start workers, which import modules while this process goes on.
+    """Start workers that import modules in the background.
 
     Args:
-        modules: what calls need, the first needed first.
+        modules: modules that calls need, in order of need.
     """
     count = available_cores()
     if count > 1:
@@ -55,26 +55,26 @@ def warm_workers(modules: Sequence[str]) -> None:
 
 
 def end_workers() -> None:
-    """End all workers, whatever they do."""
+    """End all workers, even during a call."""
     if processes := _processes():
         from joblib.externals.loky import get_reusable_executor
 
-        for process in processes:  # loky's way may stumble over a call that waits
+        for process in processes:  # loky's own shutdown may fail on a waiting call
             process.terminate()
-        executor: Any = get_reusable_executor  # its types state reuse as a text
+        executor: Any = get_reusable_executor  # its annotations declare reuse as str
         executor(reuse=True).shutdown()
 
 
 def running_workers() -> int:
-    """Return how many workers earlier calls have started; 1 where there are none.
+    """Return the number of workers already running; 1 without any.
 
-    Calls that take less time than starting them are worth giving to these only.
+    Calls shorter than the start of a worker should only use these.
     """
     return max(1, len(_processes()))
 
 
 def run_on_processes(calls: Iterable[Call], count: int) -> Generator[Any]:
-    """Yield what calls return, as soon as each is done.
+    """Yield the results of calls as they complete.
 
     Args:
         calls: functions that can be imported by name, and their arguments.
@@ -85,12 +85,12 @@ def run_on_processes(calls: Iterable[Call], count: int) -> Generator[Any]:
     """
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
-    executor, left = _executor(count), iter(calls)
+    executor, pending = _executor(count), iter(calls)
     try:
-        running = _submit(executor, islice(left, 2 * count))
+        running = _submit(executor, islice(pending, 2 * count))
         while running:
             done, running = wait(running, return_when=FIRST_COMPLETED)
-            running |= _submit(executor, islice(left, len(done)))
+            running |= _submit(executor, islice(pending, len(done)))
             yield from (future.result() for future in done)
     except TerminatedWorkerError as error:
         codes = _EXIT_CODES.search(str(error))
@@ -107,7 +107,7 @@ def _processes() -> list[BaseProcess]:
 def _executor(count: int) -> Any:  # noqa: ANN401
     from joblib.externals.loky import get_reusable_executor
 
-    # that a worker was replaced, or how one was killed, is nothing to tell a person
+    # users need no warnings about replaced or killed workers
     warnings.filterwarnings("ignore", module=r"joblib\.externals\.loky")
     with _shielded():
         return get_reusable_executor(
@@ -116,13 +116,13 @@ def _executor(count: int) -> Any:  # noqa: ANN401
 
 
 def _submit(executor: Any, calls: Iterable[Call]) -> set[Future[Any]]:  # noqa: ANN401
-    with _shielded():  # the first one starts processes
+    with _shielded():  # the first submission starts processes
         return {executor.submit(*call) for call in calls}
 
 
 @contextmanager
 def _shielded() -> Generator[None]:
-    """Let processes start deaf to Ctrl-C, and without modules of the working folder."""
+    """Start processes with Ctrl-C blocked and no working folder on sys.path."""
     safe_path = os.environ.get("PYTHONSAFEPATH")
     os.environ["PYTHONSAFEPATH"] = "1"
     try:
@@ -136,11 +136,11 @@ def _shielded() -> Generator[None]:
 
 @contextmanager
 def _no_interrupt() -> Generator[None]:
-    """Let what is started be deaf to Ctrl-C; it reaches this process afterwards."""
+    """Block Ctrl-C in child processes; it is delivered to this process afterwards."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    resource_tracker.ensure_running()  # it would unblock the signal below
+    resource_tracker.ensure_running()  # starting it later would unblock the signal
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -149,14 +149,14 @@ def _no_interrupt() -> Generator[None]:
 
 
 def _end_with(parent: int) -> None:
-    """Let this process end with its parent, whatever it does then."""
+    """End this process when its parent ends, whatever it is doing."""
 
-    def look() -> None:
+    def watch() -> None:
         while os.getppid() == parent:
             threading.Event().wait(_LOOK)
         os._exit(1)
 
-    threading.Thread(target=look, daemon=True).start()
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def _import(modules: Sequence[str]) -> None:

@@ -1,7 +1,7 @@
-"""What is doubtful in the rows of a table, before any work is done on them; pure.
+"""Plausibility checks of the rows of a table before any analysis; pure.
 
-A time in another unit, a hole, a spike or a column that misses most of its values is
-refused or named here, with its line.
+A time in another unit, a gap, a spike or a column that lacks most of its values is
+refused or reported, with its line.
 """
 
 from collections.abc import Iterator
@@ -16,31 +16,31 @@ from analysis.tables.columns import COLUMNS
 from analysis.tables.refusals import refusal
 from analysis.tables.trial_table import TrialTable
 
-MOST_MISSING = 0.2  # share of the rows without a value
+MOST_MISSING = 0.2  # largest share of rows without a value
 GAP = 1.0  # s between two rows
-_STEPS = 10.0  # of the table's own, below which no step is a gap
-_SLOWEST, _FASTEST = 0.2, 2e-5  # s between rows of a table that states no unit of t
+_STEPS = 10.0  # smallest gap as a multiple of the median step
+_SLOWEST, _FASTEST = 0.2, 2e-5  # s between rows if the unit of t is not stated
 _WORDS = {"d": "days"}
-_USUAL = (5e-5, 0.2)  # s between the rows of a table
-_WILD = 20.0  # times the 99.9 % quantile
-_FLOORS = (0.05, 1.0, 1.0)  # m/s, N, N; smaller quantiles count as that
-# Column, the unit that a larger number suggests, and how large [m/s, N].
+_USUAL = (5e-5, 0.2)  # s, plausible range between rows
+_WILD = 20.0  # multiple of the 99.9 % quantile beyond which a value is an outlier
+_FLOORS = (0.05, 1.0, 1.0)  # m/s, N, N; lower limits of that quantile
+# Column, unit suggested by values above the limit, and the limit [m/s, N].
 _UNUSUAL = (("v_t", "mm/s", 2.0), ("F_n", "mN", 500.0), ("F_t", "mN", 2500.0))
-_FEWEST = 20  # rows below which no value is wild
-_LOWEST_RATE = 90.0  # Hz; below it one sample is 22 ms wide
-_OWN_RATE = 0.02  # share that the rate may differ from the rig's
+_FEWEST = 20  # rows below which outliers are not searched
+_LOWEST_RATE = 90.0  # Hz below which smoothing over 22 ms has no effect
+_OWN_RATE = 0.02  # relative difference from the rig's rate that is not reported
 
 
 def check_clock(path: Path, rows: Array, is_stated: bool) -> None:
-    """Refuse times that are no seconds, where nothing says that they are.
+    """Refuse times that do not look like seconds, unless their unit is stated.
 
     Args:
-        path: of the file.
-        rows: in s, m/s and N by what the table and the user say, shape (n, 4).
+        path: the file.
+        rows: t, v_t, F_n, F_t in s, m/s and N as stated, shape (n, 4).
         is_stated: the unit of t is stated.
 
     Raises:
-        SettingsError: it looks like another unit.
+        SettingsError: the times look like another unit.
     """
     step = _step(rows)
     if is_stated or step is None or _FASTEST <= step <= _SLOWEST:
@@ -56,16 +56,16 @@ def check_clock(path: Path, rows: Array, is_stated: bool) -> None:
     raise refusal(
         path,
         f"column t: {step:.6g} s between two rows; {looks}",
-        f"Say it: --unit t={likely[0] if likely else 's'}"
-        + ("; or --unit t=s where they are seconds." if likely else ""),
+        f"State it: --unit t={likely[0] if likely else 's'}"
+        + ("; or --unit t=s if they are seconds." if likely else ""),
     )
 
 
 def check_order(path: Path, table: TrialTable, rows: Array) -> None:
-    """Refuse a time that goes back or stands, repeated rows apart.
+    """Refuse times that do not increase; repeated rows are allowed.
 
     Raises:
-        SettingsError: it does, and where.
+        SettingsError: time does not increase at a row.
     """
     kept = np.flatnonzero(np.isfinite(rows).all(axis=1))
     if kept.size < 2:
@@ -94,14 +94,14 @@ def check_order(path: Path, table: TrialTable, rows: Array) -> None:
 
 
 def notes_of(path: Path, table: TrialTable, rows: Array) -> Iterator[str]:
-    """Give what a reader should know of a table.
+    """Yield remarks on a table: missing values, units, outliers, gaps, rate.
 
     Raises:
         SettingsError: too many rows lack a value.
     """
     yield from _missing(path, table, rows)
     yield from _units(table, rows)
-    yield from _wild(table, rows)
+    yield from _outliers(table, rows)
     if not table.is_prepared:
         yield from _gaps(table, rows)
         yield from _rate(rows)
@@ -132,7 +132,7 @@ def _missing(path: Path, table: TrialTable, rows: Array) -> Iterator[str]:
 
 
 def _units(table: TrialTable, rows: Array) -> Iterator[str]:
-    """Name columns that no foot can give in the unit that was assumed."""
+    """Report columns with values implausible in the assumed unit."""
     for k, (name, looks, most) in enumerate(_UNUSUAL, 1):
         size = np.abs(rows[np.isfinite(rows[:, k]), k])
         if name in table.units or not size.size:
@@ -149,8 +149,8 @@ def _counted(rows: int) -> str:
     return f"{rows} row{'' if rows == 1 else 's'}"
 
 
-def _wild(table: TrialTable, rows: Array) -> Iterator[str]:
-    """Name values far beyond nearly all others: spikes, and words for "no value"."""
+def _outliers(table: TrialTable, rows: Array) -> Iterator[str]:
+    """Report values far beyond nearly all others: spikes, and missing-value codes."""
     if len(rows) < _FEWEST:
         return
     for k, floor in enumerate(_FLOORS, 1):
@@ -164,19 +164,19 @@ def _wild(table: TrialTable, rows: Array) -> Iterator[str]:
             first = int(same.argmax())
             yield (
                 f"{COLUMNS[k]} is {rows[first, k]:.6g} in {_counted(count)}, the first "
-                f"is {table.location(first)}, elsewhere {others:.3g} at most: a word "
+                f"is {table.location(first)}, elsewhere {others:.3g} at most: a code "
                 "for a missing value? Leave the cells empty"
             )
             continue
         spared = max(3, -(-size.size // 1000))
         usual = float(np.partition(size, -spared - 1)[-spared - 1])
-        wild = np.flatnonzero(size > _WILD * max(usual, floor))
-        if wild.size:
-            first = int(wild[0])
+        outliers = np.flatnonzero(size > _WILD * max(usual, floor))
+        if outliers.size:
+            first = int(outliers[0])
+            more = f" and in {outliers.size - 1} more rows" if outliers.size > 1 else ""
             yield (
                 f"{COLUMNS[k]} is {rows[first, k]:.6g} in {table.location(first)}"
-                f"{f' and wild in {wild.size - 1} more rows' if wild.size > 1 else ''}"
-                f", elsewhere {usual:.3g} at most: a spike? Leave the cell empty"
+                f"{more}, elsewhere {usual:.3g} at most: a spike? Leave the cell empty"
             )
 
 
@@ -207,6 +207,6 @@ def _rate(rows: Array) -> Iterator[str]:
 
 
 def _step(rows: Array) -> float | None:
-    """Return the median step of time [s]; None where there is none."""
+    """Return the median time step [s]; None with fewer than three rows."""
     t = rows[np.isfinite(rows[:, 0]), 0]
     return float(np.median(np.abs(np.diff(t)))) if t.size > 2 else None

@@ -1,4 +1,4 @@
-"""Names and units of the columns of a table: of its header or the command line."""
+"""Names and units of table columns, from the header or the command line."""
 
 import csv
 import re
@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 from acquisition.errors import SettingsError
 
 COLUMNS = ("t", "v_t", "F_n", "F_t")
-PREPARED = "kept_row"  # a column of tables that were prepared before
-TRIAL, TERRAIN = "trial", "terrain"  # columns of words that part a table
+PREPARED = "kept_row"  # column that marks tables prepared before
+TRIAL, TERRAIN = "trial", "terrain"  # text columns that divide a table
 GROUPS = (TRIAL, TERRAIN)
-_MOST_SKIPPED = 10_000  # last line that --skip takes
-MOST_INPUTS = 6  # beside F_n and v_t
-SIMULATED = "simulated"  # 1 in every row where the devices were simulated
+_MOST_SKIPPED = 10_000  # last line that --skip accepts
+MOST_INPUTS = 6  # in addition to F_n and v_t
+SIMULATED = "simulated"  # column that is 1 in every row if the devices were simulated
 _TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "d": 86_400.0}
 _SPEEDS = {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3, "um/s": 1e-6}
 _GRAM_FORCE = 9.80665e-3  # N
@@ -25,7 +25,7 @@ _FORCES = {
     "lbf": 4.4482216152605,
 }
 _MASSES = {"g": "gf", "kg": "kgf", "lb": "lbf", "lbs": "lbf"}
-# Factor from each unit that a column may have to its own.
+# Factor from each accepted unit of a column to its SI unit.
 UNITS: Mapping[str, Mapping[str, float]] = {
     "t": _TIMES,
     "v_t": _SPEEDS,
@@ -33,12 +33,12 @@ UNITS: Mapping[str, Mapping[str, float]] = {
     "F_t": _FORCES,
 }
 _EVERY_UNIT = {unit for units in UNITS.values() for unit in units} | {*_MASSES}
-# Signs that other programs write for minus, micro and blank.
+# Characters that other programs write for minus, micro and blank.
 _SIGNS = str.maketrans(
     {"\u2212": "-", "\u00b5": "u", "\u03bc": "u", "\u00a0": " ", "\u2007": " "}
 )
 _HEADER = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*)[\])]")
-# Names that other programs give the columns, without case, blanks and signs.
+# Common names of the columns in other programs: lower-case letters only.
 _KNOWN_AS = {
     "t": {"t", "time", "times", "timestamp", "ts", "seconds", "sec", "zeit", "temps"},
     "v_t": {"vt", "v", "vel", "velocity", "speed", "vx", "vslip", "slipvelocity"},
@@ -48,23 +48,23 @@ _KNOWN_AS = {
 
 
 def plain(text: str) -> str:
-    """Return a text with ASCII signs for minus, micro and the blanks of a fixed width.
+    """Replace Unicode minus, micro and fixed-width blanks by ASCII.
 
-    U+2212 is a minus, U+00B5 and U+03BC are u, U+00A0 and U+2007 are blanks.
+    U+2212 becomes a minus, U+00B5 and U+03BC a u, U+00A0 and U+2007 a blank.
     """
     return text if text.isascii() else text.translate(_SIGNS)
 
 
 def parse_columns(text: str) -> dict[str, str]:
-    """Names of the columns from `t=t_s,"v_t=Speed, foot",F_n=3,...`.
+    """Parse column names such as `t=t_s,"v_t=Speed, foot",F_n=3,...`.
 
-    An item with commas stands in quotes; a number that is no name is a place, from 1.
+    Items with commas are quoted; a number that is not a name is a position, from 1.
     Columns that are not mentioned keep their own name. `trial=` and `terrain=` name
-    columns whose words say which rows belong together.
+    text columns that group the rows.
 
     Raises:
-        SettingsError: a part is not NAME=COLUMN, names no column of the analysis, or
-            one that was named before.
+        SettingsError: a part is not NAME=COLUMN, or NAME is not a column of the
+            analysis or was named before.
     """
     columns: dict[str, str] = {}
     for part in _items("--columns", text):
@@ -80,10 +80,10 @@ def parse_columns(text: str) -> dict[str, str]:
 
 
 def _items(option: str, text: str) -> list[str]:
-    """Items of an option, as a row of CSV: one with a comma stands in quotes.
+    """Split an option like a row of CSV: items with commas are quoted.
 
     Raises:
-        SettingsError: quotes do not close.
+        SettingsError: quotes are not closed.
     """
     try:
         rows = list(csv.reader([text], skipinitialspace=True, strict=True))
@@ -103,10 +103,10 @@ def _not_named(text: str, part: str) -> SettingsError:
 
 
 def parse_inputs(text: str) -> tuple[str, ...]:
-    """Return the inputs beside v_t and F_n of `v_t,F_n,skid_deg`.
+    """Parse inputs such as `v_t,F_n,skid_deg`; returns those other than v_t and F_n.
 
     Raises:
-        SettingsError: v_t or F_n is missing, a name stands twice or is no input, or
+        SettingsError: v_t or F_n is missing, a name occurs twice or is not an input, or
             there are too many.
     """
     names = _items("--inputs", text)
@@ -117,9 +117,9 @@ def parse_inputs(text: str) -> tuple[str, ...]:
     if sorted(own) != ["F_n", "v_t"]:
         reason = "v_t and F_n are always inputs; name each once"
     elif len(set(further)) < len(further) or taken & set(further):
-        reason = "a name stands twice, or is no input"
+        reason = "a name occurs twice, or is not an input"
     elif not 1 <= len(further) <= MOST_INPUTS:
-        reason = f"{len(further)} inputs beside them, 1 to {MOST_INPUTS} can be"
+        reason = f"{len(further)} further inputs, 1 to {MOST_INPUTS} are allowed"
     if reason:
         raise SettingsError(
             f"--inputs {text}: {reason}.",
@@ -129,14 +129,14 @@ def parse_inputs(text: str) -> tuple[str, ...]:
 
 
 def parse_covariates(text: str, known: Sequence[str] | None = None) -> tuple[str, ...]:
-    """Return the columns of `height,tilt` that are tested.
+    """Parse the columns to test, such as `height,tilt`.
 
     Args:
         text: from the command line.
-        known: names that there are; None = those of any table.
+        known: available names; None = those of any table.
 
     Raises:
-        SettingsError: there is no such column, a name stands twice or is that of an
+        SettingsError: there is no such column, a name occurs twice or is that of an
             input, or there are too many.
     """
     names = tuple(_items("--covariate", text))
@@ -146,9 +146,9 @@ def parse_covariates(text: str, known: Sequence[str] | None = None) -> tuple[str
     if strangers:
         reason = f"there is no {', '.join(strangers)}"
     elif len(set(names)) < len(names) or taken:
-        reason = "a name stands twice, or is no further column"
+        reason = "a name occurs twice, or is not a further column"
     elif not 1 <= len(names) <= MOST_INPUTS:
-        reason = f"{len(names)} columns, 1 to {MOST_INPUTS} can be"
+        reason = f"{len(names)} columns, 1 to {MOST_INPUTS} are allowed"
     if reason:
         what = "a column of every table" if known is None else ", ".join(known)
         raise SettingsError(
@@ -159,10 +159,10 @@ def parse_covariates(text: str, known: Sequence[str] | None = None) -> tuple[str
 
 
 def parse_units(text: str) -> dict[str, str]:
-    """Return the units of columns from `v_t=mm/s,F_t=mN`.
+    """Parse units of columns such as `v_t=mm/s,F_t=mN`.
 
     Raises:
-        SettingsError: a part is not NAME=UNIT, or the column has no such unit.
+        SettingsError: a part is not NAME=UNIT, or the unit does not suit the column.
     """
     units: dict[str, str] = {}
     for part in _items("--unit", text):
@@ -177,16 +177,16 @@ def parse_units(text: str) -> dict[str, str]:
 
 
 def parse_names(text: str) -> tuple[str, ...]:
-    """Return columns of the analysis from `F_n,F_t`.
+    """Parse columns of the analysis such as `F_n,F_t`.
 
     Raises:
-        SettingsError: one is none.
+        SettingsError: a name is not a column of the analysis.
     """
     names = tuple(_items("--negate", text))
     strangers = [name for name in names if name not in COLUMNS]
     if strangers or not names:
         raise SettingsError(
-            f"--negate {text}: {', '.join(strangers) or 'nothing'} is no column of "
+            f"--negate {text}: {', '.join(strangers) or 'nothing'} is not a column of "
             "the analysis.",
             hint="Write e.g. --negate F_n,F_t",
         )
@@ -194,15 +194,15 @@ def parse_names(text: str) -> tuple[str, ...]:
 
 
 def parse_separator(text: str) -> str:
-    """The character between columns from `;`, `tab` or `blanks`."""
+    """Parse the separator between columns: a character, `tab` or `blanks`."""
     return {"tab": "\t", "\\t": "\t"}.get(text, text)
 
 
 def parse_lines(text: str) -> frozenset[int]:
-    """Numbers of lines from `1-3,5`.
+    """Parse line numbers such as `1-3,5`.
 
     Raises:
-        SettingsError: a part is no line, or there are too many.
+        SettingsError: a part is not a line, or a number is too large.
     """
     lines: set[int] = set()
     for part in _items("--skip", text):
@@ -219,10 +219,10 @@ def parse_lines(text: str) -> frozenset[int]:
 
 
 def split_header(header: str) -> tuple[str, str]:
-    """Return name and unit of `v_t [mm/s]`, `v_t (mm/s)` or `v_t/mm/s`.
+    """Split `v_t [mm/s]`, `v_t (mm/s)` or `v_t/mm/s` into name and unit.
 
-    No unit is empty. A stroke begins one only where a unit is behind it, and where the
-    stroke is not within one itself, as in `speed m/s`.
+    Without a unit, the second part is empty. A slash separates them only if a unit
+    follows and the slash is not part of the unit, as in `speed m/s`.
     """
     if match := _HEADER.fullmatch(header):
         return match["name"], match["unit"].strip()
@@ -234,74 +234,74 @@ def split_header(header: str) -> tuple[str, str]:
 
 
 def factor(name: str, stated: str, asked: str) -> float:
-    """Return what turns a column into its own unit.
+    """Return the factor that converts a column to its SI unit.
 
     Args:
-        name: of the column.
-        stated: its unit as the table says; empty where it says none.
-        asked: its unit as the command line says; empty where it says none.
+        name: name of the column.
+        stated: unit in the table; empty = none.
+        asked: unit on the command line; empty = none.
 
     Raises:
-        SettingsError: the two differ, or the table's unit is not known.
+        SettingsError: the two differ, or the unit is not known.
     """
     stated = plain(stated)
     if stated and asked and asked not in {stated, _MASSES.get(stated)}:
         raise SettingsError(
             f"{name} is in {stated} by the table's header and in {asked} by --unit.",
-            hint="Leave --unit out, or mend the header.",
+            hint="Leave --unit out, or correct the header.",
         )
     unit = stated or asked
     if asked and asked == _MASSES.get(stated):
         return UNITS[name][asked]
     if unit in _MASSES and name.startswith("F"):
         raise SettingsError(
-            f"{name} is in {unit!r}, which is a mass and no force.",
+            f"{name} is in {unit!r}, which is a mass, not a force.",
             hint=f"If a scale shows the force so: --unit {name}={_MASSES[unit]}; 1 "
             f"{_MASSES[unit]} is {_FORCES[_MASSES[unit]]:.9g} N.",
         )
     if unit and unit not in UNITS[name]:
         raise SettingsError(
-            f"{name} is in {unit!r}, which is not a unit of it.",
+            f"{name} is in {unit!r}, which is not a unit of {name}.",
             hint=f"It may be in {', '.join(UNITS[name])}.",
         )
     return UNITS[name][unit] if unit else 1.0
 
 
 def find_column(header: Sequence[str], column: str) -> list[int]:
-    """Return the places of a column in a header, from 0; none, one or several.
+    """Return the positions of a column in a header, from 0: none, one or several.
 
-    A header `v_t [mm/s]` is the column v_t, or a column of that whole name. A number
-    that is no name is a place, from 1.
+    A header `v_t [mm/s]` matches the column v_t or that whole name. A number that is
+    not a name is a position, from 1.
     """
     bare = [split_header(name)[0] for name in header]
     for among in (header, bare):
-        if places := [k for k, name in enumerate(among) if name == column]:
-            return places
+        if positions := [k for k, name in enumerate(among) if name == column]:
+            return positions
     if column.isdecimal() and 1 <= int(column) <= len(header):
         return [int(column) - 1]
     return []
 
 
 def columns_hint(header: Sequence[str], wanted: Mapping[str, str]) -> str:
-    """Return `--columns ...` for a header that lacks some of the wanted columns.
+    """Suggest `--columns ...` for a header that lacks some of the wanted columns.
 
-    Columns that go by a usual name are named; the others are left to be filled in.
-    Where inputs or covariates alone are lacking, their options are what names them.
+    Columns with a common name are filled in; the others are left open. If only inputs
+    or covariates are missing, their options are suggested.
 
     Args:
-        header: the names that the table has.
-        wanted: names that were looked for, by column of the analysis or by input.
+        header: names in the table.
+        wanted: names searched for, by column of the analysis or by input.
     """
     items: list[str] = []
-    lacking: set[str] = set()
+    missing: set[str] = set()
     for name, column in wanted.items():
-        is_there = bool(find_column(header, column))
-        if not is_there:
-            lacking.add(name)
+        is_present = bool(find_column(header, column))
+        if not is_present:
+            missing.add(name)
         if name in {*COLUMNS, *GROUPS}:
-            known = [column] if is_there else _usual(header, name)
-            items.append(f"{name}={known[0] if len(known) == 1 else '...'}")
-    if lacking and not lacking & {*COLUMNS, *GROUPS}:
+            candidates = [column] if is_present else _columns_like(header, name)
+            items.append(f"{name}={candidates[0] if len(candidates) == 1 else '...'}")
+    if missing and not missing & {*COLUMNS, *GROUPS}:
         return "Name columns that it has: --inputs v_t,F_n,... or --covariate NAME"
     row = ",".join(f'"{item}"' if "," in item else item for item in items)
     is_plain = re.fullmatch(r"[\w.=,/]*", row, re.ASCII) is not None
@@ -309,21 +309,22 @@ def columns_hint(header: Sequence[str], wanted: Mapping[str, str]) -> str:
 
 
 def place_hint(name: str, places: Sequence[int]) -> str:
-    """Return how one of several columns of the same name is taken.
+    """Suggest how to select one of several columns of the same name.
 
     Args:
         name: column of the analysis, or an input.
-        places: where the header has it, from 0.
+        places: its positions in the header, from 0.
     """
-    either = [str(place + 1) for place in places[:4]]
+    numbers = [str(place + 1) for place in places[:4]]
     if name in {*COLUMNS, *GROUPS}:
-        return "Take one by its place: --columns " + " or ".join(
-            f"{name}={place}" for place in either
+        return "Take one by its position: --columns " + " or ".join(
+            f"{name}={number}" for number in numbers
         )
-    return f"Take one by its place: {' or '.join(either)} for {name} in --inputs"
+    return f"Take one by its position: {' or '.join(numbers)} for {name} in --inputs"
 
 
-def _usual(header: Sequence[str], name: str) -> list[str]:
+def _columns_like(header: Sequence[str], name: str) -> list[str]:
+    """Return the columns whose name is a common one for a column of the analysis."""
     bare = [split_header(column)[0] for column in header]
     return [
         column

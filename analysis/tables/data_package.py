@@ -1,9 +1,9 @@
-"""Frictionless data packages: `datapackage.json` beside tables, written and read.
+"""Frictionless data packages: reading and writing `datapackage.json` with its tables.
 
-A package names every file with its size and SHA-256, every column with its unit and
-meaning, and of every trial the terrain. A file that is not as it was written is never
-read. The form is Data Package 1.0 of https://specs.frictionlessdata.io; `unit` and
-`traction` are properties of our own, which other programs keep and ignore.
+A package lists every file with size and SHA-256, every column with unit and meaning,
+and the terrain of every trial. A modified file is never read. The format is Data
+Package 1.0 of https://specs.frictionlessdata.io; `unit` and `traction` are additional
+properties, which other programs keep and ignore.
 """
 
 import hashlib
@@ -32,15 +32,15 @@ from analysis.data.recorded_factors import MOST, checked_factors
 from analysis.data.terrain_kinds import Value
 
 DESCRIPTOR = "datapackage.json"
-_LARGEST = 16_000_000  # bytes of a descriptor at least; 80 trials have 2 million
-_PARTS = 48  # of the free memory; a descriptor takes some twenty times its size
-_FILE = 3200  # bytes of a descriptor for each of its files, at least
+_LARGEST = 16_000_000  # bytes always allowed for a descriptor; 80 trials take 2 million
+_PARTS = 48  # fraction 1/48 of the free memory; parsing takes twenty times the size
+_FILE = 3200  # least bytes of a descriptor per file
 _ABSENT = ("", "NaN")  # cells without a value
 _CHANGED = "Copy the file again, or read it alone, outside of its package."
 
 
 class TableOrigin(BaseModel):
-    """What is known of a table beyond its numbers.
+    """Origin of a table: session, trial, terrain and recording.
 
     Attributes:
         table: "trial" at the recorded rate, "kept" for the samples that models are
@@ -48,14 +48,13 @@ class TableOrigin(BaseModel):
         session: id of the session.
         trial: number of the trial, e.g. "T04".
         terrain: name of the terrain.
-        stones: size of the stones; empty where it is not known.
-        incline_deg: of the plane [degrees].
-        factors: what else is known of terrain and foot, by name; None = does not
-            apply.
-        force_age: how much older than the joints the forces are [s].
+        stones: size of the stones; empty if not known.
+        incline_deg: incline of the plane [degrees].
+        factors: further properties of terrain and foot by name; None = does not apply.
+        force_age: age of the forces relative to the joints [s].
         simulated: the devices were simulated.
-        recording: SHA-256 of the recorded trial, or of the log it was imported from.
-        imported: it comes from the log of another robot; `import.json` tells how.
+        recording: SHA-256 of the recorded trial, or of the imported log.
+        imported: imported from the log of another robot; see `import.json`.
         rig: name of that robot.
     """
 
@@ -89,10 +88,10 @@ class PackageField(BaseModel):
     """One column of a table.
 
     Attributes:
-        name: as in the header of the file.
+        name: name in the header of the file.
         type: "number", "integer", "boolean" or "string".
-        unit: "" for words.
-        description: what it is.
+        unit: unit; "" for text.
+        description: meaning.
     """
 
     model_config = ConfigDict(frozen=True, extra="ignore")
@@ -107,8 +106,8 @@ class TableSchema(BaseModel):
     """The columns of a table.
 
     Attributes:
-        fields: in the order of the file.
-        missingValues: cells that hold no value.
+        fields: columns in the order of the file.
+        missingValues: cell contents that mean no value.
     """
 
     model_config = ConfigDict(frozen=True, extra="ignore")
@@ -121,17 +120,17 @@ class PackageFile(BaseModel):
     """One file of a package.
 
     Attributes:
-        name: in lower case, of this file alone.
-        profile: of the Frictionless standard.
-        path: below the folder of the package.
+        name: unique name in lower case.
+        profile: profile of the Frictionless standard.
+        path: path relative to the package.
         format: "csv" or "parquet".
-        mediatype: the same as a media type.
-        encoding: of the text.
+        mediatype: media type of the format.
+        encoding: text encoding.
         bytes: size of the file.
         hash: "sha256:" and the digest of the file.
-        description: what the rows are.
-        table: its columns.
-        traction: what is known of it beyond that.
+        description: meaning of the rows.
+        table: columns.
+        traction: origin of the table.
     """
 
     model_config = ConfigDict(frozen=True, extra="ignore", populate_by_name=True)
@@ -153,12 +152,12 @@ class DataPackage(BaseModel):
     """The content of `datapackage.json`.
 
     Attributes:
-        name: in lower case.
-        title: for people.
-        description: where the tables come from.
-        created: UTC, as text.
-        version: of the tables of Traction; None = written by another program.
-        profile: of the Frictionless standard.
+        name: name in lower case.
+        title: title.
+        description: origin of the tables.
+        created: time in UTC, as text.
+        version: format version of the tables; None = written by another program.
+        profile: profile of the Frictionless standard.
         resources: the files.
     """
 
@@ -188,17 +187,17 @@ class DataPackage(BaseModel):
         return files
 
     def text(self) -> str:
-        """Return it as JSON."""
+        """Serialise the package as JSON."""
         return self.model_dump_json(by_alias=True, exclude_none=True, indent=1) + "\n"
 
 
 @dataclass(frozen=True, slots=True)
 class PackagedTable:
-    """A table of a package, on the disk.
+    """A table of a package on disk.
 
     Attributes:
         path: the file.
-        entry: what the package says of it.
+        entry: its entry in the package.
     """
 
     path: Path
@@ -206,14 +205,14 @@ class PackagedTable:
 
     @property
     def origin(self) -> TableOrigin:
-        """What is known of it; a trial of no name where the package tells nothing."""
+        """Origin of the table; an unnamed trial if the package states none."""
         return self.entry.traction or TableOrigin(table="trial")
 
     def check(self) -> None:
-        """Compare the file with its package.
+        """Check size and digest of the file.
 
         Raises:
-            SettingsError: it is missing, no regular file, or not as it was written.
+            SettingsError: the file is missing, not a regular file, or modified.
         """
         try:
             with open_regular(self.path) as file:
@@ -237,18 +236,18 @@ class PackagedTable:
 
 
 def is_package(path: Path) -> bool:
-    """Return whether `path` is a folder, or the descriptor of a package."""
+    """Return whether `path` is a folder or the descriptor of a package."""
     return path.is_dir() or path.name == DESCRIPTOR
 
 
 def packaged_tables(path: Path) -> Iterator[PackagedTable]:
-    """Give every table of a package; the files themselves are not opened.
+    """Yield every table of a package without opening the files.
 
     Args:
-        path: `datapackage.json`, or the folder that holds it.
+        path: `datapackage.json` or its folder.
 
     Raises:
-        SettingsError: there is no package, it is none, or it leads out of its folder.
+        SettingsError: there is no valid package, or it points outside its folder.
     """
     descriptor = path / DESCRIPTOR if path.is_dir() else path
     for entry in _read(descriptor).resources:
@@ -264,10 +263,10 @@ def packaged_tables(path: Path) -> Iterator[PackagedTable]:
 
 
 def packaged_table(path: Path) -> PackagedTable | None:
-    """Return what a package beside a file, or one folder above it, says of the file.
+    """Find the entry of a file in the package in its folder or the parent folder.
 
     Raises:
-        SettingsError: there is a package that cannot be read.
+        SettingsError: a package exists but cannot be read.
     """
     for folder in (path.parent, path.parent.parent):
         if (folder / DESCRIPTOR).is_file():
@@ -277,13 +276,13 @@ def packaged_table(path: Path) -> PackagedTable | None:
     return None
 
 
-@lru_cache(maxsize=2)  # a pattern of a thousand tables asks for it a thousand times
+@lru_cache(maxsize=2)  # a pattern of a thousand tables needs it a thousand times
 def _read_once(path: Path, _changed_ns: int, _size: int) -> DataPackage:
     return DataPackage.model_validate_json(read_regular(path, _largest()))
 
 
 def _largest() -> int:
-    """Return how many bytes a descriptor may have by the memory that is free."""
+    """Return the size limit of a descriptor by the free memory [bytes]."""
     return share_of_memory(_PARTS, _LARGEST)
 
 
@@ -300,8 +299,8 @@ def _check_folders(top: Path, file: Path) -> None:
 
 def _read(path: Path) -> DataPackage:
     try:
-        found = path.lstat()
-        return _read_once(path, found.st_mtime_ns, found.st_size)
+        status = path.lstat()
+        return _read_once(path, status.st_mtime_ns, status.st_size)
     except UnfitFileError as error:
         raise SettingsError(f"{path}: it {error}.") from error
     except OSError as error:

@@ -1,8 +1,8 @@
-"""Tables as trials: CSV, Parquet, npz with one array per trial, data packages.
+"""Loading of tables as trials: CSV, Parquet, npz with one array per trial, packages.
 
-Every byte is taken as hostile: sizes are checked before anything is unpacked, nothing
-is unpickled, and whatever does not fit becomes one SettingsError that names the file.
-Text is read by `text`.
+Files are untrusted: sizes are checked before anything is unpacked, nothing is
+unpickled, and every problem becomes one SettingsError that names the file. `text` reads
+text tables.
 """
 
 import glob
@@ -38,14 +38,14 @@ from analysis.tables.text import BLANKS, TextForm, read_text_table
 from analysis.tables.trial_table import TrialTable
 
 DEFAULT_TERRAIN = "table"
-LARGEST_FILE = 24_000_000  # bytes of a table; six times in memory
-LARGEST_RATIO = 100  # of a larger npz unpacked to the same npz packed
-PARTS = 8  # of the free memory, of which an npz or all trials of a CSV may take one
-_TRIAL = 12_000  # bytes that a trial costs in memory at least, however few its rows
-_LARGE_TIME = 1e6  # of its unit; times beyond count from some epoch
-_LARGEST_INPUT = 1e12  # of its unit; squares of larger ones leave the double numbers
+LARGEST_FILE = 24_000_000  # bytes of a table; six times as much in memory
+LARGEST_RATIO = 100  # unpacked to packed size of an npz above that size
+PARTS = 8  # an npz, or all trials of a CSV, may take 1/8 of the free memory
+_TRIAL = 12_000  # least bytes in memory per trial
+_LARGE_TIME = 1e6  # in its unit; larger times are counted from an epoch
+_LARGEST_INPUT = 1e12  # in its unit; squares of larger values lose precision
 
-_ZIP = b"PK"  # how an npz begins
+_ZIP = b"PK"  # first bytes of an npz
 _FORM = "An npz holds arrays TERRAIN/NN of four columns: t, v_t, F_n, F_t."
 _BROKEN_NPZ = (
     ValueError,
@@ -72,37 +72,38 @@ def load_tables(
     decimal: str = ".",
     skipped: frozenset[int] = frozenset(),
 ) -> dict[str, list[TractionSeries]]:
-    """Return the trials in `paths` by terrain, in the order of the files.
+    """Load the trials in `paths` by terrain, in the order of the files.
 
     Args:
-        paths: CSV and Parquet files, one trial each; npz files, any number of trials
-            each; folders of `traction export`, of which every whole trial is read.
+        paths: CSV and Parquet files with one trial each; npz files with any number of
+            trials; folders of `traction export`, of which every whole trial is read.
             `~` and patterns such as `*.csv` are expanded.
         columns: name of each column of the analysis in a CSV or Parquet file, or its
-            place from "1"; by default its own. Beside them "trial" and "terrain":
-            columns of a CSV whose words part it into several trials.
-        terrain: terrain of every CSV; by default that of the data package it lies in,
-            or "table". An npz names its own.
-        stones: size of the stones by terrain: "small", "big" or "none"; where it is
-            not given, see `analysis.data.terrain_kinds.terrain_kind`.
-        units: unit of each column where its header gives none, e.g. {"v_t": "mm/s"};
+            position from "1"; by default its own name. In addition "trial" and
+            "terrain": text columns that divide a CSV into several trials.
+        terrain: terrain of every CSV; by default that of its data package, or "table".
+            An npz names its own.
+        stones: size of the stones by terrain: "small", "big" or "none"; if not given,
+            see `analysis.data.terrain_kinds.terrain_kind`.
+        units: unit of each column without a unit in the header, e.g. {"v_t": "mm/s"};
             s, m/s and N by default.
-        rate: rows of a CSV per second, where it has no time [Hz].
-        negate: columns with the other sign, e.g. F_n of a machine that counts
-            compression below zero.
-        inputs: further columns of numbers: inputs of models beside F_n and v_t.
+        rate: sampling rate of a CSV without times [Hz].
+        negate: columns to negate, e.g. F_n of a machine with negative compression.
+        inputs: further numeric columns: model inputs in addition to F_n and v_t.
         separator: one character between the columns of a CSV, or "blanks" for runs of
             blanks.
         decimal: decimal mark of a CSV, "." or ",".
-        skipped: lines of a CSV that are no part of the table, from 1.
+        skipped: lines of a CSV to skip, from 1.
 
     Raises:
-        SettingsError: a file that is missing, too large, or not what it should be.
+        SettingsError: a file is missing, too large or invalid.
     """
     _check_names({*(columns or {})} - {*GROUPS} | {*(units or {}), *negate})
     _check_layout(separator, decimal)
     if not (rate is None or _is_rate(rate)):
-        raise SettingsError(f"{rate!r} is no rate.", hint="Give rows per second [Hz].")
+        raise SettingsError(
+            f"{rate!r} is not a rate.", hint="Give rows per second [Hz]."
+        )
     if terrain is not None and "terrain" in (columns or {}):
         raise SettingsError(
             f"The terrain is {terrain}, and a column of it is named too.",
@@ -112,12 +113,12 @@ def load_tables(
     text = TextForm(columns, separator, decimal, skipped, rate)
     form = _TableForm(text, terrain, stones or {}, units or {}, frozenset(negate))
     trials: dict[str, list[TractionSeries]] = {}
-    for path in (each for given in paths for each in _expanded(given)):
+    for path in (file for given in paths for file in _expanded(given)):
         for series in _load(path, form):
             trials.setdefault(series.terrain, []).append(series)
     if not trials:
         raise SettingsError("No table was given.", hint="Name at least one file.")
-    _check_further_units([series for found in trials.values() for series in found])
+    _check_further_units([series for group in trials.values() for series in group])
     return trials
 
 
@@ -133,12 +134,12 @@ def _check_layout(separator: str, decimal: str) -> None:
 
 
 def _check_further_units(trials: Sequence[TractionSeries]) -> None:
-    """Refuse a further column that has one unit here and another there."""
+    """Refuse a further column whose unit differs between tables."""
     first: dict[str, TractionSeries] = {}
     for series in trials:
         for name in series.further:
             other = first.setdefault(name, series)
-            units = [each.units.get(name, "") for each in (other, series)]
+            units = [table.units.get(name, "") for table in (other, series)]
             if units[0] != units[1]:
                 here, there = (
                     f"in {unit}" if unit else "without a unit" for unit in units
@@ -151,14 +152,14 @@ def _check_further_units(trials: Sequence[TractionSeries]) -> None:
 
 
 def _is_rate(rate: object) -> bool:
-    """Return whether rows can come at that rate [Hz]."""
+    """Return whether `rate` is a positive finite number."""
     if isinstance(rate, bool) or not isinstance(rate, Real):
         return False
     return 0.0 < float(rate) < math.inf
 
 
 def _check_names(names: set[str]) -> None:
-    """Refuse what is no column of the analysis."""
+    """Refuse names that are not columns of the analysis."""
     if strangers := names - {*COLUMNS}:
         raise SettingsError(
             f"{', '.join(sorted(map(str, strangers)))}: no column of the analysis.",
@@ -167,10 +168,10 @@ def _check_names(names: set[str]) -> None:
 
 
 def _expanded(path: Path) -> list[Path]:
-    """Return the files that a name stands for: `~` and patterns are expanded.
+    """Expand `~` and patterns in a path.
 
     Raises:
-        SettingsError: a pattern fits no file, or there is no such user.
+        SettingsError: a pattern matches no file, or there is no such user.
     """
     if os.path.lexists(path):
         return [path]
@@ -182,20 +183,20 @@ def _expanded(path: Path) -> list[Path]:
         return [path]
     files = sorted(map(Path, glob.glob(str(path))))  # noqa: PTH207  a pattern may be absolute
     if not files:
-        raise SettingsError(f"{path}: no file fits this pattern.", hint="Check it.")
+        raise SettingsError(f"{path}: no file matches this pattern.", hint="Check it.")
     return files
 
 
 @dataclass(frozen=True, slots=True)
 class _TableForm:
-    """How tables are read.
+    """Options for reading tables.
 
     Attributes:
         text: columns, rate and decimal mark.
-        terrain: terrain of every CSV; None = as its package says.
-        stones: size of the stones by terrain, where it is given.
-        units: unit by column, where it is given.
-        negate: columns with the other sign.
+        terrain: terrain of every CSV; None = as stated by its package.
+        stones: size of the stones by terrain, if given.
+        units: unit by column, if given.
+        negate: columns to negate.
     """
 
     text: TextForm
@@ -207,11 +208,11 @@ class _TableForm:
     def series(
         self, name: str, path: Path, table: TrialTable, origin: TableOrigin
     ) -> TractionSeries:
-        """Return a table as a trial of its terrain.
+        """Convert a table to a trial of its terrain.
 
         Raises:
-            SettingsError: a unit is not known or is stated otherwise, or the rows make
-                no trial.
+            SettingsError: a unit is unknown or contradictory, or the rows do not form a
+                trial.
         """
         rows = self._in_own_units(name, table)
         is_timed = (
@@ -227,8 +228,8 @@ class _TableForm:
             notes = list(notes_of(path, table, rows))
         if further := list(table.further.values()):
             _check_inputs(path, table.further)
-            lacking = ~np.isfinite(np.column_stack(further)).all(axis=1)
-            if count := int(np.count_nonzero(lacking)):
+            is_lacking = ~np.isfinite(np.column_stack(further)).all(axis=1)
+            if count := int(np.count_nonzero(is_lacking)):
                 notes.append(f"{count} rows without a value of an input dropped")
         terrain = self.terrain or origin.terrain or DEFAULT_TERRAIN
         return TractionSeries(
@@ -248,11 +249,11 @@ class _TableForm:
         )
 
     def _in_own_units(self, name: str, table: TrialTable) -> Array:
-        """The rows in s, m/s and N, shape (n, 4); large times from the first one."""
+        """Convert rows to s, m/s and N, shape (n, 4); large times start from zero."""
         stated, asked = table.units, self.units
         t = table.rows[:, 0]
         first = float(t[np.isfinite(t)][0]) if np.isfinite(t).any() else 0.0
-        if abs(first) > _LARGE_TIME:  # keeps the digits of the steps
+        if abs(first) > _LARGE_TIME:  # preserves the precision of the steps
             t = t - first
         try:
             factors = np.array(
@@ -267,7 +268,7 @@ class _TableForm:
 
 
 def _check_inputs(path: Path, further: Mapping[str, Array]) -> None:
-    """Refuse an input that models cannot compute with."""
+    """Refuse inputs too large for the models."""
     for name, values in further.items():
         sizes = np.abs(values[np.isfinite(values)])
         largest = float(sizes.max(initial=0.0))
@@ -275,7 +276,7 @@ def _check_inputs(path: Path, further: Mapping[str, Array]) -> None:
             raise refusal(
                 path,
                 f"column {name} has a value of {largest:g}, beyond {_LARGEST_INPUT:g}",
-                "Leave the cell empty where there is no value, or take a larger unit.",
+                "Leave the cell empty if there is no value, or use a larger unit.",
             )
 
 
@@ -295,7 +296,7 @@ def _load(path: Path, form: _TableForm) -> list[TractionSeries]:
 
 
 def _first_bytes(path: Path) -> bytes:
-    """Return how a file begins that may be read; refuse every other one."""
+    """Return the first bytes of a readable file; refuse any other."""
     try:
         with open_regular(path, is_link_followed=True) as file:
             size = os.fstat(file.fileno()).st_size
@@ -318,7 +319,7 @@ def _refuse_rate(path: Path, form: _TableForm) -> None:
 
 
 def _load_package(path: Path, form: _TableForm) -> list[TractionSeries]:
-    """Return every whole trial of a data package."""
+    """Load every whole trial of a data package."""
     tables = [t for t in packaged_tables(path) if t.origin.table == "trial"]
     if not tables:
         raise refusal(path, "no trials in it", "Give a folder of traction export.")
@@ -335,7 +336,7 @@ def _load_packaged(table: PackagedTable, form: _TableForm) -> list[TractionSerie
 def _load_table(
     path: Path, form: _TableForm, origin: TableOrigin | None
 ) -> list[TractionSeries]:
-    """Return the trial in a CSV or Parquet file, or the trials of a CSV."""
+    """Load the trial in a CSV or Parquet file, or the trials of a CSV."""
     with path.open("rb") as file:
         is_parquet = file.read(4) == MAGIC
     if is_parquet:
@@ -362,39 +363,39 @@ class _TablePart(NamedTuple):
 
     @property
     def label(self) -> str:
-        """Its terrain and trial, as far as the table names them."""
+        """Terrain and trial, as far as the table names them."""
         return "/".join(filter(None, (self.terrain, self.trial)))
 
     def of(self, origin: TableOrigin) -> TableOrigin:
-        """Return the origin with the terrain that the rows name."""
+        """Return the origin with the terrain named by the rows."""
         if not self.terrain:
             return origin
         return origin.model_copy(update={"terrain": self.terrain})
 
 
 def _parts(path: Path, table: TrialTable, rate: float | None) -> list[_TablePart]:
-    """Return the trials of a table that its words part, in the order of its rows.
+    """Divide a table by its text columns into trials, in the order of its rows.
 
-    Where rows have no time of their own, those of a trial are numbered anew.
+    Without a time column, the times of every trial start from zero.
 
     Raises:
-        SettingsError: a row has no word, or there are too many trials.
+        SettingsError: a row has no text, or there are too many trials.
     """
     nothing = [""] * len(table.rows)
     keys = list(zip(*(table.groups.get(n, nothing) for n in GROUPS), strict=True))
-    places = dict.fromkeys(keys)
+    trials = dict.fromkeys(keys)
     for name, words in table.groups.items():
         if "" in words:
             where = table.location(words.index(""))
             raise refusal(path, f"{where}: no {name}", "Name it in every row.")
-    if len(places) > (most := most_trials()):
+    if len(trials) > (most := most_trials()):
         raise refusal(
             path,
-            f"{len(places)} trials by {' and '.join(table.groups)}, the limit is "
-            f"{most} by the memory that is free",
-            "Name a column that parts it into fewer.",
+            f"{len(trials)} trials by {' and '.join(table.groups)}, the limit is "
+            f"{most} by the free memory",
+            "Name a column that divides it into fewer.",
         )
-    rows_of: dict[tuple[str, ...], list[int]] = {key: [] for key in places}
+    rows_of: dict[tuple[str, ...], list[int]] = {key: [] for key in trials}
     for row, key in enumerate(keys):
         rows_of[key].append(row)
     parts = []
@@ -415,7 +416,7 @@ def _parts(path: Path, table: TrialTable, rate: float | None) -> list[_TablePart
 
 
 class _ParquetTrial(NamedTuple):
-    """A Parquet table, and what it says of itself."""
+    """A Parquet table and its stated origin."""
 
     table: TrialTable
     origin: TableOrigin | None
@@ -444,7 +445,7 @@ def _load_parquet(path: Path, form: _TableForm) -> _ParquetTrial:
 
 def _check_size(path: Path, size: int, limit: int) -> None:
     if size > limit:
-        by_memory = " by the memory that is free" if limit > LARGEST_FILE else ""
+        by_memory = " by the free memory" if limit > LARGEST_FILE else ""
         raise refusal(
             path,
             f"{size / 1e6:.0f} MB, the limit is {limit / 1e6:.0f} MB{by_memory}",
@@ -453,12 +454,12 @@ def _check_size(path: Path, size: int, limit: int) -> None:
 
 
 def most_trials() -> int:
-    """Return how many trials the free memory lets a file hold, 2000 or more."""
+    """Return the limit of trials per file by the free memory, at least 2000."""
     return share_of_memory(PARTS, LARGEST_FILE) // _TRIAL
 
 
 def _largest_npz() -> int:
-    """Return how many bytes an npz may unpack to by the memory that is free."""
+    """Return the limit of the unpacked size of an npz by the free memory [bytes]."""
     return share_of_memory(PARTS, LARGEST_FILE)
 
 
@@ -504,7 +505,7 @@ def _is_trial(member: zipfile.ZipInfo) -> bool:
 def _from_array(
     path: Path, key: str, array: np.ndarray, form: _TableForm
 ) -> TractionSeries:
-    """Return an array of an npz as a trial; its times are seconds by its form."""
+    """Convert an array of an npz to a trial; its times are in seconds by definition."""
     if (
         array.ndim != 2
         or array.shape[1] != len(COLUMNS)

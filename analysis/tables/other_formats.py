@@ -1,4 +1,4 @@
-"""Files of other kinds that are given for a table, known by how they begin."""
+"""Recognition of other file formats by their first bytes."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -6,7 +6,7 @@ from typing import NamedTuple
 from acquisition.errors import SettingsError
 from analysis.tables.refusals import refusal
 
-ENOUGH = 20  # bytes that tell
+ENOUGH = 20  # bytes needed to recognise a format
 
 
 class _Kind(NamedTuple):
@@ -61,14 +61,14 @@ _KINDS = (
 
 
 def check_kind(path: Path, start: bytes) -> None:
-    """Refuse a file of another kind.
+    """Refuse a file of another format.
 
     Args:
         path: the file.
-        start: its first bytes, `ENOUGH` of them where it has as many.
+        start: its first `ENOUGH` bytes, or all if it is shorter.
 
     Raises:
-        SettingsError: it is no table; the hint says how one is made of it.
+        SettingsError: the file is not a table; the hint says how to convert it.
     """
     for kind in _KINDS:
         if start.startswith(kind.start):
@@ -76,7 +76,7 @@ def check_kind(path: Path, start: bytes) -> None:
 
 
 def not_an_npz(path: Path, members: list[str]) -> SettingsError:
-    """Return why an archive is not read that is no npz of trials."""
+    """Make the error for an archive that is not an npz of trials."""
     if "[Content_Types].xml" in members:
         return refusal(path, "this is an Excel workbook", _SAVE)
     if "mimetype" in members:

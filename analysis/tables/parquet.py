@@ -1,4 +1,4 @@
-"""Parquet tables with units and origin; the only module that imports pyarrow."""
+"""Parquet tables with units and origin. The only module that imports pyarrow."""
 
 import json
 import re
@@ -26,10 +26,10 @@ from analysis.tables.data_package import TableOrigin
 from analysis.tables.refusals import refusal
 
 MAGIC = b"PAR1"
-MOST_ROWS = 500_000  # of a table; 17 minutes at 500 Hz
+MOST_ROWS = 500_000  # per table; 17 minutes at 500 Hz
 _MOST_COLUMNS = 1000
-_KEY = b"traction"  # of the metadata of a file
-_LEVEL = 9  # of zstd
+_KEY = b"traction"  # key in the file metadata
+_LEVEL = 9  # zstd compression level
 
 
 def to_parquet(
@@ -37,12 +37,12 @@ def to_parquet(
     units: Mapping[str, str],
     origin: TableOrigin | None = None,
 ) -> bytes:
-    """Return a table as Parquet; pyarrow, pandas and DuckDB read it.
+    """Encode a table as Parquet, readable by pyarrow, pandas and DuckDB.
 
     Args:
         columns: values by name, all of shape (n,).
-        units: by name; kept as the metadata "unit" of a column.
-        origin: of the table; kept as the metadata "traction" of the file.
+        units: units by name; stored as metadata "unit" of a column.
+        origin: origin of the table; stored as metadata "traction" of the file.
 
     Raises:
         MissingLibraryError: pyarrow is not installed.
@@ -65,14 +65,14 @@ def to_parquet(
 
 @dataclass(frozen=True, slots=True)
 class ParquetTable:
-    """The columns that were wanted of a Parquet table.
+    """Selected columns of a Parquet table.
 
     Attributes:
         columns: values by column of the analysis, shape (n,); NaN for a missing one.
-        units: by column of the analysis; "" where the file states none.
-        is_prepared: it has the column of kept samples.
-        is_simulated: what its column `simulated` says of every row; None without one.
-        origin: of the table, where the file states one.
+        units: unit by column of the analysis; "" if the file states none.
+        is_prepared: the file has the column of kept samples.
+        is_simulated: value of the column `simulated`; None without one.
+        origin: origin of the table; None if not stated.
     """
 
     columns: Mapping[str, Array]
@@ -83,15 +83,15 @@ class ParquetTable:
 
 
 def read_parquet(path: Path, columns: Mapping[str, str]) -> ParquetTable:
-    """Return columns of a file by their names, as `v_t` or `v_t [cm/s]`, or places.
+    """Read columns of a file by name, as `v_t` or `v_t [cm/s]`, or position.
 
     Args:
-        path: the file; the caller has checked its size.
+        path: the file; its size must have been checked.
         columns: name in the file by column of the analysis.
 
     Raises:
-        SettingsError: it lacks a column, it is no Parquet file of numbers, or unpacks
-            to too much.
+        SettingsError: a column is missing, the file is not a Parquet table of numbers,
+            or it is too large unpacked.
         MissingLibraryError: pyarrow is not installed.
     """
     arrow = _arrow()
@@ -102,7 +102,7 @@ def read_parquet(path: Path, columns: Mapping[str, str]) -> ParquetTable:
             places = _places(path, schema.names, columns)
             mark = find_column(schema.names, SIMULATED)
             wanted = sorted({*places.values(), *mark[:1]})
-            # by place: names may occur twice, and those with points are taken for paths
+            # by position: names may be duplicated, and dots are interpreted as paths
             table = file.read(use_threads=False).select(wanted)
         at = {place: table.column(k) for k, place in enumerate(wanted)}
         values = {
@@ -125,22 +125,22 @@ def read_parquet(path: Path, columns: Mapping[str, str]) -> ParquetTable:
 def _places(
     path: Path, header: Sequence[str], columns: Mapping[str, str]
 ) -> dict[str, int]:
-    """Return the place of each column, from 0."""
-    found = {name: find_column(header, plain(c)) for name, c in columns.items()}
-    missing = [columns[name] for name, places in found.items() if not places]
+    """Return the position of each column, from 0."""
+    matches = {name: find_column(header, plain(c)) for name, c in columns.items()}
+    missing = [columns[name] for name, places in matches.items() if not places]
     if missing:
         names = ", ".join(header)[:300] or "none"
         reason = f"no column {', '.join(missing)}; it has {names}"
         raise refusal(path, reason, columns_hint(header, columns))
-    for name, places in found.items():
+    for name, places in matches.items():
         if len(places) > 1:
             reason = f"column {columns[name]} occurs twice"
             raise refusal(path, reason, place_hint(name, places))
-    return {name: places[0] for name, places in found.items()}
+    return {name: places[0] for name, places in matches.items()}
 
 
 def _numbers(arrow: Any, path: Path, name: str, column: Any) -> Array:  # noqa: ANN401
-    """Return the values of a column; times are those since the first one."""
+    """Return the values of a column; times are counted from the first."""
     kind = column.type
     types = arrow.types
     if types.is_timestamp(kind) or types.is_duration(kind):
@@ -160,19 +160,19 @@ def _numbers(arrow: Any, path: Path, name: str, column: Any) -> Array:  # noqa: 
 
 
 def _mark(path: Path, column: Any) -> bool:  # noqa: ANN401
-    """Return what the column `simulated` says of every row."""
+    """Return the value of the column `simulated`; it must be the same in all rows."""
     values = {bool(value) for value in column.unique().to_pylist()}
     if len(values) > 1:
         raise refusal(
             path,
             f"column {SIMULATED} is 0 in some rows and 1 in others",
-            "Keep simulated and recorded trials in files of their own.",
+            "Keep simulated and recorded trials in separate files.",
         )
     return True in values
 
 
 def _check_shape(path: Path, about: Any) -> None:  # noqa: ANN401
-    """Refuse what unpacks to too much, before it is unpacked."""
+    """Refuse a table with too many rows or columns, before unpacking."""
     if about.num_rows > MOST_ROWS or about.num_columns > _MOST_COLUMNS:
         raise SettingsError(
             f"{path}: {about.num_rows} rows of {about.num_columns} columns, the limit "
@@ -188,7 +188,7 @@ def _arrow_array(arrow: Any, values: NDArray[np.generic]) -> Any:  # noqa: ANN40
 
 
 def _unit(path: Path, schema: Any, place: int) -> str:  # noqa: ANN401
-    """Return the unit that type, name or metadata of a column state; "" for none."""
+    """Return the unit stated by type, name or metadata of a column; "" for none."""
     field = schema.field(place)
     metadata = field.metadata or {}
     stated = {

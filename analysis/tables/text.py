@@ -1,9 +1,9 @@
-"""Text tables by RFC 4180, with the separator and decimal mark that the user states.
+"""Text tables by RFC 4180 with user-defined separator and decimal mark.
 
-Without options a table is UTF-8 with commas between columns, decimal points and a
-header of `name [unit]`. Nothing about the layout is guessed: another separator or
-decimal mark, or lines that are no rows, are options, and what does not fit is refused
-with line, column, content and the option that would describe it.
+By default a table is UTF-8 with commas between columns, decimal points and a header of
+`name [unit]`. The layout is not guessed: another separator or decimal mark, or lines to
+skip, are options, and what does not fit is refused with line, column, content and the
+option that would describe it.
 """
 
 import codecs
@@ -36,7 +36,7 @@ from analysis.tables.refusals import refusal, refused_cell, refused_line
 from analysis.tables.times import is_iso, iso_times
 from analysis.tables.trial_table import Array, TrialTable
 
-BLANKS = "blanks"  # the separator of columns that runs of blanks divide
+BLANKS = "blanks"  # separator of columns divided by runs of blanks
 GZIP = b"\x1f\x8b"
 LONGEST_LINE = 65_536  # characters
 MOST_LINES = 1_000_000
@@ -45,22 +45,22 @@ _NUMBER = re.compile(
     r"[+-]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[+-]?[0-9]+)?|inf(?:inity)?)",
     re.IGNORECASE,
 )
-_SEARCHED = 64  # rows below the first in which the names of the columns may stand
+_SEARCHED = 64  # rows below the first that are searched for the column names
 _COPY = "Check that it was copied completely."
 _OTHER_SEPARATORS = {";": "';'", "\t": "tab"}  # as --sep names them
 
 
 @dataclass(frozen=True, slots=True)
 class TextForm:
-    """The layout of a text table, as the user states it.
+    """Layout of a text table as stated by the user.
 
     Attributes:
-        columns: name in the header of each column of the analysis, each further
-            column, and of what divides the table into trials and terrains.
+        columns: header name of each column of the analysis, each further column, and
+            each text column that divides the table into trials and terrains.
         separator: one character between columns, or `BLANKS`.
         decimal: decimal mark, "." or ",".
-        skipped: lines of the file that are no part of the table, from 1.
-        rate: rows per second of a table without times [Hz].
+        skipped: lines of the file to skip, from 1.
+        rate: sampling rate of a table without times [Hz].
     """
 
     columns: Mapping[str, str]
@@ -71,12 +71,12 @@ class TextForm:
 
     @property
     def further(self) -> tuple[str, ...]:
-        """Columns of numbers beside those of the analysis."""
+        """Further numeric columns."""
         return tuple(n for n in self.columns if n not in {*COLUMNS, *GROUPS})
 
     @property
     def groups(self) -> tuple[str, ...]:
-        """Columns of words that divide the table: of "trial" and "terrain"."""
+        """Text columns that divide the table: "trial" and "terrain"."""
         return tuple(n for n in GROUPS if n in self.columns)
 
 
@@ -84,12 +84,12 @@ def read_text_table(path: Path, form: TextForm, largest: int) -> TrialTable:
     """Read a text table.
 
     Args:
-        path: the file; the caller has checked its size.
+        path: the file; its size must have been checked.
         form: its layout.
-        largest: bytes that it may unpack to, where gzip packed it.
+        largest: limit of the size unpacked by gzip [bytes].
 
     Raises:
-        SettingsError: it is no such table.
+        SettingsError: the file does not have this layout.
     """
     rows = _rows(path, _lines(path, largest), form)
     header_line, names = next(rows, (0, []))
@@ -101,13 +101,13 @@ def read_text_table(path: Path, form: TextForm, largest: int) -> TrialTable:
 
 @dataclass(frozen=True, slots=True)
 class _Header:
-    """Names, places and units of the columns that are read.
+    """Names, positions and units of the columns to read.
 
     Attributes:
-        line: of the file, from 1.
+        line: line of the file, from 1.
         width: number of columns of the file.
-        places: of every column that is read, from 0.
-        units: by column, where the header states one.
+        places: position of every column to read, from 0.
+        units: unit by column, if the header states one.
     """
 
     line: int
@@ -124,26 +124,26 @@ class _Header:
         form: TextForm,
         below: Iterator[tuple[int, list[str]]],
     ) -> "_Header":
-        """Find the columns of a form in the first row.
+        """Find the columns of a layout in the first row.
 
-        The rows `below` are looked at only to say where the names stand instead.
+        The rows `below` are searched only to report where the names are instead.
 
         Raises:
-            SettingsError: a column is missing or occurs twice, or two are the same.
+            SettingsError: a column is missing, occurs twice or is used twice.
         """
         names = [plain(name).strip() for name in names]
         needed = {name: plain(column) for name, column in form.columns.items()}
         if form.rate is not None:
             if find_column(names, needed["t"]):
-                raise refusal(path, "it has a time of its own", "Leave --rate out.")
+                raise refusal(path, "it has a time column", "Leave --rate out.")
             del needed["t"]
         marks = {PREPARED: PREPARED, SIMULATED: SIMULATED}
-        found = {n: find_column(names, c) for n, c in (needed | marks).items()}
-        for name, places in found.items():
+        matches = {n: find_column(names, c) for n, c in (needed | marks).items()}
+        for name, places in matches.items():
             if len(places) > 1:
                 reason = f"column {(needed | marks)[name]} occurs twice"
                 raise refused_line(path, line, reason, place_hint(name, places))
-        missing = [needed[n] for n in needed if not found[n]]
+        missing = [needed[n] for n in needed if not matches[n]]
         if missing:
             for other, row in islice(below, _SEARCHED):
                 cells = [plain(cell).strip() for cell in row]
@@ -151,11 +151,11 @@ class _Header:
                     raise refused_line(
                         path,
                         line,
-                        f"the names of the columns stand in line {other}",
-                        f"Leave out what stands above them: --skip 1-{other - 1}",
+                        f"the names of the columns are in line {other}",
+                        f"Skip the lines above them: --skip 1-{other - 1}",
                     )
             raise _no_columns(path, line, names, missing, needed, form)
-        places = {name: at[0] for name, at in found.items() if at}
+        places = {name: at[0] for name, at in matches.items() if at}
         chosen = [places[name] for name in needed]
         if len(set(chosen)) < len(chosen):
             hint = columns_hint(names, dict.fromkeys(needed, ""))
@@ -176,21 +176,21 @@ def _no_columns(
     needed: Mapping[str, str],
     form: TextForm,
 ) -> SettingsError:
-    """A refusal of a header that lacks columns, with the option that may help."""
+    """Make the error for a header that lacks columns, with a suggested option."""
     if len(names) > 1 and all(
         _number(name, form.decimal) is not None for name in names
     ):
         return refused_line(
             path,
             line,
-            f"{len(names)} numbers stand where the names of the columns were expected",
+            f"{len(names)} numbers instead of the names of the columns",
             "Put a line of names above them, e.g. t,v_t,F_n,F_t.",
         )
     shown = ", ".join(name for name in names if name)[:300] or "none"
     hint = columns_hint(names, needed)
     other = [sign for sign in _OTHER_SEPARATORS if sign in shown]
     if len(names) == 1 and other:
-        hint = f"Another mark between columns: --sep {_OTHER_SEPARATORS[other[0]]}"
+        hint = f"Another separator: --sep {_OTHER_SEPARATORS[other[0]]}"
     elif len(names) == 1 and len(names[0].split()) > 1:
         hint = f"Blanks between columns: --sep {BLANKS}"
     elif list(missing) == [needed.get("t")]:
@@ -205,9 +205,9 @@ def _read_rows(
     numeric = [n for n in (*COLUMNS, *form.further) if n in header.places]
     values = {name: array("d") for name in numeric}
     words: dict[str, list[str]] = {name: [] for name in (*form.groups, "t")}
-    marks: dict[str, int] = {}  # value of `simulated` by the first line with it
+    marks: dict[str, int] = {}  # first line of each value of `simulated`
     lines = array("q")
-    is_dated: bool | None = None  # not known before the first time
+    is_dated: bool | None = None  # unknown until the first time
     for line, cells in rows:
         if len(cells) != header.width:
             if not any(cells):
@@ -255,7 +255,7 @@ def _cell(cells: Sequence[str], place: int) -> str:
 
 
 def _number(cell: str, decimal: str) -> float | None:
-    """Value of a cell, NaN for a missing one, None where it is no number."""
+    """Parse a cell; NaN for a missing value, None if it is not a number."""
     if cell.lower() in MISSING:
         return math.nan
     if decimal == ",":
@@ -270,7 +270,7 @@ def _no_number(
     expected = f"a number with decimal mark {form.decimal!r}"
     if other in cell and any(sign.isdigit() for sign in cell):
         hint = (
-            f"Decimal marks {other!r}: --decimal {other}. Groups of thousands are not "
+            f"Decimal marks {other!r}: --decimal {other}. Thousands separators are not "
             "read: save the numbers without them."
         )
     elif name == "t":
@@ -278,8 +278,8 @@ def _no_number(
         hint = "Give the times so, or leave the column out and give --rate HZ."
     else:
         hint = (
-            "Leave the cell empty where there is no value: its row is dropped and "
-            f"counted. A line that is no row: --skip {line}."
+            "Leave the cell empty if there is no value: its row is dropped and "
+            f"counted. A line that is not a row: --skip {line}."
         )
     return refused_cell(path, line, form.columns[name], cell, expected, hint)
 
@@ -289,7 +289,7 @@ def _uneven(
 ) -> SettingsError:
     reason = f"{len(cells)} cells below {header.width} names"
     if len(cells) < header.width:
-        hint = "Complete the line or take it out; a last one may be cut off."
+        hint = "Complete or remove the line; the last line may be cut off."
     else:
         hint = (
             "Give every column a name. A cell that holds the separator, as a decimal "
@@ -315,10 +315,10 @@ def _dated(
 
 
 def _simulated(path: Path, marks: Mapping[str, int]) -> bool | None:
-    """What the column `simulated` states; None without one.
+    """Return the value of the column `simulated`; None without one.
 
     Raises:
-        SettingsError: it does not state the same in all rows.
+        SettingsError: the value differs between rows.
     """
     if not marks:
         return None
@@ -330,7 +330,7 @@ def _simulated(path: Path, marks: Mapping[str, int]) -> bool | None:
                 SIMULATED,
                 cell,
                 "0 in every row, or 1 in every row of a simulated trial,",
-                "Keep simulated and recorded trials in files of their own.",
+                "Keep simulated and recorded trials in separate files.",
             )
     return "1" in marks
 
@@ -338,10 +338,10 @@ def _simulated(path: Path, marks: Mapping[str, int]) -> bool | None:
 def _rows(
     path: Path, lines: Sequence[str], form: TextForm
 ) -> Iterator[tuple[int, list[str]]]:
-    """Yield (line on which it begins, cells) of every row that is not empty.
+    """Yield (first line, cells) of every non-empty row.
 
     Raises:
-        SettingsError: quotes do not close.
+        SettingsError: quotes are not closed.
     """
     if beyond := [number for number in form.skipped if number > len(lines)]:
         raise refusal(
@@ -352,7 +352,7 @@ def _rows(
     if form.separator == BLANKS:
         texts = [" ".join(text.split()) for text in texts]
     if texts and texts[0].startswith("#"):
-        texts[0] = texts[0].lstrip("# ")  # a header as numpy.savetxt writes it
+        texts[0] = texts[0].lstrip("# ")  # header as written by numpy.savetxt
     reader = csv.reader(
         texts,
         delimiter=" " if form.separator == BLANKS else form.separator,
@@ -378,10 +378,10 @@ def _rows(
 
 
 def _lines(path: Path, largest: int) -> list[str]:
-    """Lines of a text file, or of one that gzip packed.
+    """Return the lines of a text file, plain or packed by gzip.
 
     Raises:
-        SettingsError: it is no text, or a line or their number exceeds its limit.
+        SettingsError: the file is not text, or a line or their number exceeds a limit.
     """
     text = _decoded(path, _content(path, largest)).rstrip("\x1a")  # end-of-file mark
     text = text.replace("\r\n", "\n").replace("\r", "\n")
@@ -390,7 +390,7 @@ def _lines(path: Path, largest: int) -> list[str]:
         raise refusal(path, f"{count} lines, the limit is {MOST_LINES}", hint)
     lines = text.removesuffix("\n").split("\n")
     for number, line in enumerate(lines, 1):
-        if len(line) + 1 >= LONGEST_LINE:  # with its end
+        if len(line) + 1 >= LONGEST_LINE:  # including the line end
             reason = f"a line exceeds {LONGEST_LINE} characters"
             hint = "Give a table with a row per line."
             raise refused_line(path, number, reason, hint)
@@ -413,7 +413,7 @@ def _content(path: Path, largest: int) -> bytes:
 
 
 def _decoded(path: Path, content: bytes) -> str:
-    """The text of UTF-8, or of UTF-16 with a byte-order mark."""
+    """Decode UTF-8, or UTF-16 with a byte-order mark."""
     is_wide = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     encoding = "utf-16" if is_wide else "utf-8-sig"
     try:
@@ -429,6 +429,6 @@ def _decoded(path: Path, content: bytes) -> str:
         ) from error
     if "\0" in text:
         line = text[: text.index("\0")].count("\n") + 1
-        reason = "a zero byte; this is no UTF-8 text"
+        reason = "a zero byte; this is not UTF-8 text"
         raise refused_line(path, line, reason, "Give CSV, Parquet or npz tables.")
     return text

@@ -1,4 +1,4 @@
-"""Times by ISO 8601 in seconds; pure."""
+"""Parsing of ISO 8601 times; pure."""
 
 import re
 from collections.abc import Sequence
@@ -17,12 +17,12 @@ _ISO = re.compile(
 
 
 class IsoTimes(NamedTuple):
-    """ISO 8601 times.
+    """Parsed ISO 8601 times.
 
     Attributes:
-        seconds: since the first one, shape (n,); NaN for a missing one.
-        wrong: index of the first cell that is none, or has a zone where the first has
-            none or the other way round; None where all fit.
+        seconds: time since the first one [s], shape (n,); NaN for a missing one.
+        wrong: index of the first invalid cell, or of the first one that differs in
+            having a time zone; None if all are valid.
     """
 
     seconds: NDArray[np.float64]
@@ -35,11 +35,11 @@ def is_iso(cell: str) -> bool:
 
 
 def iso_times(cells: Sequence[str], missing: frozenset[str]) -> IsoTimes:
-    """Return ISO 8601 times since the first; all have a zone, or none has.
+    """Parse ISO 8601 times relative to the first; all or none must have a zone.
 
     Args:
-        cells: of the column.
-        missing: cells that hold no value, in lower case.
+        cells: cells of the column.
+        missing: cell contents that mean no value, in lower case.
     """
     seconds = np.full(len(cells), np.nan)
     origin: int | None = None

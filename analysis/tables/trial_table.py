@@ -1,4 +1,4 @@
-"""Rows of one table before they become trials."""
+"""Rows of one table before conversion to trials."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -11,18 +11,18 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class TrialTable:
-    """The rows of a table, in its own units.
+    """Rows of a table in its own units.
 
     Attributes:
         rows: t, v_t, F_n and F_t, shape (n, 4); NaN for a missing value.
-        units: unit by column, further columns included, where the table states one.
+        units: unit by column, further columns included, if the table states one.
         is_prepared: the rows are samples kept by an earlier preparation.
-        is_simulated: what the column `simulated` states; None without one.
-        lines: line of the file of every row, shape (n,); None where it has no lines.
-        header: line of the file with the names; None where it has none.
+        is_simulated: value of the column `simulated`; None without one.
+        lines: line in the file of every row, shape (n,); None if not a text file.
+        header: line in the file with the names; None if not a text file.
         is_in_seconds: times are seconds by the format of the file.
         further: further columns by name, each of shape (n,); NaN for a missing value.
-        groups: words of every row by kind, "trial" or "terrain", that divide the table.
+        groups: text of every row that divides the table, by "trial" or "terrain".
     """
 
     rows: Array
@@ -38,7 +38,7 @@ class TrialTable:
     )
 
     def location(self, row: int) -> str:
-        """The line of a row in its file, for messages."""
+        """Return the location of a row in its file for messages."""
         if self.lines is None:
             return f"row {row + 1}"
         return f"line {self.lines[row]}"

@@ -1,6 +1,6 @@
-"""Which terrain is it, and what traction does it give.
+"""Terrain recognition and the terrain database.
 
 Begin with `tabulation`, which makes the terrain database of a study; `database` is what
-a locomotion controller queries, `identify` and `verdict` tell terrains apart, and
+a locomotion controller queries, `identify` and `verdict` classify terrains, and
 `export` writes the database for other programs.
 """

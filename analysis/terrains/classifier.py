@@ -1,8 +1,8 @@
-"""Flat or rocky, from a window of motion: logistic regressions on its features.
+"""Flat or rocky ground from a window of motion: logistic regression on its features.
 
     p(rocky) = 1 / (1 + exp(-(w0 + w'x))),   x standardised features and their squares
 
-Both kinds weigh alike in the fit.
+Both classes have the same total weight in the fit.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,16 +17,16 @@ from analysis.terrains.logistic import RidgeLogistic, fit_balanced
 from analysis.terrains.windows import FEATURES, WINDOWS
 
 FLAT_GROUND, ROCKY_GROUND = "flat", "rocky"
-_NEW = 0.2  # share of an overlapping window that the one before did not have
-_DIGITS = 8  # of a stored number
+_NEW = 0.2  # share of an overlapping window that the previous one does not contain
+_DIGITS = 8  # significant digits of a stored number
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SurfaceClassifier:
-    """Tells flat ground from rocky by windows of several sizes.
+    """Classifier of flat and rocky ground for windows of several sizes.
 
     Attributes:
-        models: by size of the window [kept samples].
+        models: regression by window size [kept samples].
     """
 
     models: Mapping[int, RidgeLogistic]
@@ -40,11 +40,10 @@ class SurfaceClassifier:
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> "SurfaceClassifier":
-        """Return the classifier of plain values.
+        """Restore a classifier from plain values.
 
         Raises:
-            ValueError: a value is missing or not what it should be, or features have
-                changed.
+            ValueError: a value is missing or invalid, or the features have changed.
         """
         file = _ClassifierFile.model_validate(content)
         if file.features != FEATURES:
@@ -60,7 +59,7 @@ class SurfaceClassifier:
 
 
 class _ClassifierFile(BaseModel):
-    """A classifier as it is stored."""
+    """Stored form of a classifier."""
 
     features: Many[str]
     models: Entries[int, dict[str, Any]]
@@ -77,14 +76,14 @@ def _plain(model: RidgeLogistic) -> dict[str, list[float]]:
 def fit_surface(
     trials: Sequence[tuple[Mapping[int, Array], str]], size: int
 ) -> RidgeLogistic | None:
-    """Return the probability of rocky ground of windows of one size.
+    """Fit the probability of rocky ground for windows of one size.
 
     Args:
         trials: as in `fit_surfaces`.
-        size: of the window [kept samples].
+        size: window size [kept samples].
 
     Returns:
-        The regression; None with one kind of ground only.
+        The regression; None if only one kind of ground occurs.
     """
     parts = [
         (features[size], surface == ROCKY_GROUND)
@@ -97,11 +96,11 @@ def fit_surface(
 def fit_surfaces(
     trials: Sequence[tuple[Mapping[int, Array], str]],
 ) -> SurfaceClassifier | None:
-    """Return the classifier of trials with their surfaces; None with one kind only.
+    """Fit a classifier to labelled trials; None if only one kind occurs.
 
     Args:
-        trials: each with the features of its overlapping windows by size, and "flat"
-            or "rocky"; other surfaces are left out.
+        trials: features of the overlapping windows by size, and "flat" or "rocky", of
+            every trial; other surfaces are left out.
     """
     fitted = {size: fit_surface(trials, size) for size in WINDOWS}
     models = {size: model for size, model in fitted.items() if model is not None}

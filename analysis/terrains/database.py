@@ -1,10 +1,10 @@
-"""The terrain database on disk: fitted models of terrains in one file.
+"""Terrain database on disk: fitted models of terrains in one file.
 
-A JSON object, nothing that is executed. `_File` is its model; what every key means
-stands in `terrain_db.schema.json` beside this module, its JSON Schema.
+The file is a plain JSON object. `_File` is its model; the JSON Schema
+`terrain_db.schema.json` next to this module describes every key.
 
-Between the points of a table values are linear; outside of it they are those of its
-edge.
+Values are interpolated linearly between the points of a table and clamped to its edge
+outside.
 """
 
 import json
@@ -27,11 +27,11 @@ from analysis.terrains.path_copula import PathCopula
 from analysis.terrains.table import Rows, Table
 
 FORMAT, VERSION = "traction-terrain-db", "1.0"
-LARGEST = 6_000_000  # bytes; in memory it takes thirty times as much
+LARGEST = 6_000_000  # bytes; in memory the content takes thirty times as much
 _MOST = 1_000_000_000  # trials or samples
-_MOST_POINTS = 400  # of an axis
+_MOST_POINTS = 400  # per axis
 _MOST_SHARES = 99
-_DIGITS = 5  # of a tabulated force
+_DIGITS = 5  # significant digits of a tabulated force
 
 
 def _increasing(values: tuple[float, ...]) -> tuple[float, ...]:
@@ -96,7 +96,7 @@ class _Axes(BaseModel):
 
 
 class _File(BaseModel):
-    """A database in the order of its file; units are for people."""
+    """Content of a database file; `units` is informative only."""
 
     format: Literal["traction-terrain-db"]
     version: Literal["1.0"]
@@ -119,10 +119,10 @@ class _File(BaseModel):
 
 
 def load(path: Path | str) -> TerrainDatabase:
-    """Return the database in a file.
+    """Read a database file.
 
     Raises:
-        SettingsError: it cannot be read or is none.
+        SettingsError: the file cannot be read or is not a terrain database.
     """
     path = Path(path)
     try:
@@ -162,9 +162,9 @@ def _database(file: _File) -> TerrainDatabase:
 
 def _terrain(name: str, terrain: _Terrain, file: _File) -> KnownTerrain:
     models, copula = terrain.models, terrain.copula
-    for wanted in (file.default, file.recogniser):
-        if wanted not in models:
-            raise ValueError(f"{name} lacks the model {wanted!r:.80}")
+    for model in (file.default, file.recogniser):
+        if model not in models:
+            raise ValueError(f"{name} lacks the model {model!r:.80}")
     return KnownTerrain(
         name=name,
         kind=terrain.kind,
@@ -203,17 +203,18 @@ def _array(rows: tuple[Any, ...], shape: tuple[int, ...]) -> Array:
 
 
 def to_text(database: TerrainDatabase) -> str:
-    """Return a database as the text of a file.
+    """Serialise a database as the text of a file.
 
     Raises:
-        SettingsError: it has no terrain, terrains with different axes, or more than a
-            file may have.
+        SettingsError: the database has no terrain, terrains with different axes, or is
+            too large for a file.
     """
-    known = list(database.terrains.values())
-    grids = {(t.F_n, t.v_t, t.shares) for k in known for t in k.tables.values()}
+    terrains = list(database.terrains.values())
+    grids = {(t.F_n, t.v_t, t.shares) for k in terrains for t in k.tables.values()}
     if len(grids) != 1:
         raise SettingsError(
-            f"{len(known)} terrains with {len(grids)} different grids make no file.",
+            f"{len(terrains)} terrains with {len(grids)} different grids do not fit in "
+            "one file.",
             hint="Fit the terrains together, so that their tables agree.",
         )
     ((F_n, v_t, shares),) = grids
@@ -223,18 +224,18 @@ def to_text(database: TerrainDatabase) -> str:
         version=VERSION,
         made_utc=database.made_utc,
         simulated=database.is_simulated,
-        default=known[0].default,
-        recogniser=known[0].recogniser or known[0].default,
+        default=terrains[0].default,
+        recogniser=terrains[0].recogniser or terrains[0].default,
         units={"F_n": "N", "v_t": "m/s", "quantiles": "N", "shares": "1"},
         shares=shares,
         axes=_Axes.model_construct(F_n=F_n, v_t=v_t),
-        terrains={terrain.name: _stored(terrain) for terrain in known},
+        terrains={terrain.name: _stored(terrain) for terrain in terrains},
         surfaces=None if surfaces is None else surfaces.to_dict(),
     )
     text = json.dumps(file.model_dump(), default=str)
     if len(text.encode()) > LARGEST:
         raise SettingsError(
-            f"{len(known)} terrains make a file of {len(text) / 1e6:.1f} MB, larger "
+            f"{len(terrains)} terrains make a file of {len(text) / 1e6:.1f} MB, larger "
             f"than the {LARGEST / 1e6:.0f} MB that are read.",
             hint="Export fewer sessions at a time.",
         )
@@ -242,7 +243,7 @@ def to_text(database: TerrainDatabase) -> str:
 
 
 def _stored(terrain: KnownTerrain) -> _Terrain:
-    known, copula = terrain.break_away, terrain.copula
+    break_away, copula = terrain.break_away, terrain.copula
     return _Terrain.model_construct(
         kind=terrain.kind,
         incline_deg=terrain.incline_deg,
@@ -260,7 +261,7 @@ def _stored(terrain: KnownTerrain) -> _Terrain:
             for name, table in terrain.tables.items()
         },
         roughness=terrain.roughness,
-        break_away=None if known is None else known.to_dict(),
+        break_away=None if break_away is None else break_away.to_dict(),
         copula=None if copula is None else _Copula.model_construct(**asdict(copula)),
     )
 

@@ -1,7 +1,8 @@
-"""What the windows of a study show, each trial judged by what never saw it.
+"""Recognition of the windows of a study by models and limits of held-out trials.
 
-The classifier of a trial's number is fitted to the trials of all other numbers, and so
-are the limits beyond which a window is of none of the known terrains.
+Trial k of every terrain is judged by a classifier fitted to the trials of all other
+numbers, and by rejection limits from those trials: a window beyond the limits belongs
+to none of the known terrains.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -21,23 +22,23 @@ from analysis.terrains.recognition import Expert, TerrainScores, score_trial
 from analysis.terrains.verdict import WindowLimits
 from analysis.terrains.windows import RESID, WINDOWS, window_features, windows_of
 
-# Share of a terrain's own windows that may count as of none. At most 10 % are to be
-# refused: limits set for 10 % refuse 10.2 to 10.4 % of the windows of trials left out.
+# Share of a terrain's own windows that may be rejected as unknown. The aim is at most
+# 10 %: limits set for 10 % reject 10.2 to 10.4 % of the windows of held-out trials.
 REFUSED = 0.08
-_SMOOTH_PER_STRAINED = 2.0  # windows refused as too smooth per one that strains
-SURE = 0.98  # probability from which an answer counts as sure
+_SMOOTH_PER_STRAINED = 2.0  # windows rejected as too smooth per window of high strain
+SURE = 0.98  # probability at which an answer counts as certain
 _BINS = 10
 
 
 @dataclass(frozen=True, slots=True)
 class TrialEvidence:
-    """One trial: how it fits models that never saw it, and what it shows without.
+    """Scores of one trial under models not fitted to it, and its window features.
 
     Attributes:
-        number: of the trial on its terrain, from 0.
-        scores: sample by sample, by every terrain's model.
-        features: of consecutive windows by size, shape (windows, features).
-        overlapping: the same of windows that overlap.
+        number: number of the trial on its terrain, from 0.
+        scores: scores of every sample by every terrain's model.
+        features: features of consecutive windows by size, shape (windows, features).
+        overlapping: the same for overlapping windows.
     """
 
     number: int
@@ -49,18 +50,18 @@ class TrialEvidence:
     def of(
         cls, trial: PreparedTrial, number: int, experts: Mapping[str, Expert]
     ) -> "TrialEvidence":
-        """Return the evidence of a trial."""
+        """Score a trial and compute its window features."""
         windows = {size: windows_of(trial.kept, size) for size in WINDOWS}
-        more = {size: windows_of(trial.kept, size, overlap=True) for size in WINDOWS}
+        dense = {size: windows_of(trial.kept, size, overlap=True) for size in WINDOWS}
         return cls(
             number=number,
             scores=score_trial(trial, experts),
             features={s: window_features(trial, rows) for s, rows in windows.items()},
-            overlapping={s: window_features(trial, rows) for s, rows in more.items()},
+            overlapping={s: window_features(trial, rows) for s, rows in dense.items()},
         )
 
     def strains(self, terrain: str, size: int, *, overlap: bool = False) -> Array:
-        """Return the mean strain of windows under a terrain's model, shape (n,)."""
+        """Return the mean strain of windows by a terrain's model, shape (n,)."""
         column = self.scores.strain[:, self.scores.terrains.index(terrain)]
         begins = [w.start for w in windows_of(column.size, size, overlap=overlap)]
         if not begins:
@@ -70,11 +71,11 @@ class TrialEvidence:
 
 @dataclass(frozen=True, slots=True)
 class StudyEvidence:
-    """All trials of a study.
+    """Evidence of all trials of a study.
 
     Attributes:
         trials: evidence by terrain.
-        surface: "flat", "rocky" or a kind of its own, by terrain.
+        surface: "flat", "rocky" or the terrain's own kind, by terrain.
     """
 
     trials: Mapping[str, Sequence[TrialEvidence]]
@@ -83,7 +84,7 @@ class StudyEvidence:
     def labelled(
         self, without: int | None = None
     ) -> list[tuple[Mapping[int, Array], str]]:
-        """Return overlapping features and surface of every trial but one number's."""
+        """Return overlapping features and surface of all trials except one number."""
         return [
             (trial.overlapping, self.surface[name])
             for name, trials in self.trials.items()
@@ -94,23 +95,23 @@ class StudyEvidence:
     def limits(
         self, terrain: str, size: int, without: int | None = None
     ) -> WindowLimits:
-        """Return the limits that leave a terrain's windows refused as often as allowed.
+        """Return the rejection limits of a terrain's windows.
 
-        Each trial is held against the windows of the others: the limits are shares of
-        all of them, so chosen that `REFUSED` of the windows of a trial left out lie
-        beyond. Stones strain their models alike and share that limit; every terrain has
-        its own least roughness.
+        The limits are quantiles over all windows, at a level chosen by leaving out one
+        trial at a time so that a share `REFUSED` of the windows of the trial left out
+        is rejected. Terrains of stones have similar strain and share that limit; every
+        terrain has its own lower limit of roughness.
         """
         own = [t for t in self.trials[terrain] if t.number != without]
         roughness = {t.number: t.overlapping[size][:, RESID] for t in own}
         strain = {t.number: t.strains(terrain, size, overlap=True) for t in own}
-        alike: dict[int, list[Array]] = {}
-        for name in self._alike(terrain):
+        pooled: dict[int, list[Array]] = {}
+        for name in self._similar_terrains(terrain):
             for trial in self.trials[name]:
                 if trial.number != without:
                     strains = trial.strains(name, size, overlap=True)
-                    alike.setdefault(trial.number, []).append(strains)
-        every = {number: np.concatenate(parts) for number, parts in alike.items()}
+                    pooled.setdefault(trial.number, []).append(strains)
+        every = {number: np.concatenate(parts) for number, parts in pooled.items()}
         share = _allowed_share(
             [
                 np.minimum(
@@ -127,7 +128,7 @@ class StudyEvidence:
             _quantile(every.values(), 1.0 - share, np.inf),
         )
 
-    def _alike(self, terrain: str) -> tuple[str, ...]:
+    def _similar_terrains(self, terrain: str) -> tuple[str, ...]:
         if self.surface[terrain] != ROCKY_GROUND:
             return (terrain,)
         return self.of_surface(ROCKY_GROUND)
@@ -138,18 +139,18 @@ class StudyEvidence:
 
 
 def _allowed_share(parts: Sequence[Array]) -> float:
-    """Return the share of windows beyond the limit of strain.
+    """Return the share of windows to reject by the limit of strain.
 
     Args:
-        parts: of each trial left out the smallest such share that refuses a window;
-            without any of them both limits refuse windows of their own.
+        parts: for every held-out trial, the smallest such share that rejects each
+            window; without any, the two limits are assumed to reject different windows.
     """
-    alone = REFUSED / (1.0 + _SMOOTH_PER_STRAINED)
-    return min(_quantile(parts, REFUSED, alone), 1.0 / _SMOOTH_PER_STRAINED)
+    disjoint = REFUSED / (1.0 + _SMOOTH_PER_STRAINED)
+    return min(_quantile(parts, REFUSED, disjoint), 1.0 / _SMOOTH_PER_STRAINED)
 
 
 def _share_up_to(values: Array, others: Array) -> Array:
-    """Return the share of `others` not above each value; 1 without any, shape (n,)."""
+    """Return the share of `others` at or below each value, shape (n,); 1 if empty."""
     if others.size == 0:
         return np.ones(values.shape)
     return np.searchsorted(np.sort(others), values, "right") / others.size
@@ -166,10 +167,10 @@ def _quantile(parts: Iterable[Array], share: float, empty: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class SurfaceProbability:
-    """What the classifier says of a window of a trial that it has not seen.
+    """Classification of a window of a held-out trial.
 
     Attributes:
-        terrain: of the trial.
+        terrain: terrain of the trial.
         surface: the truth, "flat" or "rocky".
         rocky: probability of rocky ground.
     """
@@ -187,20 +188,20 @@ class SurfaceProbability:
 def surface_probabilities(
     evidence: StudyEvidence, size: int
 ) -> list[SurfaceProbability]:
-    """Return the classifier's probabilities of all windows of a size, held out."""
-    known = {
+    """Return the classifier's probabilities for all windows of held-out trials."""
+    labelled = {
         name: trials
         for name, trials in evidence.trials.items()
         if evidence.surface[name] in (FLAT_GROUND, ROCKY_GROUND)
     }
     probabilities = []
-    for number in sorted({t.number for trials in known.values() for t in trials}):
+    for number in sorted({t.number for trials in labelled.values() for t in trials}):
         model = fit_surface(evidence.labelled(number), size)
         if model is None:
             continue
         probabilities += [
             SurfaceProbability(name, evidence.surface[name], float(rocky))
-            for name, trials in known.items()
+            for name, trials in labelled.items()
             for trial in trials
             if trial.number == number and len(trial.features[size])
             for rocky in model.probabilities(trial.features[size])
@@ -210,13 +211,13 @@ def surface_probabilities(
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """How honest probabilities of flat and rocky ground are.
+    """Calibration of the probabilities of flat and rocky ground.
 
     Attributes:
-        error: mean difference of probability and share over ten bins, both surfaces
-            weighing alike.
-        sure: share of windows answered with 98 % or more.
-        sure_and_wrong: share of windows so answered, and wrong.
+        error: expected calibration error over ten bins, both surfaces weighted
+            equally.
+        sure: share of windows answered with a probability of 98 % or more.
+        sure_and_wrong: share of windows answered with 98 % or more, but wrongly.
     """
 
     error: float
@@ -242,13 +243,13 @@ def calibration_of(windows: Sequence[SurfaceProbability]) -> Calibration:
 
 @dataclass(frozen=True, slots=True)
 class Exclusion:
-    """How often windows count as of none of the known terrains.
+    """Rates at which windows are rejected as none of the known terrains.
 
     Attributes:
-        false_alarms: share of windows, their own terrain being known.
-        flat_among_rocky: share of windows of flat ground where only rocky is known;
-            None without either.
-        rocky_among_flat: the other way round.
+        false_alarms: share of windows rejected although their terrain is known.
+        flat_among_rocky: share of windows of flat ground rejected when only rocky
+            terrains are known; None if either is missing.
+        rocky_among_flat: the reverse.
     """
 
     false_alarms: float | None
@@ -257,7 +258,7 @@ class Exclusion:
 
 
 def exclusion_of(evidence: StudyEvidence, size: int) -> Exclusion:
-    """Return how often windows of a size are excluded, by limits of other trials."""
+    """Return the rejection rates of windows of a size by limits of other trials."""
     rocky, flat = (
         evidence.of_surface(surface) for surface in (ROCKY_GROUND, FLAT_GROUND)
     )
@@ -272,11 +273,11 @@ def exclusion_of(evidence: StudyEvidence, size: int) -> Exclusion:
 def _excluded(
     evidence: StudyEvidence, known: Sequence[str], tested: Sequence[str], size: int
 ) -> float | None:
-    """Return the share of windows of `tested` that are of none of `known`."""
+    """Return the share of windows of `tested` that are rejected by `known` terrains."""
     limits: dict[tuple[str, int], WindowLimits] = {}
     verdicts: list[bool] = []
     for trial in (trial for name in tested for trial in evidence.trials[name]):
-        # a terrain of fewer trials has no model of this number
+        # a terrain with fewer trials has no model for this trial number
         strains = {
             name: trial.strains(name, size) for name in known if _has(trial, name)
         }

@@ -1,8 +1,8 @@
-"""How well the terrains of a study can be told apart, by models that never saw a trial.
+"""Terrain classification of a study by models of held-out trials.
 
 Windows of motion are attributed to a terrain by two rules: the largest log density of
-`recognition`, and the smallest mean absolute error, which is the paper's. Flat or rocky
-is told by a third, the `classifier` of the trials of other numbers.
+`recognition`, and the smallest mean absolute error, which is the paper's. A third rule,
+the `classifier` fitted to the trials of other numbers, decides flat or rocky.
 """
 
 from collections.abc import Mapping, Sequence
@@ -41,17 +41,18 @@ from analysis.terrains.recognition import (
 from analysis.terrains.verdict import WindowLimits
 from analysis.terrains.windows import WINDOWS
 
-KEPT_PER_SECOND = 100  # kept samples of a second of motion
-_SCORES_HERE = 200  # of a trial by an expert, 12 ms each; processes need 2 s to start
+KEPT_PER_SECOND = 100  # kept samples per second of motion
+# scores (trial by expert, 12 ms each) up to which no processes are started (2 s)
+_SCORES_HERE = 200
 
 
 @dataclass(frozen=True, slots=True)
 class Confusion:
-    """How often a window of one kind was taken for which.
+    """Confusion matrix of windows.
 
     Attributes:
-        names: kinds, m of them.
-        counts: windows, rows the truth, columns the answer, shape (m, m).
+        names: the m classes.
+        counts: number of windows; rows the truth, columns the answer; shape (m, m).
     """
 
     names: tuple[str, ...]
@@ -59,7 +60,7 @@ class Confusion:
 
     @property
     def accuracy(self) -> float:
-        """Mean over the kinds of the share that was recognised; NaN without windows."""
+        """Balanced accuracy: mean recall over the classes; NaN without windows."""
         totals = self.counts.sum(axis=1)
         present = totals > 0
         if not present.any():
@@ -68,7 +69,7 @@ class Confusion:
 
 
 def confusion_of(pairs: Sequence[tuple[str, str]]) -> Confusion:
-    """Return how often each truth got each answer, by (truth, answer) pairs."""
+    """Count (truth, answer) pairs."""
     names = tuple(
         dict.fromkeys(name for pair in zip(*pairs, strict=True) for name in pair)
     )
@@ -80,18 +81,19 @@ def confusion_of(pairs: Sequence[tuple[str, str]]) -> Confusion:
 
 @dataclass(frozen=True, slots=True)
 class Identification:
-    """How well the terrains of a study can be told apart.
+    """Results of terrain classification in a study.
 
     Attributes:
         rho: correlation of neighbouring residuals by terrain.
         by_density: confusions by window size [kept samples] and level ("terrain",
             "stones", "surface"), by posterior.
-        by_error: the same by the smallest mean absolute error: the paper's rule.
+        by_error: the same by the smallest mean absolute error, the paper's rule.
         by_features: the same by the classifier, level "surface" only.
-        limits: by window size and terrain: what hardly any of its own windows exceed.
-        calibrations: of the classifier's probabilities, by window size.
-        exclusions: how well ground that is not known is excluded, by window size.
-        classifier: of flat and rocky ground, of all trials; None with one of them only.
+        limits: rejection limits by window size and terrain.
+        calibrations: calibration of the classifier's probabilities by window size.
+        exclusions: rejection rates of unknown ground by window size.
+        classifier: classifier of flat and rocky ground fitted to all trials; None if
+            only one of them occurs.
         rocky: names of the terrains of stones.
     """
 
@@ -111,10 +113,9 @@ class Identification:
         return len(self.rocky)
 
     def exact_stones(self, size: int) -> float | None:
-        """Return the share of windows of stones whose own terrain is the likeliest.
+        """Return the share of windows on stones whose own terrain is the likeliest.
 
-        By the log density, of all windows on stones; None with fewer than two terrains
-        of stones or without a window.
+        By log density; None with fewer than two terrains of stones or no windows.
         """
         confusion = self.by_density[size]["terrain"]
         rows = [k for k, name in enumerate(confusion.names) if name in self.rocky]
@@ -125,12 +126,12 @@ class Identification:
 
     @property
     def levels(self) -> tuple[str, ...]:
-        """What windows are told apart by: terrain, stones, surface, words stated."""
+        """Levels of classification: terrain, stones, surface and stated factors."""
         return tuple(next(iter(self.by_density.values())))
 
     @property
     def sizes(self) -> tuple[int, ...]:
-        """Sizes that at least one trial has a window of."""
+        """Window sizes of which at least one trial has a window."""
         return tuple(
             size
             for size, levels in self.by_density.items()
@@ -174,10 +175,10 @@ def _plain(rule: Mapping[int, Mapping[str, Confusion]]) -> dict[str, Any]:
 
 
 def identify_study(study: Study) -> Identification | None:
-    """Return how well windows of trials are recognised by models that never saw them.
+    """Classify the windows of held-out trials.
 
     Trial k of every terrain is scored by the models of fold k, Gaussian processes with
-    the SE kernel. None where no fold has the model for two terrains or more.
+    the SE kernel. None if no fold has that model for at least two terrains.
     """
     rho = _correlations(study)
     evidence = _evidence(study, rho)
@@ -186,20 +187,20 @@ def identify_study(study: Study) -> Identification | None:
     groups = groups_of(study.kinds) | words_of(study)
     density, error = _by_models(evidence, groups)
     probabilities = {size: surface_probabilities(evidence, size) for size in WINDOWS}
-    known = {size: found for size, found in probabilities.items() if found}
+    windows = {size: answers for size, answers in probabilities.items() if answers}
     return Identification(
         rho=rho,
         by_density=density,
         by_error=error,
         by_features={
-            size: {"surface": confusion_of([(p.surface, p.answer) for p in found])}
-            for size, found in known.items()
+            size: {"surface": confusion_of([(p.surface, p.answer) for p in answers])}
+            for size, answers in windows.items()
         },
         limits={
             size: {name: evidence.limits(name, size) for name in evidence.trials}
             for size in WINDOWS
         },
-        calibrations={size: calibration_of(found) for size, found in known.items()},
+        calibrations={size: calibration_of(p) for size, p in windows.items()},
         exclusions={size: exclusion_of(evidence, size) for size in WINDOWS},
         classifier=fit_surfaces(evidence.labelled()),
         rocky=evidence.of_surface(ROCKY_GROUND),
@@ -209,7 +210,7 @@ def identify_study(study: Study) -> Identification | None:
 def _by_models(
     evidence: StudyEvidence, groups: Mapping[str, Mapping[str, str]]
 ) -> tuple[dict[int, dict[str, Confusion]], dict[int, dict[str, Confusion]]]:
-    """Return the confusions by log density and by the smallest error."""
+    """Return the confusions by log density and by smallest error."""
     density: dict[int, dict[str, Confusion]] = {}
     error: dict[int, dict[str, Confusion]] = {}
     for size in WINDOWS:
@@ -241,9 +242,9 @@ def _by_models(
 
 
 def words_of(study: Study) -> dict[str, dict[str, str]]:
-    """Return the words of every terrain by factor, where all state one and they vary.
+    """Return the text values of every factor by terrain, if all state it and it varies.
 
-    The foot is one where the experiment has factors of its own.
+    The foot is included if the experiment has factors of its own.
     """
     stated = {name: result.factors for name, result in study.terrains.items()}
     names = dict.fromkeys(name for factors in stated.values() for name in factors)
@@ -261,7 +262,7 @@ def words_of(study: Study) -> dict[str, dict[str, str]]:
 
 
 def _correlations(study: Study) -> dict[str, float]:
-    """Return rho of every terrain, from trials that its models never saw."""
+    """Return rho of every terrain from held-out trials."""
     return {
         name: neighbour_correlation(
             [
@@ -280,7 +281,7 @@ def _held_out(result: TerrainResult) -> list[tuple[PreparedTrial, Predictor]]:
 
 
 def _evidence(study: Study, rho: Mapping[str, float]) -> StudyEvidence:
-    """Return every trial scored by the models of its own number's folds."""
+    """Score every trial by the models of the folds with its number."""
     experts: dict[int, dict[str, Expert]] = {}
     for name, result in study.terrains.items():
         for k, fold in result.left_out(GP_SE):
@@ -313,5 +314,5 @@ class ScoreTask:
 
 
 def run_score(task: ScoreTask) -> TrialEvidence:
-    """Return how the trial fits every expert, and what its windows show without."""
+    """Score a trial by every expert and compute its window features."""
     return TrialEvidence.of(task.trial, task.number, task.experts)

@@ -1,7 +1,6 @@
-"""Terrains that are known by their models: what another program asks.
+"""Query interface of the terrain database.
 
-`load` of `database` reads them from a file, and checks everything before it
-believes it.
+`database.load` reads and validates a file.
 """
 
 from collections.abc import Mapping, Sequence
@@ -29,24 +28,24 @@ class KnownTerrain:
     """One terrain of a database.
 
     Attributes:
-        name: of the terrain.
+        name: name of the terrain.
         kind: "small", "big", "flat" or a word of its own.
-        trials: it was fitted to so many trials,
-        samples: with so many samples.
-        rho: correlation of its residuals from one kept sample to the next.
-        limits: mean strain by window size that its own windows stay below.
-        tables: by name of the model.
-        parameters: of every model, as fitted.
-        default: name of the model that answers.
-        titles: of every model, for people.
-        recogniser: name of the model that `rho` and `limits` belong to, which says how
-            well a trial fits the terrain; "" = the default.
-        roughness: by window [kept samples], the least log sd of F_t about a line in F_n
-            [nat] of its own windows.
-        break_away: what it gives before a foot at rest slips; None = not known.
+        trials: number of trials fitted.
+        samples: number of samples fitted.
+        rho: correlation of residuals from one kept sample to the next.
+        limits: upper limit of the mean strain by window size [kept samples].
+        tables: table by model name.
+        parameters: fitted parameters by model name.
+        default: name of the model used by default.
+        titles: title by model name.
+        recogniser: name of the model used for recognition, to which `rho` and `limits`
+            belong; "" = the default.
+        roughness: lower limit of the log sd of F_t about a line in F_n [nat] by window
+            size [kept samples].
+        break_away: model of the force at which a foot at rest slips; None = not known.
         incline_deg: along the push, positive downhill [degrees]; None where unknown.
-        factors: of its recordings, the foot among them, by name; None = does not apply.
-        copula: how forces along a path hang together; None = not known.
+        factors: recorded factors by name, foot included; None = does not apply.
+        copula: dependence of the forces along a path; None = not known.
     """
 
     name: str
@@ -82,7 +81,7 @@ class KnownTerrain:
     def predict(
         self, F_n: ArrayLike, v_t: ArrayLike, model: str = ""
     ) -> TractionEstimate | TractionEstimates:
-        """Return the traction to expect of a new trial, at one point or many.
+        """Predict the traction of a new trial at one point or many.
 
         Args:
             F_n: normal force [N], a number or shape (n,).
@@ -90,10 +89,10 @@ class KnownTerrain:
             model: name of a model; "" = the default.
 
         Returns:
-            The answer of one point for two numbers, else that of n points.
+            The estimate at one point for two numbers, otherwise at n points.
 
         Raises:
-            SettingsError: there is no such model, or a value is no finite number.
+            SettingsError: there is no such model, or a value is not finite.
         """
         table = self._table(model)
         if isinstance(F_n, Real) and isinstance(v_t, Real):
@@ -113,39 +112,39 @@ class KnownTerrain:
         seed: int | np.random.Generator,
         count: int = 1,
     ) -> Array:
-        """Return traction forces of new trials along a path [N], shape (count, n).
+        """Draw traction forces of new trials along a path [N], shape (count, n).
 
-        Each row is one trial: its level holds along the whole path, and neighbouring
-        forces resemble each other; see `analysis.terrains.path_copula`. A foot slower
-        than the slowest one measured sticks. Outside of the measured range forces are
-        those of its edge. Where no quantile of the table is below 0, no force is.
+        Each row is one trial with a common level along the path and correlated
+        neighbouring forces; see `analysis.terrains.path_copula`. A foot slower than the
+        slowest one measured sticks. Outside the measured range forces are clamped to
+        those of its edge. Forces are not negative where no quantile is.
 
         Args:
             F_n: normal force at every step [N], shape (n,).
             v_t: slip velocity at every step [m/s], shape (n,).
             dt: time from one step to the next [s].
-            seed: of the draws, or what draws them.
-            count: trials.
+            seed: seed of the draws, or a random generator.
+            count: number of trials.
 
         Raises:
-            SettingsError: F_n and v_t are not finite or not of one shape, dt is not
-                positive and finite, there is no such seed or count, or it is not
-                known how forces of the terrain hang together.
+            SettingsError: F_n and v_t are not finite or differ in shape, dt is not
+                positive and finite, seed or count is invalid, or the terrain has no
+                copula.
         """
         if self.copula is None:
             raise SettingsError(
-                f"{self.name}: how its forces hang together is not known.",
-                hint="Export a database of two trials or more of each terrain anew.",
+                f"{self.name}: the correlation of forces along a path is not known.",
+                hint="Export the database again, with two trials or more per terrain.",
             )
         loads, speeds = points_of(F_n, v_t)
         if not (isinstance(dt, Real) and 0.0 < dt < inf):
             raise SettingsError(
-                f"dt = {dt!r:.60} is no time between two steps.",
+                f"dt = {dt!r:.60} is not a time between two steps.",
                 hint="Give a positive number of seconds, e.g. dt=0.01.",
             )
         if not (isinstance(count, Integral) and count > 0):
             raise SettingsError(
-                f"count = {count!r:.60} is no number of trials.",
+                f"count = {count!r:.60} is not a number of trials.",
                 hint="Give a whole number of at least 1.",
             )
         normals = _generator(seed).standard_normal((int(count), 1 + loads.size))
@@ -154,42 +153,42 @@ class KnownTerrain:
         return self.predict(loads, speeds).at_scores(scores)
 
     def prediction(self, F_n: Array, v_t: Array) -> Prediction:
-        """Return the recogniser's answer as a model of the study gives it."""
+        """Return mean and standard deviation by the model used for recognition."""
         many = self.predict(F_n, v_t, self.recogniser)
         return Prediction(many.mean, many.sd)
 
     def slip_risk(self, required: float, F_n: float) -> BreakAwayRisk:
-        """Return `BreakAwayModel.slip_risk`: of a push from rest at a load F_n [N].
+        """Return the slip risk of a push from rest, see `BreakAwayModel.slip_risk`.
 
         Raises:
-            SettingsError: a value is negative or no finite number, or it is not known.
+            SettingsError: a value is negative or not finite, or the model is not known.
         """
         return self.from_rest.slip_risk(required, F_n)
 
     @property
     def has_from_rest(self) -> bool:
-        """Whether it is known what it gives before it slips."""
+        """Whether the database has a break-away model of the terrain."""
         return self.break_away is not None
 
     @property
     def from_rest(self) -> BreakAwayModel:
-        """What it gives before it slips.
+        """Model of the force at which a foot at rest slips.
 
         Raises:
-            SettingsError: it is not known.
+            SettingsError: the model is not known.
         """
         if self.break_away is None:
             raise SettingsError(
-                f"{self.name}: the force before it slips from rest is not known.",
+                f"{self.name}: the break-away force from rest is not known.",
                 hint="Record three trials or more; risk_in_motion answers for sliding.",
             )
         return self.break_away
 
     def risk_in_motion(self, required: float, F_n: float, v_t: float = 0.0) -> SlipRisk:
-        """Return the probability that a sliding foot meets less than `required` [N].
+        """Return the probability that a sliding foot gets less than `required` [N].
 
-        Velocities below the slowest one that was measured count as that. A load or
-        velocity outside the table is marked by `is_extrapolated` of the answer.
+        Velocities below the slowest one measured are raised to it. A load or velocity
+        outside the table sets `is_extrapolated` of the result.
 
         Raises:
             SettingsError: a value is not a finite number.
@@ -215,7 +214,7 @@ def _generator(seed: int | np.random.Generator) -> np.random.Generator:
         return seed
     if not isinstance(seed, Integral) or seed < 0:
         raise SettingsError(
-            f"seed = {seed!r:.60} is no seed.",
+            f"seed = {seed!r:.60} is not a seed.",
             hint="Give a whole number of at least 0, or a generator of numpy.",
         )
     return np.random.default_rng(int(seed))
@@ -228,8 +227,8 @@ class TerrainDatabase:
     Attributes:
         terrains: every terrain.
         is_simulated: the trials were simulated.
-        made_utc: when.
-        surfaces: tells flat ground from rocky; None = not known.
+        made_utc: time at which the database was made.
+        surfaces: classifier of flat and rocky ground; None = not known.
     """
 
     terrains: Mapping[str, KnownTerrain]
@@ -238,10 +237,10 @@ class TerrainDatabase:
     surfaces: SurfaceClassifier | None = None
 
     def terrain(self, name: str) -> KnownTerrain:
-        """Return a terrain.
+        """Return a terrain by name.
 
         Raises:
-            SettingsError: there is none of that name.
+            SettingsError: there is no terrain of that name.
         """
         if name not in self.terrains:
             raise SettingsError(

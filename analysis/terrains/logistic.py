@@ -2,8 +2,8 @@
 
     p = 1 / (1 + exp(-(w0 + w'z + v'z^2)))
 
-The fit is Newton's method on the log loss plus a ridge, a step halved until nothing is
-lost.
+The fit is Newton's method on the log loss plus a ridge penalty, with step halving until
+the loss does not increase.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,13 +16,13 @@ from pydantic import Field, TypeAdapter
 from acquisition.validation import Many
 from analysis.data.series import Array
 
-_CLIPPED_AT = 5.0  # standard deviations beyond which a feature says no more
+_CLIPPED_AT = 5.0  # standard deviations at which features are clipped
 _LARGEST_LOGIT = 30.0
 _STEPS, _HALVINGS = 25, 14
 _CONVERGED = 1e-4
 _RIDGE = 1.0  # penalty of every weight but the bias
 _SMALL = 1e-9
-_LARGEST_NUMBER = 1e9  # of a stored number
+_LARGEST_NUMBER = 1e9  # limit of a stored number
 
 _Number = Annotated[
     float, Field(ge=-_LARGEST_NUMBER, le=_LARGEST_NUMBER, allow_inf_nan=False)
@@ -35,9 +35,9 @@ class RidgeLogistic:
     """A fitted regression.
 
     Attributes:
-        mean: of the features, shape (n,).
-        scale: their standard deviations, shape (n,).
-        weights: bias, features, squares; shape (1 + 2 n,).
+        mean: means of the features, shape (n,).
+        scale: standard deviations of the features, shape (n,).
+        weights: weights of bias, features and squares, shape (1 + 2 n,).
     """
 
     mean: Many[_Number]
@@ -48,29 +48,29 @@ class RidgeLogistic:
         """Return the probability of every row of features, shape (m,).
 
         Args:
-            features: shape (m, n).
+            features: rows of features, shape (m, n).
         """
         design = _design(features, np.array(self.mean), np.array(self.scale))
         return _logistic(design @ np.array(self.weights))
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any], count: int) -> "RidgeLogistic":
-        """Return the regression of plain values.
+        """Restore a regression from plain values.
 
         Args:
             content: mean, scale and weights.
-            count: number of features that it has to be for.
+            count: expected number of features.
 
         Raises:
-            ValueError: a value is missing or is not what it should be.
+            ValueError: a value is missing or invalid.
         """
         return _PLAIN.validate_python(content).checked(count)
 
     def checked(self, count: int) -> "RidgeLogistic":
-        """Return the regression itself.
+        """Return the regression itself after a check of its sizes.
 
         Raises:
-            ValueError: it is not for `count` features.
+            ValueError: the regression is not for `count` features.
         """
         sizes = {"mean": count, "scale": count, "weights": 1 + 2 * count}
         for name, size in sizes.items():
@@ -83,15 +83,15 @@ _PLAIN = TypeAdapter(RidgeLogistic)
 
 
 def fit_logistic(features: Array, truth: np.ndarray, weight: Array) -> RidgeLogistic:
-    """Return the regression of rows; both answers have to occur.
+    """Fit a regression to rows; both classes have to occur.
 
     Args:
         features: shape (m, n).
         truth: whether the row is positive, shape (m,).
-        weight: what a row counts, shape (m,).
+        weight: weight of every row, shape (m,).
 
     Raises:
-        ValueError: only one answer occurs.
+        ValueError: only one class occurs.
     """
     if not 0 < int(truth.sum()) < truth.size:
         raise ValueError("only one answer occurs")
@@ -116,14 +116,14 @@ def fit_logistic(features: Array, truth: np.ndarray, weight: Array) -> RidgeLogi
 def fit_balanced(
     parts: Sequence[tuple[Array, bool]], new: float
 ) -> RidgeLogistic | None:
-    """Return the regression of windows on features and squares; None of one kind only.
+    """Fit a class-balanced regression to windows; None if only one class occurs.
 
-    Both kinds weigh alike. Windows that overlap are correlated, so the loss counts
-    every window as the share of it that is new.
+    Both classes have the same total weight. Overlapping windows are correlated, so each
+    is weighted by its share of new samples.
 
     Args:
         parts: features of windows, shape (m, n), and whether they are positive.
-        new: share of a window that the one before did not have.
+        new: share of a window that the previous one does not contain.
     """
     filled = [(features, kind) for features, kind in parts if len(features)]
     if len({kind for _, kind in filled}) < 2:
@@ -145,7 +145,7 @@ def _design(features: Array, mean: Array, scale: Array) -> Array:
 
 
 class _Iterate(NamedTuple):
-    """Weights, what they say of every row, and what is lost with them."""
+    """Weights with the logit of every row and the loss."""
 
     w: Array
     logit: Array
@@ -175,11 +175,11 @@ class _Loss:
         return _Iterate(w, logit, loss)
 
     def improved(self, iterate: _Iterate) -> _Iterate:
-        """Return the weights after a Newton step, halved until nothing is lost."""
+        """Take a Newton step, halved until the loss does not increase."""
         w, p = iterate.w, _logistic(iterate.logit)
         gradient = self.design.T @ (self.weight * (p - self.truth)) + self.penalty * w
-        bend = (self.design.T * (self.weight * p * (1.0 - p))) @ self.design
-        step = np.linalg.solve(bend + np.diag(self.penalty), gradient)
+        hessian = (self.design.T * (self.weight * p * (1.0 - p))) @ self.design
+        step = np.linalg.solve(hessian + np.diag(self.penalty), gradient)
         for halvings in range(_HALVINGS):
             after = self.at(w - 0.5**halvings * step)
             if after.loss <= iterate.loss:

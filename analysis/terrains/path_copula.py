@@ -1,17 +1,17 @@
-"""Forces along a path: quantiles of a new trial, joined in time by a Gaussian copula.
+"""Forces along a path: quantiles of a new trial correlated by a Gaussian copula.
 
-The force of a step is the quantile of a normal score z, and scores of a trial are those
-of a level of its own and a first-order process:
+The force of a step is the quantile at a normal score z. The scores of a trial consist
+of a level of the trial and a first-order autoregressive process:
 
     F_t = Q(Phi(z_i); F_n, v_t),    z_i = sqrt(s) u + sqrt(1 - s) x_i
     x_i = r x_{i-1} + sqrt(1 - r^2) e_i,    r = exp(-dt / tau)
 
-with u, x_0 and e_i standard normal. tau is one time while the foot sticks and another
-while it slides: two scores of a trial have the correlation
+with u, x_0 and e_i standard normal. tau differs between sticking and sliding, so two
+scores of a trial have the correlation
 
     s + (1 - s) exp(-a / tau_stick - b / tau_slide)
 
-where the foot sticks for a seconds and slides for b between them. Copula and marginal
+if the foot sticks for a and slides for b seconds between them. Copula and marginal
 distributions: Nelsen, An Introduction to Copulas (2006), section 2.3.
 """
 
@@ -26,19 +26,19 @@ from analysis.data.series import Array
 from analysis.study.distribution import Distribution
 
 LAGS = (1, 2, 5, 10, 15, 20, 25, 30, 50, 100)  # kept samples
-_EDGE = 1e-9  # a share nearer to 0 or 1 has no normal score worth the name
+_EDGE = 1e-9  # probabilities are clipped to this distance from 0 and 1
 _TAUS = (1e-3, 1e2)  # s
-_START = (0.2, 0.2, 0.2)  # level, and both times [s]
+_START = (0.2, 0.2, 0.2)  # level, and both correlation times [s]
 
 
 @dataclass(frozen=True, slots=True)
 class ScoredTrial:
-    """Normal scores of a trial that the model was not fitted to.
+    """Normal scores of a held-out trial.
 
     Attributes:
-        score: of its kept samples, shape (n,).
-        stuck: how long the foot has stuck up to each of them [s], shape (n,).
-        slid: how long it has moved [s], shape (n,).
+        score: normal scores of the kept samples, shape (n,).
+        stuck: cumulative sticking time at each of them [s], shape (n,).
+        slid: cumulative sliding time at each of them [s], shape (n,).
     """
 
     score: Array
@@ -49,30 +49,30 @@ class ScoredTrial:
     def of(
         cls, trial: PreparedTrial, prediction: Distribution, slowest: float
     ) -> "ScoredTrial":
-        """Return the scores of a trial's kept samples.
+        """Compute the scores of a trial's kept samples.
 
         Args:
-            trial: one that is left out.
-            prediction: of its kept samples.
-            slowest: a foot that is slower sticks [m/s].
+            trial: held-out trial.
+            prediction: predictive distribution of its kept samples.
+            slowest: speed below which the foot sticks [m/s].
         """
         from scipy.special import ndtri
 
         step = np.diff(trial.smooth.t, prepend=trial.smooth.t[:1])
         is_stuck = np.abs(trial.smooth.v_t) < slowest
-        stuck, slid = (np.cumsum(step * each) for each in (is_stuck, ~is_stuck))
+        stuck, slid = (np.cumsum(step * mask) for mask in (is_stuck, ~is_stuck))
         share = np.clip(prediction.cdf(trial.F_t), _EDGE, 1.0 - _EDGE)
         return cls(ndtri(share), stuck[trial.indices], slid[trial.indices])
 
 
 @dataclass(frozen=True, slots=True)
 class PathCopula:
-    """How the normal scores of a trial hang together.
+    """Dependence between the normal scores of a trial.
 
     Attributes:
-        level: share of their variance that is the trial's own level, s.
-        tau_stick: correlation time of the rest while the foot sticks [s].
-        tau_slide: the same while it moves [s].
+        level: share of their variance that belongs to the trial's level, s.
+        tau_stick: correlation time of the other part while the foot sticks [s].
+        tau_slide: the same while the foot slides [s].
     """
 
     level: float
@@ -80,32 +80,32 @@ class PathCopula:
     tau_slide: float
 
     def correlations(self, stuck: Array, slid: Array) -> Array:
-        """Return the correlation of scores with such times between them [s], (n,)."""
-        rest = np.exp(-stuck / self.tau_stick - slid / self.tau_slide)
-        return self.level + (1.0 - self.level) * rest
+        """Return correlations of scores separated by these times [s], shape (n,)."""
+        decay = np.exp(-stuck / self.tau_stick - slid / self.tau_slide)
+        return self.level + (1.0 - self.level) * decay
 
     def scores(self, is_stuck: NDArray[np.bool_], dt: float, normals: Array) -> Array:
-        """Return normal scores of trials along a path, shape (count, n).
+        """Draw normal scores of trials along a path, shape (count, n).
 
         Args:
-            is_stuck: at which steps the foot sticks, shape (n,).
+            is_stuck: whether the foot sticks at each step, shape (n,).
             dt: time from one step to the next [s].
-            normals: standard normal numbers, shape (count, 1 + n): of each trial its
-                level, then one for every step.
+            normals: standard normal numbers, shape (count, 1 + n): for each trial its
+                level, then one per step.
         """
         r = np.exp(-dt / np.where(is_stuck, self.tau_stick, self.tau_slide))
         innovation = np.sqrt(1.0 - r**2) * normals[:, 1:]
-        rest = normals[:, 1:].copy()
+        x = normals[:, 1:].copy()
         for i in range(1, r.size):
-            rest[:, i] = r[i] * rest[:, i - 1] + innovation[:, i]
-        return np.sqrt(self.level) * normals[:, :1] + np.sqrt(1.0 - self.level) * rest
+            x[:, i] = r[i] * x[:, i - 1] + innovation[:, i]
+        return np.sqrt(self.level) * normals[:, :1] + np.sqrt(1.0 - self.level) * x
 
 
 def fit_copula(trials: Sequence[ScoredTrial]) -> PathCopula | None:
-    """Return the copula whose correlations are nearest to those of products of scores.
+    """Fit a copula to the products of scores at several lags by least squares.
 
-    Every lag has the same weight. None with fewer than two trials that are longer than
-    a lag.
+    Every lag has the same weight. None with fewer than two trials of at least two
+    samples.
     """
     from scipy.optimize import least_squares
 
@@ -117,16 +117,16 @@ def fit_copula(trials: Sequence[ScoredTrial]) -> PathCopula | None:
     )
     products /= np.mean(np.concatenate([trial.score for trial in trials]) ** 2)
 
-    def distances(theta: Array) -> Array:
+    def residuals(theta: Array) -> Array:
         return weight * (PathCopula(*theta).correlations(stuck, slid) - products)
 
     low, high = (0.0, _TAUS[0], _TAUS[0]), (1.0, _TAUS[1], _TAUS[1])
-    best = least_squares(distances, _START, bounds=(low, high), x_scale=_START)
+    best = least_squares(residuals, _START, bounds=(low, high), x_scale=_START)
     return PathCopula(*(round(value, 6) for value in best.x.tolist()))
 
 
 def lag_correlation(trials: Sequence[ScoredTrial], lag: int) -> float:
-    """Return the correlation of scores `lag` kept samples apart around 0."""
+    """Return the uncentred correlation of scores `lag` kept samples apart."""
     products = _pairs(trials, lag)[0]
     return float(
         products.mean() / np.mean(np.concatenate([t.score for t in trials]) ** 2)

@@ -1,4 +1,4 @@
-"""Loads and velocities that a model is asked for, as people give them."""
+"""Validation of the loads and velocities passed to a query."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -8,17 +8,17 @@ from analysis.data.series import Array
 
 
 def points_of(F_n: ArrayLike, v_t: ArrayLike) -> tuple[Array, Array]:
-    """Return normal forces [N] and velocities [m/s] of one shape (n,).
+    """Convert normal forces [N] and velocities [m/s] to arrays of one shape (n,).
 
     Raises:
-        SettingsError: they are no finite numbers, or not of one shape.
+        SettingsError: the values are not finite numbers or differ in shape.
     """
     loads, speeds = _numbers("F_n", F_n), _numbers("v_t", v_t)
     try:
         loads, speeds = np.broadcast_arrays(loads, speeds)
     except ValueError as error:
         raise SettingsError(
-            f"F_n and v_t are no numbers of one shape ({error}).",
+            f"F_n and v_t do not have one shape ({error}).",
             hint="Give two numbers, or two arrays of one length.",
         ) from error
     return loads, speeds
@@ -39,6 +39,6 @@ def _numbers(name: str, values: ArrayLike) -> Array:
 
 def _no_numbers(name: str, values: ArrayLike) -> SettingsError:
     return SettingsError(
-        f"{name} = {values!r:.60} is no number and no row of numbers.",
+        f"{name} = {values!r:.60} is neither a number nor a row of numbers.",
         hint=f"Write e.g. {name}=3.5, or an array of shape (n,).",
     )

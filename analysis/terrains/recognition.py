@@ -1,14 +1,14 @@
-"""One trial against known terrains: log densities, probabilities over time.
+"""Recognition of known terrains: log densities and posterior probabilities of a trial.
 
-Neighbouring samples repeat each other, so a sample is judged by what it adds: with the
-standardised residual z_i = (y_i - m_i) / s_i and its correlation rho from one sample to
-the next
+Neighbouring samples are correlated, so each sample is scored given the previous one:
+with the standardised residual z_i = (y_i - m_i) / s_i and its correlation rho from one
+sample to the next
 
     ll = sum_i log N(z_i; rho z_{i-1}, 1 - rho^2) - log s_i
 
-(a first-order process; after a gap, and at first, log N(z_i; 0, 1)). Single terms are
-held above a floor, which keeps one spike from deciding. The posterior is the softmax of
-ll / tau: what is left of the correlation makes plain sums overconfident.
+(a first-order process; for the first sample and after a gap, log N(z_i; 0, 1)). Single
+terms are bounded below, so that one spike cannot decide. The posterior is the softmax
+of ll / tau, because the remaining correlation makes plain sums overconfident.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -21,9 +21,9 @@ from analysis.data.series import Array
 from analysis.study.distribution import Distribution
 from analysis.terrains.windows import windows_of
 
-TAU = 10.0  # samples that count as one
+TAU = 10.0  # samples that count as one independent sample
 _SMALLEST_SD = 1e-6  # N
-_SPIKE = 10.0  # standard deviations beyond which a larger error adds nothing
+_SPIKE = 10.0  # standard deviations at which errors are clipped
 Predictor = Callable[[Array, Array], Distribution]
 
 
@@ -32,8 +32,8 @@ class Expert:
     """The prediction of one terrain's model.
 
     Attributes:
-        predict: F_t of given (F_n, v_t).
-        rho: correlation of its standardised residual from one sample to the next.
+        predict: distribution of F_t for given (F_n, v_t).
+        rho: correlation of the standardised residual from one sample to the next.
     """
 
     predict: Predictor
@@ -41,7 +41,7 @@ class Expert:
 
 
 def log_densities(trial: PreparedTrial, prediction: Distribution, rho: float) -> Array:
-    """Return the log density of every kept sample given the one before, shape (n,)."""
+    """Return the log density of every kept sample given the previous one, (n,)."""
     sd = np.maximum(prediction.sd, _SMALLEST_SD)
     z = (trial.F_t - prediction.mean) / sd
     before = np.where(_is_next(trial), rho, 0.0)
@@ -53,7 +53,7 @@ def log_densities(trial: PreparedTrial, prediction: Distribution, rho: float) ->
 
 
 def neighbour_correlation(pairs: Sequence[tuple[PreparedTrial, Distribution]]) -> float:
-    """Return rho of trials under their own terrain's models, 0 to 0.99."""
+    """Estimate rho of trials under the models of their own terrain, 0 to 0.99."""
     products = squares = 0.0
     for trial, prediction in pairs:
         z = (trial.F_t - prediction.mean) / np.maximum(prediction.sd, _SMALLEST_SD)
@@ -64,7 +64,7 @@ def neighbour_correlation(pairs: Sequence[tuple[PreparedTrial, Distribution]]) -
 
 
 def _is_next(trial: PreparedTrial) -> np.ndarray:
-    """Return which kept samples follow the one before without a gap, shape (n,)."""
+    """Return which kept samples follow the previous one without a gap, shape (n,)."""
     steps = np.diff(trial.indices)
     usual = int(steps.min()) if steps.size else 1
     return np.concatenate([[False], steps == usual])[: trial.kept]
@@ -72,14 +72,14 @@ def _is_next(trial: PreparedTrial) -> np.ndarray:
 
 @dataclass(frozen=True, slots=True)
 class TerrainScores:
-    """How a trial fits each terrain, sample by sample.
+    """Scores of every sample of a trial by the model of each terrain.
 
     Attributes:
-        terrains: names, m of them.
-        log_density: of every kept sample, shape (n, m).
+        terrains: the m names.
+        log_density: log density of every kept sample, shape (n, m).
         error: absolute error of every kept sample [N], shape (n, m).
         strain: squared error over the predicted variance, shape (n, m); 1 on average
-            where the model is right.
+            if the model is right.
     """
 
     terrains: tuple[str, ...]
@@ -88,7 +88,7 @@ class TerrainScores:
     strain: Array
 
     def windows(self, size: int) -> "list[slice]":
-        """Return consecutive windows of `size` kept samples; a rest is left out."""
+        """Return consecutive windows of `size` kept samples; a remainder is dropped."""
         return windows_of(len(self.log_density), size)
 
     def posterior(self, rows: slice) -> Array:
@@ -98,19 +98,19 @@ class TerrainScores:
         return weight / weight.sum()
 
     def least_error(self, rows: slice) -> str:
-        """Return the terrain whose model is nearest on average: the paper's rule."""
+        """Return the terrain with the smallest mean error: the paper's rule."""
         return self.terrains[int(self.error[rows].mean(axis=0).argmin())]
 
     def likeliest(self, rows: slice) -> str:
-        """Return the terrain of the largest log density."""
+        """Return the terrain with the largest log density."""
         return self.terrains[int(self.log_density[rows].sum(axis=0).argmax())]
 
     def likeliest_group(self, rows: slice, groups: Mapping[str, str]) -> str:
-        """Return the group whose terrains have most of the posterior together.
+        """Return the group of terrains with the largest total posterior.
 
         Args:
-            rows: the samples that decide.
-            groups: group by name of the terrain.
+            rows: samples used.
+            groups: group by terrain name.
         """
         total: dict[str, float] = {}
         for name, share in zip(self.terrains, self.posterior(rows), strict=True):
@@ -120,7 +120,7 @@ class TerrainScores:
 
 
 def score_trial(trial: PreparedTrial, experts: Mapping[str, Expert]) -> TerrainScores:
-    """Return how `trial` fits the prediction of every expert."""
+    """Score `trial` by the prediction of every expert."""
     predictions = [
         (expert.predict(trial.F_n, trial.v_t), expert.rho)
         for expert in experts.values()

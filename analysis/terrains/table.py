@@ -1,8 +1,8 @@
-"""What a terrain database answers, and the table that it is read from.
+"""Tabulated distributions of F_t, and the estimates read from them.
 
-A distribution of F_t is kept as quantiles. Between them forces are linear in the normal
-score of the share, and beyond the outer ones they go on with the same slope: a normal
-distribution comes back exactly.
+A distribution of F_t is stored as quantiles. Forces are interpolated linearly in the
+normal score of the share and extrapolated with the slope of the outer pair, so a normal
+distribution is reproduced exactly.
 """
 
 from bisect import bisect_right
@@ -22,8 +22,8 @@ from analysis.study.distribution import (
 
 Rows = tuple[tuple[float, ...], ...]
 
-_AT_ONCE = 1024  # points
-_NODES = 64  # shares that moments are integrated over
+_AT_ONCE = 1024  # points evaluated at a time
+_NODES = 64  # quadrature nodes for moments
 
 
 @dataclass(frozen=True)
@@ -33,8 +33,8 @@ class Table:
     Attributes:
         F_n: normal forces [N], shape (n,), increasing.
         v_t: velocities [m/s], shape (m,), increasing.
-        shares: of the quantiles, increasing, shape (q,).
-        forces: F_t [N] that is not reached with each share, q times n rows of m.
+        shares: probabilities of the quantiles, increasing, shape (q,).
+        forces: quantiles of F_t [N], q times n rows of m.
     """
 
     F_n: tuple[float, ...]
@@ -54,7 +54,7 @@ class Table:
         return is_load and self.v_t[0] <= v_t <= self.v_t[-1]
 
     def covers_many(self, F_n: Array, v_t: Array) -> NDArray[np.bool_]:
-        """Return the same of many points, shape (n,)."""
+        """Return which points lie between the ends of both axes, shape (n,)."""
         is_load = (self.F_n[0] <= F_n) & (F_n <= self.F_n[-1])
         return is_load & (self.v_t[0] <= v_t) & (v_t <= self.v_t[-1])
 
@@ -67,7 +67,7 @@ class Table:
         if cell.size <= _AT_ONCE:
             return _blended(cells.take(cell, axis=1), a, b).T
         forces = np.empty((cell.size, cells.shape[2]))
-        for start in range(0, cell.size, _AT_ONCE):  # what fits into the cache
+        for start in range(0, cell.size, _AT_ONCE):  # blocks that fit into the cache
             part = slice(start, start + _AT_ONCE)
             corners = cells.take(cell[part], axis=1)
             forces[part] = _blended(corners, a[part], b[part])
@@ -75,11 +75,11 @@ class Table:
 
     @cached_property
     def _arrays(self) -> tuple[tuple[Array, Array], tuple[Array, Array], Array]:
-        """Return both axes with their numbers and, by point, the cell above it.
+        """Return both axes with their indices, and the cell above each point.
 
-        Cells have the shape (4, n m, q): F_t [N] at the point, what it gains along v_t,
-        what it gains to the next load, and what that gains along v_t. Beyond the last
-        point of an axis nothing is gained.
+        Cells have the shape (4, n m, q): F_t [N] at the point, its difference along
+        v_t, its difference to the next load, and the difference of that along v_t.
+        Beyond the last point of an axis the differences are 0.
         """
         forces = np.array(self.forces)
         along = np.diff(forces, axis=2, append=forces[:, :, -1:])
@@ -90,12 +90,12 @@ class Table:
 
 
 def rows_of(values: Array) -> Rows:
-    """Return an array of shape (n, m) as n rows of m numbers."""
+    """Convert an array of shape (n, m) to n rows of m numbers."""
     return tuple(tuple(row) for row in values.tolist())
 
 
 def _bracket(axis: tuple[float, ...], value: float) -> tuple[int, float]:
-    """Return (lower point, share of the way to the next), clamped to the axis."""
+    """Return (lower index, fraction of the interval), clamped to the axis."""
     if value <= axis[0]:
         return 0, 0.0
     if value >= axis[-1]:
@@ -109,14 +109,14 @@ def _numbered(axis: tuple[float, ...]) -> tuple[Array, Array]:
 
 
 def _brackets(points: Array, numbers: Array, values: Array) -> tuple[np.ndarray, Array]:
-    """Return (lower points, shares of the way to the next), clamped to the axis."""
+    """Return (lower indices, fractions of the interval), clamped to the axis."""
     position = np.interp(values, points, numbers)
     i = position.astype(np.intp)
     return i, position - i
 
 
 def _blended(corners: Array, a: Array, b: Array) -> Array:
-    """Return F_t [N], shape (n, q), in the memory of cells of shape (4, n, q)."""
+    """Interpolate F_t [N], shape (n, q), in place in cells of shape (4, n, q)."""
     low, gains = corners[:2], corners[2:]
     gains *= a[:, None]
     low += gains
@@ -135,11 +135,11 @@ def _blend(rows: Rows, i: int, a: float, j: int, b: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class TractionEstimates:
-    """What is to be expected of a terrain at many points.
+    """Predicted traction on a terrain at many points.
 
     Attributes:
-        shares: of the quantiles, shape (q,).
-        forces: traction [N] that is not reached with each share, shape (q, n).
+        shares: probabilities of the quantiles, shape (q,).
+        forces: quantiles of the traction [N], shape (q, n).
         is_extrapolated: which points lie outside the table, shape (n,).
     """
 
@@ -149,7 +149,7 @@ class TractionEstimates:
 
     @property
     def median(self) -> Array:
-        """Traction [N] that is reached every second time, shape (n,)."""
+        """Median traction [N], shape (n,)."""
         return self.quantile(0.5)
 
     @property
@@ -165,15 +165,15 @@ class TractionEstimates:
         return np.sqrt(weights @ (values - weights @ values) ** 2)
 
     def quantile(self, share: float) -> Array:
-        """Return the traction [N] not reached with probability `share`, shape (n,)."""
+        """Return the quantile of the traction [N] at `share`, shape (n,)."""
         checked_shares((share,))
         return self._forces_at(normal_scores((share,))[:, None])[0]
 
     def at_scores(self, scores: Array) -> Array:
         """Return the traction [N] at normal scores of each point, shape (count, n).
 
-        Beyond the outer shares it goes on with the slope of the last two, but not
-        across 0: where no quantile is below 0 no force is, and likewise above.
+        Beyond the outer shares forces are extrapolated with the slope of the outer
+        pair, but not across 0 unless the quantiles cross it.
 
         Args:
             scores: normal scores of the force, shape (count, n).
@@ -183,7 +183,7 @@ class TractionEstimates:
         return np.clip(self._forces_at(scores), least, most)
 
     def _integrated(self) -> tuple[Array, Array]:
-        """Return weights, shape (64,), and forces [N], shape (64, n), of moments."""
+        """Return quadrature weights (64,) and forces [N] (64, n) for moments."""
         nodes, weights = np.polynomial.legendre.leggauss(_NODES)
         shares = tuple((0.5 * (nodes + 1.0)).tolist())
         return 0.5 * weights, self._forces_at(normal_scores(shares)[:, None])
@@ -195,12 +195,12 @@ class TractionEstimates:
 
 @dataclass(frozen=True, slots=True)
 class TractionEstimate:
-    """What is to be expected of a terrain at one point.
+    """Predicted traction on a terrain at one point.
 
     Attributes:
-        shares: of the quantiles, shape (q,).
-        forces: traction [N] that is not reached with each share, shape (q,).
-        is_extrapolated: the point lies outside the table: the values are of its edge.
+        shares: probabilities of the quantiles, shape (q,).
+        forces: quantiles of the traction [N], shape (q,).
+        is_extrapolated: the point lies outside the table; the values are from its edge.
     """
 
     shares: tuple[float, ...]
@@ -209,7 +209,7 @@ class TractionEstimate:
 
     @property
     def median(self) -> float:
-        """Traction [N] that is reached every second time."""
+        """Median traction [N]."""
         return self.quantile(0.5)
 
     @property
@@ -223,7 +223,7 @@ class TractionEstimate:
         return float(self._many().sd[0])
 
     def quantile(self, share: float) -> float:
-        """Return the traction [N] that is not reached with probability `share`."""
+        """Return the quantile of the traction [N] at probability `share`."""
         return float(self._many().quantile(share)[0])
 
     def probability_below(self, force: float) -> float:
@@ -238,19 +238,19 @@ class TractionEstimate:
 
 
 def _score_of(force: float, forces: Sequence[float], scores: Array) -> float:
-    """Return the normal score of a force [N] among quantiles, which do not decrease."""
+    """Return the normal score of a force [N] among non-decreasing quantiles."""
     i = min(max(bisect_right(forces, force) - 1, 0), len(forces) - 2)
     step = max(forces[i + 1] - forces[i], 1e-9)
     return float(scores[i] + (force - forces[i]) / step * (scores[i + 1] - scores[i]))
 
 
 class SlipRisk(float):
-    """A probability of too little traction, a number that knows where it comes from.
+    """Probability of too little traction, with its kind.
 
     Attributes:
-        kind: "in motion": of a foot that slides, not of one at rest.
-        is_extrapolated: the point lies outside the table: the risk is that of its edge,
-            and nobody has measured it.
+        kind: "in motion": for a sliding foot, not one at rest.
+        is_extrapolated: the point lies outside the measured table; the risk is from its
+            edge.
     """
 
     __slots__ = ("is_extrapolated",)
@@ -258,7 +258,7 @@ class SlipRisk(float):
     is_extrapolated: bool
 
     def __new__(cls, probability: float, *, is_extrapolated: bool) -> "SlipRisk":
-        """Return the risk `probability` (0 to 1)."""
+        """Create a risk from a probability (0 to 1)."""
         risk = super().__new__(cls, probability)
         risk.is_extrapolated = is_extrapolated
         return risk

@@ -1,4 +1,4 @@
-"""From trials to a terrain database: models of all trials, tabulated."""
+"""Terrain database of a study: models fitted to all trials and tabulated."""
 
 import zlib
 from collections.abc import Mapping, Sequence
@@ -23,21 +23,21 @@ from analysis.terrains.known import KnownTerrain, TerrainDatabase
 from analysis.terrains.path_copula import PathCopula, ScoredTrial, fit_copula
 from analysis.terrains.table import Table, rows_of
 
-POINTS = 32  # of each axis
-_LOAD_PERCENTILE = 99.8  # percentile of F_n up to which the tables reach, with a margin
-_MARGIN = 1.2
-_STREAM = 2_000_000  # apart from folds and terrain fits
+POINTS = 32  # per axis
+_LOAD_PERCENTILE = 99.8  # percentile of F_n that sets the range of the tables
+_MARGIN = 1.2  # factor on that percentile
+_STREAM = 2_000_000  # random stream, distinct from folds and terrain fits
 
 
 @dataclass(frozen=True, slots=True)
 class TableTask:
-    """Everything the tables of one terrain need.
+    """Input for the tables of one terrain.
 
     Attributes:
         terrain: its name.
-        trials: kept samples of every trial that has any.
+        trials: kept samples of every non-empty trial.
         axes: points of the tables: F_n [N] and v_t [m/s].
-        options: how to fit.
+        options: options of the fits.
     """
 
     terrain: str
@@ -47,9 +47,9 @@ class TableTask:
 
 
 def tabulate(task: TableTask) -> dict[str, dict[str, Any]]:
-    """Return models of all trials of a terrain as tables; a pure function of the task.
+    """Fit models to all trials of a terrain and tabulate them; pure.
 
-    Of each model its parameters and the quantiles of F_t [N], an array of shape
+    Returns the parameters of each model and its quantiles of F_t [N], an array of shape
     (q, n, m) over the axes. A model that cannot be fitted is left out.
     """
     F_n, v_t = (grid.ravel() for grid in np.meshgrid(*task.axes, indexing="ij"))
@@ -70,7 +70,7 @@ def tabulate(task: TableTask) -> dict[str, dict[str, Any]]:
 
 
 def training_set(task: TableTask) -> TrainingSet:
-    """Return the samples of all trials, the rows of the processes chosen at random."""
+    """Return the samples of all trials, with the rows for the processes drawn."""
     rows = SampleTable.joined(task.trials)
     key = (task.options.seed, zlib.crc32(task.terrain.encode()), _STREAM)
     count = min(task.options.gp_points, rows.count)
@@ -85,14 +85,14 @@ def database_of(
     workers: Workers | int | None = None,
     store: ResultStore | None = None,
 ) -> str:
-    """Return the text of a terrain database of every terrain of a study.
+    """Make the text of a terrain database with every terrain of a study.
 
     Args:
-        study: the trials and how models are fitted.
-        identification: how well they can be told apart; gives correlations and limits.
-        made_utc: when.
-        workers: where the models are fitted.
-        store: results of earlier runs.
+        study: trials and fit options.
+        identification: terrain classification; provides correlations and limits.
+        made_utc: time stamp of the database.
+        workers: processes that fit the models.
+        store: cache of earlier results.
 
     Raises:
         SettingsError: no terrain has kept samples.
@@ -112,8 +112,8 @@ def database_of(
             samples=sum(rows.count for rows in task.trials),
             rho=_rho(identification, task.terrain),
             limits=_limits(identification, task.terrain),
-            tables={n: _table(one["quantiles"], axes) for n, one in fitted.items()},
-            parameters={n: one["parameters"] for n, one in fitted.items()},
+            tables={n: _table(m["quantiles"], axes) for n, m in fitted.items()},
+            parameters={n: m["parameters"] for n, m in fitted.items()},
             default=default,
             titles={name: TITLES[name] for name in fitted},
             recogniser=recogniser,
@@ -131,14 +131,14 @@ def database_of(
 
 
 def copula_of(result: TerrainResult, model: str, slowest: float) -> PathCopula | None:
-    """Return how forces of a terrain's trials hang together; None where not known.
+    """Fit the copula of a terrain's trials; None with too few trials.
 
-    Each trial is scored by the model that was fitted without it.
+    Each trial is scored by the model fitted without it.
 
     Args:
-        result: the terrain with its folds.
+        result: results of the terrain with its folds.
         model: name of the model.
-        slowest: a foot that is slower sticks [m/s].
+        slowest: speed below which the foot sticks [m/s].
     """
     held_out = [(result.trials[k], fold.model) for k, fold in result.left_out(model)]
     scored = [
@@ -175,14 +175,14 @@ def _tasks(study: Study) -> tuple[tuple[Array, Array], list[TableTask]]:
 
 
 def _rho(identification: Identification | None, terrain: str) -> float:
-    """Return the correlation of neighbouring residuals; 0 where it is not known."""
+    """Return the correlation of neighbouring residuals; 0 if not known."""
     return 0.0 if identification is None else round(identification.rho[terrain], 4)
 
 
 def _axes(
     trials: Sequence[PreparedTrial], options: PrepareOptions
 ) -> tuple[Array, Array]:
-    """Return F_n [N] up to nearly all of it, v_t [m/s] finer where it is slow."""
+    """Return F_n [N] up to a high percentile, v_t [m/s] in geometric steps."""
     loads = np.concatenate([trial.F_n for trial in trials])
     most = max(_MARGIN * float(np.percentile(loads, _LOAD_PERCENTILE)), 1.0)
     least = min(float(np.percentile(loads, 100.0 - _LOAD_PERCENTILE)), 0.0)

@@ -1,10 +1,10 @@
-"""Verdicts on windows of a trial: the likeliest terrain, flat or rocky, or none known.
+"""Verdicts on windows of a trial: likeliest terrain, flat or rocky, or none.
 
-A window is of none of the known terrains where it strains the likeliest one's model
-more than nearly all of its own windows do, or is smoother than nearly all of them: a
-plate fits into the wide bands of stones and shows itself only by what it lacks. Among
-stones the likeliest terrain is a name for a family: they are alike, and `surface`, flat
-or rocky, is what can be told.
+A window belongs to none of the known terrains if its strain under the likeliest model
+exceeds that of nearly all windows of that terrain, or if it is smoother than nearly all
+of them: a plate fits within the wide bands of stones and differs only by its lack of
+roughness. Terrains of stones are so similar that the likeliest one only stands for the
+group; `surface`, flat or rocky, is what can be decided.
 """
 
 from collections.abc import Mapping
@@ -21,16 +21,16 @@ from analysis.terrains.logistic import RidgeLogistic
 from analysis.terrains.recognition import Expert, TerrainScores, score_trial
 from analysis.terrains.windows import RESID, window_features
 
-NONE = "none"  # of the known terrains
+NONE = "none"  # none of the known terrains
 
 
 @dataclass(frozen=True, slots=True)
 class WindowEvidence:
-    """The evidence of one window.
+    """Verdict on one window.
 
     Attributes:
-        t: time of its last sample [s].
-        posterior: probability of each terrain, in the database's order.
+        t: time of the last sample [s].
+        posterior: probability of each terrain, in the order of the database.
         best: the likeliest terrain, or "none".
         surface: "flat", "rocky" or "none"; or the likeliest terrain's own kind.
         rocky: probability of rocky ground by the classifier; None without one.
@@ -45,15 +45,15 @@ class WindowEvidence:
 
 @dataclass(frozen=True, slots=True)
 class Recognition:
-    """The terrain that a trial is attributed to.
+    """Verdict on a trial.
 
     Attributes:
-        terrains: names, in the database's order.
-        moments: evidence window by window.
+        terrains: names in the order of the database.
+        moments: verdict on every window.
         posterior: probability of each terrain after the whole trial.
-        best: the verdict on the whole trial: a terrain or "none".
-        least_error: the paper's rule: the terrain with the smallest error.
-        surface: the answer of most windows: "flat", "rocky", "none".
+        best: terrain of the whole trial, or "none".
+        least_error: terrain with the smallest error: the paper's rule.
+        surface: majority over the windows: "flat", "rocky", "none".
     """
 
     terrains: tuple[str, ...]
@@ -66,7 +66,7 @@ class Recognition:
 
 @dataclass(frozen=True, slots=True)
 class WindowLimits:
-    """What hardly any of a terrain's own windows of one size goes beyond.
+    """Rejection limits of a terrain for windows of one size.
 
     Attributes:
         roughness: smallest log sd of F_t about a line in F_n [nat].
@@ -77,21 +77,21 @@ class WindowLimits:
     strain: float = np.inf
 
     def exclude(self, roughness: float, strain: float) -> bool:
-        """Whether a window is too smooth, or strains the model too much."""
+        """Whether a window is too smooth or its strain is too large."""
         return roughness < self.roughness or strain > self.strain
 
 
 def recognise(
     trial: PreparedTrial, database: TerrainDatabase, window: int = 100
 ) -> Recognition | None:
-    """Return which terrain of `database` a trial is from; None without a window.
+    """Attribute a trial to a terrain of `database`; None without a window.
 
-    The verdict is "none" when most windows are of none of the known terrains.
+    The verdict is "none" if most windows belong to none of the known terrains.
 
     Args:
-        trial: its kept samples count.
+        trial: prepared trial; its kept samples are used.
         database: the known terrains.
-        window: kept samples per moment: 50, 100 or 200.
+        window: window size [kept samples]: 50, 100 or 200.
     """
     scores = score_trial(
         trial,
@@ -103,14 +103,14 @@ def recognise(
     windows = scores.windows(window)
     if not windows:
         return None
-    known = _Known.of(database, window)
+    rules = _WindowRules.of(database, window)
     moments = [
-        known.moment(_Judged(trial, scores, rows, row))
+        rules.verdict(_Window(trial, scores, rows, row))
         for rows, row in zip(windows, window_features(trial, windows), strict=True)
     ]
     whole = slice(0, len(scores.log_density))
-    strange = sum(moment.best == NONE for moment in moments)
-    is_none = strange > 0.5 * len(moments)
+    rejected = sum(moment.best == NONE for moment in moments)
+    is_none = rejected > 0.5 * len(moments)
     surfaces = [moment.surface for moment in moments]
     return Recognition(
         terrains=scores.terrains,
@@ -123,8 +123,8 @@ def recognise(
 
 
 @dataclass(frozen=True, slots=True)
-class _Judged:
-    """A window of a trial: its kept samples and its features."""
+class _Window:
+    """A window of a trial: its kept samples and features."""
 
     trial: PreparedTrial
     scores: TerrainScores
@@ -133,13 +133,13 @@ class _Judged:
 
 
 @dataclass(frozen=True, slots=True)
-class _Known:
-    """What is known for windows of one size.
+class _WindowRules:
+    """Limits and classifier for windows of one size.
 
     Attributes:
-        limits: of every terrain's windows.
-        surface: "flat", "rocky" or its own kind, by terrain.
-        classifier: of flat and rocky ground; None where there is none of that size.
+        limits: rejection limits by terrain.
+        surface: "flat", "rocky" or the terrain's own kind, by terrain.
+        classifier: classifier of flat and rocky ground; None without one of that size.
     """
 
     limits: Mapping[str, WindowLimits]
@@ -147,7 +147,7 @@ class _Known:
     classifier: RidgeLogistic | None
 
     @classmethod
-    def of(cls, database: TerrainDatabase, window: int) -> "_Known":
+    def of(cls, database: TerrainDatabase, window: int) -> "_WindowRules":
         kinds = {name: terrain.kind for name, terrain in database.terrains.items()}
         surfaces = database.surfaces
         return cls(
@@ -159,18 +159,18 @@ class _Known:
             classifier=None if surfaces is None else surfaces.models.get(window),
         )
 
-    def moment(self, judged: _Judged) -> WindowEvidence:
-        scores, rows = judged.scores, judged.rows
+    def verdict(self, window: _Window) -> WindowEvidence:
+        scores, rows = window.scores, window.rows
         best = scores.likeliest(rows)
         strain = float(scores.strain[rows, scores.terrains.index(best)].mean())
-        is_none = self.limits[best].exclude(float(judged.features[RESID]), strain)
+        is_none = self.limits[best].exclude(float(window.features[RESID]), strain)
         if self.classifier is None:
             rocky, surface = None, scores.likeliest_group(rows, self.surface)
         else:
-            rocky = float(self.classifier.probabilities(judged.features[None])[0])
+            rocky = float(self.classifier.probabilities(window.features[None])[0])
             surface = ROCKY_GROUND if rocky > 0.5 else FLAT_GROUND
         return WindowEvidence(
-            t=float(judged.trial.smooth.t[judged.trial.indices[rows.stop - 1]]),
+            t=float(window.trial.smooth.t[window.trial.indices[rows.stop - 1]]),
             posterior=tuple(scores.posterior(rows).tolist()),
             best=NONE if is_none else best,
             surface=NONE if is_none else surface,
@@ -179,7 +179,7 @@ class _Known:
 
 
 def limits_of(terrain: KnownTerrain, window: int) -> WindowLimits:
-    """Return the limits of a known terrain's windows; none where they are not known."""
+    """Return the rejection limits of a terrain; infinite where not known."""
     return WindowLimits(
         roughness=terrain.roughness.get(window, -np.inf),
         strain=terrain.limits.get(window, np.inf),

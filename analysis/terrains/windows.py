@@ -1,8 +1,8 @@
-"""What a window of motion shows without any model: features of its stretch.
+"""Model-free features of a window of motion.
 
 A window is a number of kept samples; its stretch is every thinned sample from its first
-to its last, those in which the foot sticks, runs or is thrown back included. Features
-are functions of the stretch alone, so that a live process computes the same numbers.
+to its last, including those in which the foot sticks, slips fast or bounces back.
+Features depend on the stretch alone, so that a live process computes the same numbers.
 """
 
 from dataclasses import dataclass
@@ -28,11 +28,11 @@ FEATURES = (
     "log mean F_t",
     "slope of F_t on F_n",
 )
-RESID = 0  # number of the feature that tells rough ground from smooth
-_STRIDES = 5  # windows begin at every fifth of their size where they overlap
+RESID = 0  # index of the feature that separates rough from smooth ground
+_STRIDES = 5  # overlapping windows begin at every fifth of their size
 _STICKING = 0.005  # m/s
-_LEAST = 1e-3  # N, m/s or s below which logarithms end
-_LEAST_LOAD = 1.0  # N; ratios are not taken below
+_LEAST = 1e-3  # N, m/s or s, lower limit of values in logarithms
+_LEAST_LOAD = 1.0  # N, lower limit of the load in ratios
 _LARGEST_RATIO = 10.0
 _CURL = 0.01  # m/s
 
@@ -46,7 +46,7 @@ class Stretch:
         v_t: velocity [m/s], shape (n,).
         F_n: normal force [N], shape (n,).
         F_t: traction force [N], shape (n,).
-        is_kept: inside the window of velocities, shape (n,).
+        is_kept: inside the velocity window, shape (n,).
     """
 
     t: Array
@@ -56,7 +56,7 @@ class Stretch:
     is_kept: np.ndarray
 
     def features(self) -> Array:
-        """Return the numbers of `FEATURES`, shape (13,)."""
+        """Return the features in the order of `FEATURES`, shape (13,)."""
         F_n, F_t = self.F_n[self.is_kept], self.F_t[self.is_kept]
         slope, sd = _line(F_n, F_t)
         steps = np.diff(self.F_t)
@@ -82,12 +82,12 @@ class Stretch:
 
 
 def windows_of(kept: int, size: int, *, overlap: bool = False) -> list[slice]:
-    """Return windows of `size` kept samples; a rest is left out.
+    """Return windows of `size` kept samples; a remainder is dropped.
 
     Args:
         kept: number of kept samples.
-        size: of a window.
-        overlap: begin one at every fifth of the size, else one after the other.
+        size: size of a window.
+        overlap: begin a window at every fifth of the size instead of consecutively.
     """
     step = max(size // _STRIDES, 1) if overlap else size
     return [slice(k, k + size) for k in range(0, kept - size + 1, step)]
@@ -114,7 +114,7 @@ def stretch_of(trial: PreparedTrial, window: slice) -> Stretch:
 
 
 def _line(x: Array, y: Array) -> tuple[float, float]:
-    """Return slope, and sd of y about the straight line in x."""
+    """Return the slope, and the sd of y about the fitted line in x."""
     dx, dy = x - x.mean(), y - y.mean()
     variance = float(dx @ dx)
     slope = float(dx @ dy) / variance if variance > _LEAST**2 else 0.0

@@ -1,7 +1,7 @@
-"""Intervals of the Tustin parameters from resampled trials.
+"""Bootstrap intervals of the Tustin parameters from resampled trials.
 
-Samples of one trial are strongly correlated, so s^2 (J'J)^-1 would be far too sure:
-whole trials are drawn with replacement instead, and every draw is fitted.
+Samples of one trial are strongly correlated, so s^2 (J'J)^-1 would be far too small.
+Whole trials are drawn with replacement instead, and every draw is fitted.
 """
 
 from collections.abc import Sequence
@@ -31,10 +31,10 @@ def bootstrap_tustin(
 
     Args:
         trials: (F_n, v_t, F_t) of every trial.
-        fit: the fit of all of them, where every draw starts as well.
-        rng: draws the trials.
+        fit: the fit to all trials; an additional start for every draw.
+        rng: random generator for the draws.
         bounds: box of the search.
-        draws: number of mixtures of trials.
+        draws: number of bootstrap draws.
     """
     box = (bounds or TustinBounds()).box()
     moments = _moments(trials, fit.form, box)
@@ -59,7 +59,7 @@ def _moments(trials: Sequence[Rows], form: TustinForm, box: Box) -> Moments:
 
 
 def _coarse(sums: Array, v: Array, box: Box, warm: Array) -> Array:
-    """Return for every draw the best of a grid and the warm start, (draws, 2)."""
+    """Return the best of grid and warm start for every draw, shape (draws, 2)."""
     axes = [
         np.linspace(low, high, count)
         for (low, high), count in zip(box.logarithmic, _GRID, strict=True)
@@ -70,7 +70,7 @@ def _coarse(sums: Array, v: Array, box: Box, warm: Array) -> Array:
 
 
 def _zoom(sums: Array, v: Array, q: Array, box: Box) -> Array:
-    """Return the points after going to the best neighbour in ever smaller steps."""
+    """Refine the points by pattern search with halving steps."""
     low, high = box.logarithmic.T
 
     def sse(near: Array) -> Array:

@@ -1,12 +1,12 @@
-"""Least squares with three parameters in a box, solved exactly and in bulk.
+"""Box-constrained least squares with three parameters, exact and vectorised.
 
 With Gram matrix G = A'A and c = A'y the sum of squares is y'y - 2 c'p + p'Gp, a convex
-quadratic. Where its stationary point lies in the box, that is the minimum. Otherwise
-the minimum lies on one of the bounds that the stationary point violates: from a point
-inside all of those the cost would still fall on the way to the stationary point. With
-one parameter held at such a bound the same holds of the two others. So one of the six
-orders in which parameters are held, each where its violated bound is, leads to the
-minimum; every order gives a point of the box, and the best of them is taken.
+quadratic. If its stationary point lies in the box, that is the minimum. Otherwise the
+minimum lies on one of the bounds that the stationary point violates: from a point
+strictly inside all of those, the cost still decreases towards the stationary point.
+With one parameter fixed at such a bound the same argument applies to the other two. So
+one of the six orders of fixing parameters at their violated bounds leads to the
+minimum. Every order gives a feasible point, and the best of the six is taken.
 """
 
 from itertools import permutations
@@ -15,7 +15,7 @@ import numpy as np
 
 from analysis.data.series import Array
 
-# relative; keeps collinear columns solvable. The tiny part does that for zero ones
+# The relative ridge keeps collinear columns solvable, the tiny one zero columns.
 _RIDGE = 1.0 + 1e-12 * np.eye(3)
 _TINY = np.finfo(np.float64).tiny * np.eye(3)
 _ORDERS = np.array(list(permutations(range(3))))  # (6, 3)
@@ -38,15 +38,15 @@ def solve_in_box(G: Array, c: Array, lower: Array, upper: Array) -> Array:
     p = _stationary(ridged, c)
     is_outside = ((p < lower) | (p > upper)).any(axis=-1)
     if is_outside.any():
-        held = np.minimum(np.maximum(p[is_outside], lower), upper)
-        p[is_outside] = _on_a_bound(
-            ridged[is_outside], c[is_outside], held, lower, upper
+        clipped = np.minimum(np.maximum(p[is_outside], lower), upper)
+        p[is_outside] = _bound_minimum(
+            ridged[is_outside], c[is_outside], clipped, lower, upper
         )
     return p
 
 
 def _stationary(G: Array, c: Array) -> Array:
-    """Return the solution of G p = c, shape (..., 3), by elimination without pivots."""
+    """Solve G p = c by elimination without pivoting, shape (..., 3)."""
     a, b, d = G[..., 0, 0], G[..., 0, 1], G[..., 0, 2]
     first, second = b / a, d / a
     e = G[..., 1, 1] - first * b
@@ -61,19 +61,21 @@ def _stationary(G: Array, c: Array) -> Array:
     return p
 
 
-def _on_a_bound(G: Array, c: Array, held: Array, low: Array, high: Array) -> Array:
-    """Return the minimum where the stationary point is outside, shape (m, 3).
+def _bound_minimum(
+    G: Array, c: Array, clipped: Array, low: Array, high: Array
+) -> Array:
+    """Return the constrained minimum for stationary points outside the box, (m, 3).
 
     Args:
         G: Gram matrices, shape (m, 3, 3).
         c: right-hand sides, shape (m, 3).
-        held: stationary points clipped into the box, shape (m, 3).
+        clipped: stationary points clipped to the box, shape (m, 3).
         low: lower bounds, shape (3,).
         high: upper bounds, shape (3,).
     """
     i, j, k = _ORDERS.T
     G_jj, G_jk, G_kk = G[:, j, j], G[:, j, k], G[:, k, k]
-    p_i = held[:, i]
+    p_i = clipped[:, i]
     c_j, c_k = c[:, j] - G[:, i, j] * p_i, c[:, k] - G[:, i, k] * p_i
     ratio = G_jk / G_kk
     p_j = (c_j - ratio * c_k) / (G_jj - ratio * G_jk)

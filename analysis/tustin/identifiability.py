@@ -1,4 +1,4 @@
-"""What the samples can and cannot say about the Tustin parameters."""
+"""Identifiability of the Tustin parameters from the samples."""
 
 from typing import NamedTuple
 
@@ -9,11 +9,11 @@ from analysis.tustin.varpro import Point, Problem
 
 _SINGULAR = 1e8  # condition number of the scaled Gram matrix
 _UNCORRELATED = 0.05
-_WIDE = 10.0  # ratio of an interval's ends that says nothing about the value
+_WIDE = 10.0  # ratio of an interval's ends above which it is uninformative
 
 
 class Interval(NamedTuple):
-    """A range of a parameter.
+    """Interval of a parameter.
 
     Attributes:
         lower: lower end.
@@ -25,7 +25,7 @@ class Interval(NamedTuple):
 
 
 class Profiles(NamedTuple):
-    """What the samples leave open about the two parameters of the curve's shape.
+    """Profile intervals of the two shape parameters.
 
     Attributes:
         v_s: 95 % interval of the Stribeck velocity [m/s].
@@ -39,13 +39,13 @@ class Profiles(NamedTuple):
 
     @property
     def are_closed(self) -> bool:
-        """Whether both intervals end inside the search and span less than ten."""
+        """Whether both intervals end inside the search and span at most a factor 10."""
         widths = (self.v_s.upper / self.v_s.lower, self.delta_s.upper / self.delta_s[0])
         return not self.touches_edge and max(widths) <= _WIDE
 
 
 def is_identifiable(problem: Problem, point: Point) -> bool:
-    """Return whether the three linear columns can be told apart at the optimum."""
+    """Return whether the three linear columns are independent at the optimum."""
     A = problem.design(point.q)
     length = np.linalg.norm(A, axis=0)
     if length.min() == 0:
@@ -54,10 +54,10 @@ def is_identifiable(problem: Problem, point: Point) -> bool:
 
 
 def is_straight(problem: Problem, point: Point) -> bool:
-    """Return whether mu F_n + b v_t + F_0 does as well as the whole model.
+    """Return whether mu F_n + b v_t + F_0 fits as well as the full model.
 
-    As well: its SSE is below (1 + 4/n_eff) times the model's, with n_eff the number of
-    independent samples.
+    Criterion: its SSE is below (1 + 4/n_eff) times the model's, with n_eff the number
+    of independent samples.
     """
     line = np.column_stack([problem.F_n, problem.v_t, np.ones(problem.v_t.size)])
     root = np.sqrt(problem.weights)
@@ -68,12 +68,12 @@ def is_straight(problem: Problem, point: Point) -> bool:
 
 
 def independent_samples(residual: Array) -> float:
-    """Return how many independent samples a residual (n,) is worth: n/tau."""
+    """Effective number of independent samples of a residual (n,): n/tau."""
     return residual.size / correlation_samples(residual)
 
 
 def correlation_samples(residual: Array) -> float:
-    """Return the integrated autocorrelation time of a residual [samples], >= 1.
+    """Integrated autocorrelation time of a residual [samples], at least 1.
 
     The sum ends where the correlation first falls below 0.05.
     """

@@ -2,8 +2,8 @@
 
 F_t = mu F_n + (F_s - mu F_n) exp(-|v_t/v_s|^delta_s) + b v_t             (eq. 1)
 
-F_s is a constant in newtons. Only the curve is identified on most terrains, not each
-parameter; the flags of a fit say so.
+F_s is a constant in newtons. On most terrains the data identify only the curve, not
+each parameter; the flags of a fit report this.
 """
 
 from dataclasses import astuple, dataclass, field, fields
@@ -30,8 +30,8 @@ NO_STRIBECK = "no Stribeck shape"
 UNITS = {"mu": "1", "F_s": "N", "v_s": "m/s", "delta_s": "1", "b": "kg/s"}
 SYMBOLS = {"mu": "μ", "F_s": "F_s", "v_s": "v_s", "delta_s": "δ_s", "b": "b"}
 
-_LOG_EDGE = 0.01  # v_s, delta_s: relative closeness that counts as on a bound
-_LINEAR_EDGE = 1e-5  # mu, F_s, b: the same, of the width of the range
+_LOG_EDGE = 0.01  # v_s, delta_s: relative distance that counts as on a bound
+_LINEAR_EDGE = 1e-5  # mu, F_s, b: the same, relative to the width of the range
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,11 +55,11 @@ class TustinParameters:
 
 @dataclass(frozen=True, slots=True)
 class TustinForm:
-    """Which variant of the model is fitted, and how residuals are weighed.
+    """Variant of the model and loss function of the fit.
 
     Attributes:
         static: "constant" has F_s in newtons (eq. 1 as printed), "proportional"
-            F_s = f_s F_n with f_s [-] in the place of F_s (as the paper's text says).
+            F_s = f_s F_n with f_s [-] in place of F_s (as in the paper's text).
         loss: "squares" (the paper), "huber" or "student".
     """
 
@@ -96,11 +96,11 @@ class TustinBounds:
                 )
 
     def items(self) -> list[tuple[str, tuple[float, float]]]:
-        """Return (parameter, (lower, upper)) in the order of the parameters."""
+        """Return (parameter, (lower, upper)) in parameter order."""
         return [(item.name, getattr(self, item.name)) for item in fields(self)]
 
     def reached(self, name: str, value: float) -> Literal["lower", "upper"] | None:
-        """Return the bound that a value of the parameter `name` lies on, if any."""
+        """Return the bound that a value of parameter `name` lies on, or None."""
         edges: tuple[float, float] = getattr(self, name)
         width, is_logarithmic = edges[1] - edges[0], name in {"v_s", "delta_s"}
         for side, edge in zip(("lower", "upper"), edges, strict=True):
@@ -109,7 +109,7 @@ class TustinBounds:
         return None
 
     def box(self) -> Box:
-        """Return the same bounds as the search takes them."""
+        """Return the bounds in the form used by the search."""
         linear = np.array([self.mu, self.F_s, self.b])
         logarithmic = np.log(np.array([self.v_s, self.delta_s]))
         return Box(linear[:, 0], linear[:, 1], logarithmic)
@@ -123,9 +123,9 @@ class TustinFit:
         parameters: the optimum.
         sse: sum of squared residuals [N^2], unweighted.
         rows: number of samples it was fitted to.
-        flags: what a reader must know before believing a parameter.
+        flags: warnings about the parameters.
         form: variant that was fitted.
-        profiles: intervals of v_s and delta_s that the samples leave open.
+        profiles: profile intervals of v_s and delta_s.
     """
 
     parameters: TustinParameters
@@ -146,7 +146,7 @@ class TustinFit:
 
     @property
     def residual_sd(self) -> float:
-        """Standard deviation of the residual [N], five parameters taken off."""
+        """Standard deviation of the residual [N], corrected for five parameters."""
         freedom = max(self.rows - len(fields(TustinParameters)), 1)
         return float(np.sqrt(self.sse / freedom))
 
@@ -190,7 +190,7 @@ def fit_tustin(
     bounds: TustinBounds | None = None,
     form: TustinForm | None = None,
 ) -> TustinFit:
-    """Return the Tustin model inside `bounds` with the smallest loss.
+    """Fit the Tustin model within `bounds` by minimising the loss.
 
     Args:
         F_n: normal force [N], shape (n,).
@@ -230,7 +230,7 @@ def fit_tustin(
 
 
 def parameters_at(point: Point) -> TustinParameters:
-    """Return the parameters of a point of the search."""
+    """Convert a point of the search to parameters."""
     mu, F_s, b = (float(value) for value in point.p)
     v_s, delta_s = (float(value) for value in np.exp(point.q))
     return TustinParameters(mu=mu, F_s=F_s, v_s=v_s, delta_s=delta_s, b=b)

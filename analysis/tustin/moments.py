@@ -1,4 +1,4 @@
-"""The samples of a Tustin fit as sums over narrow bins of velocity.
+"""Samples of a Tustin fit as sums over narrow velocity bins.
 
 Given (v_s, delta_s) the normal equations need the samples only through e(v) times
 products of F_n, v_t, F_t and 1. Sums of those over bins of 2 % of velocity, one set per
@@ -28,12 +28,12 @@ _MOST_BINS = 300
 _CHI2_95 = 3.841458820694124  # of one degree of freedom
 _GRID = (16, 14)  # points over log v_s and log delta_s
 _POLISHED = 4  # starting cells, no two of them neighbours
-_BLOCK = 128  # points at a time: what belongs to them stays in the cache
-_ZOOMS = 8  # every one halves the step
+_BLOCK = 128  # points at a time, so that their data stay in the cache
+_ZOOMS = 8  # each halves the step
 _STAR = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)], dtype=float)
 _STEEP = 100  # points along the largest exponent
-_APART = 0.05  # of q, below which two points lead to the same optimum
-_POINTS, _ACROSS = 25, 24  # of a profile: along it, and minimised over
+_DISTINCT = 0.05  # distance in q below which two points lead to the same optimum
+_POINTS, _ACROSS = 25, 24  # of a profile: along the fixed and the free parameter
 
 
 class Moments(NamedTuple):
@@ -41,7 +41,7 @@ class Moments(NamedTuple):
 
     Attributes:
         v: mean velocity of every bin [m/s], shape (k,).
-        sums: of the ten products of (F_n, static column, v_t, F_t), shape
+        sums: sums of the ten products of (F_n, static column, v_t, F_t), shape
             (trials, k, 10) in the order of `_PAIRS`.
     """
 
@@ -50,7 +50,7 @@ class Moments(NamedTuple):
 
     @classmethod
     def of(cls, problem: Problem, lengths: Sequence[int]) -> "Moments":
-        """Return the moments of a problem whose trials have `lengths` rows."""
+        """Sum the products of a problem whose trials have `lengths` rows."""
         log_v = problem.log_v
         width = max(_BIN, float(np.ptp(log_v)) / _MOST_BINS)
         index = np.floor((log_v - log_v.min()) / width).astype(np.intp)
@@ -77,7 +77,7 @@ _PAIR_INDEX = np.array(  # of the products in a symmetric matrix
 
 
 def solve_moments(sums: Array, v: Array, q: Array, box: Box) -> tuple[Array, Array]:
-    """Return the best linear parameters at every q and their sums of squares.
+    """Return the optimal linear parameters at every q and their sums of squares.
 
     Args:
         sums: moments of one mixture of trials, (k, 10), or one per q, (g, k, 10).
@@ -99,7 +99,7 @@ def solve_moments(sums: Array, v: Array, q: Array, box: Box) -> tuple[Array, Arr
 
 
 def _gram(sums: Array, v: Array, q: Array) -> Array:
-    """Return the products of columns and output at every q, shape (g, 4, 4)."""
+    """Return the Gram matrix of design columns and F_t at every q, shape (g, 4, 4)."""
     e = np.log(v) - q[:, :1]
     e *= np.exp(q[:, 1:])
     e = np.exp(np.minimum(e, LARGEST_LOG_POWER, out=e), out=e)
@@ -120,7 +120,7 @@ def _gram(sums: Array, v: Array, q: Array) -> Array:
 
 
 def _weighted(weight: Array, columns: Array) -> Array:
-    """Return columns of moments summed over the bins, weight (g, k), shape (g, m)."""
+    """Sum columns of moments over the bins with weights (g, k), shape (g, m)."""
     if columns.ndim == 2:
         return weight @ columns
     return (weight[:, None, :] @ columns)[:, 0]
@@ -129,12 +129,12 @@ def _weighted(weight: Array, columns: Array) -> Array:
 def zoom(
     sse: Callable[[Array], Array], q: Array, step: Array, logarithmic: Array
 ) -> Array:
-    """Return points after going to the best neighbour in ever smaller steps.
+    """Refine points by pattern search: move to the best neighbour, halve the step.
 
     Args:
         sse: sums of squares at points of shape (g, 9, 2), shape (g, 9).
-        q: points (log v_s, log delta_s) to begin with, shape (g, 2).
-        step: first steps, shape (2,); every further one is half of the last.
+        q: starting points (log v_s, log delta_s), shape (g, 2).
+        step: initial steps, shape (2,).
         logarithmic: bounds of q, shape (2, 2).
     """
     for size in 0.5 ** np.arange(_ZOOMS):
@@ -144,10 +144,11 @@ def zoom(
 
 
 def profiles(moments: Moments, box: Box, point: Point, residual: Array) -> Profiles:
-    """Return the 95 % profile intervals of v_s and delta_s.
+    """Return the 95 % profile-likelihood intervals of v_s and delta_s.
 
-    One of the two is held on 25 values, the rest minimised over; kept is where
-    SSE < SSE_min (1 + chi2_95/n_eff), n_eff from the correlation of the residual.
+    One of the two is fixed at 25 values and the rest minimised over. The interval holds
+    the values with SSE < SSE_min (1 + chi2_95/n_eff), n_eff from the autocorrelation of
+    the residual.
     """
     limit = point.sse * (1.0 + _CHI2_95 / independent_samples(residual))
     sums = moments.sums.sum(axis=0)
@@ -164,7 +165,7 @@ def profiles(moments: Moments, box: Box, point: Point, residual: Array) -> Profi
 def _profile(
     sums: Array, v: Array, box: Box, point: Point, held: int, limit: float
 ) -> tuple[float, float]:
-    """Return the ends, in logarithms, of where the profile is below the limit."""
+    """Return the ends of the range with a profile below the limit, in logarithms."""
     (low, high), (bottom, top) = box.logarithmic[[held, 1 - held]]
     along = np.linspace(low, high, _POINTS)
     across = np.linspace(bottom, top, _ACROSS)
@@ -172,15 +173,15 @@ def _profile(
     grid[..., held], grid[..., 1 - held] = along[:, None], across
     sse = solve_moments(sums, v, grid.reshape(-1, 2), box)[1]
     kept = along[sse.reshape(_POINTS, _ACROSS).min(axis=1) < limit]
-    inside = np.append(kept, point.q[held])  # the optimum itself always belongs to it
+    inside = np.append(kept, point.q[held])  # always includes the optimum
     return float(inside.min()), float(inside.max())
 
 
 def search(problem: Problem, moments: Moments) -> list[Point]:
-    """Return the local optima that the best cells of a grid lead to, best first.
+    """Return the local optima reached from the best cells of a grid, best first.
 
-    A further start is the best of the steepest curves. Starts are refined by the
-    moments; the samples polish what is apart by then.
+    The best of the steepest curves is a further start. The starts are refined on the
+    moments; those still distinct are polished on the samples.
     """
     box, sums = problem.box, moments.sums[0]
     low, high = box.logarithmic.T
@@ -197,16 +198,16 @@ def search(problem: Problem, moments: Moments) -> list[Point]:
     refined = zoom(sse, np.array(starts), 0.5 * step, box.logarithmic)
     optima: list[Point] = []
     for q in refined:
-        if all(np.abs(q - known.q).max() > _APART for known in optima):
+        if all(np.abs(q - point.q).max() > _DISTINCT for point in optima):
             optima.append(polish(problem, q, optima))
     return sorted(optima, key=lambda point: point.sse)
 
 
 def _steepest(v: Array, box: Box) -> Array:
-    """Return points of the largest exponent, closer than a grid's, shape (100, 2).
+    """Return closely spaced points at the largest exponent, shape (100, 2).
 
-    Curves that are almost a step have optima narrower than the cells of a grid, and
-    only where there are samples.
+    Curves close to a step have optima narrower than a grid cell, and only at velocities
+    that have samples.
     """
     (low, high), (_, top) = box.logarithmic
     first, last = np.clip(np.log(v[[0, -1]]), low, high)
@@ -215,7 +216,7 @@ def _steepest(v: Array, box: Box) -> Array:
 
 
 def _promising(grid: Array, sse: Array) -> Array:
-    """Return the best cells of a grid that are not neighbours, shape (4, 2)."""
+    """Return the best cells of a grid, no two of them neighbours, shape (4, 2)."""
     taken: list[tuple[int, int]] = []
     for flat in np.argsort(sse, axis=None).tolist():
         i, j = divmod(flat, sse.shape[1])
@@ -237,9 +238,9 @@ _ROUNDS = 5
 def weighted(problem: Problem, loss: Loss) -> Problem:
     """Return the problem with the weights of a robust loss.
 
-    The scale is 1.4826 times the median absolute residual. Every round refreshes scale
-    and weights and polishes from the last optimum. The result is to be searched as a
-    whole again, so that its optimum is one of the weighted problem.
+    The scale is 1.4826 times the median absolute residual. Every round updates scale
+    and weights and polishes from the last optimum. The caller must run a full search on
+    the result to find the optimum of the weighted problem.
     """
     point = search(problem, Moments.of(problem, (problem.F_t.size,)))[0]
     for _ in range(_ROUNDS):

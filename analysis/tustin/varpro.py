@@ -1,9 +1,9 @@
 """Search of the Tustin model by variable projection.
 
 For given q = (log v_s, log delta_s) the model is linear in p = (mu, F_s, b) with the
-columns F_n (1 - e), e and v_t, e = exp(-|v_t/v_s|^delta_s). Those three are solved
-exactly in their bounds (Golub and Pereyra 1973); the two that are left are polished by
-SciPy's L-BFGS-B. `moments` finds where to begin.
+columns F_n (1 - e), e and v_t, e = exp(-|v_t/v_s|^delta_s). These three are solved
+exactly within their bounds (Golub and Pereyra 1973); the other two are polished by
+SciPy's L-BFGS-B. `moments` provides the starting points.
 """
 
 from collections.abc import Sequence
@@ -14,14 +14,14 @@ import numpy as np
 from analysis.data.series import Array
 from analysis.tustin.box_least_squares import solve_in_box
 
-_GAIN = 1e-14  # of the squared forces, below which the last step was not worth taking
-_LEVEL = 1e-9  # slope of their share that is left, by q, of what counts as flat
-_SAME = (0.2, 1e-3)  # largest difference of q, and relative one of the SSE, of optima
-LARGEST_LOG_POWER = np.log(700.0)  # exp(-700) is about the smallest that is not zero
+_GAIN = 1e-14  # smallest gain of a step, relative to the squared forces (ftol)
+_LEVEL = 1e-9  # slope of the relative SSE in q that counts as flat (gtol)
+_SAME = (0.2, 1e-3)  # largest difference in q and relative one in SSE of equal optima
+LARGEST_LOG_POWER = np.log(700.0)  # exp(-700) is near the smallest nonzero double
 
 
 class Box(NamedTuple):
-    """Where the optimum is sought.
+    """Bounds of the search.
 
     Attributes:
         lower: lower bounds of (mu, F_s, b), shape (3,).
@@ -35,14 +35,14 @@ class Box(NamedTuple):
 
 
 def stribeck_power(speed: Array, v_s: float, delta_s: float) -> Array:
-    """Return |v/v_s|^delta_s, held below overflow."""
+    """Return |v/v_s|^delta_s, limited to avoid overflow."""
     with np.errstate(divide="ignore"):
         exponent = delta_s * (np.log(speed) - np.log(abs(v_s)))
     return np.exp(np.minimum(exponent, LARGEST_LOG_POWER))
 
 
 class Point(NamedTuple):
-    """A point of the search: q, the p that is best there, and their SSE [N^2]."""
+    """A point of the search: q, the optimal p at q, and their SSE [N^2]."""
 
     q: Array
     p: Array
@@ -50,7 +50,7 @@ class Point(NamedTuple):
 
 
 class Projected(NamedTuple):
-    """A point, and the slope of the SSE with the p that is best for every q.
+    """A point and the slope of the projected SSE.
 
     Attributes:
         point: the point.
@@ -64,8 +64,8 @@ class Projected(NamedTuple):
 class Problem:
     """The samples and box of one fit, with the logarithms taken once.
 
-    With `is_proportional` the second linear parameter is f_s = F_s/F_n [-]. `weights`
-    of the squared residuals, shape (n,), are 1 at first.
+    With `is_proportional` the second linear parameter is f_s = F_s/F_n [-]. The
+    `weights` of the squared residuals, shape (n,), default to 1.
     """
 
     def __init__(
@@ -119,7 +119,7 @@ class Problem:
         )
         r = A @ p - self.F_t
         weighed_r = self.weights * r
-        lever = p[1] * self.static - p[0] * self.F_n  # of e on the prediction
+        lever = p[1] * self.static - p[0] * self.F_n  # derivative of the model by e
         by_e = weighed_r * lever * e * z
         slope = 2.0 * np.array([delta * by_e.sum(), -(log_z @ by_e)])
         return Projected(Point(q, p, float(r @ weighed_r)), slope)
@@ -131,7 +131,7 @@ def polish(problem: Problem, start: Array, known: Sequence[Point] = ()) -> Point
     Args:
         problem: samples and box.
         start: q to begin with.
-        known: optima; a start that comes to lie just above one is left there.
+        known: optima found before; a search that arrives just above one is stopped.
     """
     from scipy.optimize import minimize
 
@@ -139,24 +139,24 @@ def polish(problem: Problem, start: Array, known: Sequence[Point] = ()) -> Point
     total = max(float(problem.weights @ problem.F_t**2), np.finfo(float).tiny)
 
     def cost(q: Array) -> tuple[float, Array]:
-        found = problem.project(q)
-        return found.point.sse / total, found.slope / total
+        projected = problem.project(q)
+        return projected.point.sse / total, projected.slope / total
 
-    def watch(intermediate_result: Any) -> None:  # noqa: ANN401
+    def stop_at_known(intermediate_result: Any) -> None:  # noqa: ANN401
         if _is_known(intermediate_result.x, intermediate_result.fun * total, known):
             raise StopIteration
 
     bounds = problem.box.logarithmic
-    found = minimize(
+    result = minimize(
         cost,
         np.clip(start, *bounds.T),
         jac=True,
         method="L-BFGS-B",
         bounds=bounds,
-        callback=watch,
+        callback=stop_at_known,
         options={"ftol": _GAIN, "gtol": _LEVEL},
     )
-    return problem.project(found.x).point
+    return problem.project(result.x).point
 
 
 def _is_known(q: Array, sse: float, known: Sequence[Point]) -> bool:

@@ -1,4 +1,4 @@
-"""Serves arms and sensors to one machine: python -m lab.far --link FD --memory FILE."""
+"""Serve arms and sensors to one machine: python -m lab.far --link FD --memory FILE."""
 
 import argparse
 import json
@@ -21,7 +21,7 @@ _FAILED = 0
 
 
 class GuestClock:
-    """Implements acquisition.clock.Clock: the guest's time, as its calls tell it.
+    """Implements acquisition.clock.Clock with the guest's time of the last call.
 
     Attributes:
         t_ns: time of the last call [ns].
@@ -35,7 +35,7 @@ class GuestClock:
         return self.t_ns
 
     def utc_ns(self) -> int:
-        """Return the same: nothing here has a date."""
+        """Return the monotonic time, since no date is known here."""
         return self.t_ns
 
     def sleep_until(self, t_ns: int) -> None:
@@ -48,7 +48,7 @@ class GuestClock:
 
 
 class FarSide:
-    """Does what calls ask for."""
+    """Executes the guest's calls."""
 
     def __init__(self, exchange: Exchange) -> None:
         self._exchange = exchange
@@ -56,10 +56,10 @@ class FarSide:
         self._served: Served | None = None
 
     def call(self, offset: int) -> int:
-        """Return DONE, or another value and a text with what went wrong."""
+        """Execute a call; return DONE, or another value and the error as text."""
         try:
             self._do(Call(offset))
-        except Exception:  # told to the guest, where the scenario fails
+        except Exception:  # reported to the guest, where the scenario fails
             self._exchange.say(traceback.format_exc())
             return _FAILED
         return DONE
@@ -68,32 +68,32 @@ class FarSide:
         t_ns, frames, data = self._exchange.asked()
         self._clock.t_ns = t_ns
         if call is Call.SERVE:
-            self._served = self._made(json.loads(self._exchange.message()))
+            self._served = self._build(json.loads(self._exchange.message()))
         elif self._served is None:
             raise ValueError("nothing is served yet.")
         elif call is Call.DO:
             self._served.do(self._exchange.message())
         else:
-            left_ns, sent, written = self._served.advance(frames, data)
-            self._exchange.answer(t_ns + left_ns, sent, written)
+            wait_ns, sent, written = self._served.advance(frames, data)
+            self._exchange.answer(t_ns + wait_ns, sent, written)
 
-    def _made(self, wanted: dict[str, str]) -> Served:
-        settings = _settings(wanted["rig"], wanted["matrix"])
-        if not wanted["row"]:
+    def _build(self, request: dict[str, str]) -> Served:
+        settings = _settings(request["rig"], request["matrix"])
+        if not request["row"]:
             return LineSensor(settings, self._clock)
         return PushedArm(
             settings,
-            wanted["row"],
-            int(wanted["seed"]),
+            request["row"],
+            int(request["seed"]),
             self._clock,
-            has_line=wanted["line"] != "",
-            friction=float(wanted["friction"]),
-            wrong=wanted["wrong"],
+            has_line=request["line"] != "",
+            friction=float(request["friction"]),
+            wrong=request["wrong"],
         )
 
 
 def _settings(rig: str, matrix: str) -> Settings:
-    """Return the settings from the text of two files."""
+    """Return the settings from the texts of rig.toml and matrix.toml."""
     with tempfile.TemporaryDirectory(prefix="lab") as scratch:
         folder = Path(scratch)
         (folder / "rig.toml").write_text(rig, encoding="utf-8")
@@ -106,10 +106,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--link", type=int, required=True, metavar="FD")
     options.add_argument("--memory", type=Path, required=True, metavar="FILE")
-    given = options.parse_args(arguments)
-    with given.memory.open("r+b") as file:
+    args = options.parse_args(arguments)
+    with args.memory.open("r+b") as file:
         memory = mmap.mmap(file.fileno(), MEMORY_SIZE)
-    with socket.socket(fileno=given.link) as link:
+    with socket.socket(fileno=args.link) as link:
         ProxyDevice(link, FarSide(Exchange(memory)).call).serve()
 
 

@@ -1,4 +1,4 @@
-"""A serial sensor at the far end of the adapter, below an arm or without one."""
+"""A serial sensor at the far end of the adapter, with or without an arm."""
 
 from typing import Protocol
 
@@ -15,26 +15,26 @@ from fakes.serving.sensor_server import hanging_load
 from fakes.world_clock import TICK_NS, WorldClock
 from lab.calls import Frame
 
-Turn = tuple[int, list[Frame], bytes]  # time until the next [ns], frames, bytes
+Turn = tuple[int, list[Frame], bytes]  # time until the next call [ns], frames, bytes
 
 
 class Served(Protocol):
-    """What the relay serves."""
+    """A simulated device that the relay serves."""
 
     def advance(self, frames: list[Frame], data: bytes) -> Turn:
-        """Let the world go on up to now.
+        """Simulate up to now.
 
         Args:
-            frames: of hosts on the bus.
-            data: of the host on the serial line.
+            frames: frames from the program on the bus.
+            data: bytes from the program on the serial line.
 
         Returns:
-            how long nothing will happen by itself [ns], and what is sent now.
+            Time until the next event [ns], frames and bytes to send now.
         """
         ...
 
     def do(self, line: str) -> None:
-        """Do what a person does, in a line; raises KeyError if it is not known."""
+        """Carry out an operator's command; raises KeyError if it is unknown."""
         ...
 
 
@@ -47,7 +47,7 @@ class FarEnd:
         stream.port_opened(t_ns)
 
     def advance(self, t_ns: int, data: bytes) -> bytes:
-        """Take bytes of the host; return the sensor's up to `t_ns`."""
+        """Receive the program's bytes; return the sensor's bytes up to `t_ns`."""
         if data:
             self._stream.receive(t_ns, data)
         return b"".join(part for _, part in self._stream.due(t_ns))
@@ -66,10 +66,10 @@ class LineSensor:
         self._end = FarEnd(stream, t_ns)
 
     def advance(self, frames: list[Frame], data: bytes) -> Turn:
-        """Let the sensor go on up to now."""
+        """Simulate the sensor up to now."""
         del frames
         return TICK_NS, [], self._end.advance(self._clock.go_on(), data)
 
     def do(self, line: str) -> None:
-        """Raise KeyError: nobody is at it."""
+        """Raise KeyError: there are no commands."""
         raise KeyError(line)

@@ -1,8 +1,8 @@
 """The remote end of QEMU's `x-pci-proxy-dev`: a PCI device with one page of registers.
 
 Each access to the device is a message on a Unix socket, and the emulated processor
-waits for its answer. A message is a head of command and size, then as many bytes; an
-answer is a word of 8 bytes (docs/system/multi-process.rst of QEMU).
+waits for the answer. A message has a header of command and size, then a body of that
+size; the answer is a word of 8 bytes (docs/system/multi-process.rst of QEMU).
 """
 
 import os
@@ -15,24 +15,24 @@ from lab.calls import PCI_ID, REGISTERS_SIZE
 
 _HEAD = struct.Struct("<iiQ")  # command, padding, size
 _CONFIG = struct.Struct("<IIi")  # offset, value, length
-_ACCESS = struct.Struct("<QQI")  # address, value, length; then whether it is memory
+_ACCESS = struct.Struct("<QQI")  # address, value, length; then a flag: memory or I/O
 _WORD = struct.Struct("<Q")
-_LONGEST = 4096  # bytes of a message
-_MOST_DESCRIPTORS = 8
+_MAX_MESSAGE = 4096  # bytes
+_MAX_DESCRIPTORS = 8
 _CONFIG_SIZE = 256
 _CLASS_AT, _REGISTERS_AT, _SUBSYSTEM_AT = 0x08, 0x10, 0x2C
-_OTHER_REGISTERS = {0x14, 0x18, 0x1C, 0x20, 0x24, 0x30}  # and a ROM: there are none
+_UNUSED_REGISTERS = {0x14, 0x18, 0x1C, 0x20, 0x24, 0x30}  # base addresses 1 to 5, ROM
 _OTHER_PERIPHERAL = 0x0880_0001  # class and revision
 
 
 class _Command(IntEnum):
-    MEMORY = 0  # where the guest's memory is, as descriptors: unanswered
+    MEMORY = 0  # descriptors of the guest's memory; not answered
     ANSWER = 1
     CONFIG_WRITE = 2
     CONFIG_READ = 3
     WRITE = 4
     READ = 5
-    INTERRUPT = 6  # descriptors of interrupts: unanswered
+    INTERRUPT = 6  # descriptors of interrupts; not answered
     RESET = 7
 
 
@@ -40,29 +40,29 @@ _UNANSWERED = {_Command.MEMORY, _Command.INTERRUPT}
 
 
 class ProxyDevice:
-    """Answers the emulator until it hangs up."""
+    """Answers the emulator's accesses until it closes the connection."""
 
     def __init__(self, link: socket.socket, read: Callable[[int], int]) -> None:
-        """Answer over `link`; `read`: value of the word at an offset."""
+        """Use socket `link`; `read` returns the register at an offset."""
         self._link = link
         self._read = read
-        self._address = 0  # of the registers
+        self._address = 0  # base address of the registers
         self._config = bytearray(_CONFIG_SIZE)
         struct.pack_into("<HH", self._config, 0, *PCI_ID)
         struct.pack_into("<I", self._config, _CLASS_AT, _OTHER_PERIPHERAL)
         struct.pack_into("<HH", self._config, _SUBSYSTEM_AT, *PCI_ID)
 
     def serve(self) -> None:
-        """Answer every message; return when the emulator has hung up.
+        """Answer every message; return when the emulator closes the connection.
 
         Raises:
             ValueError: a message is of another version of the protocol.
         """
-        while (head := self._taken(_HEAD.size)) is not None:
+        while (head := self._receive(_HEAD.size)) is not None:
             command, _, size = _HEAD.unpack(head)
-            if size > _LONGEST:
+            if size > _MAX_MESSAGE:
                 raise ValueError(f"the emulator sent a message of {size} bytes.")
-            body = self._taken(size) if size else b""
+            body = self._receive(size) if size else b""
             if body is None:
                 return
             value = self._value(_Command(command), body)
@@ -70,12 +70,12 @@ class ProxyDevice:
                 answer = _HEAD.pack(_Command.ANSWER, 0, _WORD.size)
                 self._link.sendall(answer + _WORD.pack(value))
 
-    def _taken(self, size: int) -> bytes | None:
-        """Return the next bytes, None at the end; descriptors are not wanted."""
+    def _receive(self, size: int) -> bytes | None:
+        """Return the next bytes, None at the end; close any descriptors sent along."""
         data = b""
         while len(data) < size:
             part, descriptors, _, _ = socket.recv_fds(
-                self._link, size - len(data), _MOST_DESCRIPTORS
+                self._link, size - len(data), _MAX_DESCRIPTORS
             )
             for descriptor in descriptors:
                 os.close(descriptor)
@@ -85,7 +85,7 @@ class ProxyDevice:
         return data
 
     def _value(self, command: _Command, body: bytes) -> int:
-        """Do what a message says; return what is answered."""
+        """Execute a message; return the value of the answer."""
         if command is _Command.READ:
             address, _, _ = _ACCESS.unpack_from(body)
             return self._read(address - self._address)
@@ -97,9 +97,9 @@ class ProxyDevice:
         return 0
 
     def _configure(self, offset: int, value: int, length: int) -> None:
-        if offset in _OTHER_REGISTERS:
+        if offset in _UNUSED_REGISTERS:
             return
-        if offset == _REGISTERS_AT:  # the bits of its size are not there
+        if offset == _REGISTERS_AT:  # the low bits are fixed at 0, which gives the size
             value &= ~(REGISTERS_SIZE - 1)
             self._address = value & 0xFFFF_FFFF
         data = (value & (1 << 8 * length) - 1).to_bytes(length, "little")

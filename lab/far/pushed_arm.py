@@ -1,8 +1,8 @@
-"""An arm with ground and hand at the far end of a CAN bus.
+"""An arm with ground and operator at the far end of a CAN bus.
 
-Lines move the hand and press the pendant, as a person would do: prepare TRIAL, lift,
-put_down, push, rest, activate, idle, mend; and orders to hands as `traction fake` takes
-them, e.g. pose, release.
+Commands move the operator's hand and press the pendant: prepare TRIAL, lift, put_down,
+push, rest, activate, idle, mend; and the hand commands of `traction fake`, e.g. pose,
+release.
 """
 
 from collections.abc import Callable
@@ -18,14 +18,14 @@ from lab.calls import Frame
 from lab.far.line_sensor import FarEnd, Turn
 from wam.model.constants import load_constants
 
-# What the arm says within this time leaves together, as through an adapter that
-# collects frames: seven positions, the last of which starts 0.53 ms after the question.
+# Frames within this time are sent together, as by an adapter that collects frames:
+# seven positions, the last of which starts 0.53 ms after the request.
 _TOGETHER_NS = 550_000
-_HIGHEST_ID = 0x7FF  # of a data frame
+_HIGHEST_ID = 0x7FF  # largest identifier of a data frame
 
 
 class PushedArm:
-    """Implements Served: a simulated rig on a bus, and what a person does with it."""
+    """Implements Served: a simulated rig on a bus and its operator."""
 
     def __init__(
         self,
@@ -38,16 +38,16 @@ class PushedArm:
         friction: float,
         wrong: str,
     ) -> None:
-        """Put the arm above the container of a row of the matrix.
+        """Place the arm above the container of a row of the matrix.
 
         Args:
-            settings: of the rig.
-            row: of the matrix.
-            seed: of everything random.
-            clock: the guest's time.
-            has_line: its sensor is on the serial line.
-            friction: share of what was identified on another arm.
-            wrong: name of what is wrong with it in the catalogue; "" = nothing.
+            settings: settings of the rig.
+            row: name of the row.
+            seed: seed of all random numbers.
+            clock: clock of the guest.
+            has_line: the sensor is on the serial line.
+            friction: joint friction relative to that identified on another arm.
+            wrong: the arm's error by its name in the catalogue; "" = none.
         """
         world = SimulatedRig(
             settings.rig,
@@ -76,7 +76,7 @@ class PushedArm:
         }
 
     def do(self, line: str) -> None:
-        """Do what a person does; raises KeyError where the line is not known."""
+        """Carry out an operator's command; raises KeyError if it is unknown."""
         word, _, operand = line.partition(" ")
         if word == "prepare":
             self._simulation.prepare(int(operand))
@@ -88,7 +88,7 @@ class PushedArm:
             raise KeyError(line)
 
     def advance(self, frames: list[Frame], data: bytes) -> Turn:
-        """Let bus, arm and sensor go on up to now."""
+        """Simulate bus, arm and sensor up to now."""
         now_ns, wired = self._clock.go_on(), self._wired
         for can_id, payload in frames:
             if can_id <= _HIGHEST_ID:
@@ -97,5 +97,5 @@ class PushedArm:
         self._plant.advance(now_ns)
         written = b"" if self._line is None else self._line.advance(now_ns, data)
         event_ns = wired.next_event_ns()
-        left = TICK_NS if event_ns is None else max(event_ns - now_ns, _TOGETHER_NS)
-        return min(left, TICK_NS), sent, written
+        wait_ns = TICK_NS if event_ns is None else max(event_ns - now_ns, _TOGETHER_NS)
+        return min(wait_ns, TICK_NS), sent, written

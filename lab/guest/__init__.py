@@ -1,4 +1,4 @@
-"""What runs inside the emulated machine: scenarios, and what they are made of.
+"""The guest side, inside the emulated machine: the scenarios and their tools.
 
-`__main__` runs them one after the other; `machine_room` is what each gets.
+`__main__` runs them one after the other; each gets a `MachineRoom`.
 """

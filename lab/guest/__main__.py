@@ -1,4 +1,4 @@
-"""Runs scenarios inside the machine: python -m lab.guest NAME...; one line each."""
+"""Run scenarios inside the machine and print results: python -m lab.guest NAME..."""
 
 import importlib
 import os
@@ -20,7 +20,7 @@ from lab.results import (
     to_line,
 )
 
-# What programs load: read once, and there already when they start.
+# Modules that the programs import: loaded once, so that forked programs have them.
 _WARM = (
     "can",
     "mcap.writer",
@@ -33,10 +33,10 @@ _WARM = (
     "experiments.run.session",
     "experiments.run.quality",
     "analysis.data",
-    "scipy.signal",  # no session uses it, but without it first replies come late here
+    "scipy.signal",  # unused by sessions, but without it the first replies come late
     "fakes.serving.puck_server",
 )
-# The files' owner and time of change are others in here: git would read them all.
+# File owners and change times differ in the guest: git would read all files again.
 _GIT = {
     "GIT_CONFIG_COUNT": "3",
     "GIT_CONFIG_KEY_0": "core.checkStat",
@@ -47,33 +47,33 @@ _GIT = {
     "GIT_CONFIG_VALUE_2": "*",
 }
 _TIMER = (" lapic_events", " __per_cpu_offset")  # symbols of the kernel
-_OVER = 5.0  # s, in which what a failed scenario left behind lets go of the bus
-_LONGEST_OUTPUT = 8000  # characters of a failed scenario, its end
+_CLEANUP = 5.0  # s until processes of a failed scenario have left the bus
+_MAX_OUTPUT = 8000  # characters kept from the end of a failed scenario's output
 
 
 def main(names: list[str]) -> None:
-    """Run the scenarios `names`, telling begin and result of each.
+    """Run the scenarios `names` and print start and result of each.
 
-    "--echo" among them: what is run and said goes to the console as it comes.
+    With "--echo" among the names, commands and output are also printed immediately.
     """
     os.environ["TMPDIR"] = str(LAB_FOLDER / "tmp")
     os.environ["HOME"] = str(LAB_FOLDER)
     os.environ.update(_GIT)
     (LAB_FOLDER / "tmp").mkdir(parents=True, exist_ok=True)
-    _tell(_timer())
-    # Guest time jumps while the host's files are read: read them before it counts.
+    _send(_timer())
+    # Guest time jumps while files of the host are read, so read them beforehand.
     for name in _WARM:
         importlib.import_module(name)
     start_warm()
     booted = seconds()
     for scenario in chosen([name for name in names if name != "--echo"]):
-        _tell(Begun(scenario.name))
-        _tell(_result(scenario, is_echoed="--echo" in names))
-    _tell(Finished(round(booted, 2)))
+        _send(Begun(scenario.name))
+        _send(_result(scenario, is_echoed="--echo" in names))
+    _send(Finished(round(booted, 2)))
 
 
 def _timer() -> TimerFound:
-    """Return where the kernel keeps its local timer."""
+    """Return the symbols that locate the kernel's local timer."""
     lines = Path("/proc/kallsyms").read_text(encoding="ascii").splitlines()
     symbols = {line.split()[2]: line for line in lines if line.endswith(_TIMER)}
     events, offsets = (int(symbols[name.strip()].split()[0], 16) for name in _TIMER)
@@ -90,20 +90,20 @@ def _result(scenario: Scenario, *, is_echoed: bool) -> ScenarioResult:
             figures = scenario.run(room)
     except ScenarioError as error:
         reason = str(error)
-    except Exception:  # a defect of the scenario is a failure of its own
+    except Exception:  # an error in the scenario itself is a failure, too
         reason = traceback.format_exc()
     if reason:
-        wait(_OVER)
+        wait(_CLEANUP)
     verdict = Verdict.FAILED if reason else Verdict.PASSED
     if scenario.expected:
         verdict = Verdict.EXPECTED if reason else Verdict.SURPRISING
         reason = scenario.expected if reason else f"passes, although: {reason}"
-    output = "" if verdict.is_fine else "".join(room.log)[-_LONGEST_OUTPUT:]
-    taken = round(seconds() - start, 2)
-    return ScenarioResult(scenario.name, verdict, taken, figures, reason, output)
+    output = "" if verdict.is_fine else "".join(room.log)[-_MAX_OUTPUT:]
+    duration = round(seconds() - start, 2)
+    return ScenarioResult(scenario.name, verdict, duration, figures, reason, output)
 
 
-def _tell(message: Message) -> None:
+def _send(message: Message) -> None:
     sys.stdout.write(to_line(message) + "\n")
     sys.stdout.flush()
 

@@ -1,4 +1,4 @@
-"""Commands that a scenario runs: to their end, or with a person at the keyboard."""
+"""Commands run by a scenario: to their end, or interactively with keys."""
 
 import contextlib
 import os
@@ -14,12 +14,12 @@ from acquisition.clock import NS_PER_S, SystemClock
 from lab.guest.warm_start import Run, in_place_of
 
 CLOCK = SystemClock()
-_AT_ONCE = 65536
-_SLICE = 0.05  # s between two looks
+_READ_SIZE = 65536  # bytes
+_POLL_INTERVAL = 0.05  # s
 
 
 class ScenarioError(Exception):
-    """A scenario did not come out as its name says."""
+    """A scenario failed; the message gives the reason."""
 
 
 def seconds() -> float:
@@ -39,11 +39,11 @@ def require(is_met: bool, text: str) -> None:
 
 
 class Program:
-    """A process whose output is read, and which has a terminal as its stdin.
+    """A process with a terminal as its stdin, whose output is read.
 
     Attributes:
-        output: everything it wrote so far.
-        log: where the same is appended for the report of a failure.
+        output: all output so far.
+        log: log of the scenario; the output is appended for the report of a failure.
     """
 
     def __init__(
@@ -53,12 +53,12 @@ class Program:
         *,
         run: Run | None = None,
     ) -> None:
-        """Start `command`; `run`: the same as a function, for a warm start."""
+        """Start `command`; `run` is the equivalent function for a warm start."""
         self.output = ""
         self.log = log
-        self._seen = 0
+        self._searched = 0  # characters of the output that `expect` has passed
         self._keys, line = pty.openpty()
-        # Keys are taken as they come, not by line.
+        # Keys are delivered one by one, not by line.
         attributes = termios.tcgetattr(line)
         attributes[3] &= ~(termios.ECHO | termios.ICANON)
         termios.tcsetattr(line, termios.TCSANOW, attributes)
@@ -78,7 +78,7 @@ class Program:
 
     @property
     def is_running(self) -> bool:
-        """Whether it has not ended."""
+        """Whether the process has not ended."""
         return self._process.poll() is None
 
     def press(self, keys: str) -> None:
@@ -87,40 +87,40 @@ class Program:
         os.write(self._keys, keys.encode())
 
     def expect(self, text: str, patience: float) -> str:
-        """Return the output up to and with `text`, read on from the last such call.
+        """Wait for `text`; return the output since the last call, up to its end.
 
         Raises:
-            ScenarioError: it did not come within `patience` [s], or the process ended.
+            ScenarioError: no such output within `patience` [s], or the process ended.
         """
         end = seconds() + patience
         while True:
-            index = self.output.find(text, self._seen)
+            index = self.output.find(text, self._searched)
             if index >= 0:
-                before, self._seen = self._seen, index + len(text)
-                return self.output[before : self._seen]
+                before, self._searched = self._searched, index + len(text)
+                return self.output[before : self._searched]
             is_over = not self.is_running
-            self._read(_SLICE)
-            if is_over and text not in self.output[self._seen :]:
+            self._read(_POLL_INTERVAL)
+            if is_over and text not in self.output[self._searched :]:
                 code = self._process.returncode
-                raise ScenarioError(f"ended with {code} before it said {text!r}")
-            if seconds() > end and text not in self.output[self._seen :]:
-                raise ScenarioError(f"did not say {text!r} within {patience:g} s")
+                raise ScenarioError(f"ended with {code} before printing {text!r}")
+            if seconds() > end and text not in self.output[self._searched :]:
+                raise ScenarioError(f"did not print {text!r} within {patience:g} s")
 
     def run_on(self, duration: float) -> None:
-        """Let it run for a while [s], reading what it says."""
+        """Let the process run for a while [s], reading its output."""
         end = seconds() + duration
         while (left := end - seconds()) > 0:
-            self._read(min(left, _SLICE))
+            self._read(min(left, _POLL_INTERVAL))
 
     def wait(self, patience: float) -> int:
-        """Return its exit code.
+        """Wait for the end of the process; return its exit code.
 
         Raises:
-            ScenarioError: it does not end within `patience` [s]; it is killed.
+            ScenarioError: it did not end within `patience` [s] and was killed.
         """
         end = seconds() + patience
         while self.is_running:
-            self._read(_SLICE)
+            self._read(_POLL_INTERVAL)
             if seconds() > end:
                 self.close()
                 raise ScenarioError(f"did not end within {patience:g} s")
@@ -128,7 +128,7 @@ class Program:
         return self._process.returncode
 
     def close(self) -> None:
-        """End it and all it has started, if it still runs; safe to repeat."""
+        """Kill the process and its children if they still run; safe to repeat."""
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait()
@@ -141,17 +141,17 @@ class Program:
         if not select.select([self._out], [], [], patience)[0]:
             return
         with contextlib.suppress(BlockingIOError):
-            while data := os.read(self._out, _AT_ONCE):
+            while data := os.read(self._out, _READ_SIZE):
                 text = data.decode(errors="replace")
                 self.output += text
                 self.log.append(text)
-            # At the end of the file select returns at once for ever.
+            # At the end of the file, select always returns at once.
             if self.is_running:
-                wait(min(_SLICE, patience))
+                wait(min(_POLL_INTERVAL, patience))
 
 
 class Shell:
-    """Runs commands of the system to their end.
+    """Runs system commands to their end.
 
     Attributes:
         log: commands and their output.
@@ -161,10 +161,10 @@ class Shell:
         self.log = log
 
     def run(self, line: str, *, is_checked: bool = True) -> str:
-        """Return the output of a command line without quoting.
+        """Run a command line without quoting; return its output.
 
         Raises:
-            ScenarioError: it failed.
+            ScenarioError: the command failed.
         """
         done = subprocess.run(
             line.split(),
@@ -181,5 +181,5 @@ class Shell:
 
 
 def read_text(path: Path) -> str:
-    """Return a small file of the kernel without its last newline."""
+    """Return the text of a small kernel file, surrounding white space removed."""
     return path.read_text(encoding="ascii", errors="replace").strip()

@@ -1,4 +1,4 @@
-"""A served arm whose commissioning is taken for granted, so that torque may be sent."""
+"""Records of a passed commissioning for a served arm, so that torque may be sent."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
@@ -20,10 +20,9 @@ from wam.driver.startup import ArmInfo
 
 
 def take_as_commissioned(config: Path, steps: Sequence[StepId] = GATED) -> None:
-    """Write a record of sound `steps` beside `config` for the arm that it names.
+    """Write a record of passed `steps` next to `config` for the configured arm.
 
-    The arm is asked what it is, as a command would; nothing is done where there is a
-    record already.
+    The arm is queried for its identity, as by a command; an existing record is kept.
 
     Raises:
         TractionError: there is no such arm.
@@ -42,7 +41,7 @@ def take_as_commissioned(config: Path, steps: Sequence[StepId] = GATED) -> None:
 def sound_record(
     rig: Rig, info: ArmInfo, steps: Sequence[StepId] = GATED
 ) -> Commissioning:
-    """Return a record of `steps` for an arm that was started; all: it may be driven."""
+    """Return a record of `steps` for a started arm; all steps allow driving it."""
     present = present_inputs(rig, rig.backend.ask(LastAnswers()), info)
     now = datetime.fromtimestamp(rig.clock.utc_ns() // 1_000_000_000, UTC)
     return record_of(steps, present, now)
@@ -51,7 +50,7 @@ def sound_record(
 def record_of(
     steps: Iterable[StepId], present: Mapping[str, str], when: datetime
 ) -> Commissioning:
-    """Return a record in which these steps were sound on what was `present`."""
+    """Return a record in which `steps` passed with the inputs `present`."""
     record = Commissioning(program="a test")
     for step in steps:
         done = StepRecord(

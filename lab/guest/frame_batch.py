@@ -1,7 +1,7 @@
-"""Frames of a CAN socket by the dozen: one call of the kernel for all that wait.
+"""Batched frames of a CAN socket: one system call for all waiting frames.
 
-Every instruction of the relay is emulated. The kernel puts frames into the memory that
-the host reads, and takes them from it: no frame becomes an object in here.
+Every instruction of the relay is emulated, so frames are never turned into objects: the
+kernel writes them to the memory shared with the host and reads them from it.
 """
 
 import ctypes
@@ -50,16 +50,16 @@ class FrameBatch:
     """A raw CAN socket whose frames lie in shared memory.
 
     Attributes:
-        lost: frames that the bus did not take, as on a wire without an acknowledgement.
+        lost: frames not accepted by the bus, as without an acknowledging node.
     """
 
     def __init__(
         self, opened: socket.socket, memory: ctypes.Array[ctypes.c_char]
     ) -> None:
-        """Take over a bound socket, or one of datagrams that carries can_frames."""
+        """Take over a bound CAN socket, or a datagram socket of struct can_frame."""
         self.lost = 0
         self._socket = opened
-        self._memory = memory  # outlives the addresses
+        self._memory = memory  # keeps the addresses valid
         self._arriving = _messages(ctypes.addressof(memory) + FRAMES_IN_AT)
         self._leaving = _messages(ctypes.addressof(memory) + FRAMES_OUT_AT)
         libc = ctypes.CDLL(None, use_errno=True)
@@ -71,14 +71,14 @@ class FrameBatch:
         return self._socket.fileno()
 
     def receive(self) -> int:
-        """Take the frames that wait; return how many; raises OSError."""
+        """Receive the waiting frames; return their number; raises OSError."""
         count: int = self._receive(
             self.fileno(), self._arriving, MOST_FRAMES, socket.MSG_DONTWAIT, None
         )
         return self._checked(count)
 
     def send(self, count: int) -> None:
-        """Send so many frames; raises OSError."""
+        """Send `count` frames; raises OSError."""
         sent: int = self._send(self.fileno(), self._leaving, count, socket.MSG_DONTWAIT)
         self.lost += count - self._checked(sent)
 
@@ -92,7 +92,7 @@ class FrameBatch:
 
 
 def _messages(address: int) -> ctypes.Array[_Message]:
-    """Return messages of one frame each, which lie side by side from an address."""
+    """Return messages of one frame each, contiguous from an address."""
     messages = (_Message * MOST_FRAMES)()
     for number, message in enumerate(messages):
         part = _Part(address + number * FRAME.size, FRAME.size)

@@ -1,4 +1,4 @@
-"""What a scenario gets: the network, a served arm, the program, a place for data."""
+"""The environment of a scenario: shell, served arm, program, data folder."""
 
 import shutil
 import sys
@@ -18,12 +18,12 @@ LAB_FOLDER = Path("/run/lab")
 ROOT = Path(__file__).parents[2]
 CAN, FAR_CAN = "can0", "can1"  # the program's card, and the simulated arm's
 BITRATE = 1_000_000
-# A short preflight: every second of the loop costs the host many.
+# A short preflight: every second of the loop takes the host many seconds.
 _QUICK = {"test_time = 5.0 ": "test_time = 0.5 "}
-TRAVEL = 0.07  # m: a container that is crossed in a few seconds
+TRAVEL = 0.07  # m; a container short enough to cross in a few seconds
 _PYTHON = sys.executable
 _START = "import sys; from experiments.__main__ import main; sys.exit(main())"
-COLD = ("env",)  # a command before the program: it is executed, as on the rig
+COLD = ("env",)  # prefix that makes the program be executed, as on the rig
 _ARM_PATIENCE = 60.0  # s of guest time until the served arm is ready
 _BUS_SENSOR = {'kind = "bota" ': 'kind = "barrett" '}
 _SERIAL_KEYS = ("port =", "baudrate =", "sinc =")
@@ -34,39 +34,39 @@ def line_port() -> Path:
     return virtio_port("lab.line")
 
 
-def virtio_port(wanted: str) -> Path:
-    """Return the device of a virtio port by the name that the machine gave it.
+def virtio_port(label: str) -> Path:
+    """Return the device of the virtio port with a name.
 
     Raises:
         ScenarioError: there is none.
     """
     for name in Path("/sys/class/virtio-ports").glob("vport*/name"):
-        if read_text(name) == wanted:
+        if read_text(name) == label:
             return Path("/dev") / name.parent.name
-    raise ScenarioError(f"the machine has no virtio port {wanted}")
+    raise ScenarioError(f"the machine has no virtio port {label}")
 
 
 class EchoedLog(list[str]):
-    """A log that is written to stdout as it grows."""
+    """A log that also prints every entry."""
 
     def append(self, text: str) -> None:
-        """Add and write `text`."""
+        """Add and print `text`."""
         super().append(text)
         sys.stdout.write(text)
         sys.stdout.flush()
 
 
 class MachineRoom:
-    """One scenario's surroundings; leaving it ends every process it started.
+    """Environment of one scenario; leaving it ends every process it started.
 
     Attributes:
-        log: what was run, typed and said.
-        shell: for commands of the system.
-        folder: empty at the start; configuration and data go there.
+        log: commands, keys and output.
+        shell: runs system commands.
+        folder: folder of configuration and data, empty at the start.
     """
 
     def __init__(self, name: str, *, is_echoed: bool = False) -> None:
-        """Name its folder; `is_echoed`: the log goes to stdout as it grows, too."""
+        """`name` names the folder; `is_echoed`: also print the log."""
         self.log: list[str] = EchoedLog() if is_echoed else []
         self.shell = Shell(self.log)
         self.folder = LAB_FOLDER / name.replace(" ", "-")
@@ -92,13 +92,13 @@ class MachineRoom:
 
     @property
     def config(self) -> Path:
-        """The configuration, once one of `write_config` was called."""
+        """Path of the configuration; see `write_config`."""
         return self.folder / "rig.toml"
 
     def start(self, *command: str, run: Run | None = None) -> Program:
-        """Start a process that ends with the scenario at the latest.
+        """Start a process that is killed at the end of the scenario.
 
-        `run`: what the command does, as a function, for a warm start.
+        `run` is the function equivalent to the command, for a warm start.
         """
         program = Program(command, self.log, run=run)
         self._stack.callback(program.close)
@@ -107,42 +107,42 @@ class MachineRoom:
     def traction(self, *arguments: str, before: Sequence[str] = ()) -> Program:
         """Start the program with the scenario's configuration and data folder.
 
-        It is forked with its libraries loaded, or executed by `before`: a command that
-        starts another one, with its options.
+        It is forked with its libraries loaded, or executed by the prefix command
+        `before`.
         """
-        where = ("--config", str(self.config), "--data", str(self.data))
+        paths = ("--config", str(self.config), "--data", str(self.data))
         if not before:
-            return self.start_plain(*arguments, *where)
-        return self.start(*before, _PYTHON, "-c", _START, *arguments, *where)
+            return self.start_plain(*arguments, *paths)
+        return self.start(*before, _PYTHON, "-c", _START, *arguments, *paths)
 
     def start_plain(self, *arguments: str) -> Program:
         """Start the program with these arguments only."""
         return self.start("traction", *arguments, run=lambda: sys.exit(traction()))
 
     def finish(self, program: Program, patience: float, code: int = 0) -> str:
-        """Return the output of a program that is to end with an exit code.
+        """Wait for a program to end with exit code `code`; return its output.
 
         Raises:
-            ScenarioError: it ends otherwise, or not within `patience` [s].
+            ScenarioError: it ends with another code, or not within `patience` [s].
         """
-        ended = program.wait(patience)
-        if ended != code:
-            raise ScenarioError(f"exit code {ended} in place of {code}")
+        actual = program.wait(patience)
+        if actual != code:
+            raise ScenarioError(f"exit code {actual} instead of {code}")
         return program.output
 
     def serve_home_arm(self, *options: str) -> Program:
-        """Return `traction fake` serving an arm at home, pucks asleep."""
-        where = ("--can", f"socketcan:{FAR_CAN}", "--idle-first")
-        server = self.start_plain("fake", *where, *options, *self._config_option())
+        """Start `traction fake` with an arm in its home pose, pucks asleep."""
+        bus = ("--can", f"socketcan:{FAR_CAN}", "--idle-first")
+        server = self.start_plain("fake", *bus, *options, *self._config_option())
         server.expect("ready:", _ARM_PATIENCE)
         return server
 
     def serve_pushed_arm(self, *options: str) -> Program:
-        """Return the relay to an arm with hand and ground, above the container."""
+        """Start the relay to an arm with operator and ground, above the container."""
         return self._relay("--can", FAR_CAN, *options)
 
     def serve_far_sensor(self) -> Program:
-        """Return the relay to the configured serial sensor behind the adapter."""
+        """Start the relay to the configured serial sensor behind the adapter."""
         return self._relay("--line", str(line_port()))
 
     def _relay(self, *options: str) -> Program:
@@ -161,11 +161,11 @@ class MachineRoom:
     def write_config(
         self, changes: dict[str, str], dropped: Sequence[str] = ()
     ) -> None:
-        """Write the shipped configuration, a short container in it.
+        """Write the shipped configuration with a short container.
 
         Args:
-            changes: what stands in rig.toml, and what is to stand there.
-            dropped: beginnings of lines that are left out.
+            changes: replacements in rig.toml, new text by old.
+            dropped: prefixes of lines to leave out.
         """
         shipped = resources.files("experiments.data")
         text = (shipped / "rig.toml").read_text(encoding="utf-8")

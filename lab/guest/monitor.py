@@ -1,4 +1,4 @@
-"""QEMU's monitor, from inside its own machine: devices pulled out and put in."""
+"""QEMU's monitor, used from inside its own machine to unplug and plug in devices."""
 
 import json
 import os
@@ -17,11 +17,11 @@ ADAPTER = {
     "id": "adapter",
 }
 _PATIENCE = 20.0  # s of guest time
-_is_greeted: list[bool] = []  # the monitor takes its greeting once in a boot
+_is_greeted: list[bool] = []  # the monitor accepts its greeting once per boot
 
 
 class Monitor:
-    """Commands to the machine."""
+    """Sends commands to the monitor."""
 
     def __init__(self, room: MachineRoom) -> None:
         self._room = room
@@ -32,14 +32,14 @@ class Monitor:
             _is_greeted.append(True)
 
     def pull_out(self, device: dict[str, Any], node: Path) -> None:
-        """Pull a device out and wait until the kernel has seen it."""
+        """Unplug a device and wait until `node` has disappeared."""
         self._ask("device_del", {"id": device["id"]})
         self._await(node, is_there=False)
 
     def put_in(self, device: dict[str, Any], node: Path) -> None:
-        """Put a device in again and wait until the kernel has it."""
+        """Plug a device in again and wait until `node` exists."""
         end = seconds() + _PATIENCE
-        # The old device is gone for QEMU a moment after it is gone for the kernel.
+        # QEMU releases the old device a moment later than the kernel.
         while error := self._ask("device_add", device, is_checked=False):
             if seconds() > end:
                 raise ScenarioError(f"device_add: {error}")
@@ -47,7 +47,7 @@ class Monitor:
         self._await(node, is_there=True)
 
     def close(self) -> None:
-        """Leave the monitor."""
+        """Close the connection."""
         os.close(self._port)
 
     def _await(self, node: Path, *, is_there: bool) -> None:
@@ -60,7 +60,7 @@ class Monitor:
     def _ask(
         self, name: str, arguments: dict[str, Any], *, is_checked: bool = True
     ) -> str:
-        """Return what the machine refuses to do, in words; empty if it does it."""
+        """Send a command; return the error message, "" on success."""
         text = json.dumps({"execute": name, "arguments": arguments})
         self._room.log.append(f"[monitor: {text}]\n")
         os.write(self._port, text.encode() + b"\n")

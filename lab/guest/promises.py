@@ -10,11 +10,11 @@ _CODES: Mapping[End, int] = {End.COMPLETE: 0, End.ENDED: 4}
 
 
 def hold_to(fault: str, phase: str, code: int) -> None:
-    """Raise ScenarioError unless the exit code is what the matrix promises.
+    """Raise ScenarioError unless the exit code is the one promised by the matrix.
 
     Args:
-        fault: of the matrix, e.g. "interface-down".
-        phase: in which it came, e.g. "recording".
+        fault: fault of the matrix, e.g. "interface-down".
+        phase: phase of the fault, e.g. "recording".
         code: exit code of the program.
     """
     promised = TABLE[fault][PHASES.index(phase)].end

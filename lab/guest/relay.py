@@ -1,7 +1,7 @@
-"""Joins the far ends of bus and serial line to the host's arm: `relay --config FILE`.
+"""Connects the far ends of bus and serial line to the host's arm: relay --config FILE.
 
-Lines on stdin go to what is served (lab.far.pushed_arm, lab.far.line_sensor), in time
-with everything else; "quit" ends the relay.
+Lines on stdin are commands to the served device (lab.far.pushed_arm,
+lab.far.line_sensor), executed at the guest time of arrival; "quit" ends the relay.
 """
 
 import argparse
@@ -29,19 +29,19 @@ from lab.guest.frame_batch import FrameBatch, open_can
 
 _DEVICES = Path("/sys/bus/pci/devices")
 _SHARED_MEMORY = (0x1AF4, 0x1110)  # vendor and device of ivshmem
-_AT_ONCE = 4096
-_FRICTION = 0.02  # of the joints, as a share of what was identified on another arm
+_READ_SIZE = 4096  # bytes
+_FRICTION = 0.02  # joint friction relative to that identified on another arm
 
 
 class FarSideError(Exception):
-    """The host's arm failed, or is not there any more."""
+    """The host's simulated arm failed or has ended."""
 
 
 class FarSide:
-    """What the host serves, as the guest calls it.
+    """The guest's connection to the device simulated by the host.
 
     Attributes:
-        memory: shared with the host.
+        memory: memory shared with the host.
     """
 
     def __init__(self) -> None:
@@ -52,12 +52,12 @@ class FarSide:
         self._words = memoryview(registers).cast("Q")
 
     def call(self, call: Call) -> None:
-        """Let the host do something; no time passes meanwhile.
+        """Make a call to the host; no guest time passes meanwhile.
 
         Raises:
-            FarSideError: it could not.
+            FarSideError: the call failed.
         """
-        # One read of 8 bytes: the emulated processor waits for its value.
+        # One read of 8 bytes, during which the emulated processor stalls.
         value = self._words[call // 8]
         if value == DONE:
             return
@@ -66,35 +66,35 @@ class FarSide:
         raise FarSideError("the host's process that simulates the arm has ended.")
 
     def say(self, call: Call, t_ns: int, text: str) -> None:
-        """Call with a text at a time [ns]; raises FarSideError."""
+        """Make a call with a text at time `t_ns`; raises FarSideError."""
         self.exchange.ask(t_ns, 0, b"")
         self.exchange.say(text)
         self.call(call)
 
 
 class Line:
-    """The far end of the serial adapter: a virtio port, which may have no room."""
+    """The far end of the serial adapter: a virtio port of limited capacity."""
 
     def __init__(self, path: Path) -> None:
         self._port = os.open(path, os.O_RDWR | os.O_NONBLOCK)
-        self._left = b""
+        self._unsent = b""
 
     def read(self) -> bytes:
-        """Return the bytes of the host at the adapter that have arrived."""
+        """Return the bytes received from the program."""
         with contextlib.suppress(OSError):
-            return os.read(self._port, _AT_ONCE)
+            return os.read(self._port, _READ_SIZE)
         return b""
 
     def write(self, data: bytes) -> None:
-        """Write bytes; what has no room waits for the next call."""
-        self._left = (self._left + data)[-MOST_BYTES:]
-        if self._left:
+        """Write bytes; those not accepted by the port wait for the next call."""
+        self._unsent = (self._unsent + data)[-MOST_BYTES:]
+        if self._unsent:
             with contextlib.suppress(OSError):
-                self._left = self._left[os.write(self._port, self._left) :]
+                self._unsent = self._unsent[os.write(self._port, self._unsent) :]
 
 
 class Relay:
-    """Carries frames, bytes and lines; sleeps in between."""
+    """Forwards frames, bytes and commands; sleeps in between."""
 
     def __init__(self, options: argparse.Namespace) -> None:
         self._clock = SystemClock()
@@ -109,20 +109,20 @@ class Relay:
         if self._can is not None:
             self._watched.append(self._can.fileno())
         self._wake_ns = self._clock.now_ns()
-        far.say(Call.SERVE, self._wake_ns, json.dumps(_wanted(options)))
+        far.say(Call.SERVE, self._wake_ns, json.dumps(_request(options)))
 
     def serve(self) -> None:
-        """Go on until a line says quit."""
+        """Run until the command "quit"."""
         clock, watched = self._clock, self._watched
         while True:
             left = (self._wake_ns - clock.now_ns()) / NS_PER_S
             ready = select.select(watched, [], [], max(0.0, left))[0]
             self._advance()
-            if self._stdin in ready and not self._obey():
+            if self._stdin in ready and not self._forward_commands():
                 return
 
     def _advance(self) -> None:
-        """Make one call: what has arrived goes out, what comes back is sent."""
+        """Make one call: forward received frames and bytes, send those returned."""
         far, can, line = self._far, self._can, self._line
         count = can.receive() if can is not None else 0
         data = line.read() if line is not None else b""
@@ -134,8 +134,8 @@ class Relay:
         if line is not None:
             line.write(data)
 
-    def _obey(self) -> bool:
-        """Pass lines on; return False where one ends the relay."""
+    def _forward_commands(self) -> bool:
+        """Forward the commands on stdin; return False if the relay must end."""
         for line in self._lines.take():
             if line.strip() == "quit":
                 return False
@@ -143,8 +143,8 @@ class Relay:
         return not self._lines.is_ended
 
 
-def _wanted(options: argparse.Namespace) -> dict[str, str]:
-    """Return what the host is to serve: it does not see the guest's files."""
+def _request(options: argparse.Namespace) -> dict[str, str]:
+    """Return the device to serve, file contents included: the host cannot read them."""
     config: Path = options.config
     return {
         "rig": config.read_text(encoding="utf-8"),
@@ -157,37 +157,37 @@ def _wanted(options: argparse.Namespace) -> dict[str, str]:
     }
 
 
-def _mapped(wanted: tuple[int, int], resource: str, size: int) -> mmap.mmap:
-    """Return a resource of the PCI device with a vendor and a device number.
+def _mapped(pci_id: tuple[int, int], resource: str, size: int) -> mmap.mmap:
+    """Return the mapped resource of the PCI device with a (vendor, device) number.
 
     Raises:
         FarSideError: the machine has no such device.
     """
     for device in _DEVICES.iterdir():
         pair = ((device / name).read_text(encoding="ascii") for name in _PAIR)
-        if tuple(int(text, 16) for text in pair) == wanted:
+        if tuple(int(text, 16) for text in pair) == pci_id:
             (device / "enable").write_text("1", encoding="ascii")
             file = os.open(device / resource, os.O_RDWR | os.O_SYNC)
             try:
                 return mmap.mmap(file, size)
             finally:
                 os.close(file)
-    raise FarSideError(f"the machine has no PCI device {wanted}.")
+    raise FarSideError(f"the machine has no PCI device {pci_id}.")
 
 
 _PAIR = ("vendor", "device")
 
 
 def main() -> None:
-    """Serve until a line says quit."""
+    """Serve until the command "quit"."""
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--config", type=Path, required=True)
-    options.add_argument("--can", metavar="CHANNEL", help="an arm, on this interface")
-    options.add_argument("--line", type=Path, help="a serial sensor, on this port")
+    options.add_argument("--can", metavar="CHANNEL", help="serve an arm on it")
+    options.add_argument("--line", type=Path, help="serve a serial sensor on this port")
     options.add_argument("--row", default="TF")
     options.add_argument("--seed", type=int, default=1)
     options.add_argument("--friction", type=float, default=_FRICTION)
-    options.add_argument("--wrong", default="", metavar="NAME", help="of the catalogue")
+    options.add_argument("--wrong", default="", metavar="NAME", help="error of the arm")
     relay = Relay(options.parse_args())
     sys.stdout.write("ready\n")
     sys.stdout.flush()

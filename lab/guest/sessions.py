@@ -1,4 +1,4 @@
-"""A session as an operator leads it: keys for the program, a hand for the arm."""
+"""An operator's session: keys to the program, commands to the hand on the arm."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -10,13 +10,14 @@ from lab.guest.commands import Program, ScenarioError, require, seconds
 from lab.guest.commissioned import take_as_commissioned
 from lab.guest.machine_room import MachineRoom
 
-_START = 60.0  # s of guest time until the arm is to be activated
-_STEP = 30.0  # s until the program goes on by itself
-_REVIEW = 90.0  # s until a trial is reviewed: what that needs is read from the host
+_START = 60.0  # s of guest time until the prompt to activate the arm
+_STEP = 30.0  # s until the next prompt
+_REVIEW = 90.0  # s until a trial's review, whose modules are read from the host
 _REACTION = 0.1  # s from a prompt to the key
 _SUPPORT, _IDLE = "Support the arm: it goes idle", "i"
 _REST = 0.7  # s in which the foot comes to rest on the ground
-# s of a trial: each costs the host many; sooner the key that ends it counts as held.
+# Duration of a trial [s]: short, as it takes the host far longer; but any sooner the
+# key that ends it would count as held down.
 _PUSH = 0.8
 TERRAIN = "TF"
 MOST_MISSED_PPM = 10
@@ -24,31 +25,31 @@ MOST_MISSED_PPM = 10
 
 @dataclass(frozen=True, slots=True)
 class LedSession:
-    """A running session and the arm it is on."""
+    """A running session and its arm."""
 
     room: MachineRoom
     program: Program
     arm: Program
 
     def wait_idle(self) -> None:
-        """Wait until the arm is to be activated."""
+        """Wait for the prompt to activate the arm."""
         self.program.expect("Press Shift-activate", _START)
 
     def tare(self) -> None:
-        """Activate the arm; lift the foot, which is tared then."""
+        """Activate the arm and lift the foot for the tare."""
         self.wait_idle()
         self.activate()
         self.lift()
 
     def activate(self) -> None:
-        """Support the arm, press the pendant, confirm it."""
+        """Support the arm, press the pendant and confirm."""
         self.hand("lift")
-        self.program.run_on(_REACTION)  # an arm that is held is silent for no cycle
+        self.program.run_on(_REACTION)  # the hand must hold the arm before it is active
         self.hand("activate")
         self._press(" ")
 
     def lift(self) -> None:
-        """Lift the foot as asked; it is tared while it is still."""
+        """Lift the foot when prompted; it is tared while still."""
         self.program.expect("Lift the foot", _STEP)
         self.hand("lift")
 
@@ -58,30 +59,30 @@ class LedSession:
         self.program.expect("[space] record", _STEP)
 
     def put_down(self, number: int) -> None:
-        """Put the foot down on the ground of trial `number`, once it is tared."""
+        """Put the tared foot down on the ground of trial `number`."""
         self.hand(f"prepare {number}", "put_down")
         self.program.run_on(_REST)
 
     def start_trial(self, number: int = 1) -> None:
-        """Put the foot down, begin to record and to push."""
+        """Put the foot down, start recording and pushing."""
         self.put_down(number)
         self._press(" ")
         self.hand("push")
 
     def record(self, number: int = 1) -> None:
-        """Put the foot down, begin to record, push for a while."""
+        """Put the foot down, start recording, push for a while."""
         self.start_trial(number)
         self.program.run_on(_PUSH)
 
     def review(self) -> None:
-        """End the trial, wait until it is on the disk and to be judged."""
+        """End the trial; wait until it is written and can be reviewed."""
         self._press(" ")
         self.program.expect("written and verified", _REVIEW)
         self.program.expect("[k]eep", _STEP)
         self.hand("rest")
 
     def keep(self) -> None:
-        """Review the trial and keep it; the foot is to be lifted next."""
+        """Review and keep the trial, then lift the foot."""
         self.review()
         self._press("k")
         self.lift()
@@ -91,9 +92,9 @@ class LedSession:
         self.program.expect("[space] record", _STEP)
 
     def cut_off(self) -> int:
-        """Return the exit code of a session that was cut, once it has ended.
+        """Wait for the end of an interrupted session; return its exit code.
 
-        An arm that still holds then is supported before it goes idle, as asked.
+        If prompted, confirm that the arm is supported before it goes idle.
         """
         end = seconds() + _STEP
         while self.program.is_running and seconds() < end:
@@ -104,33 +105,33 @@ class LedSession:
         return self.program.wait(_STEP)
 
     def leave(self) -> None:
-        """Leave the session to be resumed another time."""
+        """Quit the session, to be resumed later."""
         self._press("q")
 
     def confirm(self) -> None:
-        """Press the space bar, as asked."""
+        """Press the space bar."""
         self._press(" ")
 
     def _press(self, key: str) -> None:
-        """Press a key as a person does: what comes before a prompt is forgotten."""
+        """Press a key after a reaction time: keys before a prompt are discarded."""
         self.program.run_on(_REACTION)
         self.program.press(key)
 
     def hand(self, *actions: str) -> None:
-        """Let the person at the arm act."""
+        """Send commands to the operator at the arm."""
         for action in actions:
             self.arm.press(f"{action}\n")
 
 
 def begin(room: MachineRoom, arm: Program, trials: int, *options: str) -> LedSession:
-    """Return a session of `trials` trials, before its preflight."""
+    """Start a session of `trials` trials."""
     take_as_commissioned(room.config)
     program = room.traction("run", TERRAIN, "--trials", str(trials), *options)
     return LedSession(room, program, arm)
 
 
 def resume(room: MachineRoom, arm: Program) -> LedSession:
-    """Return the unfinished session, opened again; whoever cut it has mended it."""
+    """Clear the arm's faults and resume the unfinished session."""
     arm.press("mend\n")
     arm.press("idle\n")
     return LedSession(room, room.traction("resume"), arm)
@@ -140,32 +141,36 @@ def session_folder(room: MachineRoom) -> Path:
     """Return the folder of the scenario's one session."""
     folders = [path for path in (room.data / "sessions").iterdir() if path.is_dir()]
     if len(folders) != 1:
-        raise ScenarioError(f"{len(folders)} sessions in place of one")
+        raise ScenarioError(f"{len(folders)} sessions instead of one")
     return folders[0]
 
 
-def verify_kept(room: MachineRoom, wanted: int) -> list[Path]:
-    """Return the kept trials' files, each accepted by `traction verify`."""
+def verify_kept(room: MachineRoom, expected: int) -> list[Path]:
+    """Check the kept trials with `traction verify`; return their files.
+
+    Raises:
+        ScenarioError: there are not `expected` trials, or one is damaged.
+    """
     folder = session_folder(room)
     kept = sorted((folder / "trials").glob("T??.mcap"))
-    require(len(kept) == wanted, f"{len(kept)} trials kept in place of {wanted}")
+    require(len(kept) == expected, f"{len(kept)} trials kept instead of {expected}")
     room.finish(room.start_plain("verify", str(folder)), _STEP)
     return kept
 
 
-def require_rejected(room: MachineRoom, wanted: int) -> int:
-    """Return how many attempts were put away.
+def require_rejected(room: MachineRoom, expected: int) -> int:
+    """Return the number of rejected attempts.
 
     Raises:
-        ScenarioError: it is not `wanted`.
+        ScenarioError: it is not `expected`.
     """
     count = len(list((session_folder(room) / "rejected").glob("T???.mcap")))
-    require(count == wanted, f"{count} attempts put away in place of {wanted}")
+    require(count == expected, f"{count} rejected attempts instead of {expected}")
     return count
 
 
 def cycle_figures(room: MachineRoom) -> dict[str, str]:
-    """Return cycles, missed ones and the worst gap of the kept trials.
+    """Return number of cycles, missed cycles and largest gap of the kept trials.
 
     Raises:
         ScenarioError: more than 10 ppm of the cycles were missed.

@@ -1,9 +1,9 @@
-"""Processes that begin with their libraries loaded: forked, in place of executed.
+"""Processes that start with their libraries loaded: forked instead of executed.
 
-An interpreter that loads numpy, Pinocchio and the program takes the emulated processor
-ten seconds of the host's time, and every command starts four of them. A forked one does
-the same with what the runner of the scenarios has loaded before. Streams, signals,
-descriptors and environment are those of a fresh process; nothing else is shared.
+Loading numpy, Pinocchio and the program takes an interpreter in the emulator ten
+seconds of the host's time, and every command starts four interpreters. A forked process
+inherits the modules loaded by the scenario runner; its streams, signals, descriptors
+and environment are those of a new process.
 """
 
 import gc
@@ -16,22 +16,22 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
 Run = Callable[[], object]
-_HIGHEST = 1024  # descriptor
+_MAX_DESCRIPTOR = 1024
 _UNTOUCHABLE = {signal.SIGKILL, signal.SIGSTOP}
-_IGNORED = {signal.SIGPIPE, signal.SIGXFSZ}  # by every interpreter
-_GENERATIONS = (700, 10, 10)  # of the garbage collector, as at its start
-_CHILD = (sys.executable, "-P", "-c")  # how the program starts its processes
+_IGNORED = {signal.SIGPIPE, signal.SIGXFSZ}  # by every new interpreter
+_GENERATIONS = (700, 10, 10)  # default thresholds of the garbage collector
+_CHILD = (sys.executable, "-P", "-c")  # the program's command for its own processes
 
 
 def in_place_of(
     command: Sequence[str], run: Run, kept: Collection[int] = ()
 ) -> Callable[[], None]:
-    """Return what a new process does in place of executing a command; it never returns.
+    """Return a function for a new process that replaces a command; it never returns.
 
     Args:
-        command: what `sys.argv` becomes.
-        run: what the command does.
-        kept: descriptors that stay open beside the streams.
+        command: the new `sys.argv`.
+        run: function equivalent to the command.
+        kept: descriptors that stay open in addition to the streams.
     """
 
     def become() -> None:
@@ -54,7 +54,7 @@ def in_place_of(
 
 
 def exit_code(end: SystemExit) -> int:
-    """Return the exit code of a process, a text written to stderr."""
+    """Return the exit code of SystemExit; a text is written to stderr."""
     if end.code is None or isinstance(end.code, int):
         return end.code or 0
     sys.stderr.write(f"{end.code}\n")
@@ -62,15 +62,15 @@ def exit_code(end: SystemExit) -> int:
 
 
 def _make_fresh(kept: Collection[int]) -> None:
-    """Leave nothing of the parent but the modules that it has loaded."""
-    gc.freeze()  # what the parent had is not collected, and closed, here
+    """Reset all state inherited from the parent except its loaded modules."""
+    gc.freeze()  # the parent's objects must not be collected, and closed, here
     gc.enable()
     gc.set_threshold(*_GENERATIONS)
     for number in signal.valid_signals() - _UNTOUCHABLE:
         signal.signal(number, _first_handler(number))
     low = 3
-    for descriptor in (*sorted(kept), _HIGHEST):
-        os.closerange(low, descriptor)  # also what tells the parent of an exec
+    for descriptor in (*sorted(kept), _MAX_DESCRIPTOR):
+        os.closerange(low, descriptor)  # also signals the parent, as an exec would
         low = descriptor + 1
     sys.stdin = os.fdopen(0, "r", closefd=False)
     sys.stdout = os.fdopen(1, "w", closefd=False)
@@ -79,7 +79,7 @@ def _make_fresh(kept: Collection[int]) -> None:
 
 
 def start_warm() -> None:
-    """Let what this process starts of the program begin warm."""
+    """Make later starts of the program's processes in this process warm."""
     subprocess.Popen = WarmPopen  # pyright: ignore[reportAttributeAccessIssue]
 
 
@@ -93,7 +93,7 @@ _Popen = subprocess.Popen[Any]
 
 
 class WarmPopen(_Popen):
-    """As `subprocess.Popen`; the program's own processes are forked."""
+    """`subprocess.Popen` that forks the program's own processes."""
 
     def __init__(self, args: Sequence[str], **options: Any) -> None:  # noqa: ANN401
         if tuple(args[: len(_CHILD)]) == _CHILD:

@@ -82,9 +82,7 @@ CALLS: tuple[Border, ...] = (
         lambda _: _TERRAIN.predict(2.0, 0.1).quantile(1.5),
         "from 0 to 1",
     ),
-    _refused(
-        'predict(F_n="3")', lambda _: points_of("3", 0.1), "F_n = '3' is no number"
-    ),
+    _refused('predict(F_n="3")', lambda _: points_of("3", 0.1), "F_n = '3' is neither"),
     _refused(
         "predict of a NaN", lambda _: points_of(3.0, np.nan), "v_t has to be finite"
     ),
@@ -124,7 +122,7 @@ CALLS: tuple[Border, ...] = (
     _refused(
         "a pattern that no file fits",
         lambda f: load_tables([f / "*.csv"]),
-        "no file fits this pattern",
+        "no file matches this pattern",
     ),
     _refused(
         "a name that is not there",

@@ -107,7 +107,7 @@ LAYOUTS: tuple[Border, ...] = (
     refused(
         "sep=; in the first line, not left out",
         "sep=;\n" + text(delimiter=";"),
-        "the names of the columns stand in line 2",
+        "the names of the columns are in line 2",
         separator=";",
     ),
     refused(
@@ -153,7 +153,7 @@ LAYOUTS: tuple[Border, ...] = (
     refused(
         "no header",
         "\n".join(_LINES[1:]),
-        "4 numbers stand where the names of the columns were expected",
+        "4 numbers instead of the names of the columns",
     ),
     table(
         "columns by place keep the header's unit",
@@ -168,7 +168,7 @@ LAYOUTS: tuple[Border, ...] = (
     refused(
         "lines before the header",
         "Machine 7\nOperator: mk, room 3\n\n" + _PLAIN,
-        "line 1: the names of the columns stand in line 4. Leave out what stands above "
+        "line 1: the names of the columns are in line 4. Skip the lines above "
         "them: --skip 1-3",
     ),
     refused(
@@ -327,5 +327,5 @@ LAYOUTS: tuple[Border, ...] = (
         text([row[1:] for row in ROWS], names=NAMES[1:]),
         "--rate HZ",
     ),
-    refused("a rate beside a time", _PLAIN, "it has a time of its own", rate=500.0),
+    refused("a rate beside a time", _PLAIN, "it has a time column", rate=500.0),
 )

@@ -163,7 +163,7 @@ NUMBERS: tuple[Border, ...] = (
     refused(
         "F_n in g",
         text(_scaled(2, 100.0), names=_names(F_n="g")),
-        "line 1: F_n is in 'g', which is a mass and no force",
+        "line 1: F_n is in 'g', which is a mass, not a force",
     ),
     table(
         "F_n in g, with --unit F_n=gf",
@@ -174,7 +174,7 @@ NUMBERS: tuple[Border, ...] = (
     refused(
         "v_t in km/h",
         text(names=_names(v_t="km/h")),
-        "'km/h', which is not a unit of it",
+        "'km/h', which is not a unit of",
     ),
     refused(
         "--unit that contradicts the header",

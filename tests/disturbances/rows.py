@@ -114,7 +114,7 @@ TABLES = (
     TableRow(
         "F_n with the other sign", times(N, -1.0), FLAGGED, "pulls at the moving foot"
     ),
-    TableRow("heading by 180 degrees", times(V, -1.0), FLAGGED, "goes backward"),
+    TableRow("heading by 180 degrees", times(V, -1.0), FLAGGED, "moves backward"),
     TableRow("v_t in mm/s", times(V, 1e3), REFUSED, "--unit v_t=mm/s"),
     TableRow("time in ms", times(T, 1e3), FLAGGED, "--unit t=ms"),
     TableRow("F_n in mN", times(N, 1e3), FLAGGED, "--unit F_n=mN"),

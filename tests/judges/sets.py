@@ -156,7 +156,7 @@ def robot_leg(folder: Path) -> Iterator[Judgement]:
         ("wrong frame", {"sensor": "shank"}, ["axes of the wrench"]),
         ("another wrong frame", {"sensor": "base"}, ["other sign", "another frame"]),
         ("forgotten tare", {"tare": "none"}, ["forgotten tare"]),
-        ("tare under load", {"tare": (4.5, 4.9)}, ["at its lowest place"]),
+        ("tare under load", {"tare": (4.5, 4.9)}, ["at its lowest position"]),
         ("no such frame", {"foot": "sole"}, ["nearest links"]),
         ("wrong lag", {"lag": 0.06}, ["--lag 60 ms; starts and stops show"]),
         ("forgotten weight", {"mass": 0.0}, ["--tool-mass 0", "weight"]),

@@ -1,5 +1,5 @@
-"""The sections of a report, each a module or a package named by its heading.
+"""Sections of a report, each a module or package named after its heading.
 
-A section is one value: its heading, its tables, its figures with their captions, and
-beside them the numbers that they show. `order` has them as they stand on the page.
+A section is a value with heading, tables, figures and captions, next to the code that
+computes their numbers. `order` lists the sections in page order.
 """

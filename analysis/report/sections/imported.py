@@ -1,4 +1,4 @@
-"""What the report says of imported trials: files, topics, estimates, warnings."""
+"""Section on imported trials: files, topics, estimates, warnings."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def import_tables(record: ImportRecord) -> list[ReportTable]:
         _table(
             f"Imported from {name}",
             ("what", "stated", "shown by the log", "spread", "how"),
-            [_figure_row(each) for each in record.checks],
+            [_figure_row(check) for check in record.checks],
             _ESTIMATED if record.is_estimated else "",
         ),
         _table(
@@ -47,10 +47,10 @@ def import_tables(record: ImportRecord) -> list[ReportTable]:
                 ("robot", f"{record.robot}: {', '.join(record.joints)}"),
                 *(
                     (
-                        each.what,
-                        f"{each.path}, {each.bytes} bytes, SHA-256 {each.sha256}",
+                        file.what,
+                        f"{file.path}, {file.bytes} bytes, SHA-256 {file.sha256}",
                     )
-                    for each in record.files
+                    for file in record.files
                 ),
                 *((f"--{key}", value) for key, value in record.arguments.items()),
                 *(

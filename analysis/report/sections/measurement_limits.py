@@ -1,4 +1,4 @@
-"""Measurement limits: what the rig could have seen, beside the errors."""
+"""Measurement limits of the rig compared with the model errors."""
 
 from collections.abc import Callable, Sequence
 
@@ -12,15 +12,15 @@ from analysis.report.sections.rig_health.health import RigTrial
 
 _SATURATED = 1e-9  # share of cycles
 _REACH_NOTE = (
-    "Measurable: by the sensor's ranges and the lever of the foot; – where "
+    "Measurable: by the sensor's ranges and the lever of the foot; – if "
     "unknown: without a sample out of range it is at least the largest observed. "
     "Uncertainty: standard uncertainty of a trial's mean F_t and F_n, "
     "from the changes between the tares of its session; "
-    "with the zero between two tares (drift=interpolated) "
-    "it is four fifths of that. Floor: mean |error| of smoothed "
-    "F_t by these changes and by the noise at rest, which no model can be better than; "
-    "by the noise alone where a session has one tare only. "
-    "Drag: Coulomb friction of the joints as seen by the hand's push, "
+    "with the zero interpolated between two tares (drift=interpolated) "
+    "it is four fifths of that. Floor: lower limit of any model's mean |error|, from "
+    "these changes and the noise of smoothed F_t at rest; "
+    "from the noise alone if a session has only one tare. "
+    "Drag: Coulomb friction of the joints as felt by the pushing hand, "
     "from the recorded friction calibration, less the compensation; "
     "without a calibration, from the arm model. F_t and F_n are measured at the wrist, "
     "below the joints, and v_t at the joints: friction biases no model, but limits the "
@@ -29,7 +29,7 @@ _REACH_NOTE = (
 
 
 def reach(results: StudyResults) -> ReportTable:
-    """Return for every terrain what the rig could have seen, beside the errors."""
+    """Return the table of measurement limits and model errors by terrain."""
     rows = []
     for name, result in results.study.terrains.items():
         trials = [trial for trial in results.rig if trial.terrain == name]

@@ -1,4 +1,4 @@
-"""The sections of a page in the order in which they stand, and their figures."""
+"""Sections of the page in order, and their figures."""
 
 from collections.abc import Mapping, Sequence
 

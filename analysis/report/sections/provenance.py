@@ -1,4 +1,4 @@
-"""Analysis settings and provenance: every choice of the analysis."""
+"""Analysis settings and provenance."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from analysis.tustin.model import SYMBOLS
 
 
 def choices(study: Study, *, is_foreign: bool) -> ReportTable:
-    """Return every choice of the analysis."""
+    """Return the table of all settings of the analysis."""
     prepare, fit = study.options.prepare, study.options.fit
     box = ", ".join(
         f"{SYMBOLS[name]} {low:g} to {high:g}"
@@ -31,10 +31,10 @@ def choices(study: Study, *, is_foreign: bool) -> ReportTable:
         ],
         [
             "noise of the GP",
-            "constant in the five models of Fig. 9; beside them chosen per fold among "
-            "constant, log-linear and Student's t, by trials left out of the training",
+            "constant in the five models of Fig. 9; a further model chooses per fold "
+            "among constant, log-linear and Student's t, by held-out training trials",
         ],
-        ["across terrains", "the model of fold k tested on trial k, wrapping round"],
+        ["across terrains", "the model of fold k tested on trial k, wrapping around"],
         ["recorded rate", _rates(study)],
     ]
     note = "External data: not recorded by this rig." if is_foreign else ""
@@ -42,31 +42,31 @@ def choices(study: Study, *, is_foreign: bool) -> ReportTable:
 
 
 def _widths(study: Study) -> list[list[str]]:
-    """Return how samples were smoothed and thinned, in time and in samples."""
+    """Describe smoothing and thinning, in time and in samples."""
     prepare = study.options.prepare
     trials = [trial for result in study.terrains.values() for trial in result.trials]
     used = sorted({trial.widths for trial in trials if not trial.is_prepared})
     averaged = " or ".join(str(width) for width in sorted({w for w, _ in used}))
     thinned = " or ".join(str(every) for every in sorted({e for _, e in used}))
     prepared = sum(trial.is_prepared for trial in trials)
-    rest = f"; {prepared} trials were prepared before" if prepared else ""
+    remark = f"; {prepared} trials were prepared before" if prepared else ""
     span, step = (1e3 * n / RATE_HZ for n in (prepare.smoothing, prepare.downsample))
     return [
         [
             "smoothing",
             f"centred moving average over {span:g} ms: {averaged or 'no'} samples"
-            + rest,
+            + remark,
         ],
         [
             "downsampling",
             f"a sample every {step:g} ms, after smoothing: one in {thinned or '1'}"
-            + rest,
+            + remark,
         ],
     ]
 
 
 def _folds(study: Study) -> str:
-    """Return what a fold leaves out, in words."""
+    """Describe the folds."""
     sizes = [len(f.left_out) for r in study.terrains.values() for f in r.folds]
     if max(sizes, default=1) == 1:
         return "one whole trial left out at a time"

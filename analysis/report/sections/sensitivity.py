@@ -1,4 +1,4 @@
-"""Sensitivity to analysis choices: a study, and the same under another choice."""
+"""Sensitivity to analysis choices: a study repeated with one choice changed."""
 
 from __future__ import annotations
 
@@ -46,18 +46,18 @@ _MEASURES = (("mae", "N"), ("nlpd", "nat"))
 
 @dataclass(frozen=True, slots=True)
 class StudyVariant:
-    """One choice made otherwise.
+    """One changed analysis choice.
 
     Attributes:
-        key: which one.
-        value: how, as given.
-        models: names of the models that it touches.
-        frame: the frame that forces are projected on.
-        lag: how late the forces are taken to be [s].
-        change: from the options of the study to those of the repeated one.
-        is_interpolated: the sensor's zero lies on a line between two tares.
-        is_massless: the force that accelerates the foot is taken out.
-        remark: what it did to the trials, for people.
+        key: name of the choice.
+        value: its value, as given.
+        models: names of the models that it affects.
+        frame: frame onto which forces are projected.
+        lag: lag of the forces to compensate [s].
+        change: function from the options of the study to those of the repeated one.
+        is_interpolated: the sensor's zero is interpolated between two tares.
+        is_massless: the inertial force of the foot is removed.
+        remark: effect on the trials in words.
     """
 
     key: str
@@ -72,14 +72,14 @@ class StudyVariant:
 
     @property
     def text(self) -> str:
-        """The choice as it was given."""
+        """The choice as given: KEY=VALUE."""
         return f"{self.key}={self.value}"
 
     def series(self, trial: RecordedTrial | TractionSeries) -> TractionSeries:
-        """Return a trial under the choice.
+        """Apply the choice to a trial.
 
         Raises:
-            SettingsError: the choice needs a recording, and the trial is a table.
+            SettingsError: the choice needs a recording, but the trial is a table.
         """
         if isinstance(trial, RecordedTrial):
             chosen = trial.interpolated() if self.is_interpolated else trial
@@ -97,7 +97,7 @@ class StudyVariant:
     def remarked(
         self, trials: Iterable[RecordedTrial | TractionSeries]
     ) -> StudyVariant:
-        """Return the choice with a remark on what it does to trials."""
+        """Add a remark on the effect of the choice on the trials."""
         if not self.is_massless:
             return self
         forces = [t.inertial_force() for t in trials if isinstance(t, RecordedTrial)]
@@ -105,23 +105,23 @@ class StudyVariant:
         noise = np.median([f.uncertainty for f in forces])
         return replace(
             self,
-            remark=f" The foot's inertia took {largest:.2f} N at most (median of "
-            f"trials), known to {noise:.2f} N (standard uncertainty of a component by "
-            f"the scatter of the positions); changes within {WINDOW * 1e3:.0f} ms are "
-            "not seen.",
+            remark=f" The foot's inertial force was at most {largest:.2f} N (median of "
+            f"trials), with a standard uncertainty of {noise:.2f} N per component from "
+            f"the scatter of the positions; changes within {WINDOW * 1e3:.0f} ms are "
+            "not resolved.",
         )
 
     def options(self, before: StudyOptions) -> StudyOptions:
-        """Return the options of the repeated study, only of the models it touches."""
+        """Return the options of the repeated study, with only the affected models."""
         fit = replace(before.fit, models=self.models, draws=0)
         return self.change(replace(before, fit=fit))
 
 
 def parse_choice(text: str) -> StudyVariant:
-    """Return the choice in `text`: KEY=VALUE.
+    """Parse a choice KEY=VALUE.
 
     Raises:
-        SettingsError: an unknown key or value; the hint lists what there is.
+        SettingsError: unknown key or value; the hint lists the valid ones.
     """
     key, _, value = (part.strip() for part in text.partition("="))
     if key not in VALUES:
@@ -156,10 +156,10 @@ def _window(value: str) -> StudyVariant:
 
 
 def parse_window(value: str) -> tuple[float, float]:
-    """Return the edges of `slowest:fastest` [m/s].
+    """Parse a window `slowest:fastest` [m/s].
 
     Raises:
-        ValueError: there are not two finite numbers.
+        ValueError: not two finite numbers.
     """
     slowest, fastest = (float(part) for part in value.split(":"))
     if not (math.isfinite(slowest) and math.isfinite(fastest)):
@@ -170,8 +170,8 @@ def parse_window(value: str) -> tuple[float, float]:
 def _of_samples(
     key: str, value: str, prepare: Callable[[PrepareOptions], PrepareOptions]
 ) -> StudyVariant:
-    """Return a choice of training samples; the tested ones stay those of the study."""
-    prepare(PrepareOptions())  # refused here, not in the middle of a study
+    """Make a choice of training samples; the test samples remain those of the study."""
+    prepare(PrepareOptions())  # refuses invalid values before the study starts
 
     def change(options: StudyOptions) -> StudyOptions:
         target = options.target or options.prepare
@@ -252,7 +252,7 @@ _PARSERS: Mapping[str, Callable[[str], StudyVariant]] = {
 
 
 def side_by_side(choice: StudyVariant, before: Study, after: Study) -> ReportTable:
-    """Return errors of both studies per terrain and model, trial by trial."""
+    """Compare the errors of both studies per terrain and model, trial by trial."""
     rows = [
         [
             terrain,
@@ -276,14 +276,13 @@ def side_by_side(choice: StudyVariant, before: Study, after: Study) -> ReportTab
         name=f"What if {choice.text}?",
         header=("terrain", "model", *heads),
         rows=rows,
-        note="The study as it is, then repeated under the choice, with the same "
-        "points and the same trials left out. Means over trials; difference ± its "
+        note="The original study and its repetition under the choice, with the same "
+        "points and the same held-out trials. Means over trials; difference ± its "
         "standard error over the trials that both have, below zero is better under "
         "the choice; p by the exact permutation test over signs. Smoothing and "
-        "window change what models are fitted to; they are tested on the samples of "
-        "the study as it is. Frame, lag, drift and inertia change the data "
-        "themselves, and with them what is "
-        "tested." + choice.remark,
+        "window change the training samples; tests use the samples of the original "
+        "study. Frame, lag, drift and inertia change the data themselves, including "
+        "the test samples." + choice.remark,
         section=ReportSection.CHANGED,
     )
 

@@ -1,5 +1,5 @@
-"""Terrains of a database for other programs: a C99 header, ONNX graphs.
+"""Export of a terrain database for other programs: a C99 header, ONNX graphs.
 
-Begin with `exported`: what a target is given. `targets` has a module for every format,
-`folder` puts what a target writes together with its README and where it comes from.
+Begin with `exported`, the input of a target. `targets` has a module for every format;
+`folder` adds a README and the origin to the files of a target.
 """

@@ -1,4 +1,4 @@
-"""What is exported: terrains of a database, by one model, with where they come from."""
+"""Data to export: terrains of a database with one model, and their origin."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -11,13 +11,13 @@ from analysis.terrains.table import Table
 
 @dataclass(frozen=True, slots=True)
 class ExportedTerrain:
-    """One terrain as it is exported.
+    """One terrain to export.
 
     Attributes:
-        name: in the database; may hold anything.
+        name: name in the database; any text.
         identifier: letters, digits and underscores, for names in other languages.
-        known: what the database knows.
-        table: of the model that is exported.
+        known: entry of the database.
+        table: table of the exported model.
     """
 
     name: str
@@ -28,16 +28,16 @@ class ExportedTerrain:
 
 @dataclass(frozen=True, slots=True)
 class TerrainExport:
-    """Everything that a target is given.
+    """Input of an export target.
 
     Attributes:
-        terrains: in the database's order.
+        terrains: terrains in the order of the database.
         model: name of the model.
-        title: of the model, for people.
+        title: title of the model.
         digest: SHA-256 of the database.
-        made_utc: when the database was made.
-        is_simulated: its trials were simulated.
-        version: of Traction.
+        made_utc: time at which the database was made.
+        is_simulated: the trials were simulated.
+        version: version of Traction.
         is_float: single precision in C.
     """
 
@@ -61,31 +61,31 @@ class TerrainExport:
         *,
         is_float: bool = False,
     ) -> "TerrainExport":
-        """Return the export of a database.
+        """Select terrains and model of a database.
 
         Args:
             database: the terrains.
-            digest: SHA-256 of its file.
-            version: of Traction.
-            names: of the terrains that are wanted; all where empty.
+            digest: SHA-256 of the database file.
+            version: version of Traction.
+            names: names of the terrains; empty = all.
             model: name of the model; "" = the default.
             is_float: single precision in C.
 
         Raises:
             SettingsError: there is no such terrain or model.
         """
-        wanted = {name: database.terrain(name) for name in names or database.terrains}
-        model = model or next(iter(wanted.values())).default
-        for known in wanted.values():
+        chosen = {name: database.terrain(name) for name in names or database.terrains}
+        model = model or next(iter(chosen.values())).default
+        for known in chosen.values():
             if model not in known.tables:
                 raise SettingsError(
                     f"{known.name!r:.60}: there is no model {model!r:.60}.",
                     hint=f"Models: {', '.join(known.tables)}. Nothing was written.",
                 )
-        words = identifiers(wanted)
+        words = identifiers(chosen)
         terrains = tuple(
             ExportedTerrain(name, words[name], known, known.tables[model])
-            for name, known in wanted.items()
+            for name, known in chosen.items()
         )
         return cls(
             terrains=terrains,
@@ -100,12 +100,12 @@ class TerrainExport:
 
     @property
     def trials_are(self) -> str:
-        """What every artefact says of the trials."""
+        """Kind of the trials, as stated in every artefact."""
         return "SIMULATED trials" if self.is_simulated else "recorded trials"
 
     @property
     def origin(self) -> str:
-        """Where it comes from, in a line of plain letters."""
+        """Origin of the data in one line of plain characters."""
         return (
             f"Traction {shown(self.version)}, {self.trials_are}, model "
             f"{shown(self.title)}, database {self.digest[:16]} of "

@@ -1,4 +1,4 @@
-"""The folder of a target: what it writes, a README of ten lines, and `source.json`."""
+"""Folder of an export target: its files, a README and `source.json`."""
 
 import importlib
 import json
@@ -16,13 +16,13 @@ Files = Mapping[str, bytes]
 
 @dataclass(frozen=True, slots=True)
 class ExportTarget:
-    """A program that reads terrains; each module of `targets` has one as `TARGET`.
+    """Export format; each module of `targets` defines one as `TARGET`.
 
     Attributes:
-        title: of the README.
-        files: content by path below the folder, of what is exported.
-        about: six lines of the README: what is there, how it is used, what is lost.
-        extra: of Traction, without which it cannot be written; "" = none.
+        title: title of the README.
+        files: function that returns file contents by path below the folder.
+        about: function that returns six lines of the README: content, use, limits.
+        extra: optional dependency of Traction that the target needs; "" = none.
     """
 
     title: str
@@ -32,15 +32,15 @@ class ExportTarget:
 
 
 def parse_targets(text: str) -> tuple[str, ...]:
-    """Return the targets of "c,onnx".
+    """Parse a list of targets such as "c,onnx".
 
     Raises:
-        SettingsError: there is no such target, or one is named twice.
+        SettingsError: a target does not exist or is named twice.
     """
     names = tuple(name.strip() for name in text.split(",") if name.strip())
     unknown = [name for name in names if name not in target_names()]
     if unknown or not names or len(set(names)) < len(names):
-        what = f"no target {', '.join(unknown)}" if unknown else "no list of targets"
+        what = f"no target {', '.join(unknown)}" if unknown else "not a list of targets"
         raise SettingsError(
             f"--for {text:.80}: {what:.200}.",
             hint=f"Name each once, with commas between: {', '.join(target_names())}. "
@@ -50,7 +50,7 @@ def parse_targets(text: str) -> tuple[str, ...]:
 
 
 def require_target(name: str) -> None:
-    """Refuse before anything is read what would fail for want of a library.
+    """Check that the libraries of a target are installed, before anything is read.
 
     Raises:
         MissingLibraryError: the target needs a library that is not installed.
@@ -64,11 +64,11 @@ def _target(name: str) -> ExportTarget:
 
 
 def target_files(name: str, export: TerrainExport) -> dict[str, bytes]:
-    """Return everything that a target writes, by path below its folder.
+    """Return the files of a target, README and origin included, by path.
 
     Raises:
-        SettingsError: the target cannot be had of this database.
-        MissingLibraryError: it needs a library that is not installed.
+        SettingsError: the target cannot be made from this database.
+        MissingLibraryError: the target needs a library that is not installed.
     """
     require_target(name)
     target = _target(name)

@@ -1,4 +1,4 @@
-"""Names: of the targets, and of terrains as harmless parts of other languages."""
+"""Names of the targets, and of terrains as identifiers of other languages."""
 
 import importlib
 import pkgutil
@@ -7,34 +7,35 @@ from collections.abc import Iterable
 
 from acquisition.errors import SettingsError
 
-TARGETS = "analysis.terrains.export.targets"  # package, a module for each
+TARGETS = "analysis.terrains.export.targets"  # package with one module per target
 _LONGEST, _LONGEST_SHOWN = 40, 60  # characters
 
 
 def target_names() -> tuple[str, ...]:
-    """Return the names of all targets: those of the modules of `targets`."""
+    """Return the names of all targets: the modules of the package `targets`."""
     package = importlib.import_module(TARGETS)
-    return tuple(sorted(each.name for each in pkgutil.iter_modules(package.__path__)))
+    modules = pkgutil.iter_modules(package.__path__)
+    return tuple(sorted(module.name for module in modules))
 
 
 def shown(text: str) -> str:
-    """Return a text for comments and titles: a line of letters, digits, " .,:()_+-".
+    """Sanitise a text for comments and titles: letters, digits and " .,:()_+-".
 
-    No character of it ends a comment or a string of any language.
+    None of these ends a comment or a string in any language.
     """
     return re.sub(r"[^A-Za-z0-9 .,:()_+-]", "?", text)[:_LONGEST_SHOWN].strip() or "?"
 
 
 def identifiers(names: Iterable[str]) -> dict[str, str]:
-    """Letters, digits and underscores for every name, whatever other names there are.
+    """Return an identifier of letters, digits and underscores for every name.
 
-    A sign or a point beside a digit keeps its meaning: +10 is p10, -10 is m10 and 12.5
-    is 12p5. They differ in more than capitals, since they become names of files too.
+    A sign or a point next to a digit is encoded: +10 becomes p10, -10 m10 and 12.5
+    12p5. Identifiers differ in more than case, because they also become file names.
 
     Raises:
-        SettingsError: two names have one identifier.
+        SettingsError: two names have the same identifier.
     """
-    found: dict[str, str] = {}
+    words: dict[str, str] = {}
     name_of: dict[str, str] = {}
     for name in names:
         word = _identifier(name)
@@ -45,8 +46,8 @@ def identifiers(names: Iterable[str]) -> dict[str, str]:
                 "digits and underscores are allowed.",
                 hint="Export them apart, or rename one of the terrains.",
             )
-        found[name] = word
-    return found
+        words[name] = word
+    return words
 
 
 def _identifier(name: str) -> str:

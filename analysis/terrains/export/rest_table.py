@@ -1,7 +1,7 @@
-"""The risk of a push from rest as one table over the distance from a law's centre.
+"""Slip risk of a push from rest as a table over the distance from a law's centre.
 
-The centre is b0 + b1 log(max(F_n, 1 N) / 3.5 N) of log F_t, or, where the model is of
-sliding, a + b F_n of F_t: what is left is one distribution for all loads.
+The centre is b0 + b1 log(max(F_n, 1 N) / 3.5 N) in log F_t or, for a sliding model,
+a + b F_n in F_t. The distribution about the centre is the same for all loads.
 """
 
 import numpy as np
@@ -10,13 +10,13 @@ from analysis.data.series import Array
 from analysis.study.slip_risk import BREAK_AWAY, BreakAwayModel
 
 REST_POINTS = 2049
-_REFERENCE_LOAD = 3.5  # N, where the slope of a law of break-away begins
+_REFERENCE_LOAD = 3.5  # N, at which the slope term of a break-away law is zero
 
 
 def rest_distances(model: BreakAwayModel) -> Array:
-    """Return distances from the centre of a law over which its risk is tabulated.
+    """Return the distances from the centre of a law at which its risk is tabulated.
 
-    In log F_t [nat] or, where the model is of sliding, in F_t [N]; shape (2049,).
+    In log F_t [nat] or, for a sliding model, in F_t [N]; shape (2049,).
     """
     _, _, spread, trial_sd = model.law.values
     low, high = (14.0, 4.0) if model.kind == BREAK_AWAY else (5.5, 5.5)

@@ -1,4 +1,4 @@
-"""The arm at home on a real CAN socket: check, zero, bench at the loop's rate."""
+"""The arm in its home pose on a real CAN socket: zero, check, bench at 500 Hz."""
 
 import re
 
@@ -8,16 +8,16 @@ from lab.guest.network import counters, set_up_both
 
 Figures = dict[str, str]
 _PATIENCE = 60.0  # s of guest time for a command that tests the loop
-_MEASURED = 1.0  # s of bench
+_BENCH_TIME = 1.0  # s
 _CYCLES_PER_S = 500
-_REPLIES = 7  # frames that come in a cycle
+_REPLIES = 7  # received frames per cycle
 
 
 def figure(output: str, pattern: str) -> str:
     """Return the first group of `pattern` in `output`.
 
     Raises:
-        ScenarioError: it is not there.
+        ScenarioError: the pattern does not occur.
     """
     match = re.search(pattern, output)
     if match is None:
@@ -36,11 +36,11 @@ def at_rate(room: MachineRoom) -> Figures:
     )
     require("LIVE RIG" in page, "check did not meet a live rig")
     before = counters(CAN)
-    words = ("bench", "--seconds", f"{_MEASURED:g}")
-    bench = room.finish(room.traction(*words), _PATIENCE)
+    arguments = ("bench", "--seconds", f"{_BENCH_TIME:g}")
+    bench = room.finish(room.traction(*arguments), _PATIENCE)
     counted = {name: n - before[name] for name, n in counters(CAN).items()}
-    least = round(_MEASURED * _CYCLES_PER_S) * _REPLIES
-    require(counted["rx_packets"] >= least, f"{counted} in place of {least} frames")
+    least = round(_BENCH_TIME * _CYCLES_PER_S) * _REPLIES
+    require(counted["rx_packets"] >= least, f"{counted} instead of {least} frames")
     lost = {name: n for name, n in counted.items() if n and "packets" not in name}
     require(not lost, f"the interface counted {lost}")
     return {

@@ -1,4 +1,4 @@
-"""The first day by its command: who is on the bus, the stop circuit, the rest pose."""
+"""Commissioning by its command: steps C8 (rest pose) and C11 (gravity ramp)."""
 
 from collections.abc import Sequence
 
@@ -19,11 +19,11 @@ from lab.guest.sessions import LedSession
 from wam.model.arm_model import ArmModel
 from wam.model.constants import load_constants
 
-_STEP = 120.0  # s of guest time until it asks for the next thing, or has ended
-_CARRIED = 1.0  # s, in which hands bring the arm into a pose
-_COMES_TO_REST = 0.5  # s, until an arm that is held or let go of is still
-_FRICTION = "0.7"  # of the joints, as a share of what was identified on another arm
-_STOPPED = 3  # exit code: a step found something wrong
+_STEP = 120.0  # s of guest time until the next prompt, or the end
+_POSE_TIME = 1.0  # s in which the operator moves the arm to a pose
+_SETTLING = 0.5  # s until a held or released arm is still
+_FRICTION = "0.7"  # joint friction relative to that identified on another arm
+_STOPPED = 3  # exit code: a step failed
 _BEFORE_TORQUE = GATED[: GATED.index(StepId.REST_POSE)]
 _BETWEEN = (StepId.RAMPS, StepId.LIFT)
 _ON_REST_POSE = (StepId.REST_POSE, StepId.GRAVITY_RAMP)
@@ -31,10 +31,10 @@ _WRONG = "motor-2-weak"
 
 
 def at_rest(room: MachineRoom) -> Figures:
-    """Commission an arm on its rest pose: no torque in C8, its whole weight in C11.
+    """Commission an arm in its rest pose: no torque in C8, its whole weight in C11.
 
-    The steps before and between them, which take longer, are written into the record as
-    sound. The command finds by itself that C8 is next, and then C11.
+    The steps before and between these take longer and are entered as passed in the
+    record. The command selects C8 and then C11 as the next steps by itself.
     """
     day = _laid_down(room, _pushed(room), *_BEFORE_TORQUE, *_BETWEEN)
     day.hand("activate")
@@ -44,44 +44,44 @@ def at_rest(room: MachineRoom) -> Figures:
     room.finish(day.program, _STEP)
     record = _sound_record(room, GATED)
     return {
-        "silence": _measured(record, StepId.REST_POSE, "a module that brakes"),
-        "sole": _farthest(room, record),
+        "silence": _quantity(record, StepId.REST_POSE, "a module that brakes"),
+        "sole": _sole_travel(room, record),
     }
 
 
 def wrong_arm(room: MachineRoom) -> Figures:
-    """Commission an arm with a weak motor: C11 stops, the arm goes idle."""
+    """Commission an arm with a weak motor: C11 stops and the arm goes idle."""
     sound = GATED[: GATED.index(StepId.GRAVITY_RAMP)]
     day = _laid_down(room, _pushed(room, "--wrong", _WRONG), *sound)
     day.hand("activate")
     room.finish(day.program, _STEP, _STOPPED)
     record = _record(room)
     (wrong,) = [done for done in record.steps if done.cause]
-    said = f"{wrong.step} stopped, in place of C11"
-    require(wrong.step is StepId.GRAVITY_RAMP, said)
+    text = f"{wrong.step} stopped instead of C11"
+    require(wrong.step is StepId.GRAVITY_RAMP, text)
     require("Compensation moves the arm" in wrong.cause, wrong.cause)
-    return {_WRONG: wrong.cause, "sole": _farthest(room, record)}
+    return {_WRONG: wrong.cause, "sole": _sole_travel(room, record)}
 
 
 def _pushed(room: MachineRoom, *options: str) -> Program:
-    """Return an arm with the friction of many, held by a hand that may let go of it."""
+    """Start an arm with realistic friction, held by an operator who may release it."""
     return served_arm(room, "--friction", _FRICTION, *options)
 
 
 def _laid_down(room: MachineRoom, arm: Program, *sound: StepId) -> LedSession:
-    """Return a commissioning that waits for its arm, on the rest pose, to be activated.
+    """Start a commissioning up to the activation of the arm in its rest pose.
 
-    `sound`: steps that are taken as done. Hands lay the arm down before its pucks are
-    woken: shorted windings would slow them.
+    `sound` are the steps recorded as passed. The operator lays the arm down before the
+    pucks are woken, since shorted windings would brake it.
     """
     angles = " ".join(f"{angle:.4f}" for angle in rest_pose(load_constants()))
-    arm.press(f"pose {angles} {_CARRIED:g}\n")
-    arm.run_on(_CARRIED + _COMES_TO_REST)
+    arm.press(f"pose {angles} {_POSE_TIME:g}\n")
+    arm.run_on(_POSE_TIME + _SETTLING)
     take_as_commissioned(room.config, sound)
     day = LedSession(room, room.traction("commission", "--until", GATED[-1]), arm)
     day.program.expect("Lay the arm into its rest pose", _STEP)
     day.hand("release")
-    day.program.run_on(_COMES_TO_REST)
+    day.program.run_on(_SETTLING)
     day.confirm()
     day.program.expect("Press Shift-activate", _STEP)
     return day
@@ -95,7 +95,7 @@ def _record(room: MachineRoom) -> Commissioning:
 
 
 def _sound_record(room: MachineRoom, steps: Sequence[StepId]) -> Commissioning:
-    """Return the record; raise ScenarioError where one of `steps` is not sound."""
+    """Return the record; raise ScenarioError if one of `steps` has not passed."""
     record = _record(room)
     sound = {done.step for done in record.steps if done.verdict == "sound"}
     missing = [step for step in steps if step not in sound]
@@ -103,16 +103,16 @@ def _sound_record(room: MachineRoom, steps: Sequence[StepId]) -> Commissioning:
     return record
 
 
-def _measured(record: Commissioning, step: StepId, words: str) -> str:
-    """Return the quantity of a step whose name ends with `words`."""
+def _quantity(record: Commissioning, step: StepId, ending: str) -> str:
+    """Return the value of a step's quantity whose name ends with `ending`."""
     done = record.of(step)
     quantities = () if done is None else done.quantities
-    (measured,) = [each for each in quantities if each.name.endswith(words)]
-    return f"{measured.value:.3g} {measured.unit}"
+    (quantity,) = [q for q in quantities if q.name.endswith(ending)]
+    return f"{quantity.value:.3g} {quantity.unit}"
 
 
-def _farthest(room: MachineRoom, record: Commissioning) -> str:
-    """Return in words how far the sole went at most in C8 or C11."""
+def _sole_travel(room: MachineRoom, record: Commissioning) -> str:
+    """Return the largest distance of the sole from its start in C8 and C11, as text."""
     settings = load_settings(room.config)
     tool = build_tool(settings.rig, settings.matrix.terrains[0].foot)
     model = ArmModel(load_constants(), tool)

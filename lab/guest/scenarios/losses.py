@@ -1,4 +1,4 @@
-"""Replies that get lost, and a link that goes down, in one session."""
+"""Lost replies and a link that goes down, in one session."""
 
 from lab.guest.commands import Program
 from lab.guest.machine_room import CAN, FAR_CAN, MachineRoom
@@ -14,17 +14,17 @@ from lab.guest.sessions import (
 
 
 def served_arm(room: MachineRoom, *options: str) -> Program:
-    """Return the arm above the container, its sensor on the bus."""
+    """Start the arm above the container, its sensor on the bus."""
     set_up_both(room.shell)
     room.write_bus_config()
     return room.serve_pushed_arm(*options)
 
 
 def lossy_and_down(room: MachineRoom) -> Figures:
-    """Record a trial whose replies get lost; can0 goes down in the next.
+    """Record a trial with lost replies; in the next trial can0 goes down.
 
-    A controller that has left the bus refuses to send and receive like a link that is
-    down; the emulated bus has no errors that would make it leave.
+    A controller in the bus-off state refuses to send and receive, like a link that is
+    down; the emulated bus has no errors that lead to bus-off.
     """
     arm = served_arm(room)
     session = begin(room, arm, 2)

@@ -11,14 +11,13 @@ Run = Callable[[MachineRoom], dict[str, str]]
 
 @dataclass(frozen=True, slots=True)
 class Scenario:
-    """One scenario.
+    """One scenario and its properties.
 
     Attributes:
-        name: as `--only` takes it and the table shows it.
-        run: does it, returns figures, raises ScenarioError.
-        weight: processor time beside others, about 10 s each; machines get even
-            shares.
-        expected: why it fails for now; empty = it has to pass.
+        name: name for `--only` and the table.
+        run: runs it; returns figures, raises ScenarioError.
+        weight: processor time in units of about 10 s, for sharing among machines.
+        expected: reason of a known failure; "" = it must pass.
     """
 
     name: str
@@ -28,7 +27,7 @@ class Scenario:
 
     @property
     def what(self) -> str:
-        """What it does, in a sentence."""
+        """One-line description."""
         return (self.run.__doc__ or "").strip().splitlines()[0]
 
 
@@ -43,5 +42,5 @@ ALL = (
 
 
 def chosen(names: list[str]) -> list[Scenario]:
-    """Return the scenarios of these names, all of them without any."""
-    return [one for one in ALL if not names or one.name in names]
+    """Return the scenarios of these names, or all if no name is given."""
+    return [scenario for scenario in ALL if not names or scenario.name in names]

@@ -1,4 +1,4 @@
-"""The wrist sensor over ftdi_sio: speed, latency, makes, rights, the plug pulled."""
+"""The wrist sensor over ftdi_sio: sensor makes, baud rates and latency."""
 
 import fcntl
 import struct
@@ -19,7 +19,7 @@ PORT = Path("/dev/ttyUSB0")
 _LATENCY = Path("/sys/bus/usb-serial/devices/ttyUSB0/latency_timer")
 _TIOCGSERIAL = 0x541E
 _LOW_LATENCY = 0x2000  # ASYNC_LOW_LATENCY
-_FLAGS_AT = 16  # of struct serial_struct
+_FLAGS_AT = 16  # offset in struct serial_struct
 _NEW, _OLD_KIND = 'kind = "{}"', 'kind = "bota"'
 _PATIENCE = 60.0
 
@@ -32,7 +32,7 @@ _OPTOFORCE = (
 
 @dataclass(frozen=True, slots=True)
 class Make:
-    """A sensor as rig.toml names it; `extra`: lines that its section needs, too."""
+    """A sensor of rig.toml; `extra`: lines added to its section, `dropped`: removed."""
 
     kind: str
     baudrate: int
@@ -40,8 +40,8 @@ class Make:
     dropped: tuple[str, ...] = ("sinc =",)
 
 
-# At both speeds of the adapters in use, where their protocols know them; the Bota's
-# ends at 460800, the OptoForce has one of its own.
+# Both baud rates of common adapters where the sensor supports them: the Bota only
+# supports up to 460800; the OptoForce has a third one.
 MAKES = (
     Make("bota", 460_800, dropped=()),
     Make("robotous", 460_800, ("rate = 500",)),
@@ -53,7 +53,7 @@ MAKES = (
 
 
 def serial_line(room: MachineRoom) -> Figures:
-    """Ask for low latency, read each make at its speeds, check the rig with one."""
+    """Set low latency, read each sensor at its baud rates, check the rig with one."""
     figures = _low_latency(room)
     for make in MAKES:
         write_make(room, make)
@@ -74,7 +74,7 @@ def serial_line(room: MachineRoom) -> Figures:
 
 
 def _low_latency(room: MachineRoom) -> Figures:
-    """Ask the driver for low latency and read it back."""
+    """Set low latency in the driver and read it back."""
     write_make(room, MAKES[0])
     _LATENCY.write_text("16", encoding="ascii")
     opened = open_port(str(PORT), MAKES[0].baudrate)
@@ -84,7 +84,7 @@ def _low_latency(room: MachineRoom) -> Figures:
     finally:
         opened.port.close()
     require(bool(flags & _LOW_LATENCY), f"flags {flags:#x} without low latency")
-    require(not opened.warning, f"warned of: {opened.warning}")
+    require(not opened.warning, f"warning: {opened.warning}")
     return {"latency timer": f"{read_text(_LATENCY)} ms"}
 
 

@@ -1,4 +1,4 @@
-"""The sensor's adapter and the CAN card pulled out in a trial, and put in again."""
+"""The sensor's adapter and the CAN card unplugged in a trial and plugged in again."""
 
 from lab.guest.machine_room import CAN, MachineRoom, line_port
 from lab.guest.monitor import ADAPTER, CARD, Monitor
@@ -13,15 +13,15 @@ from lab.guest.sessions import (
     resume,
 )
 
-_PATIENCE = 60.0  # s of guest time until a cut trial is on the disk
-_UNFINISHED = 5  # exit code of a session that is to go on another time
-_SETTLED = 2.0  # s until a sensor that came back is read again
+_PATIENCE = 60.0  # s of guest time until an interrupted trial is written
+_UNFINISHED = 5  # exit code of a session that can be resumed
+_RECONNECT = 2.0  # s until a sensor plugged in again is read
 
 
 def in_a_trial(room: MachineRoom) -> Figures:
-    """Pull the sensor's adapter out in a trial, the CAN card in its repetition.
+    """Unplug the sensor's adapter in a trial, the CAN card in its repetition.
 
-    Both are back in the end: the session's preflight finds arm and sensor as before.
+    After both are plugged in again, the session's preflight finds arm and sensor.
     """
     write_make(room, MAKES[0])
     set_up_both(room.shell)
@@ -59,8 +59,8 @@ def in_a_trial(room: MachineRoom) -> Figures:
 
 
 def _again(session: LedSession) -> None:
-    """Wait until the same trial can be recorded again, the sensor being back."""
-    session.program.run_on(_SETTLED)
+    """Wait until the trial can be recorded again with the reconnected sensor."""
+    session.program.run_on(_RECONNECT)
     session.hand("rest")
     session.lift()
     session.another()

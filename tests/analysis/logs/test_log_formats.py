@@ -68,7 +68,7 @@ def test_a_cut_log_is_read_to_where_it_was_cut(logs, tmp_path, name, share):
     cut.write_bytes(data[: int(share * len(data))])
     _, found, losses = read(cut)
     assert len(losses) == 1
-    assert "nothing is read behind byte" in losses[0]
+    assert "nothing is read after byte" in losses[0]
     assert len(found) < 2400
 
 
@@ -109,8 +109,8 @@ def test_metadata_that_are_damaged_end_no_log(tmp_path, spoil):
 
 def test_what_is_no_log_is_refused(tmp_path):
     for name, data, why in (
-        ("a.csv", b"t,v_t\n1,2\n", "no log that is known"),
-        ("a.parquet", b"PAR1" + bytes(20), "no log that is known"),
+        ("a.csv", b"t,v_t\n1,2\n", "not a known log format"),
+        ("a.parquet", b"PAR1" + bytes(20), "not a known log format"),
         ("a.db3", b"SQLite format 3\0" + bytes(200), "cannot be read as a database"),
         ("a.mcap.zstd", zstandard.compress(bytes(9_000_000)), "unpacks to over"),
     ):
@@ -132,7 +132,7 @@ def test_a_view_in_the_place_of_a_table_is_not_read(tmp_path):
     )
     database.commit()
     database.close()
-    with pytest.raises(SettingsError, match="no log of rosbag2"):
+    with pytest.raises(SettingsError, match="not a rosbag2 log"):
         read(path)
 
 

@@ -4,15 +4,15 @@ from tests.analysis.logs.refusals import sentences
 
 ESTABLISHED_BY = {
     "bag_log": {
-        "a field leads out of its header": "its size is over the bytes left",
-        "a header holds what is no field": "a field without =",
-        "a record leads out of its chunk": "its size is over the bytes left",
+        "a field exceeds its header": "its size is over the bytes left",
+        "a header has an invalid field": "a field without =",
+        "a record exceeds its chunk": "its size is over the bytes left",
         "a record of {} bytes": "its size is over 64 MiB",
         "over {} topics": "the count of connections",
         "the file is cut there": "the file ends before the size of a record",
     },
     "channels": {
-        "message {} of {} is not as its type says ({}).": "a count or size that the "
+        "message {} of {} does not match its type ({}).": "a count or size that the "
         "bytes of the message do not hold",
         "over {} messages of {}.": "the count",
         "{} jumps {} s after its first message: joint {} of the leg goes from {} to {} "
@@ -22,9 +22,8 @@ ESTABLISHED_BY = {
         "{} of {} stamps of {} are not set.": "the count of stamps of 0",
         "{} topics of {}.{}": "the count of topics of the type",
         "{} usable messages of {} of {}{}.": "the counts, by cause",
-        "{} was received at {} times for {} messages: they tell no messages apart.": (
-            "distinct receipts are under 90 % of the messages"
-        ),
+        "{} was received at {} times for {} messages, which does not distinguish the "
+        "messages.": "distinct receipts are under 90 % of the messages",
         "{} {} {}.": "the topic is missing, or its type is another one",
     },
     "checks": {"{}": "a sentence of signs; the checks that disagree are put before it"},
@@ -42,8 +41,8 @@ ESTABLISHED_BY = {
     "leg_record": {
         "this is a trial of Traction: report, fit and export read it.": "a topic of "
         "traction_msgs/Cycle",
-        "Joints and wrench share no time: the joints go from 0 to {} s, the wrench "
-        "from {} to {} s.": "no row of the joints has a reading; both spans",
+        "Joints and wrench do not overlap in time: the joints go from 0 to {} s, the "
+        "wrench from {} to {} s.": "no row of the joints has a reading; both spans",
     },
     "log_file": {
         "cannot be copied ({})": "what the system says",
@@ -66,19 +65,19 @@ ESTABLISHED_BY = {
         "a bag of format 1": "its first bytes, #ROSBAG V1",
         "cannot be read ({})": "what the system says",
         "it {}": "what the file is instead of a regular one",
-        "no log that is known": "its first bytes are those of no format",
+        "not a known log format": "its first bytes are those of no format",
         "{}": "damage of a packed file, at its place",
-        "{} and {} hold the same {} messages: the recording is there twice": "count, "
+        "{} and {} hold the same {} messages: the recording is duplicated": "count, "
         "and checksum of receipts and bytes, of both files",
         "{} logs in this folder.": "the count of names with a known ending",
     },
     "record": {
         "cannot be read ({}).": "what the system says",
-        "it is no record of an import ({}).": "the first field that is wrong",
+        "it is not a record of an import ({}).": "the first field that is wrong",
         "it {}.": "what the file is instead of a regular one",
     },
     "robot": {
-        "a name is there twice": "fewer names than links or joints",
+        "a name occurs twice": "fewer names than links or joints",
         "a {} has no usable name": "an empty, long or unprintable name",
         "byte {} is not {}": "the first byte that the encoding cannot say",
         "cannot be read ({})": "what the system says",
@@ -86,14 +85,15 @@ ESTABLISHED_BY = {
         "it has no element": "the parser ends without one",
         "it holds <!DOCTYPE or <!ENTITY": "the bytes of either",
         "it holds xacro:{}": "an element in the namespace of xacro; a comment is none",
-        "it is no XML ({})": "what the parser says, with line and column",
+        "it is not XML ({})": "what the parser says, with line and column",
         "it {}": "what the file is instead of a regular one, or its size",
         "its element is {}, not robot": "its first element",
         "its encoding is {}, not UTF-8 or Latin-1": "the declaration",
         "joint {} has no axis": "an axis shorter than 1e-6",
         "joint {} is {}": "its type is none that one number places",
         "joint {} mimics {}": "its element mimic",
-        "joint {}: its links make no tree": "a link is missing, or is a child twice",
+        "joint {}: its links do not form a tree": "a link is missing, or is a child "
+        "twice",
         "joint {}: {} is {}": "the text is not three finite numbers within 1 km",
         "link {} is its own parent": "the way up from it comes back to it",
         "no joint moves between the base and {}": "every joint on the way is fixed",
@@ -107,17 +107,17 @@ ESTABLISHED_BY = {
         "In {} rows of the trials the force is over {} N while the foot moves (limit "
         "{}): the largest force is {} N, the fastest motion {} mm/s.": "the count, and "
         "both largest values",
-        "No ground carries and slows a foot so: {}.": "the shares of both signs",
-        "Normal and traction force have the other sign: {}.": "F_n < 0 in 95 % and F_t "
-        "along the motion in 80 % of the rows",
-        "The force across the way is {} N, along it {} N.": "both medians",
+        "These forces cannot come from the ground: {}.": "the shares of both signs",
+        "Normal and traction force have the opposite sign: {}.": "F_n < 0 in 95 % and "
+        "F_t along the motion in 80 % of the rows",
+        "The force across the path is {} N, along it {} N.": "both medians",
     },
     "sqlite_log": {
-        "a message is no bytes": "the type of its column",
-        "beside it stands {}, of a transaction that has not ended: its messages may be "
+        "a message is not bytes": "the type of its column",
+        "{} shows a transaction that has not ended: its messages may be "
         "half written": "the journal is there and its first byte is not zero",
         "cannot be read as a database ({})": "what SQLite says",
-        "no log of rosbag2: the tables topics and messages are missing": "the names of "
+        "not a rosbag2 log: the tables topics and messages are missing": "the names of "
         "its tables; a view is none",
     },
 }

@@ -43,7 +43,7 @@ def test_the_arm_by_its_urdf_is_where_its_own_model_says():
     ("data", "why"),
     [
         (b"<!DOCTYPE x><robot/>", "it holds <!DOCTYPE"),
-        (b"<robot", "no XML"),
+        (b"<robot", "not XML"),
         (b"<robot></robot>", "0 links"),
         (b"\xff\xfe", "byte 0 is not utf-8"),
         (b'<?xml version="1.0" encoding="UTF-16"?><robot/>', "encoding is utf-16"),
@@ -54,7 +54,10 @@ def test_the_arm_by_its_urdf_is_where_its_own_model_says():
         ),
         (b"<robot>" + b"<a>" * 100 + b"</a>" * 100 + b"</robot>", "over 64 deep"),
         (b"<sdf/>", "its element is 'sdf', not robot"),
-        (chain(("j", "fixed", "a", "b", ""), ("k", "fixed", "c", "b", "")), "no tree"),
+        (
+            chain(("j", "fixed", "a", "b", ""), ("k", "fixed", "c", "b", "")),
+            "not form a tree",
+        ),
         (
             chain(("j", "fixed", "a", "b", ""), ("k", "fixed", "b", "a", "")),
             "own parent",

@@ -154,8 +154,8 @@ def test_the_way_is_a_column_of_any_trial():
     ("text", "known", "reason"),
     [
         ("", None, "0 columns"),
-        ("a,a", None, "stands twice"),
-        ("F_t", None, "is no further column"),
+        ("a,a", None, "occurs twice"),
+        ("F_t", None, "is not a further column"),
         ("a,b,c,d,e,f,g", None, "7 columns"),
         ("tilt,skew", ("tilt", "height"), "there is no skew"),
     ],

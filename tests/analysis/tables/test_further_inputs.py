@@ -1,4 +1,4 @@
-"""Inputs beside F_n and v_t, and tables that hold several trials in their rows."""
+"""Further inputs, and tables that hold several trials in their rows."""
 
 from dataclasses import replace
 
@@ -115,13 +115,13 @@ def test_trials_with_other_inputs_are_no_study_together(tmp_path):
     [
         ("angle", "always inputs"),
         ("v_t,F_n,F_n,angle", "always inputs"),
-        ("v_t,F_n", "0 inputs beside them"),
-        ("v_t,F_n,a,b,c,d,e,f,g", "7 inputs beside them"),
-        ("v_t,F_n,angle,angle", "stands twice"),
-        ("v_t,F_n,F_t", "is no input"),
+        ("v_t,F_n", "0 further inputs"),
+        ("v_t,F_n,a,b,c,d,e,f,g", "7 further inputs"),
+        ("v_t,F_n,angle,angle", "occurs twice"),
+        ("v_t,F_n,F_t", "is not an input"),
         ("", "v_t and F_n are always inputs"),
-        ("v_t,F_n,trial", "is no input"),
-        ("v_t,F_n,simulated", "is no input"),
+        ("v_t,F_n,trial", "is not an input"),
+        ("v_t,F_n,simulated", "is not an input"),
     ],
 )
 def test_a_list_that_is_none_of_inputs_is_refused(text, reason):
@@ -145,7 +145,9 @@ def test_an_input_whose_name_stands_twice_is_taken_by_its_place(tmp_path):
     path.write_text(f"{header},angle\n{wide}\n")
     with pytest.raises(SettingsError, match="angle occurs twice") as refused:
         load(path)
-    assert refused.value.hint == "Take one by its place: 6 or 7 for angle in --inputs"
+    assert (
+        refused.value.hint == "Take one by its position: 6 or 7 for angle in --inputs"
+    )
     trials = load_tables([path], COLUMNS, rate=1.0, inputs=("7",))
     assert set(trials["a"][0].further["7"]) == {7.0}
 

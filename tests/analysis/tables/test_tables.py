@@ -299,7 +299,7 @@ def test_rows_without_a_time_and_a_rate_say_how_to_give_it(tmp_path):
 
 
 def test_a_rate_beside_a_time_is_refused(tmp_path):
-    with pytest.raises(SettingsError, match="a time of its own"):
+    with pytest.raises(SettingsError, match="a time column"):
         load_tables([write(tmp_path, GOOD)], rate=200.0)
 
 
@@ -319,7 +319,7 @@ def test_a_table_of_kept_samples_is_known_by_its_column(tmp_path):
 @pytest.mark.parametrize("rate", [0, -200.0, np.nan, np.inf, True, "200"])
 def test_a_rate_that_is_none_is_refused(tmp_path, rate):
     path = write(tmp_path, "v_t,F_n,F_t\n" + "0.1,2,1\n" * 5)
-    with pytest.raises(SettingsError, match="is no rate"):
+    with pytest.raises(SettingsError, match="is not a rate"):
         load_tables([path], rate=rate)
 
 

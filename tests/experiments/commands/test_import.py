@@ -54,7 +54,7 @@ def test_a_list_prints_the_command_line_that_imports(given, tmp_path):
     frames = ("--foot", "foot", "--sensor", "gauge", "--acts", "ground-on-foot")
     done = traction("import", log, "--urdf", urdf, *frames, "--list")
     assert done.code == 0, done.err
-    assert "--tool-mass: the quiet foot turned by 0 degrees, 20 show it" in done.out
+    assert "--tool-mass: the quiet foot turned by 0 degrees, 20 are needed" in done.out
     _, _, line = done.out.partition("traction import ")
     words = shlex.split(line.replace("\\\n", " "))
     assert words[words.index("--tool-mass") + 1] == "KG"
@@ -120,7 +120,7 @@ def test_a_changed_record_of_an_import_is_refused(given, tmp_path):
     (tmp_path / "a" / "import.json").write_text('{"format": "other"}')
     done = traction("fit", tmp_path / "a", "--to", tmp_path / "b")
     assert done.code == 2
-    assert "no record of an import" in done.err
+    assert "not a record of an import" in done.err
 
 
 @pytest.mark.parametrize(

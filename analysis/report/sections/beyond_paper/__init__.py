@@ -1,4 +1,4 @@
 """Beyond the paper: uncertainty, new trials, forces from rest, recognition, trends.
 
-A module a subject, with its numbers, table and figures. Begin with `section`.
+One module per subject, with its numbers, table and figures. Begin with `section`.
 """

@@ -1,4 +1,4 @@
-"""What the ground gives before it goes: models of break-away beside the pushes."""
+"""Force available from rest: break-away models compared with the pushes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,29 +16,29 @@ from analysis.study.slip_risk import BREAK_AWAY, SLIDING, BreakAwayModel
 from analysis.study.survival import SurvivalCurve, kaplan_meier, pit_limit
 from analysis.study.terrain_fit import TerrainResult
 
-RISKS = (0.05, 0.1, 0.5)  # at which forces are stated
+RISKS = (0.05, 0.1, 0.5)  # risks at which forces are stated
 BREAK_AWAY_UNITS = {
     "law": "log N (sliding: N), 1, log N, log N",
     "v_slip": "m/s",
     "F_n, loads, forces, available, in_motion": "N",
     "pushes": "peak N, F_n N, held",
 }
-_POINTS = 60  # of a curve
+_POINTS = 60  # points of a curve
 _CURVES = ("#0072B2", "#D55E00", "#009E73")
 _STYLES = ("-", "--", "-.")
 _SLIP, _HELD = "#4d4d4d", "#CC79A7"
-_MIDDLE = RISKS[1]  # the curve with an interval
+_MIDDLE = RISKS[1]  # risk of the curve with an interval
 
 
 @dataclass(frozen=True, slots=True)
 class TerrainBreakAway:
-    """A terrain's break-away model and the pushes that it was fitted to.
+    """Break-away model of a terrain and the pushes it was fitted to.
 
     Attributes:
         terrain: name of the terrain.
-        title: its name with its kind in words.
-        model: the fit of all trials.
-        pushes: of all trials, in order.
+        title: name and kind in words.
+        model: fit to all trials.
+        pushes: pushes of all trials in order.
         motion: mean and standard deviation [N] of F_t at the slowest velocity of the
             window and the median load; None without a Gaussian process.
     """
@@ -56,12 +56,12 @@ class TerrainBreakAway:
 
     @property
     def F_n(self) -> Array:
-        """Their normal forces [N], shape (n,)."""
+        """Normal forces of the pushes [N], shape (n,)."""
         return np.array([push.F_n for push in self.pushes])
 
     @property
     def is_held(self) -> np.ndarray:
-        """Which of them held, shape (n,)."""
+        """Which pushes held, shape (n,)."""
         return np.array([push.is_held for push in self.pushes], dtype=bool)
 
     @property
@@ -71,7 +71,7 @@ class TerrainBreakAway:
 
     @property
     def loads(self) -> Array:
-        """Normal forces of curves [N], over the range that is not extrapolated."""
+        """Normal forces of curves [N], over the range without extrapolation."""
         return np.linspace(*self.model.loads, _POINTS)
 
     @property
@@ -82,14 +82,14 @@ class TerrainBreakAway:
 
     @property
     def survival(self) -> SurvivalCurve | None:
-        """Kaplan and Meier's curve of the peaks; None without a slip."""
+        """Kaplan-Meier curve of the peaks; None without a slip."""
         if self.is_held.all():
             return None
         return kaplan_meier(self.peaks, self.is_held)
 
     @property
     def mean_risk(self) -> Array:
-        """The model's risk at `forces`, mean over the loads of the pushes."""
+        """Risk by the model at `forces`, mean over the loads of the pushes."""
         risks = [
             self.model.risks(np.full(self.F_n.size, force), self.F_n)
             for force in self.forces
@@ -98,13 +98,13 @@ class TerrainBreakAway:
 
     @property
     def limit(self) -> float | None:
-        """Distance from Kaplan and Meier's curve that chance exceeds in 5 %."""
+        """Critical distance from the Kaplan-Meier curve at the 5 % level."""
         if self.model.kind != BREAK_AWAY:
             return None
         return pit_limit(self.model.slips)
 
     def motion_quantile(self, share: float) -> float | None:
-        """Return the force in motion [N] that is not reached with that probability."""
+        """Return the quantile of the force in motion [N]."""
         from scipy.special import ndtri
 
         if self.motion is None:
@@ -112,7 +112,7 @@ class TerrainBreakAway:
         return self.motion[0] + self.motion[1] * float(ndtri(share))
 
     def numbers(self) -> dict[str, Any]:
-        """Return what is stated of the terrain as plain values, for fits.json."""
+        """Return the reported numbers as plain values for fits.json."""
         model = self.model
         available = [model.available(self.load, risk) for risk in RISKS]
         return {
@@ -131,7 +131,7 @@ class TerrainBreakAway:
 
 
 def break_away_findings(results: StudyResults) -> Mapping[str, TerrainBreakAway]:
-    """Return what every terrain gives before it slips, where that is known."""
+    """Return the break-away model and pushes of every terrain that has a model."""
     study = results.study
     return {
         name: _of_terrain(study.terrains[name], model, study.options.prepare.slowest)
@@ -148,17 +148,17 @@ def _of_terrain(
         if trial.kept
         for push in find_pushes(trial, model.v_slip)
     )
-    quiet = TerrainBreakAway(result.terrain, result.title, model, pushes, None)
+    at_rest = TerrainBreakAway(result.terrain, result.title, model, pushes, None)
     folds = result.models(GP_SE)
     if not folds:
-        return quiet
-    found = folds[0].model.predict(np.array([quiet.load]), np.array([slowest]))
-    motion = (float(found.mean[0]), float(found.sd[0]))
+        return at_rest
+    prediction = folds[0].model.predict(np.array([at_rest.load]), np.array([slowest]))
+    motion = (float(prediction.mean[0]), float(prediction.sd[0]))
     return TerrainBreakAway(result.terrain, result.title, model, pushes, motion)
 
 
 def break_away_table(results: StudyResults) -> ReportTable:
-    """Return the force available from rest and in motion, and what it rests on."""
+    """Return the table of the force available from rest and in motion."""
     terrains = results.of(break_away_findings)
     speeds = sorted({f.model.v_slip for f in terrains.values()})
     return ReportTable(
@@ -174,11 +174,11 @@ def break_away_table(results: StudyResults) -> ReportTable:
             "distance (limit)",
             "effect of the trial",
         ),
-        rows=[_break_away_row(found) for found in terrains.values()],
-        note="From rest: a push at a new place in a new trial slips with that "
+        rows=[_break_away_row(terrain) for terrain in terrains.values()],
+        note="From rest: a push at a new location in a new trial slips with that "
         f"probability (v_slip {', '.join(f'{v:g}' for v in speeds)} m/s) before F_t "
-        "reaches the force; brackets: 90 % interval by resampled trials. "
-        '"sliding": too few pushes slipped, the force is that of slow motion. In '
+        "reaches the force; brackets: 90 % bootstrap interval over trials. "
+        '"sliding": too few pushes slipped, the force is that of slow sliding. In '
         "motion: the force at the slowest velocity of the window is below it with that "
         "probability, by GP-SE. F_n: median of the pushes. Distance: of the model from "
         "the Kaplan-Meier curve, and its critical value at 5 %. The effect of the "
@@ -188,16 +188,16 @@ def break_away_table(results: StudyResults) -> ReportTable:
     )
 
 
-def _break_away_row(found: TerrainBreakAway) -> list[str]:
-    model, load = found.model, found.load
+def _break_away_row(terrain: TerrainBreakAway) -> list[str]:
+    model, load = terrain.model, terrain.load
     answers = [model.available(load, risk) for risk in RISKS]
-    motion = [found.motion_quantile(risk) for risk in RISKS]
-    limit = found.limit
+    motion = [terrain.motion_quantile(risk) for risk in RISKS]
+    limit = terrain.limit
     distance = "–" if limit is None else f"{model.distance:.2f} ({limit:.2f})"
     unit = " N" if model.kind == SLIDING else ""
     trial_sd = f"{model.law.trial_sd:.2f}{unit}"
     return [
-        found.terrain,
+        terrain.terrain,
         model.kind,
         str(model.slips),
         str(model.held),
@@ -210,21 +210,26 @@ def _break_away_row(found: TerrainBreakAway) -> list[str]:
 
 
 def draw_available(results: StudyResults) -> Figure | None:
-    """Return the force available over F_n, a panel per terrain, with the peaks."""
+    """Draw the force available over F_n, a panel per terrain, with the peaks."""
     shown = list(results.of(break_away_findings).values())
     if not shown:
         return None
     figure, axes = panel_grid(len(shown), 2.1)
-    for ax, found in zip(axes, shown, strict=True):
-        _draw_peaks(ax, found)
+    for ax, terrain in zip(axes, shown, strict=True):
+        _draw_peaks(ax, terrain)
         for risk, colour, style in zip(RISKS, _CURVES, _STYLES, strict=True):
-            curve = found.model.curve(found.loads, risk)
+            curve = terrain.model.curve(terrain.loads, risk)
             ax.plot(
-                found.loads, curve, style, color=colour, lw=1.6, label=f"risk {risk:g}"
+                terrain.loads,
+                curve,
+                style,
+                color=colour,
+                lw=1.6,
+                label=f"risk {risk:g}",
             )
-        _draw_interval(ax, found)
-        _name(ax, found)
-    axes[0].set_ylim(0.0, 1.15 * max(float(found.forces[-1]) for found in shown))
+        _draw_interval(ax, terrain)
+        _name(ax, terrain)
+    axes[0].set_ylim(0.0, 1.15 * max(float(terrain.forces[-1]) for terrain in shown))
     axes[0].set_xlim(left=0.0)
     figure.supxlabel(LOAD_LABEL, fontsize=8)
     figure.supylabel("traction force from rest [N]", fontsize=8)
@@ -233,61 +238,61 @@ def draw_available(results: StudyResults) -> Figure | None:
 
 
 def caption_available(results: StudyResults) -> str:
-    """State the forces at the median load and what is in motion beside them."""
+    """State the forces at the median load, from rest and in motion."""
     terrains = results.of(break_away_findings)
     parts = []
-    for name, found in terrains.items():
-        answer = found.model.available(found.load, _MIDDLE)
-        motion = found.motion_quantile(_MIDDLE)
+    for name, terrain in terrains.items():
+        answer = terrain.model.available(terrain.load, _MIDDLE)
+        motion = terrain.motion_quantile(_MIDDLE)
         parts.append(
             f"{name} {answer.force:.1f} N ({answer.low:.1f} to {answer.high:.1f}) at "
-            f"{found.load:.1f} N"
+            f"{terrain.load:.1f} N"
             + ("" if motion is None else f", in motion {motion:.1f} N")
         )
-    speeds = {found.model.v_slip for found in terrains.values()}
+    speeds = {terrain.model.v_slip for terrain in terrains.values()}
     limits = ", ".join(f"{speed:g}" for speed in sorted(speeds))
     return (
-        f"Peaks of pushes from rest; a slip is faster than {limits} m/s. A push that "
-        "held says only that break-away lies above its peak. Curves: force at which a "
-        "push at a new place in a new trial slips with that probability; band: 90 % "
-        f"interval at {_MIDDLE:g} by resampled trials. With risk {_MIDDLE:g}: "
+        f"Peaks of pushes from rest; a slip is faster than {limits} m/s. For a push "
+        "that held, break-away lies above its peak. Curves: force at which a push at a "
+        "new location in a new trial slips with that probability; band: 90 % bootstrap "
+        f"interval over trials at {_MIDDLE:g}. With risk {_MIDDLE:g}: "
         f"{'; '.join(parts)}."
     )
 
 
 def draw_risk(results: StudyResults) -> Figure | None:
-    """Return the risk over the force asked for, with Kaplan and Meier's steps."""
+    """Draw the risk over the required force, with the Kaplan-Meier curve."""
     shown = [
         f for f in results.of(break_away_findings).values() if f.survival is not None
     ]
     if not shown:
         return None
     figure, axes = panel_grid(len(shown), 1.8)
-    for ax, found in zip(axes, shown, strict=True):
-        _draw_survival(ax, found)
+    for ax, terrain in zip(axes, shown, strict=True):
+        _draw_survival(ax, terrain)
         ax.plot(
-            found.forces,
-            found.mean_risk,
+            terrain.forces,
+            terrain.mean_risk,
             color=_CURVES[1],
             lw=1.6,
             label="model, mean over the loads",
         )
-        _name(ax, found)
-    axes[0].set_ylim(0.0, 1.25)  # room for the words
+        _name(ax, terrain)
+    axes[0].set_ylim(0.0, 1.25)  # space for the text
     axes[0].set_yticks(np.linspace(0.0, 1.0, 6))
     axes[0].set_xlim(left=0.0)
-    figure.supxlabel("traction force asked for [N]", fontsize=8)
+    figure.supxlabel("required traction force [N]", fontsize=8)
     figure.supylabel("probability of a slip before it", fontsize=8)
     _legend(figure, axes)
     return figure
 
 
 def caption_risk(results: StudyResults) -> str:
-    """State how far the models are from Kaplan and Meier's curves."""
+    """State the distance of the models from the Kaplan-Meier curves."""
     parts = [
-        f"{name} {found.model.distance:.2f} ({found.limit:.2f})"
-        for name, found in results.of(break_away_findings).items()
-        if found.limit is not None
+        f"{name} {terrain.model.distance:.2f} ({terrain.limit:.2f})"
+        for name, terrain in results.of(break_away_findings).items()
+        if terrain.limit is not None
     ]
     return (
         "Steps: share of pushes that slipped below a force, those that held censored "
@@ -297,15 +302,15 @@ def caption_risk(results: StudyResults) -> str:
     )
 
 
-def _draw_peaks(ax: Axes, found: TerrainBreakAway) -> None:
-    is_held = found.is_held
+def _draw_peaks(ax: Axes, terrain: TerrainBreakAway) -> None:
+    is_held = terrain.is_held
     for chosen, mark, colour, label in (
         (~is_held, "o", _SLIP, "slipped"),
         (is_held, "^", _HELD, "held"),
     ):
         ax.plot(
-            found.F_n[chosen],
-            found.peaks[chosen],
+            terrain.F_n[chosen],
+            terrain.peaks[chosen],
             mark,
             ms=3.4,
             mfc="none" if mark == "^" else colour,
@@ -316,10 +321,10 @@ def _draw_peaks(ax: Axes, found: TerrainBreakAway) -> None:
         )
 
 
-def _draw_interval(ax: Axes, found: TerrainBreakAway) -> None:
-    answers = [found.model.available(float(load), _MIDDLE) for load in found.loads]
+def _draw_interval(ax: Axes, terrain: TerrainBreakAway) -> None:
+    answers = [terrain.model.available(float(load), _MIDDLE) for load in terrain.loads]
     ax.fill_between(
-        found.loads,
+        terrain.loads,
         [answer.low for answer in answers],
         [answer.high for answer in answers],
         color=_CURVES[1],
@@ -328,23 +333,24 @@ def _draw_interval(ax: Axes, found: TerrainBreakAway) -> None:
     )
 
 
-def _draw_survival(ax: Axes, found: TerrainBreakAway) -> None:
-    curve = found.survival
+def _draw_survival(ax: Axes, terrain: TerrainBreakAway) -> None:
+    curve = terrain.survival
     if curve is None:
         return
-    at = np.concatenate([[0.0], curve.at, [found.forces[-1]]])
+    at = np.concatenate([[0.0], curve.at, [terrain.forces[-1]]])
     below = np.concatenate([[0.0], curve.below, curve.below[-1:]])
     ax.step(at, below, where="post", color=_CURVES[0], lw=1.1, label="Kaplan-Meier")
-    held = found.peaks[found.is_held]
+    held = terrain.peaks[terrain.is_held]
     ax.plot(held, curve.share_below(held), "|", ms=5, color=_HELD, label="held")
 
 
-def _name(ax: Axes, found: TerrainBreakAway) -> None:
-    ax.set_title(plain(found.title), loc="left")
+def _name(ax: Axes, terrain: TerrainBreakAway) -> None:
+    ax.set_title(plain(terrain.title), loc="left")
     ax.text(
         0.03,
         0.97,
-        f"{found.model.kind}\n{found.model.slips} slipped, {found.model.held} held",
+        f"{terrain.model.kind}\n"
+        f"{terrain.model.slips} slipped, {terrain.model.held} held",
         transform=ax.transAxes,
         va="top",
         fontsize=6,
@@ -370,7 +376,7 @@ BREAK_AWAY_FIGURE = FigureSpec(
 BREAK_AWAY_RISK_FIGURE = FigureSpec(
     "break_away_risk",
     "From rest: slip probability over required force",
-    "Probability of a slip over the traction force that is asked for, by "
+    "Probability of a slip over the required traction force, by "
     "Kaplan-Meier and by the model, one panel per terrain.",
     draw_risk,
     caption_risk,

@@ -1,4 +1,4 @@
-"""Terrain classification: which terrain windows of motion were taken for."""
+"""Terrain classification: confusion of windows of motion between terrains."""
 
 from collections.abc import Callable
 
@@ -17,14 +17,14 @@ from analysis.report.style import (
 from analysis.terrains.evidence import REFUSED, Exclusion
 from analysis.terrains.identify import KEPT_PER_SECOND, Confusion, Identification
 
-_LEVELS = {  # in words; a factor has its own name
+_LEVELS = {  # titles of levels; a factor has its own name
     "terrain": "each terrain",
     "stones": "size of stones",
     "surface": "flat or rocky",
 }
 _SIDE = 2.25  # inches of one matrix of terrains
-_SMALL_SIDE = 1.55  # of a matrix of two or three kinds
-_MANY = 5  # kinds from which a matrix is a large one
+_SMALL_SIDE = 1.55  # inches of a matrix of few kinds
+_MANY = 5  # kinds from which a matrix is drawn large
 _RULES = {
     "log density": "by log density",
     "smallest error": "smallest error (paper)",
@@ -33,7 +33,7 @@ _RULES = {
 
 
 def recognition_tables(results: StudyResults) -> list[ReportTable]:
-    """Return how well windows of motion tell the terrains apart; none for one."""
+    """Return the tables of classification accuracy; none for one terrain."""
     identification = results.identification
     if identification is None:
         return []
@@ -59,8 +59,8 @@ def recognition_tables(results: StudyResults) -> list[ReportTable]:
                 *(f"by error: {name}" for name in names),
             ),
             rows,
-            note="Share of windows recognised by models that never saw the trial, mean "
-            "over kinds. By error, the paper's rule: the model with the smallest mean "
+            note="Share of windows of held-out trials that are recognised, mean over "
+            "kinds. By error, the paper's rule: the model with the smallest mean "
             f"absolute error. {_stones_note(identification)}",
             section=ReportSection.BEYOND,
         ),
@@ -69,7 +69,7 @@ def recognition_tables(results: StudyResults) -> list[ReportTable]:
 
 
 def surface_table(identification: Identification) -> ReportTable:
-    """Return how well flat and rocky ground and ground that is not known are told."""
+    """Return the table of flat or rocky accuracy and rejection of unknown ground."""
     rows = [
         (
             f"{size / KEPT_PER_SECOND:g} s",
@@ -92,10 +92,11 @@ def surface_table(identification: Identification) -> ReportTable:
         ),
         rows=rows,
         note="Flat or rocky: logistic regression on features of the window, fitted to "
-        "trials of other numbers; right: mean over the two; calibration error: mean "
-        "difference of probability and share. None: a window that strains the "
-        "likeliest terrain's model, or is smooth, as few of its own windows are; by "
-        f"limits from trials of other numbers that may refuse {REFUSED:.0%} of these.",
+        "trials of other numbers; accuracy: mean over the two; calibration error: mean "
+        "difference between probability and share. None: the strain of the window "
+        "under the likeliest terrain's model is too high, or the window is too smooth, "
+        "by limits from trials of other numbers that may reject "
+        f"{REFUSED:.0%} of a terrain's own windows.",
         section=ReportSection.BEYOND,
     )
 
@@ -122,7 +123,7 @@ def _exclusion_cells(exclusion: Exclusion) -> list[str]:
 
 
 def _stones_note(identification: Identification) -> str:
-    """Return that terrains of stones are one family; empty with fewer than two."""
+    """Explain the similarity of stony terrains; empty with fewer than two."""
     shares = {
         size: share
         for size in identification.sizes
@@ -132,7 +133,7 @@ def _stones_note(identification: Identification) -> str:
         return ""
     size = max(shares)
     return (
-        "Terrains of stones are a family: the single terrain is correct in "
+        "Terrains of stones are similar: the single terrain is correct in "
         f"{shares[size]:.2f} of their windows of {size / KEPT_PER_SECOND:g} s "
         f"({1.0 / identification.stones:.2f} by chance), so only the class flat or "
         "rocky is identifiable, not the single terrain."
@@ -140,9 +141,10 @@ def _stones_note(identification: Identification) -> str:
 
 
 def draw_confusion(level: str) -> Callable[[StudyResults], Figure | None]:
-    """Return a function that draws the matrices of a level for every window length.
+    """Return a function that draws the confusion matrices of a level.
 
-    Above the log density's, below it the paper's rule, then the classifier's.
+    A column per window length; rows from the top: log density, the paper's rule, the
+    classifier.
     """
 
     def draw(results: StudyResults) -> Figure | None:
@@ -167,16 +169,16 @@ def draw_confusion(level: str) -> Callable[[StudyResults], Figure | None]:
                     loc="left",
                     fontsize=7.5,
                 )
-            grid[row, 0].set_ylabel("from")
+            grid[row, 0].set_ylabel("true")
         for ax in grid[-1]:
-            ax.set_xlabel("taken for")
+            ax.set_xlabel("classified as")
         return figure
 
     return draw
 
 
 def rules_of(identification: Identification, level: str) -> list[str]:
-    """Return the rules that answer at a level for every size of window."""
+    """Return the rules available at a level for every window size."""
     return [
         rule
         for rule, sizes in identification.rules.items()
@@ -185,7 +187,7 @@ def rules_of(identification: Identification, level: str) -> list[str]:
 
 
 def caption_confusion(level: str, results: StudyResults) -> str:
-    """State how many windows are recognised by either rule."""
+    """State the share of windows recognised by each rule."""
     identification = results.identification
     if identification is None:
         return ""
@@ -197,21 +199,21 @@ def caption_confusion(level: str, results: StudyResults) -> str:
     ]
     third = ""
     if "features" in rules_of(identification, level):
-        right = [
+        accuracies = [
             f"{identification.by_features[size][level].accuracy:.3f}"
             for size in identification.sizes
         ]
-        third = f" Lowest: by features of the window, {', '.join(right)}."
+        third = f" Bottom: by features of the window, {', '.join(accuracies)}."
     return (
-        "Shares of the windows of each row in percent, by models that never saw the "
-        "trial. Above: the largest log density; below: the paper's rule, the smallest "
+        "Shares of the windows of each row in percent, by models fitted without the "
+        "trial. Top: the largest log density; below: the paper's rule, the smallest "
         f"mean absolute error. Recognised (by the paper's rule): {', '.join(shares)}."
         + third
     )
 
 
 def shares_of(confusion: Confusion) -> np.ndarray:
-    """Return the counts as shares of their row, NaN where a row is empty."""
+    """Return the counts as shares of their row; NaN for an empty row."""
     totals = confusion.counts.sum(axis=1, keepdims=True).astype(np.float64)
     totals[totals == 0] = np.nan
     return confusion.counts / totals

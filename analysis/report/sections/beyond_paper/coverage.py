@@ -17,7 +17,7 @@ from analysis.report.style import (
 
 
 def draw_coverage(results: StudyResults) -> Figure | None:
-    """Return how many samples lie in every cell of velocity and load."""
+    """Draw the number of samples in every cell of velocity and load."""
     if not results.coverage:
         return None
     figure, axes = panel_grid(len(results.coverage), MAP_ROW)
@@ -38,7 +38,7 @@ def draw_coverage(results: StudyResults) -> Figure | None:
 
 
 def caption_coverage(results: StudyResults) -> str:
-    """State what the coverage map leaves out, and where a terrain has few samples."""
+    """State the samples outside the map and where a terrain has few samples."""
     outside = sum(cells.outside for cells in results.coverage)
     total = outside + sum(float(cells.counts.sum()) for cells in results.coverage)
     thin = [
@@ -48,8 +48,8 @@ def caption_coverage(results: StudyResults) -> str:
     ]
     listed = f" Below {ENOUGH:.0%} of its samples: {'; '.join(thin)}." if thin else ""
     return (
-        f"Where the models have seen samples; white cells hold none. {outside} of "
-        f"{total:.0f} samples lie beyond the axis of load.{listed}"
+        f"Samples available to the models; white cells hold none. {outside} of "
+        f"{total:.0f} samples lie beyond the load axis.{listed}"
     )
 
 

@@ -8,7 +8,7 @@ from analysis.study.study import Study
 
 
 def lag_table(study: Study) -> ReportTable:
-    """Return how much later than the motion the forces were."""
+    """Return the table of the lag of the forces behind the motion."""
     rows: list[list[str]] = []
     for name, result in study.terrains.items():
         lags = [t.lag.seconds * 1e3 for t in result.trials if t.lag is not None]
@@ -32,9 +32,9 @@ def lag_table(study: Study) -> ReportTable:
         ),
         rows=rows,
         note="The offset at which -F_t = M dv/dt + B v explains most of F_t between 10 "
-        "and 80 Hz (3 and 40 Hz where velocity is coarse), M and B free. Above zero "
-        "the force is late. A trial shows it where half of the variance is explained: "
-        "stones that jam and let go do, a smooth plate does not. The last column is "
+        "and 80 Hz (3 and 40 Hz if velocity is coarse), M and B fitted. Above zero "
+        "the force is late. A trial shows it if half of the variance is explained: "
+        "stones that jam and slip do, a smooth plate does not. The last column is "
         "the median age of the forces by the time stamps of the recording; more than "
         f"{LATEST_MS:g} ms from it is a warning.",
         section=ReportSection.BEYOND,

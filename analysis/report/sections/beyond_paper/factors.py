@@ -22,14 +22,14 @@ from analysis.study.study import Study
 from analysis.study.terrain_fit import TerrainResult
 
 INCLINE = "incline_deg"
-_MOST_WORDS = len(MODEL_MARKERS)  # values of the second factor that are told apart
-_NUDGE = 0.06  # of the axis between two values of the second factor
+_MOST_WORDS = len(MODEL_MARKERS)  # values of the second factor with distinct markers
+_NUDGE = 0.06  # offset between values of the second factor [share of the axis]
 
 
 def shown_factors(study: Study) -> list[str]:
-    """Return the first two factors that vary; none where no experiment states one.
+    """Return the first two factors that vary; none if no experiment states one.
 
-    Those that are stated come first, in their order, then incline and foot.
+    Stated factors come first, in their order, then incline and foot.
     """
     results = list(study.terrains.values())
     stated = dict.fromkeys(n for r in results for n in r.factors if n != FOOT)
@@ -43,21 +43,21 @@ def shown_factors(study: Study) -> list[str]:
 
 
 def draw_factors(results: StudyResults) -> Figure | None:
-    """Return F_t/F_n of every trial over the first factor, marked by the second."""
+    """Draw F_t/F_n of every trial over the first factor, marked by the second."""
     names = shown_factors(results.study)
     if not names:
         return None
     terrains = [r for r in results.study.terrains.values() if r.kept]
     seconds = _ordered([_value(r, names[1]) for r in terrains]) if names[1:] else [None]
     firsts = _ordered([_value(r, names[0]) for r in terrains])
-    places = _places(firsts)
+    positions = _axis_positions(firsts)
     figure = new_figure(2.6, ONE_COLUMN)
     ax = figure.subplots()
-    span = max(places.values()) - min(places.values()) or 1.0
+    span = max(positions.values()) - min(positions.values()) or 1.0
     for k, second in enumerate(seconds[:_MOST_WORDS]):
         chosen = [r for r in terrains if not names[1:] or _value(r, names[1]) == second]
         points = [
-            (places[_value(r, names[0])], x) for r in chosen for x in ratios_of(r)
+            (positions[_value(r, names[0])], x) for r in chosen for x in ratios_of(r)
         ]
         if not points:
             continue
@@ -73,22 +73,22 @@ def draw_factors(results: StudyResults) -> Figure | None:
             label=None if label is None else plain(label),
         )
     units = {n: unit for r in terrains for n, unit in r.units.items()}
-    _label(ax, names[0], {INCLINE: "°"} | units, firsts, places)
+    _label(ax, names[0], {INCLINE: "°"} | units, firsts, positions)
     if names[1:]:
         ax.legend(fontsize=6.5, loc="best")
     return figure
 
 
 def caption_factors(results: StudyResults) -> str:
-    """Return what is shown, and of how many values."""
+    """State the mean ratio of every terrain."""
     names = shown_factors(results.study)
     shown = " and ".join(names)
-    found = [
+    ratio_texts = [
         f"{r.terrain} {np.mean(ratios):.2f}"
         for r in results.study.terrains.values()
         if len(ratios := ratios_of(r))
     ]
-    listed = ", ".join(found[:12]) + (" ..." if found[12:] else "")
+    listed = ", ".join(ratio_texts[:12]) + (" ..." if ratio_texts[12:] else "")
     return f"Ratio of the means of F_t and F_n of every trial, by {shown}: {listed}."
 
 
@@ -99,12 +99,12 @@ def _value(result: TerrainResult, name: str) -> Value:
 
 
 def _ordered(values: Sequence[Value]) -> list[Value]:
-    """Return distinct values: numbers by size, then words, then what does not apply."""
+    """Sort distinct values: numbers by size, then words, then None."""
     return sorted(set(values), key=lambda v: (v is None, isinstance(v, str), v or 0.0))
 
 
-def _places(values: Sequence[Value]) -> dict[Value, float]:
-    """Return where values stand: numbers at themselves, words side by side."""
+def _axis_positions(values: Sequence[Value]) -> dict[Value, float]:
+    """Return axis positions: numbers at their value, words at 0, 1, 2, ..."""
     if all(isinstance(value, float) for value in values):
         return {value: float(value) for value in values if isinstance(value, float)}
     return {value: float(k) for k, value in enumerate(values)}
@@ -115,9 +115,9 @@ def _label(
     name: str,
     units: Mapping[str, str],
     values: Sequence[Value],
-    places: dict[Value, float],
+    positions: dict[Value, float],
 ) -> None:
-    ax.set_xticks(list(places.values()), [plain(value_text(v)) for v in values])
+    ax.set_xticks(list(positions.values()), [plain(value_text(v)) for v in values])
     unit = units.get(name, "")
     ax.set_xlabel(plain(f"{name} [{unit}]" if unit else name))
     ax.set_ylabel("$F_t / F_n$")

@@ -1,4 +1,4 @@
-"""Further columns: what they tell of F_t."""
+"""Further columns: their value for predicting F_t."""
 
 from collections.abc import Sequence
 
@@ -7,19 +7,19 @@ from analysis.study.covariates import REPEATED, SPAN, CovariateResult
 
 
 def covariate_tables(results: Sequence[CovariateResult]) -> list[ReportTable]:
-    """Return the table of columns that were tested; none where none was."""
+    """Return the table of tested columns; none without any."""
     if not results:
         return []
     rows = [
         [
-            one.terrain,
-            one.column,
-            one.verdict,
-            f"{one.gain:+z.3f} ({one.lower:+z.3f} to {one.upper:+z.3f})",
-            f"{one.repeated:.0%}",
-            str(one.trials),
+            result.terrain,
+            result.column,
+            result.verdict,
+            f"{result.gain:+z.3f} ({result.lower:+z.3f} to {result.upper:+z.3f})",
+            f"{result.repeated:.0%}",
+            str(result.trials),
         ]
-        for one in results
+        for result in results
     ]
     return [
         ReportTable(
@@ -29,16 +29,16 @@ def covariate_tables(results: Sequence[CovariateResult]) -> list[ReportTable]:
                 "column",
                 "verdict",
                 "gain [nat per sample]",
-                "changes that are those of F_t",
+                "changes explained by F_t",
                 "trials",
             ),
             rows=rows,
-            note="Gain: log density of trials left out by a model of a new trial that "
-            "has the column as an input, over that of one with F_n and v_t alone, with "
-            "a 95% interval over the trials. A gain has its interval above 0 and is at "
-            f"least 0.05 nat. Of a column that repeats F_t, {REPEATED:.0%} or more of "
-            f"the changes over {SPAN:g} s are those of F_t: it is moved by the force "
-            "and is no property of the ground, whatever it gains.",
+            note="Gain in log density of held-out trials by a model of a new trial "
+            "with the column as an input, over one with F_n and v_t alone, with a 95% "
+            "interval over the trials. A gain has its interval above 0 and is at least "
+            f"0.05 nat. A column repeats F_t if {REPEATED:.0%} or more of its changes "
+            f"over {SPAN:g} s are explained by those of F_t: it is driven by the force "
+            "and is not a property of the ground, whatever its gain.",
             section=ReportSection.BEYOND,
         )
     ]

@@ -1,4 +1,4 @@
-"""A trial that nobody has recorded yet: its distribution, and how trials differ."""
+"""Predictive distribution of a new trial, and variance components of the trials."""
 
 import numpy as np
 
@@ -20,13 +20,11 @@ from analysis.study.study import Study
 from analysis.study.terrain_fit import mean_of
 from analysis.study.trial_components import TrialComponents
 
-_LEAST = (
-    0.01  # of the residual within a trial: smaller noise is not distinguishable from 0
-)
+_LEAST = 0.01  # noise relative to the residual within a trial, indistinguishable from 0
 
 
 def new_trial_tables(results: StudyResults) -> list[ReportTable]:
-    """Return the tables on predictions of a new trial; one without rows is left out."""
+    """Return the non-empty tables on predictions of a new trial."""
     tables = [
         residual_table(results.study),
         worth_table(results.study),
@@ -36,7 +34,7 @@ def new_trial_tables(results: StudyResults) -> list[ReportTable]:
 
 
 def residual_table(study: Study) -> ReportTable:
-    """Return how residuals of a new trial are distributed, and what that gains."""
+    """Return the table of the residual distribution of a new trial."""
     rows: list[list[str]] = []
     for name, result in study.terrains.items():
         fitted = [fold.model for fold in result.models(GP_SE_TRIAL)]
@@ -66,16 +64,16 @@ def residual_table(study: Study) -> ReportTable:
             "gain over chosen noise [nat]",
         ),
         rows=rows,
-        note="A Gaussian process whose noise changes with load and velocity, a level "
+        note="A Gaussian process whose noise depends on load and velocity, a level "
         "of every trial, and the quantiles of residuals of training trials, each left "
         "out in turn; those of a normal distribution are -1.64 to +1.64. Means over "
-        "folds. Scores are of trials left out of the fold.",
+        "folds. Scores are of held-out trials.",
         section=ReportSection.BEYOND,
     )
 
 
 def worth_table(study: Study) -> ReportTable:
-    """Return how trials differ, and how well so many show a terrain's level."""
+    """Return the table of variance components and the error of a terrain's level."""
     rows = [
         [
             name,
@@ -110,9 +108,9 @@ def worth_table(study: Study) -> ReportTable:
         "correlation time. Measurement: uncorrelated between rows. Last columns: "
         "standard error of the terrain's level. A spread between trials that gains "
         "less than 1.4 in log likelihood is not distinguishable from 0. The spread "
-        "between trials is by moments from 30 trials on, else by the restricted "
-        "likelihood; where the two differ by more than twice the standard error, it "
-        "says so.",
+        "between trials is estimated by moments for 30 trials or more, otherwise by "
+        "the restricted likelihood; the other estimate is given if the two differ by "
+        "more than twice the standard error.",
         section=ReportSection.BEYOND,
     )
 
@@ -122,12 +120,12 @@ def _between(components: TrialComponents) -> str:
         return f"not distinguishable from 0 (gain {components.gain:.1f})"
     shown = f"{_with_interval(components, 'between', 'N')} (gain {components.gain:.1f})"
     if components.do_differ and components.other is not None:
-        return f"{shown}; the other way gives {components.other:.2f} N"
+        return f"{shown}; the other estimate is {components.other:.2f} N"
     return shown
 
 
 def _measurement(components: TrialComponents) -> str:
-    if components.measurement < _LEAST * components.within:  # the search ends there
+    if components.measurement < _LEAST * components.within:  # at the search bound
         return "not distinguishable from 0"
     return _with_interval(components, "measurement", "N")
 
@@ -140,12 +138,12 @@ def _with_interval(components: TrialComponents, name: str, unit: str) -> str:
 
 
 def draw_new_trial(results: StudyResults) -> Figure | None:
-    """Return the band that holds 90 % of a new trial, with the samples."""
+    """Draw the 90 % band of a new trial, with the samples."""
     return draw_panels(panels(results.study, GP_SE_TRIAL), draw_quantiles)
 
 
 def caption_new_trial(results: StudyResults) -> str:
-    """State how far the bands of a new trial reach from the median."""
+    """State the extent of the bands of a new trial about the median."""
     reach = [
         f"{low:.2f} N below and {high:.2f} N above on {panel.terrain}"
         for panel in one_per_kind(panels(results.study, GP_SE_TRIAL))

@@ -1,11 +1,11 @@
-"""Whether the bands of a model hold on trials it has not seen, and how surely.
+"""Calibration of predictive bands on held-out trials.
 
-Two looks at the trials of a terrain, each left out in turn. The first is the share of
-the predicted distribution below every measurement: such shares are even where the
-distribution is right. The second is an oracle that believes no distribution: a band
-around the median, as wide as the other trials left out need it (conformal prediction
-over groups; Lee, Barber and Willett 2023). Rows of one trial repeat each other, so a
-trial counts as one in both, and an error is that over trials.
+Two checks with the trials of a terrain, each left out in turn. The first is the
+probability integral transform: the share of the predicted distribution below every
+measurement, uniform if the distribution is right. The second is a distribution-free
+band about the median whose width is calibrated on the other held-out trials (conformal
+prediction over groups; Lee, Barber and Willett 2023). Rows of one trial are correlated,
+so each trial counts as one unit, and errors are over trials.
 """
 
 from collections.abc import Sequence
@@ -21,20 +21,20 @@ from analysis.report.style import FIRST_COLOUR, Figure, panel_grid, plain
 from analysis.study.models import GP_SE_TRIAL
 from analysis.study.terrain_fit import TerrainResult
 
-BINS = 10  # of the shares
-ORACLE = (0.5, 0.8)  # bands that ten trials can show; 95 % would need nineteen
+BINS = 10  # bins of the shares
+ORACLE = (0.5, 0.8)  # bands possible with ten trials; 95 % would need nineteen
 _EDGE = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
 class OracleBand:
-    """A band of the model beside one that assumes no distribution.
+    """Comparison of a band of the model with a distribution-free one.
 
     Attributes:
-        nominal: share that both should hold.
-        coverage: share of left-out samples in the oracle's band, mean of trials.
-        coverage_error: its standard error over trials.
-        width: width of the oracle's band over that of the model's, mean of trials.
+        nominal: nominal share of both bands.
+        coverage: share of held-out samples in the conformal band, mean over trials.
+        coverage_error: standard error of the coverage over trials.
+        width: width of the conformal band over that of the model, mean over trials.
     """
 
     nominal: float
@@ -45,15 +45,15 @@ class OracleBand:
 
 @dataclass(frozen=True, slots=True)
 class HeldOutShares:
-    """Where samples of left-out trials lie in what was predicted for them.
+    """Probability integral transform of the samples of held-out trials.
 
     Attributes:
-        terrain: its terrain.
-        density: share of the samples in each of ten even bins times ten, mean of
-            trials; 1 everywhere where the prediction is right. Shape (10,).
-        error: its standard error over trials, shape (10,).
+        terrain: name of the terrain.
+        density: density of the transform in ten equal bins, mean over trials; 1
+            everywhere if the prediction is right. Shape (10,).
+        error: standard error of the density over trials, shape (10,).
         trials: number of trials.
-        oracle: bands beside those of the oracle.
+        oracle: comparisons with conformal bands.
     """
 
     terrain: str
@@ -65,19 +65,19 @@ class HeldOutShares:
 
 def held_out_shares(results: StudyResults) -> list[HeldOutShares]:
     """Return the shares of every terrain with three folds of `GP_SE_TRIAL` or more."""
-    found = map(_of_terrain, results.study.terrains.values())
-    return [shares for shares in found if shares is not None]
+    by_terrain = map(_terrain_shares, results.study.terrains.values())
+    return [shares for shares in by_terrain if shares is not None]
 
 
 def plain_shares(shares: HeldOutShares) -> dict[str, Any]:
-    """Return the shares of a terrain as plain values for fits.json."""
+    """Convert the shares of a terrain to plain values for fits.json."""
     return asdict(shares) | {
         "density": shares.density.tolist(),
         "error": shares.error.tolist(),
     }
 
 
-def _of_terrain(result: TerrainResult) -> HeldOutShares | None:
+def _terrain_shares(result: TerrainResult) -> HeldOutShares | None:
     shares = [
         fold.model.predict(trial.F_n, trial.v_t, trial.further).cdf(trial.F_t)
         for k, fold in result.left_out(GP_SE_TRIAL)
@@ -97,55 +97,55 @@ def _of_terrain(result: TerrainResult) -> HeldOutShares | None:
 
 
 def oracle_band(shares: Sequence[Array], nominal: float) -> OracleBand:
-    """Return how the conformal band over trials does on each trial in turn.
+    """Test the conformal band over trials on each trial in turn.
 
     Args:
         shares: share of the prediction below every sample, trial by trial.
-        nominal: share that the band should hold.
+        nominal: nominal share of the band.
     """
     from scipy.special import ndtri
 
     scores = [np.abs(ndtri(np.clip(u, _EDGE, 1.0 - _EDGE))) for u in shares]
     reach = conformal_reaches(scores, nominal)
-    held = np.array([np.mean(s <= r) for s, r in zip(scores, reach, strict=True)])
-    usual = float(ndtri(0.5 + 0.5 * nominal))
-    error = held.std(ddof=1) / np.sqrt(held.size)
-    width = float(np.mean(reach)) / usual
-    return OracleBand(nominal, float(held.mean()), float(error), width)
+    inside = np.array([np.mean(s <= r) for s, r in zip(scores, reach, strict=True)])
+    model_reach = float(ndtri(0.5 + 0.5 * nominal))
+    error = inside.std(ddof=1) / np.sqrt(inside.size)
+    width = float(np.mean(reach)) / model_reach
+    return OracleBand(nominal, float(inside.mean()), float(error), width)
 
 
 def conformal_reaches(scores: Sequence[Array], nominal: float) -> list[float]:
-    """Return for each trial the score that its samples stay below, by the others.
+    """Return the conformal score limit of each trial from the other trials.
 
-    The others share all weight but one part, which stands for the trial and lies at
-    infinity: the reach is infinite for a share that so few trials cannot show. With
-    G(s) the sum over all trials of the share of their samples up to s, and G_k that of
-    trial k, its reach is the smallest s with G(s) - G_k(s) at least `nominal` times
-    their number. As G_k is at most 1, it lies among few samples.
+    Each trial has the same weight, and the tested trial's weight lies at infinity: the
+    limit is infinite if there are too few trials for the share. With G(s) the sum over
+    all trials of the share of their samples up to s, and G_k that of trial k, its limit
+    is the smallest s with G(s) - G_k(s) at least `nominal` times the number of trials.
+    Because G_k is at most 1, only few samples have to be searched.
 
     Args:
-        scores: of the samples of every trial, larger where they fit less.
-        nominal: share of the trial's samples.
+        scores: scores of the samples of every trial, larger for a worse fit.
+        nominal: nominal share of the trial's samples.
     """
     values = np.concatenate(scores)
     weight = np.concatenate([np.full(s.size, 1.0 / s.size) for s in scores])
     order = np.argsort(values)
     values, total = values[order], np.cumsum(weight[order])
-    wanted = nominal * len(scores) - 1e-9
-    first, end = np.searchsorted(total, [wanted, wanted + 1.0])
+    target = nominal * len(scores) - 1e-9
+    first, end = np.searchsorted(total, [target, target + 1.0])
     near = values[first : end + 1]
     up_to = total[np.searchsorted(values, near, "right") - 1]
-    found: list[float] = []
+    reaches: list[float] = []
     for own in map(np.sort, scores):
         others = up_to - np.searchsorted(own, near, "right") / own.size
-        is_reached = others >= wanted
+        is_reached = others >= target
         reach = float(near[np.argmax(is_reached)]) if is_reached.any() else np.inf
-        found.append(reach)
-    return found
+        reaches.append(reach)
+    return reaches
 
 
 def oracle_table(results: StudyResults) -> ReportTable:
-    """Return bands of a new trial beside those that assume no distribution."""
+    """Return the comparison of bands with distribution-free ones."""
     rows = [
         [
             shares.terrain,
@@ -169,7 +169,7 @@ def oracle_table(results: StudyResults) -> ReportTable:
 
 
 def draw_shares(results: StudyResults) -> Figure | None:
-    """Return where held-out samples lie in what is predicted for a new trial."""
+    """Draw the histogram of the probability integral transform."""
     shown = results.of(held_out_shares)
     if not shown:
         return None
@@ -197,14 +197,14 @@ def draw_shares(results: StudyResults) -> Figure | None:
 
 
 def caption_shares(results: StudyResults) -> str:
-    """State how far the shares are from even, in standard errors."""
+    """State the largest deviation of the shares from uniform."""
     values = [
         f"{shares.terrain} {np.abs(shares.density - 1.0).max():.2f}"
         for shares in results.of(held_out_shares)
     ]
     return (
         "Probability integral transform: the share of the distribution predicted for a "
-        "new trial that lies below a sample of a trial left out, in ten bins; dashed: "
+        "new trial that lies below a sample of a held-out trial, in ten bins; dashed: "
         "uniform, as for a calibrated distribution. High ends: bands too narrow; "
         "a slope: a bias. Mean over trials, whiskers: standard error over trials. "
         f"Largest deviation from uniform: {'; '.join(values)}."

@@ -1,4 +1,4 @@
-"""Constant noise of the Gaussian process against noise that is chosen."""
+"""Comparison of constant with chosen noise of the Gaussian process."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -17,14 +17,14 @@ _ROW = 0.32  # inches of one terrain's gain
 
 @dataclass(frozen=True, slots=True)
 class NoiseSummary:
-    """Constant noise beside the noise that was chosen, on trials left out.
+    """Comparison of constant and chosen noise on held-out trials.
 
     Attributes:
-        terrain: its terrain.
-        counts: folds that chose each noise, by its name.
+        terrain: name of the terrain.
+        counts: number of folds that chose each noise, by name.
         before: NLPD with constant noise [nat], mean over trials.
         after: NLPD with the chosen noise.
-        paired: the second minus the first, trial by trial.
+        paired: chosen minus constant, trial by trial.
     """
 
     terrain: str
@@ -34,7 +34,7 @@ class NoiseSummary:
     paired: PairedComparison
 
     def numbers(self) -> dict[str, Any]:
-        """Return it as plain values, for fits.json."""
+        """Return the summary as plain values for fits.json."""
         return {
             "folds": self.counts,
             "nlpd_constant": self.before,
@@ -44,7 +44,7 @@ class NoiseSummary:
 
 
 def noise_summaries(results: StudyResults) -> list[NoiseSummary]:
-    """Return one summary per terrain that has both models; none if not fitted."""
+    """Return a summary for every terrain that has both models."""
     summaries = (_summary(result) for result in results.study.terrains.values())
     return [summary for summary in summaries if summary is not None]
 
@@ -65,7 +65,7 @@ def _summary(result: TerrainResult) -> NoiseSummary | None:
 
 
 def noise_table(results: StudyResults) -> ReportTable:
-    """Return which noise was chosen per terrain, and NLPD before and after."""
+    """Return the table of chosen noise and NLPD before and after."""
     summaries = results.of(noise_summaries)
     rows = [
         [
@@ -90,7 +90,7 @@ def noise_table(results: StudyResults) -> ReportTable:
 
 
 def draw_noise(results: StudyResults) -> Figure | None:
-    """Return what the chosen noise gains in log density, and what was chosen."""
+    """Draw the gain in log density from the chosen noise."""
     summaries = results.of(noise_summaries)
     if not summaries:
         return None
@@ -130,10 +130,10 @@ def caption_noise(results: StudyResults) -> str:
         if s.paired.difference < 0
     ]
     return (
-        "Constant noise against noise chosen among the training trials of each fold: "
+        "Constant noise and noise chosen by the training trials of each fold: "
         "constant, log-linear in F_n and v_t, or that with heavy tails (Student's t). "
-        "On the right: how many folds chose what, and NLPD before and after on trials "
-        "left out; whiskers: standard error over trials. "
+        "On the right: number of folds per choice, and NLPD before and after on "
+        "held-out trials; whiskers: standard error over trials. "
         + (f"Gain: {', '.join(better)}." if better else "No gain in this study.")
     )
 

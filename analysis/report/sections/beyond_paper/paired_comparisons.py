@@ -1,4 +1,4 @@
-"""Every model against the first one, trial by trial."""
+"""Paired comparison of every model with the first one over the trials."""
 
 from analysis.report.cell_texts import holm_note, paired_cells
 from analysis.report.section import ReportSection, ReportTable
@@ -8,12 +8,12 @@ from analysis.study.study import Study
 
 
 def paired_tables(study: Study) -> list[ReportTable]:
-    """Return the comparisons of errors and of log densities."""
+    """Return the comparisons by error and by log density."""
     return [paired_table(study, key, unit) for key, unit in _MEASURES]
 
 
 def paired_table(study: Study, key: str, unit: str) -> ReportTable:
-    """Return every model against the first one, trial by trial."""
+    """Compare every model with the first one over the trials."""
     first, *others = study.options.fit.models
     names = [n for n, r in study.terrains.items() if others and r.models(first)]
     pairs = [

@@ -1,4 +1,4 @@
-"""How honest the predicted uncertainties are: scores, and coverage of the bands."""
+"""Calibration of the predicted uncertainties: scores, and coverage of the bands."""
 
 import numpy as np
 
@@ -31,7 +31,7 @@ BANDS = (("coverage50", 0.50), ("coverage90", 0.90), ("coverage95", 0.95))
 
 
 def uncertainty(study: Study) -> ReportTable:
-    """Return how honest the predicted uncertainties were."""
+    """Return the table of probabilistic scores and band coverage."""
     rows = [
         [name, TITLES[model], *_cells(result, model)]
         for name, result in study.terrains.items()
@@ -44,7 +44,7 @@ def uncertainty(study: Study) -> ReportTable:
         rows=rows,
         note="Means over the held-out trials ± standard error over trials, not over "
         "samples. NLPD: negative log density; CRPS: continuous ranked probability "
-        "score; both reward a calibrated spread, less is better. A band whose "
+        "score; both reward a calibrated spread, smaller is better. A band whose "
         "coverage is far below its nominal share is too narrow. The variance is that "
         "of a measurement, noise included.",
         section=ReportSection.BEYOND,
@@ -61,7 +61,7 @@ def _cells(result: TerrainResult, model: str) -> list[str]:
 
 
 def draw_calibration(results: StudyResults) -> Figure | None:
-    """Return the share of held-out samples inside the 50, 90 and 95 % bands."""
+    """Draw the share of held-out samples inside the 50, 90 and 95 % bands."""
     terrains = [r for r in results.study.terrains.values() if r.folds]
     models = [
         m for m in results.study.options.fit.models if any(map(_has(m), terrains))
@@ -96,7 +96,7 @@ def draw_calibration(results: StudyResults) -> Figure | None:
 
 
 def caption_calibration(results: StudyResults) -> str:
-    """State how far the bands are from their nominal coverage."""
+    """State the range of coverage of each band."""
     shares = [
         (nominal, name, model, share)
         for key, nominal in BANDS
@@ -121,7 +121,7 @@ def caption_calibration(results: StudyResults) -> str:
 
 
 def coverage_of(result: TerrainResult, model: str, key: str) -> float:
-    """Return the mean over trials of a coverage; NaN where there is none."""
+    """Return the mean of a coverage over trials; NaN if there is none."""
     value = mean_of(result.scores(model, key))
     return float("nan") if value is None else value
 

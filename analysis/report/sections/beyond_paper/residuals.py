@@ -1,4 +1,4 @@
-"""Residuals, measured minus predicted F_t, of trials left out."""
+"""Residuals, measured minus predicted F_t, of held-out trials."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -25,7 +25,7 @@ from analysis.tustin.identifiability import correlation_samples
 RESIDUAL_MODELS = (TUSTIN, GP_SE)
 SHARES = (0.05, 0.5, 0.95)  # quantiles of the residual that are shown
 _BINS = 10
-_FEWEST = 20  # residuals of a bin that quantiles are taken of
+_FEWEST = 20  # smallest number of residuals in a bin for quantiles
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,9 +36,9 @@ class ResidualBand:
         v: middle of every bin [m/s], shape (k,).
         quantiles: 5 %, median and 95 % of the residual [N], shape (3, k).
         bias: mean residual over all samples [N].
-        sd: their standard deviation [N].
+        sd: standard deviation of the residuals [N].
         samples: number of residuals.
-        correlation: of residuals one kept sample apart.
+        correlation: correlation of residuals one kept sample apart.
         time: integrated autocorrelation time [kept samples].
     """
 
@@ -52,11 +52,11 @@ class ResidualBand:
 
     @property
     def independent(self) -> float:
-        """Number of independent samples that the residuals are worth."""
+        """Effective number of independent samples of the residuals."""
         return self.samples / self.time
 
     def numbers(self) -> dict[str, Any]:
-        """Return it as plain values, for fits.json."""
+        """Return the band as plain values for fits.json."""
         return {
             "v_t": self.v.tolist(),
             "quantiles": self.quantiles.tolist(),
@@ -70,7 +70,7 @@ class ResidualBand:
 
 
 def residual_bands(results: StudyResults) -> dict[str, dict[str, ResidualBand]]:
-    """Return the held-out residuals by terrain and model, of models with a fold."""
+    """Return the held-out residuals by terrain and model."""
     return {
         name: {
             model: band
@@ -82,7 +82,7 @@ def residual_bands(results: StudyResults) -> dict[str, dict[str, ResidualBand]]:
 
 
 def residual_band(result: TerrainResult, model: str) -> ResidualBand | None:
-    """Return the held-out residuals of a model; None without a fold that has it."""
+    """Return the held-out residuals of a model; None without a fold of it."""
     residual = held_out_residual(result, model)
     if residual.size == 0:
         return None
@@ -106,37 +106,37 @@ def residual_band(result: TerrainResult, model: str) -> ResidualBand | None:
 
 
 def held_out_trials(result: TerrainResult, model: str) -> list[PreparedTrial]:
-    """Return the trials that a fold of the model was tested on, in its order."""
+    """Return the trials that folds of the model were tested on, in fold order."""
     return [result.trials[k] for k, _ in result.left_out(model)]
 
 
 def held_out_residual(result: TerrainResult, model: str) -> Array:
-    """Return measured minus predicted F_t [N] of all trials left out, shape (n,)."""
-    rests = [
+    """Return measured minus predicted F_t [N] of all held-out trials, shape (n,)."""
+    residuals = [
         trial.F_t - fold.model.mean(trial.F_n, trial.v_t, trial.further)
         for k, fold in result.left_out(model)
         for trial in [result.trials[k]]
     ]
-    return np.concatenate([np.zeros(0), *rests])
+    return np.concatenate([np.zeros(0), *residuals])
 
 
 def explained_share(result: TerrainResult, model: str) -> float | None:
-    """Return R^2 on trials left out: the share of F_t's variance that is predicted."""
-    rest = held_out_residual(result, model)
+    """Return R^2 on held-out trials."""
+    residual = held_out_residual(result, model)
     F_t = SampleTable.of(held_out_trials(result, model)).F_t
     power = float(((F_t - F_t.mean()) ** 2).sum()) if F_t.size else 0.0
-    return 1.0 - float((rest**2).sum()) / power if power else None
+    return 1.0 - float((residual**2).sum()) / power if power else None
 
 
 def _neighbours(residual: Array) -> float:
-    """Return the correlation of values (n,) with those one row on; 0 if all agree."""
+    """Return the lag-1 autocorrelation of values (n,); 0 if all are equal."""
     centred = residual - residual.mean()
     power = float(centred @ centred)
     return float(centred[1:] @ centred[:-1]) / power if power else 0.0
 
 
 def independent_samples(results: StudyResults) -> ReportTable:
-    """Return how many independent samples the held-out residuals are worth."""
+    """Return the table of effective numbers of independent samples."""
     rows = [
         (
             name,
@@ -169,7 +169,7 @@ def independent_samples(results: StudyResults) -> ReportTable:
 
 
 def draw_residuals(results: StudyResults) -> Figure | None:
-    """Return quantiles of measured minus predicted F_t over velocity."""
+    """Draw quantiles of measured minus predicted F_t over velocity."""
     shown = {name: bands for name, bands in results.of(residual_bands).items() if bands}
     if not shown:
         return None
@@ -202,7 +202,7 @@ def caption_residuals(results: StudyResults) -> str:
     ]
     return (
         "Median (thick), 5 and 95 % quantiles (thin) of measured minus predicted force "
-        "on trials left out, in ten bins of velocity."
+        "on held-out trials, in ten bins of velocity."
         + (
             f" Mean and standard deviation, GP (SE): {'; '.join(values)}."
             if values

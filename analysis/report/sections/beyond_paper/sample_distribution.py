@@ -1,11 +1,11 @@
-"""How the samples of each terrain divide by velocity."""
+"""Distribution of the samples of each terrain over velocity classes."""
 
 from analysis.report.section import ReportSection, ReportTable
 from analysis.study.study import Study
 
 
 def velocity_shares(study: Study) -> ReportTable:
-    """Return how the samples of each terrain divide by velocity."""
+    """Return the table of sample shares by velocity class."""
     rows = []
     for name, result in study.terrains.items():
         shares = [trial.shares for trial in result.trials]
@@ -20,7 +20,7 @@ def velocity_shares(study: Study) -> ReportTable:
         header=("terrain", "window", "sticking", "backward", "too fast", "of moving"),
         rows=rows,
         note="Means over trials. Only the window is fitted and tested; the last column "
-        "is its share of the samples that move.",
+        "is its share of the moving samples.",
         section=ReportSection.BEYOND,
     )
 

@@ -1,4 +1,4 @@
-"""Beyond the paper: its tables and figures in the order of the page."""
+"""Section "Beyond the paper": tables and figures in page order."""
 
 from analysis.report.page_model import ReportContext, Section
 from analysis.report.results import StudyResults
@@ -37,7 +37,7 @@ from analysis.report.sections.beyond_paper.trials import TRIALS_FIGURE
 
 
 def beyond_tables(results: StudyResults) -> list[ReportTable]:
-    """Return the tables beyond the paper's; one without rows is left out."""
+    """Return the non-empty tables of the section."""
     study = results.study
     tables = [
         uncertainty(study),

@@ -20,7 +20,7 @@ from analysis.study.terrain_fit import TerrainResult
 
 
 def draw_stick_slip(results: StudyResults) -> Figure | None:
-    """Return force over displacement of one trial per kind of terrain."""
+    """Draw force over displacement of one trial per kind of terrain."""
     chosen = representatives(results.study)
     if not chosen:
         return None
@@ -30,11 +30,12 @@ def draw_stick_slip(results: StudyResults) -> Figure | None:
     axes = figure.subplots(len(chosen), 1, sharex=True, sharey=True, squeeze=False)
     for ax, result in zip(axes[:, 0], chosen, strict=True):
         number = most_slips(result)
-        smooth, way = result.trials[number].smooth, way_of(result.trials[number].smooth)
+        smooth = result.trials[number].smooth
+        travel = way_of(smooth)
         for k, slip in enumerate(result.slips[number]):
-            start, stop = np.interp((slip.onset, slip.end), smooth.t, way)
+            start, stop = np.interp((slip.onset, slip.end), smooth.t, travel)
             shade_slip(ax, 1e3 * start, 1e3 * stop, is_named=k == 0)
-        ax.plot(1e3 * way, smooth.F_t, color="#0072B2", lw=0.8)
+        ax.plot(1e3 * travel, smooth.F_t, color="#0072B2", lw=0.8)
         ax.set_title(f"{plain(result.title)}, trial {number + 1}", loc="left")
     handles, labels = axes[0, 0].get_legend_handles_labels()
     if handles:
@@ -45,7 +46,7 @@ def draw_stick_slip(results: StudyResults) -> Figure | None:
 
 
 def caption_stick_slip(results: StudyResults) -> str:
-    """State how long slips are."""
+    """State number and length of the slips."""
     values = []
     for result in representatives(results.study):
         slips = [slip.length for trial in result.slips for slip in trial]
@@ -63,13 +64,13 @@ def caption_stick_slip(results: StudyResults) -> str:
 
 
 def way_of(smooth: Smoothed) -> Array:
-    """Return the way of the sole since the start [m], shape (n,), by trapezia."""
+    """Return the travel of the sole since the start [m], shape (n,) (trapezoidal)."""
     steps = 0.5 * (smooth.v_t[1:] + smooth.v_t[:-1]) * np.diff(smooth.t)
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def most_slips(result: TerrainResult) -> int:
-    """Return the number of the trial with most slips, from 0; the first of equals."""
+    """Return the index of the first trial with the most slips."""
     counts = [len(slips) for slips in result.slips]
     return counts.index(max(counts))
 

@@ -1,4 +1,4 @@
-"""Repeatability of the trials of a terrain, and how they change from first to last."""
+"""Repeatability of the trials of a terrain, and trends over the trials."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,19 +16,19 @@ from analysis.study.terrain_fit import TerrainResult
 
 MEAN_FORCE, TRACTION_RATIO, MEAN_LOAD = "F_t", "F_t/F_n", "F_n"
 TREND_UNITS = {MEAN_FORCE: "N", TRACTION_RATIO: "1", MEAN_LOAD: "N"}
-SIGNIFICANT = 2.0  # standard errors that a slope must exceed to be called one
+SIGNIFICANT = 2.0  # standard errors that a significant slope exceeds
 
 
 @dataclass(frozen=True, slots=True)
 class Trend:
-    """A straight line through one mean per trial.
+    """Linear trend of the trial means.
 
     Attributes:
-        trials: numbers of the trials that have kept samples, from 1, shape (n,).
-        means: one mean per trial, shape (n,).
-        slope: change from one trial to the next; None below three trials.
-        slope_error: its standard error.
-        start: height of the line at trial 0; the overall mean without a slope.
+        trials: numbers of the trials with kept samples, from 1, shape (n,).
+        means: mean of every trial, shape (n,).
+        slope: change per trial; None with fewer than three trials.
+        slope_error: standard error of the slope.
+        start: value of the line at trial 0; the overall mean without a slope.
     """
 
     trials: Array
@@ -39,7 +39,7 @@ class Trend:
 
     @property
     def spread(self) -> float | None:
-        """Standard deviation of the trial means: repeatability; None for one."""
+        """Standard deviation of the trial means (repeatability); None for one trial."""
         return float(self.means.std(ddof=1)) if self.means.size > 1 else None
 
     @property
@@ -50,7 +50,7 @@ class Trend:
         return abs(self.slope) > SIGNIFICANT * self.slope_error
 
     def numbers(self) -> dict[str, Any]:
-        """Return it as plain values, for fits.json."""
+        """Return the trend as plain values for fits.json."""
         return {
             "trials": self.trials.astype(int).tolist(),
             "means": self.means.tolist(),
@@ -61,22 +61,22 @@ class Trend:
 
 
 def study_trends(results: StudyResults) -> dict[str, dict[str, Trend]]:
-    """Return the trends of the trial means, by terrain and measure."""
+    """Fit the trends of the trial means by terrain and measure."""
     terrains = results.study.terrains
     return {name: trends_of(result) for name, result in terrains.items()}
 
 
 def trends_of(result: TerrainResult) -> dict[str, Trend]:
-    """Return the trends of mean F_t, mean F_n and their ratio over the trials."""
+    """Fit the trends of mean F_t, mean F_n and their ratio over the trials."""
     kept = [(k + 1, trial) for k, trial in enumerate(result.trials) if trial.kept]
     return {name: _trend(kept, measure) for name, measure in _MEASURES.items()}
 
 
 def fit_trend(trials: Array, means: Array) -> Trend:
-    """Return the least-squares line through `means` over `trials`, shapes (n,).
+    """Fit a least-squares line to `means` over `trials`, each of shape (n,).
 
-    The slope's standard error is s / sqrt(sum (k - mean k)^2), s^2 from the residual
-    with n - 2 degrees of freedom.
+    The standard error of the slope is s / sqrt(sum (k - mean k)^2), with s^2 from the
+    residuals with n - 2 degrees of freedom.
     """
     if means.size < 3:
         start = float(means.mean()) if means.size else float("nan")
@@ -105,7 +105,7 @@ _MEASURES: Mapping[str, Callable[[PreparedTrial], float]] = {
 
 
 def trend_table(results: StudyResults) -> ReportTable:
-    """Return repeatability and first-to-last trend of every terrain."""
+    """Return the table of repeatability and trend of every terrain."""
     rows = []
     for name, trends in results.of(study_trends).items():
         force, load, ratio = (
@@ -143,14 +143,14 @@ def trend_table(results: StudyResults) -> ReportTable:
 
 
 def slope_cell(trend: Trend) -> str:
-    """Return a slope with its standard error as text, – where there is none."""
+    """Format a slope with its standard error; – without a slope."""
     if trend.slope is None or trend.slope_error is None:
         return "–"
     return f"{trend.slope:+z.3f} ± {trend.slope_error:.3f}"
 
 
 def draw_trends(results: StudyResults) -> Figure | None:
-    """Return the mean F_t of every trial with its line: wear of the terrain."""
+    """Draw the mean F_t of every trial with the trend line."""
     shown = {
         name: trends[MEAN_FORCE]
         for name, trends in results.of(study_trends).items()
@@ -164,7 +164,7 @@ def draw_trends(results: StudyResults) -> Figure | None:
         ax.set_title(plain(results.study.terrains[name].title), loc="left")
     means = np.concatenate([trend.means for trend in shown.values()])
     low, high = min(0.0, float(means.min())), float(means.max())
-    axes[0].set_ylim(low, high + 0.25 * (high - low or 1.0))  # room for the words
+    axes[0].set_ylim(low, high + 0.25 * (high - low or 1.0))  # space for the text
     most = int(max(float(trend.trials.max()) for trend in shown.values()))
     axes[0].set_xlim(0.4, most + 0.6)
     axes[0].set_xticks(range(1, most + 1, 1 + most // 6))
@@ -174,7 +174,7 @@ def draw_trends(results: StudyResults) -> Figure | None:
 
 
 def caption_trends(results: StudyResults) -> str:
-    """State which terrains change from the first trial to the last."""
+    """State which terrains have a significant trend."""
     changing = [
         f"{name} ({trend.slope:+z.3f} ± {trend.slope_error:.3f} N per trial)"
         for name, trends in results.of(study_trends).items()

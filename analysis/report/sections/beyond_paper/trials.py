@@ -1,4 +1,4 @@
-"""All trials: force over the way of each, one row per terrain."""
+"""All trials: force over travel, one row per terrain."""
 
 from collections.abc import Mapping, Sequence
 
@@ -21,16 +21,16 @@ from analysis.report.style import (
 )
 
 _MOST_TRIALS = 20  # side by side
-_MOST_POINTS = 400  # of a curve
-_GAP = 0.08  # of a cell between two trials
+_MOST_POINTS = 400  # per curve
+_GAP = 0.08  # margin on either side of a trial [share of its cell]
 
 
 def draw_trials(results: StudyResults) -> Figure | None:
-    """Return small multiples: F_t over the way of every trial, a row per terrain."""
+    """Draw F_t over the travel of every trial as small multiples, a row per terrain."""
     terrains = results.study.terrains
     trials = {name: result.trials for name, result in terrains.items()}
     titles = {name: result.title for name, result in terrains.items()}
-    return _side_by_side(trials, titles, results.study.kinds)
+    return _draw_rows(trials, titles, results.study.kinds)
 
 
 def plot_trials(
@@ -39,22 +39,22 @@ def plot_trials(
     *,
     is_simulated: bool,
 ) -> Figure:
-    """Return F_t over the way of every trial side by side, as the report draws it.
+    """Plot F_t over the travel of every trial side by side, as in the report.
 
     Args:
-        trials: by terrain, at least one.
+        trials: trials by terrain, at least one.
         kinds: "small", "big" or "flat" by terrain.
-        is_simulated: marks the figure.
+        is_simulated: add the watermark.
     """
     titles = {name: f"{name}: {kind_title(kinds[name])}" for name in trials}
     with styled():
-        figure = _side_by_side(trials, titles, kinds)
+        figure = _draw_rows(trials, titles, kinds)
         if is_simulated:
             mark_simulated(figure)
     return figure
 
 
-def _side_by_side(
+def _draw_rows(
     trials: Mapping[str, Sequence[PreparedTrial]],
     titles: Mapping[str, str],
     kinds: Mapping[str, str],
@@ -65,10 +65,10 @@ def _side_by_side(
     colours = terrain_colours(kinds)
     for ax, (terrain, group) in zip(axes[:, 0], trials.items(), strict=True):
         for k, trial in enumerate(group[:most]):
-            way, force = _thinned(trial.smooth)
-            reach = max(float(way.max()), 1e-9)
+            travel, force = _thinned(trial.smooth)
+            reach = max(float(travel.max()), 1e-9)
             ax.plot(
-                k + 0.5 + _GAP + (1.0 - 2.0 * _GAP) * np.clip(way / reach, 0.0, 1.0),
+                k + 0.5 + _GAP + (1.0 - 2.0 * _GAP) * np.clip(travel / reach, 0.0, 1.0),
                 force,
                 lw=0.6,
                 color=colours[terrain],
@@ -79,13 +79,13 @@ def _side_by_side(
     axes[0, 0].set_ylim(lowest, highest)
     axes[0, 0].set_xlim(0.5, most + 0.5)
     axes[-1, 0].set_xticks(range(1, most + 1))
-    axes[-1, 0].set_xlabel("trial, and in it the share of its way from 0 to 1")
+    axes[-1, 0].set_xlabel("trial; within each, share of its travel from 0 to 1")
     figure.supylabel(FORCE_LABEL, fontsize=8)
     return figure
 
 
 def caption_trials(results: StudyResults) -> str:
-    """State how many trials are shown."""
+    """State the number of trials."""
     count = sum(len(result.trials) for result in results.study.terrains.values())
     return (
         f"Smoothed traction of {count} trials, each from the far end to the near one; "
@@ -94,7 +94,7 @@ def caption_trials(results: StudyResults) -> str:
 
 
 def force_limits(trials: Sequence[PreparedTrial]) -> tuple[float, float]:
-    """Return limits of F_t [N] that hold all but a few spikes of all trials."""
+    """Return axis limits of F_t [N] that include all but a few spikes."""
     ends = [np.quantile(trial.smooth.F_t, (0.001, 0.999)) for trial in trials]
     low, high = min(float(e[0]) for e in ends), max(float(e[1]) for e in ends)
     margin = 0.04 * (high - low) or 1.0
@@ -109,7 +109,7 @@ def _thinned(smooth: Smoothed) -> tuple[Array, Array]:
 TRIALS_FIGURE = FigureSpec(
     "trials",
     "All trials",
-    "Small curves of traction force over the way of each trial, one row per terrain.",
+    "Small curves of traction force over the travel of each trial, a row per terrain.",
     draw_trials,
     caption_trials,
     is_vector=True,

@@ -1,4 +1,4 @@
-"""The paper's table and figures, and its statements held against the study.
+"""The paper's table and figures, and a check of its statements against the study.
 
 Begin with `section`.
 """

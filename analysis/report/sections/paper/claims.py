@@ -1,7 +1,7 @@
-"""The checkable statements of the paper as rows of data, each held against a study.
+"""Testable statements of the paper as data, and their evaluation on a study.
 
-A row has the statement, the quantities that it is about, and the bounds on them within
-which a study agrees or agrees partly. One whose terrains a study lacks is not shown.
+A row has the statement, its quantities, and the bounds on them within which a study
+agrees or partly agrees. Statements about terrains that a study lacks are not evaluated.
 """
 
 import operator
@@ -33,9 +33,9 @@ class Bound:
     """A bound on a quantity.
 
     Attributes:
-        quantity: its name in what was measured.
-        relation: of the quantity to the limit.
-        limit: of the quantity, in its unit.
+        quantity: name of the measured quantity.
+        relation: required relation of the quantity to the limit.
+        limit: limit in the unit of the quantity.
     """
 
     quantity: str
@@ -49,15 +49,15 @@ class Bound:
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """A statement of the paper, and what it takes to agree with it.
+    """A statement of the paper and the criteria for agreement.
 
     Attributes:
-        reference: where the paper makes it.
-        statement: what it says.
-        needs: what a study must have to be held against it.
-        measure: returns its quantities; None where the study lacks them.
-        agrees: bounds that all hold where a study agrees.
-        partly: bounds that all hold where it agrees partly; none = it never does.
+        reference: section, figure or equation of the paper.
+        statement: text of the statement.
+        needs: data that a study needs to test it.
+        measure: function that returns its quantities; None if the study lacks them.
+        agrees: bounds that must all hold for agreement.
+        partly: bounds that must all hold for partial agreement; none = not possible.
     """
 
     reference: str
@@ -68,7 +68,7 @@ class Claim:
     partly: Sequence[Bound] = ()
 
     def verdict(self, quantities: Mapping[str, float]) -> Agreement:
-        """Return whether a study with these quantities agrees."""
+        """Judge the agreement of a study with these quantities."""
         if all(bound.holds(quantities) for bound in self.agrees):
             return Agreement.YES
         if self.partly and all(bound.holds(quantities) for bound in self.partly):
@@ -78,14 +78,14 @@ class Claim:
 
 @dataclass(frozen=True, slots=True)
 class PaperClaim:
-    """One statement of the paper beside what the study shows.
+    """One statement of the paper with the result of the study.
 
     Attributes:
-        reference: where the paper makes it.
-        statement: what it says.
-        shown: what this study shows, or what is missing.
+        reference: section, figure or equation of the paper.
+        statement: text of the statement.
+        shown: result of this study, or missing data.
         agreement: whether the two agree.
-        numbers: of `shown`, SI units, shares as 1.
+        numbers: numbers of `shown` in SI units, shares as 1.
     """
 
     reference: str
@@ -95,7 +95,7 @@ class PaperClaim:
     numbers: Mapping[str, float]
 
     def plain(self) -> dict[str, Any]:
-        """Return it as plain values, for fits.json."""
+        """Return the statement as plain values for fits.json."""
         return {
             "place": self.reference,
             "statement": self.statement,
@@ -106,16 +106,16 @@ class PaperClaim:
 
 
 def study_claims(results: StudyResults) -> list[PaperClaim]:
-    """Return the paper's statements held against a study; see `paper_claims`."""
+    """Evaluate the paper's statements on a study; see `paper_claims`."""
     noise = results.of(noise_summaries)
     return paper_claims(gather_evidence(results.study, results.identification, noise))
 
 
 def paper_claims(evidence: PaperEvidence) -> list[PaperClaim]:
-    """Return every statement.
+    """Evaluate every statement.
 
-    None for one terrain, which makes no comparison, nor for terrains that are not the
-    paper's.
+    Empty for a single terrain, which allows no comparison, or for terrains that are not
+    the paper's.
     """
     terrains = evidence.study.terrains.values()
     if len(terrains) < 2 or not all(terrain.is_papers for terrain in terrains):
@@ -124,7 +124,7 @@ def paper_claims(evidence: PaperEvidence) -> list[PaperClaim]:
 
 
 def evaluate(claim: Claim, evidence: PaperEvidence) -> PaperClaim:
-    """Return what a study shows of a statement."""
+    """Evaluate a statement on a study."""
     measured = claim.measure(evidence)
     if measured is None:
         missing = f"Not testable in this study: it needs {claim.needs}."
@@ -154,8 +154,8 @@ def _at_most(quantity: str, limit: float) -> Bound:
     return Bound(quantity, operator.le, limit)
 
 
-_SIMILAR = 0.15  # relative difference of errors that are called similar
-_MUCH = 2.0  # ratio that is called much higher
+_SIMILAR = 0.15  # largest relative difference of similar errors
+_MUCH = 2.0  # smallest ratio that counts as much higher
 
 CLAIMS: Sequence[Claim] = (
     Claim(

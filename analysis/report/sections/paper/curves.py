@@ -20,12 +20,12 @@ from analysis.study.models import GP_SE, TUSTIN
 
 
 def draw_tustin(results: StudyResults) -> Figure | None:
-    """Return Fig. 5: Tustin curves at low, median and high F_n, with the samples."""
+    """Draw Fig. 5: Tustin curves at low, median and high F_n, with the samples."""
     return draw_panels(panels(results.study, TUSTIN), draw_curves)
 
 
 def caption_tustin(results: StudyResults) -> str:
-    """State where the Tustin curves begin and end."""
+    """State the end points of the Tustin curves."""
     values = [
         describe_curve(panel) for panel in one_per_kind(panels(results.study, TUSTIN))
     ]
@@ -34,12 +34,12 @@ def caption_tustin(results: StudyResults) -> str:
 
 
 def draw_gp(results: StudyResults) -> Figure | None:
-    """Return Fig. 6: GP mean and 2 sigma at the median F_n, with the samples."""
+    """Draw Fig. 6: GP mean and 2 sigma at the median F_n, with the samples."""
     return draw_panels(panels(results.study, GP_SE), draw_band)
 
 
 def caption_gp(results: StudyResults) -> str:
-    """State how wide the bands of the processes are."""
+    """State the width of the bands of the processes."""
     values = [
         f"{2 * float(np.median(panel.sds[1])):.2f} N on {panel.terrain}"
         for panel in one_per_kind(panels(results.study, GP_SE))
@@ -52,7 +52,7 @@ def caption_gp(results: StudyResults) -> str:
 
 
 def _bands_below_zero(chosen: Sequence[Panel]) -> str:
-    """Return which bands go below zero, and how many samples do; empty for none."""
+    """State which bands and how many samples are below zero; empty for none."""
     parts = [
         f"{panel.terrain} ({float(np.mean(panel.data.F_t < 0.0)):.1%} of the samples)"
         for panel in chosen

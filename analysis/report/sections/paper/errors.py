@@ -23,13 +23,13 @@ from analysis.study.models import GP_SE, TITLES, TUSTIN, compared
 from analysis.study.study import Study
 from analysis.study.terrain_fit import TerrainResult
 
-_MOST_NARROW = 10  # terrains whose bars one column of a paper holds
-_MOST_BARS = 12  # terrains beyond which grouped bars cannot be told apart
+_MOST_NARROW = 10  # largest number of terrains for a one-column figure
+_MOST_BARS = 12  # terrains beyond which grouped bars are unreadable
 _MAP_COLUMNS = 2  # heat maps side by side
 
 
 def draw_errors(results: StudyResults) -> Figure | None:
-    """Return Fig. 9: error per terrain and model, standard error over the folds."""
+    """Draw Fig. 9: error per terrain and model, standard error over the folds."""
     terrains = [r for r in results.study.terrains.values() if r.folds]
     if not terrains or not _models_of(results.study):
         return None
@@ -70,7 +70,7 @@ def draw_errors(results: StudyResults) -> Figure | None:
 
 
 def caption_errors(results: StudyResults) -> str:
-    """State the range of the errors, and how far models differ."""
+    """State the range of the errors and the differences between models."""
     study = results.study
     errors = {
         (name, model): mae
@@ -79,12 +79,12 @@ def caption_errors(results: StudyResults) -> str:
         if (mae := result.mae(model)) is not None
     }
     if not errors:
-        return "No model could be fitted; the dashed lines are the constant's errors."
+        return "No model could be fitted; dashed lines: errors of the constant."
     low, high = min(errors, key=errors.__getitem__), max(errors, key=errors.__getitem__)
     text = (
         f"Smallest error {errors[low]:.2f} N ({TITLES[low[1]]} on {low[0]}), largest "
         f"{errors[high]:.2f} N ({TITLES[high[1]]} on {high[0]}). Whiskers are standard "
-        "errors over the trials left out."
+        "errors over the held-out trials."
     )
     gaps = [
         abs(errors[name, TUSTIN] / errors[name, GP_SE] - 1.0)
@@ -97,7 +97,7 @@ def caption_errors(results: StudyResults) -> str:
 
 
 def draw_cross_bars(results: StudyResults) -> Figure | None:
-    """Return Fig. 10 as grouped bars: every model on every terrain."""
+    """Draw Fig. 10 as grouped bars: every model on every terrain."""
     study = results.study
     if not 2 <= len(study.terrains) <= _MOST_BARS or not _has_models(study):
         return None
@@ -141,7 +141,7 @@ def draw_cross_bars(results: StudyResults) -> Figure | None:
 
 
 def caption_cross(results: StudyResults) -> str:
-    """State how foreign models compare with a terrain's own."""
+    """State the error ratios of other terrains' models to the terrain's own."""
     study = results.study
     values = [
         f"{TITLES[model]}: {_describe_ratios(study, model)}"
@@ -149,13 +149,13 @@ def caption_cross(results: StudyResults) -> str:
         if study.cross(model)
     ]
     return (
-        "Whiskers are standard errors over the trials tested. Error of another "
+        "Whiskers are standard errors over the tested trials. Error of another "
         f"terrain's model over that of the terrain's own. {' '.join(values)}"
     )
 
 
 def draw_cross_map(results: StudyResults) -> Figure | None:
-    """Return Fig. 10 as heat maps: rows are models, columns terrains tested on."""
+    """Draw Fig. 10 as heat maps: rows are models, columns terrains tested on."""
     study = results.study
     if len(study.terrains) < 2 or not _has_models(study):
         return None
@@ -179,8 +179,8 @@ def draw_cross_map(results: StudyResults) -> Figure | None:
 
 
 def caption_cross_map(_: StudyResults) -> str:
-    """Refer to the bars for the numbers."""
-    return "The numbers of the bars above; a terrain's own model in bold."
+    """Refer to the bar figure."""
+    return "The numbers of the bars above; the terrain's own model in bold."
 
 
 def _draw_map(

@@ -1,6 +1,6 @@
-"""What statements of the paper are held against, beyond what a study has already.
+"""Additional evidence for testing the paper's statements.
 
-The paper sees stones and plates; a terrain of unknown kind counts as neither.
+The paper has stones and plates; a terrain of unknown kind counts as neither.
 """
 
 import zlib
@@ -27,16 +27,16 @@ from analysis.study.worker_processes import running_workers
 from analysis.terrains.identify import Identification
 from analysis.tustin.model import bound
 
-_MORE = 4  # times as many rows as the process was fitted to
-_STREAM = 2_000_000  # apart from the folds, which have the same kind of seed
+_MORE = 4  # factor on the number of training rows
+_STREAM = 2_000_000  # random stream, distinct from the folds
 
 
 @dataclass(frozen=True, slots=True)
 class StickingBound:
-    """How often the force stays below its bound while the foot sticks.
+    """Share of sticking samples whose force is within its bound.
 
     Attributes:
-        terrain: its terrain.
+        terrain: name of the terrain.
         samples: thinned samples slower than the window in either direction.
         as_printed: share with |F_t| <= mu F_n (eq. 2).
         with_static: share with |F_t| <= max(F_s, mu F_n).
@@ -50,13 +50,13 @@ class StickingBound:
 
 @dataclass(frozen=True, slots=True)
 class MoreRows:
-    """A Gaussian process given more training rows, its hyperparameters kept.
+    """Effect of more training rows on a Gaussian process with fixed hyperparameters.
 
     Attributes:
-        terrain: its terrain.
-        rows: training rows that the process was given, the largest fold's.
-        before: error on trials left out with the rows it was fitted to [N].
-        paired: the error with more rows minus that [N], trial by trial.
+        terrain: name of the terrain.
+        rows: number of training rows, largest over the folds.
+        before: error on held-out trials with the original rows [N].
+        paired: error with more rows minus that [N], trial by trial.
     """
 
     terrain: str
@@ -66,20 +66,20 @@ class MoreRows:
 
     @property
     def gain(self) -> float:
-        """Share of the error that more rows take away; below zero they add to it."""
+        """Relative reduction of the error by more rows; negative if it grows."""
         return -self.paired.difference / self.before
 
 
 @dataclass(frozen=True, slots=True)
 class PaperEvidence:
-    """Everything that the paper's statements are held against.
+    """Evidence for testing the paper's statements.
 
     Attributes:
         study: the study.
-        identification: how well the terrains can be told apart; None for one terrain.
-        noise: constant against chosen noise, by terrain.
-        sticking: force against its bound while sticking, by terrain.
-        more_rows: a process given more rows, by terrain.
+        identification: terrain classification; None for one terrain.
+        noise: comparison of constant and chosen noise by terrain.
+        sticking: force compared with its bound while sticking, by terrain.
+        more_rows: effect of more training rows by terrain.
     """
 
     study: Study
@@ -108,7 +108,7 @@ def gather_evidence(
     identification: Identification | None,
     noise: Sequence[NoiseSummary],
 ) -> PaperEvidence:
-    """Return what the paper's statements are held against."""
+    """Compute the evidence for testing the paper's statements."""
     results = study.terrains.values()
     sticking = [sticking_bound(result, study) for result in results]
     return PaperEvidence(
@@ -121,9 +121,9 @@ def gather_evidence(
 
 
 def sticking_bound(result: TerrainResult, study: Study) -> StickingBound | None:
-    """Return how often eq. (2) holds with the Tustin fit of all trials.
+    """Return how often eq. (2) holds for the Tustin fit to all trials.
 
-    None where there is no fit, or no sample that sticks.
+    None without a fit or without sticking samples.
     """
     fit, slowest = result.whole.fit, study.options.prepare.slowest
     columns = [_sticking(trial, slowest) for trial in result.trials]
@@ -152,12 +152,12 @@ def _sticking(trial: PreparedTrial, slowest: float) -> SampleTable:
 
 @dataclass(frozen=True, slots=True)
 class MoreRowsTask:
-    """A fold's process that is given more of its training rows.
+    """Refactorisation of a fold's process with more training rows.
 
     Attributes:
-        process: fitted to few of them.
-        rows: many of them.
-        tested: what the fold leaves out.
+        process: process fitted to few rows.
+        rows: larger set of training rows.
+        tested: samples of the held-out trials.
     """
 
     process: GaussianProcess
@@ -168,7 +168,7 @@ class MoreRowsTask:
     def of(
         cls, result: TerrainResult, fold: FoldResult, study: Study
     ) -> "MoreRowsTask | None":
-        """Return the task of a fold, None without such a process or more rows."""
+        """Make the task of a fold; None without such a process or more rows."""
         model = fold.models[GP_SE].model if GP_SE in fold.models else None
         fit = study.options.fit
         every = [k for f in result.folds for k in f.left_out]
@@ -192,7 +192,7 @@ class MoreRowsTask:
 def errors_of_more(task: MoreRowsTask) -> tuple[float, float]:
     """Return the mean absolute errors [N] with few and with many rows.
 
-    A pure function of the task.
+    Pure.
     """
     tested, rows = task.tested, task.rows
     more = task.process.given(rows.inputs, rows.F_t)
@@ -204,7 +204,7 @@ def errors_of_more(task: MoreRowsTask) -> tuple[float, float]:
 
 
 def more_rows(study: Study) -> list[MoreRows]:
-    """Return what four times as many training rows change, by terrain that has them."""
+    """Return the effect of four times as many training rows by terrain."""
     tasks = {
         name: [
             task
@@ -213,13 +213,13 @@ def more_rows(study: Study) -> list[MoreRows]:
         ]
         for name, result in study.terrains.items()
     }
-    batches = [Batch(errors_of_more, given) for given in tasks.values()]
-    done = run_batches(batches, study.options.n_jobs or running_workers())
-    found: list[MoreRows] = []
-    for (name, given), errors in zip(tasks.items(), done, strict=True):
+    batches = [Batch(errors_of_more, group) for group in tasks.values()]
+    results = run_batches(batches, study.options.n_jobs or running_workers())
+    comparisons: list[MoreRows] = []
+    for (name, group), errors in zip(tasks.items(), results, strict=True):
         before, after = ([pair[k] for pair in errors] for k in (0, 1))
         paired, mean = compare(before, after), mean_of(before)
         if paired is not None and mean:
-            count = max(task.rows.count for task in given)
-            found.append(MoreRows(name, count, mean, paired))
-    return found
+            count = max(task.rows.count for task in group)
+            comparisons.append(MoreRows(name, count, mean, paired))
+    return comparisons

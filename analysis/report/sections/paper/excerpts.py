@@ -24,24 +24,24 @@ from analysis.report.style import (
 from analysis.study.study import Study
 from analysis.study.terrain_fit import TerrainResult
 
-WINDOW = 3.5  # s shown of a trial
-_STEP = 0.1  # s between the windows compared
+WINDOW = 3.5  # s, length of an excerpt
+_STEP = 0.1  # s between candidate windows
 _ENOUGH_BOUNCES = 2
-_BEFORE, _AFTER = 0.3, 0.6  # s around a slip that a window should hold
+_BEFORE, _AFTER = 0.3, 0.6  # s around a slip that a window must include
 
 
 @dataclass(frozen=True, slots=True)
 class TimeWindow:
-    """A stretch of one trial.
+    """Excerpt of one trial.
 
     Attributes:
-        title: of its terrain, with the kind.
-        terrain: its terrain.
+        title: title of the terrain, with the kind.
+        terrain: name of the terrain.
         trial: number of the trial, from 1.
         t: time from the start of the window [s], shape (n,).
         v_t: smoothed velocity [m/s], shape (n,).
         F_t: smoothed traction force [N], shape (n,).
-        slips: the slips inside, times from the start of the window.
+        slips: slips inside, with times from the start of the window.
     """
 
     title: str
@@ -54,14 +54,14 @@ class TimeWindow:
 
 
 def time_windows(study: Study) -> list[TimeWindow]:
-    """Return the stretch to show of one terrain per kind."""
+    """Choose an excerpt of one terrain per kind."""
     return [busiest_window(result) for result in representatives(study)]
 
 
 def busiest_window(result: TerrainResult) -> TimeWindow:
-    """Return the stretch that shows most: bounce-backs, then slips, then motion.
+    """Choose the excerpt with the most bounce-backs, then slips, then motion.
 
-    Two bounce-backs are enough, as in the paper's figure.
+    At most two bounce-backs count, as in the paper's figure.
     """
     candidates = [
         (_events_and_motion(trial.smooth, slips, start), k, start)
@@ -89,7 +89,7 @@ def busiest_window(result: TerrainResult) -> TimeWindow:
 
 
 def _starts(smooth: Smoothed) -> Array:
-    """Return starts a step apart, where there are samples."""
+    """Return candidate starts, one step apart, where there are samples."""
     first = float(smooth.t[0])
     last = max(float(smooth.t[-1]) - WINDOW, first)
     starts = first + np.unique(np.floor((smooth.t - first) / _STEP)) * _STEP
@@ -111,7 +111,7 @@ def _events_and_motion(
 
 
 def draw_excerpts(results: StudyResults) -> Figure | None:
-    """Return Fig. 4: F_t and v_t over time, slips marked, one excerpt per kind."""
+    """Draw Fig. 4: F_t and v_t over time, slips marked, one excerpt per kind."""
     chosen = time_windows(results.study)
     if not chosen:
         return None
@@ -127,7 +127,7 @@ def draw_excerpts(results: StudyResults) -> Figure | None:
 
 
 def plot_trial(trial: PreparedTrial, *, is_simulated: bool) -> Figure:
-    """Return F_t and v_t of a whole trial over time, drawn as Fig. 4, slips marked."""
+    """Plot F_t and v_t of a whole trial over time in the style of Fig. 4."""
     smooth = trial.smooth
     start = float(smooth.t[0])
     whole = TimeWindow(
@@ -162,7 +162,7 @@ def _label(figure: Figure, above: Axes, below: Axes) -> None:
 
 
 def caption_excerpts(results: StudyResults) -> str:
-    """State slips and forces of the stretches in Fig. 4."""
+    """State slips and forces of the excerpts in Fig. 4."""
     parts = [_describe_window(window) for window in time_windows(results.study)]
     return "Smoothed record at the full rate. " + " ".join(parts)
 

@@ -1,4 +1,4 @@
-"""Quantities of the paper's statements about models: errors, bands, parameters."""
+"""Quantities for the paper's statements about models: errors, bands, parameters."""
 
 import math
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ from analysis.study.terrain_fit import TerrainResult, mean_of
 from analysis.terrains.identify import KEPT_PER_SECOND
 from analysis.tustin.model import NO_STRIBECK, NOT_IDENTIFIABLE
 
-_BAND, _BAND_SLACK = 0.95, 0.05  # nominal coverage, and what it may be off by
+_BAND, _BAND_SLACK = 0.95, 0.05  # nominal coverage and its tolerance
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,9 +33,9 @@ class ForeignError:
     """The GP of one terrain tested on another.
 
     Attributes:
-        ratio: its error over that of the tested terrain's own GP.
-        paired: its error minus the own one's [N], fold by fold.
-        is_same_kind: both are of the same stones, or both plates.
+        ratio: error over that of the tested terrain's own GP.
+        paired: error minus that of the own GP [N], fold by fold.
+        is_same_kind: both terrains have the same stones, or both are plates.
     """
 
     ratio: float
@@ -44,7 +44,7 @@ class ForeignError:
 
 
 def gain_of_more_rows(evidence: PaperEvidence) -> ClaimResult | None:
-    """Return what more training rows change."""
+    """Return the effect of more training rows."""
     entries = evidence.more_rows
     if not entries:
         return None
@@ -52,8 +52,8 @@ def gain_of_more_rows(evidence: PaperEvidence) -> ClaimResult | None:
     better = count_significant([entry.paired for entry in entries], -1)
     points = evidence.study.options.fit.gp_points
     text = (
-        f"With {max(entry.rows for entry in entries)} rows in the place of {points} "
-        "(hyperparameters kept) the error of GP (SE) changes by "
+        f"With {max(entry.rows for entry in entries)} rows instead of {points} "
+        "(fixed hyperparameters) the error of GP (SE) changes by "
         f"{ends_of([-gain for gain in gains], '+.1%')}; smaller beyond chance on "
         f"{beyond_chance([entry.paired for entry in entries], -1, 'terrains')}."
     )
@@ -80,14 +80,14 @@ def signs_of_b(evidence: PaperEvidence) -> ClaimResult | None:
 
 
 def shapeless_stones(evidence: PaperEvidence) -> ClaimResult | None:
-    """Return how many Tustin fits on stones have no Stribeck shape."""
+    """Return the share of Tustin fits on stones without Stribeck shape."""
     folds = [f for r in evidence.stones for f in r.models(TUSTIN)]
     if not folds:
         return None
     doubtful = {NO_STRIBECK, NOT_IDENTIFIABLE}
     count = sum(bool(doubtful & set(fold.model.flags)) for fold in folds)
     text = (
-        f"{count} of {len(folds)} fits on stones (one a fold) are flagged "
+        f"{count} of {len(folds)} fits on stones (one per fold) are flagged "
         f"“{NO_STRIBECK}” or “{NOT_IDENTIFIABLE}”."
     )
     share = count / len(folds)
@@ -95,12 +95,12 @@ def shapeless_stones(evidence: PaperEvidence) -> ClaimResult | None:
 
 
 def spread_on_stones(evidence: PaperEvidence) -> ClaimResult | None:
-    """Return how far the five models differ on stones."""
+    """Return the difference between the five models on stones."""
     return _spread(evidence.stones)
 
 
 def spread_on_plates(evidence: PaperEvidence) -> ClaimResult | None:
-    """Return how far the five models differ on plates."""
+    """Return the difference between the five models on plates."""
     return _spread(evidence.plates)
 
 
@@ -112,7 +112,7 @@ def _spread(results: Sequence[TerrainResult]) -> ClaimResult | None:
         return None
     mean = mean_of([pair.difference for pair in present]) or 0.0
     text = (
-        f"Worst of the five over best: at most {gap:+.0%} on a terrain. GP (SE) minus "
+        f"Worst over best of the five: at most {gap:+.0%} on a terrain. GP (SE) minus "
         f"Tustin {mean:+z.3f} N on average; GP better beyond chance on "
         f"{beyond_chance(present, -1, 'terrains')}, Tustin on "
         f"{count_significant(present, 1)}."
@@ -121,7 +121,7 @@ def _spread(results: Sequence[TerrainResult]) -> ClaimResult | None:
 
 
 def kernels_on_stones(evidence: PaperEvidence) -> ClaimResult | None:
-    """Return the NN kernel's error against the SE kernel's on stones."""
+    """Compare the errors of the NN and the SE kernel on stones."""
     pairs = [compare(r.maes(GP_SE), r.maes(GP_NN)) for r in evidence.stones]
     present = [pair for pair in pairs if pair is not None]
     if not present:
@@ -138,7 +138,7 @@ def kernels_on_stones(evidence: PaperEvidence) -> ClaimResult | None:
 
 
 def largest_gap(results: Sequence[TerrainResult]) -> float | None:
-    """Return how much worse the worst of the five models is than the best, at most."""
+    """Return the largest relative gap between worst and best of the five models."""
     gaps = [
         max(errors) / min(errors) - 1.0
         for result in results
@@ -148,7 +148,7 @@ def largest_gap(results: Sequence[TerrainResult]) -> float | None:
 
 
 def foreign_error(source: TerrainResult, tested: TerrainResult) -> ForeignError | None:
-    """Return how the GP of `source` does on `tested`, None where it was not tried."""
+    """Compare the GP of `source` with the own GP on `tested`; None if not tested."""
     foreign = [e for fold in source.models(GP_SE) for e in fold.cross[tested.terrain]]
     own = [fold.score.mae for fold in tested.models(GP_SE)]
     count = min(len(foreign), len(own))
@@ -160,12 +160,12 @@ def foreign_error(source: TerrainResult, tested: TerrainResult) -> ForeignError 
 
 
 def error_ratio(evidence: PaperEvidence) -> ClaimResult | None:
-    """Return the errors of the GP on stones over those on plates."""
+    """Return the ratio of the GP's error on stones to that on plates."""
     return _stones_over_plates(evidence, "mae", "N")
 
 
 def variance_ratio(evidence: PaperEvidence) -> ClaimResult | None:
-    """Return the predictive variances of the GP on stones over those on plates."""
+    """Return the ratio of the GP's predictive variance on stones to that on plates."""
     return _stones_over_plates(evidence, "variance", "N²")
 
 
@@ -188,14 +188,14 @@ def _stones_over_plates(
 
 
 def band_coverage(evidence: PaperEvidence) -> ClaimResult | None:
-    """Return how many measurements on stones the 95 % band of the GP holds."""
+    """Return the coverage of the GP's 95 % band on stones."""
     shares = [s for r in evidence.stones for s in r.scores(GP_SE, "coverage95")]
     mean, error = mean_of(shares), standard_error(shares)
     if mean is None or error is None:
         return None
     text = (
         f"The 95% band of GP (SE) holds {mean:.1%} ± {error:.1%} of the samples of "
-        "trials on stones that were left out."
+        "held-out trials on stones."
     )
     off = abs(mean - _BAND) - max(2.0 * error, _BAND_SLACK)
     numbers = {"coverage": mean, "error": error}
@@ -203,7 +203,7 @@ def band_coverage(evidence: PaperEvidence) -> ClaimResult | None:
 
 
 def plate_error(evidence: PaperEvidence) -> ClaimResult | None:
-    """Return the mean error on plates beside the sensor's."""
+    """Compare the mean error on plates with that of the sensor."""
     pairs = [(r.mae(TUSTIN), r.mae(GP_SE)) for r in evidence.plates]
     mean = mean_of([error for pair in pairs for error in pair])
     if mean is None:
@@ -216,19 +216,19 @@ def plate_error(evidence: PaperEvidence) -> ClaimResult | None:
 
 
 def foreign_stones(evidence: PaperEvidence) -> ClaimResult | None:
-    """Return the errors of stone models on other stones over the own models'."""
+    """Return the error ratios of stone models on other stones to the own models."""
     return _foreign_ratios(_foreign(evidence.stones, evidence.stones), "stone models")
 
 
 def other_inclines(evidence: PaperEvidence) -> ClaimResult | None:
-    """Return the same for terrains of the same stones: other inclines."""
+    """Return the error ratios between inclines of the same stones."""
     pairs = _foreign(evidence.stones, evidence.stones)
     same = [pair for pair in pairs if pair.is_same_kind]
     return _foreign_ratios(same, "models of the same stones at another incline")
 
 
 def foreign_surfaces(evidence: PaperEvidence) -> ClaimResult | None:
-    """Return how much worse models of plates are on stones, and the reverse."""
+    """Return the error ratios of plate models on stones and the reverse."""
     forth = _foreign(evidence.plates, evidence.stones)
     back = _foreign(evidence.stones, evidence.plates)
     if not forth or not back:
@@ -250,7 +250,7 @@ def foreign_surfaces(evidence: PaperEvidence) -> ClaimResult | None:
 
 
 def flat_or_rocky(evidence: PaperEvidence) -> ClaimResult | None:
-    """Return how often the smallest error tells plates from stones."""
+    """Return the accuracy of the smallest-error rule for plates and stones."""
     identification = evidence.identification
     if identification is None or not (evidence.stones and evidence.plates):
         return None
@@ -267,28 +267,28 @@ def flat_or_rocky(evidence: PaperEvidence) -> ClaimResult | None:
 
 
 def unexplained(evidence: PaperEvidence) -> ClaimResult | None:
-    """Return what F_n and v_t leave unexplained on stones and on plates."""
-    rest = [
+    """Return the variance of F_t not explained by F_n and v_t on stones and plates."""
+    residual_sds = [
         [float(held_out_residual(r, GP_SE).std()) for r in group if r.models(GP_SE)]
         for group in (evidence.stones, evidence.plates)
     ]
     shares = [
         s for r in evidence.stones if (s := explained_share(r, GP_SE)) is not None
     ]
-    if not all(rest) or not shares:
+    if not all(residual_sds) or not shares:
         return None
     text = (
         f"F_n and v_t explain {ends_of(shares, '.0%')} of the variance of F_t on "
-        f"stones; unexplained are {ends_of(rest[0], '.2f')} N there, "
-        f"{ends_of(rest[1], '.2f')} N on plates (standard deviations)."
+        f"stones; unexplained are {ends_of(residual_sds[0], '.2f')} N there, "
+        f"{ends_of(residual_sds[1], '.2f')} N on plates (standard deviations)."
     )
-    on_plates = max(rest[1])
-    ratio = min(rest[0]) / on_plates if on_plates else math.inf
+    on_plates = max(residual_sds[1])
+    ratio = min(residual_sds[0]) / on_plates if on_plates else math.inf
     return ClaimResult(text, {"R²": max(shares)}, {"stones over plates": ratio})
 
 
 def gain_of_chosen_noise(evidence: PaperEvidence) -> ClaimResult | None:
-    """Return what noise that depends on the inputs gains on stones."""
+    """Return the gain from input-dependent noise on stones."""
     names = {result.terrain for result in evidence.stones}
     pairs = [s.paired for s in evidence.noise if s.terrain in names]
     if not pairs:

@@ -1,4 +1,4 @@
-"""What was measured of a statement, and how its numbers are put in words."""
+"""Measured quantities of a statement and their formatting."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -9,17 +9,17 @@ from analysis.study.metrics import (
     smallest_adjusted,
 )
 
-SIGNIFICANT = 0.05  # adjusted p below which a difference is one
+SIGNIFICANT = 0.05  # adjusted p below which a difference is significant
 
 
 @dataclass(frozen=True, slots=True)
 class ClaimResult:
-    """What a study shows of a statement.
+    """Result of a study for a statement.
 
     Attributes:
-        text: in words, with numbers.
-        numbers: the same as numbers, SI units, shares as 1.
-        further: quantities that only bounds are held against.
+        text: result in words, with numbers.
+        numbers: the numbers in SI units, shares as 1.
+        further: quantities used only by the bounds.
     """
 
     text: str
@@ -28,13 +28,13 @@ class ClaimResult:
 
 
 def ends_of(values: Sequence[float], form: str) -> str:
-    """Return the smallest and the largest value as text, one where they agree."""
+    """Format the smallest and the largest value; one value if they agree."""
     low, high = (format(end, form) for end in (min(values), max(values)))
     return low if low == high else f"{low} to {high}"
 
 
 def beyond_chance(pairs: Sequence[PairedComparison], sign: int, unit: str) -> str:
-    """Return how many of the pairs differ beyond chance, and whether they could."""
+    """State how many pairs differ beyond chance, and whether the trials suffice."""
     text = f"{count_significant(pairs, sign)} of {len(pairs)} {unit}"
     if smallest_adjusted(pairs) < SIGNIFICANT:
         return text
@@ -43,7 +43,7 @@ def beyond_chance(pairs: Sequence[PairedComparison], sign: int, unit: str) -> st
 
 
 def count_significant(pairs: Sequence[PairedComparison], sign: int) -> int:
-    """Return how many differences of a sign hold for all comparisons together."""
+    """Count the differences of a sign that are significant after Holm's adjustment."""
     adjusted = adjusted_by_holm([pair.p for pair in pairs])
     return sum(
         p < SIGNIFICANT and sign * pair.difference > 0

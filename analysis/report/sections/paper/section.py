@@ -1,4 +1,4 @@
-"""The paper's table and figures in the order of the page."""
+"""Section with the paper's table and figures, in page order."""
 
 from analysis.report.page_model import ReportContext, Section
 from analysis.report.results import StudyResults

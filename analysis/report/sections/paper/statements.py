@@ -1,4 +1,4 @@
-"""The paper's statements beside what the study shows."""
+"""Table of the paper's statements and the results of the study."""
 
 from collections.abc import Sequence
 
@@ -8,14 +8,14 @@ from analysis.report.sections.paper.claims import PaperClaim, study_claims
 
 
 def statements(results: StudyResults) -> list[ReportTable]:
-    """Return the paper's statements beside what the study shows.
+    """Return the table of the paper's statements and the results of the study.
 
-    None for one terrain; for terrains that are not the paper's a line that says so.
+    Empty for one terrain; for terrains that are not the paper's, only a note.
     """
     terrains = results.study.terrains
     others = [name for name, result in terrains.items() if not result.is_papers]
     note = (
-        "Errors: mean absolute errors on trials left out. Beyond chance: paired "
+        "Errors: mean absolute errors on held-out trials. Beyond chance: paired "
         "over the trials, p below 0.05 for all comparisons of the row together (Holm)."
     )
     if others:

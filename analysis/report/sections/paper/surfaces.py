@@ -25,15 +25,15 @@ from analysis.report.style import (
 )
 from analysis.report.surfaces import Surface, common_range
 
-_WIDE = 0.7  # decades from which a logarithmic scale has logarithmic ticks
+_WIDE = 0.7  # decades above which a logarithmic scale has logarithmic ticks
 _MOST_DIGITS = 15
-_LEVELS = 14  # contours
+_LEVELS = 14  # contour levels
 _MOST_DOTS = 400  # samples shown per panel
-_VEIL = 0.65  # opacity over what no sample supports
+_VEIL = 0.65  # opacity of the veil over cells without nearby samples
 
 
 def draw_mean(results: StudyResults) -> Figure | None:
-    """Return Fig. 7: the mean of the Gaussian process over (v_t, F_n)."""
+    """Draw Fig. 7: mean of the Gaussian process over (v_t, F_n)."""
     if not results.surfaces:
         return None
     low, high = common_range([surface.mean for surface in results.surfaces])
@@ -43,7 +43,7 @@ def draw_mean(results: StudyResults) -> Figure | None:
 
 
 def caption_mean(results: StudyResults) -> str:
-    """State how far the means reach."""
+    """State the range of the means."""
     values = [
         f"{surface.terrain} {surface.mean.min():.1f} to {surface.mean.max():.1f} N"
         for surface in _representative(results)
@@ -56,7 +56,7 @@ def caption_mean(results: StudyResults) -> str:
 
 
 def _below_zero(results: StudyResults) -> str:
-    """Return where the mean is negative, though traction is not; empty for nowhere."""
+    """State the terrains with a negative mean; empty for none."""
     lowest = [s.terrain for s in results.surfaces if float(s.mean.min()) < 0.0]
     if not lowest:
         return ""
@@ -67,7 +67,7 @@ def _below_zero(results: StudyResults) -> str:
 
 
 def draw_variance(results: StudyResults) -> Figure | None:
-    """Return Fig. 8: its variance with the noise, colours on a logarithmic scale."""
+    """Draw Fig. 8: predictive variance with noise, on a logarithmic colour scale."""
     if not results.surfaces:
         return None
     low, high = common_range([surface.variance for surface in results.surfaces])
@@ -92,7 +92,7 @@ def caption_variance(results: StudyResults) -> str:
 
 
 def distinct_labels(values: Sequence[float]) -> list[str]:
-    """Return different numbers in so few digits, two at least, that all differ."""
+    """Format distinct numbers with the fewest digits (at least two) that differ."""
     for digits in range(2, _MOST_DIGITS):
         texts = [f"{value:.{digits}g}" for value in values]
         if len(set(texts)) == len(set(values)):
@@ -101,9 +101,9 @@ def distinct_labels(values: Sequence[float]) -> list[str]:
 
 
 def round_ticks(low: float, high: float, *, is_log: bool) -> list[float]:
-    """Return the round numbers of a scale from `low` to `high` that has few of them.
+    """Return a few round tick values from `low` to `high`.
 
-    Both ends where there are less than two.
+    Both ends if there are fewer than two.
     """
     span = np.log10(high / low) if is_log else 0.0
     if is_log and span > _WIDE:
@@ -154,7 +154,7 @@ def _draw(
 
 
 def _fade(ax: Axes, results: StudyResults, terrain: str) -> None:
-    """Cover what lies farther than a cell from every sample with a veil of white."""
+    """Fade cells further than one cell from every sample."""
     cells = next(c for c in results.coverage if c.terrain == terrain)
     veil = np.ma.masked_where(near_samples(cells.counts), np.ones(cells.counts.shape))
     ax.pcolormesh(
@@ -170,7 +170,7 @@ def _fade(ax: Axes, results: StudyResults, terrain: str) -> None:
 
 
 def near_samples(counts: Array) -> NDArray[np.bool_]:
-    """Return which cells hold a sample or touch one that does, shape of `counts`."""
+    """Return which cells hold or touch a sample, shape of `counts`."""
     rows, columns = counts.shape
     padded = np.pad(counts > 0, 1)
     shifted = [
@@ -180,7 +180,7 @@ def near_samples(counts: Array) -> NDArray[np.bool_]:
 
 
 def _dot(ax: Axes, surface: Surface) -> None:
-    """Show where the samples lie: beyond them a model only guesses."""
+    """Mark the samples; beyond them the model extrapolates."""
     step = max(1, surface.data.count // _MOST_DOTS)
     ax.plot(
         surface.data.v_t[::step],

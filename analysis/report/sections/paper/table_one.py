@@ -1,4 +1,4 @@
-"""Table I: median Tustin parameters, the paper's own row beside ours."""
+"""Table I: median Tustin parameters of this study and of the paper."""
 
 from analysis.report.cell_texts import bounded_text
 from analysis.report.section import ReportSection, ReportTable
@@ -25,7 +25,7 @@ PAPER = {
 
 
 def table_one(study: Study) -> ReportTable:
-    """Return Table I: median Tustin parameters, the paper's own row beside ours."""
+    """Return Table I: median Tustin parameters of this study and of the paper."""
     rows, bounds = [], study.options.fit.bounds
     for name, result in study.terrains.items():
         medians = tustin_medians(result)
@@ -60,7 +60,7 @@ def _flag_legend() -> str:
         "Flags: “at lower/upper bound” - the fit ended at a bound, so the "
         f"value is that bound; “{NEGATIVE_B}” - force falls with speed, which is not "
         "a viscosity; "
-        f"“{NO_STRIBECK}” - a straight line in F_n and v_t does as well; "
+        f"“{NO_STRIBECK}” - a straight line in F_n and v_t fits as well; "
         f"“{NOT_IDENTIFIABLE}” - the parameters are not identifiable separately. When "
         "flagged, compare curves, not parameters. v_s is given as its absolute value. "
         f"A fit needs {MINIMUM_ROWS} samples."

@@ -1,4 +1,4 @@
-"""Quantities of the paper's statements about trials: sticking, slips, velocities."""
+"""Quantities for the paper's statements about trials: sticking, slips, velocities."""
 
 from collections.abc import Sequence
 
@@ -9,11 +9,11 @@ from analysis.report.sections.paper.evidence import PaperEvidence
 from analysis.report.sections.paper.quantities import ClaimResult, ends_of
 from analysis.study.terrain_fit import TerrainResult, mean_of
 
-_LOW = 0.3  # of the peak before
+_LOW = 0.3  # floor relative to the preceding peak
 
 
 def sticking(evidence: PaperEvidence) -> ClaimResult | None:
-    """Return how often the force stays below its bound while the foot sticks."""
+    """Return the share of sticking samples within the force bound."""
     parts, numbers = [], {}
     for kind, results in (("stones", evidence.stones), ("plates", evidence.plates)):
         names = [result.terrain for result in results]
@@ -36,7 +36,7 @@ def sticking(evidence: PaperEvidence) -> ClaimResult | None:
 
 
 def floor(evidence: PaperEvidence) -> ClaimResult | None:
-    """Return how low the force falls in slips on stones, over the peak before."""
+    """Return the floor of the force in slips on stones relative to the peak."""
     ratios = [slip.floor / slip.peak for slip in _slips_of(evidence.stones)]
     if not ratios:
         return None
@@ -49,23 +49,23 @@ def floor(evidence: PaperEvidence) -> ClaimResult | None:
 
 
 def bounce(evidence: PaperEvidence) -> ClaimResult | None:
-    """Return after how many slips on stones the foot bounces back."""
+    """Return the share of slips on stones with a bounce-back."""
     slips, on_plates = _slips_of(evidence.stones), _slips_of(evidence.plates)
     if not slips:
         return None
-    thrown = [sum(s.has_bounce for s in group) for group in (slips, on_plates)]
-    share = thrown[0] / len(slips)
-    text = f"{thrown[0]} of {len(slips)} slips on stones ({share:.0%})"
+    bounces = [sum(s.has_bounce for s in group) for group in (slips, on_plates)]
+    share = bounces[0] / len(slips)
+    text = f"{bounces[0]} of {len(slips)} slips on stones ({share:.0%})"
     if on_plates:
-        text += f"; {thrown[1]} of {len(on_plates)} on plates"
+        text += f"; {bounces[1]} of {len(on_plates)} on plates"
     elif evidence.plates:
         text += "; no slip on plates"
-    numbers = {"slips": len(slips), "bounce-backs": thrown[0], "share": share}
+    numbers = {"slips": len(slips), "bounce-backs": bounces[0], "share": share}
     return ClaimResult(f"{text}.", numbers)
 
 
 def spike(evidence: PaperEvidence) -> ClaimResult | None:
-    """Return the rise of the force in bounce-backs on stones, over the peak before."""
+    """Return the force spike in bounce-backs on stones relative to the peak."""
     slips = _slips_of(evidence.stones)
     spikes = [slip.spike / slip.peak for slip in slips if slip.spike is not None]
     if not spikes:
@@ -79,7 +79,7 @@ def spike(evidence: PaperEvidence) -> ClaimResult | None:
 
 
 def sag(evidence: PaperEvidence) -> ClaimResult | None:
-    """Return before how many slips on stones the force decreases."""
+    """Return the share of slips on stones preceded by a force decrease."""
     slips = _slips_of(evidence.stones)
     if not slips:
         return None
@@ -90,7 +90,7 @@ def sag(evidence: PaperEvidence) -> ClaimResult | None:
 
 
 def window(evidence: PaperEvidence) -> ClaimResult | None:
-    """Return the share of samples inside the window, of all and of those that move."""
+    """Return the share of samples in the window, of all and of the moving ones."""
     results = [*evidence.stones, *evidence.plates]
     shares = [[trial.shares for trial in result.trials] for result in results]
     every = [float(np.mean([s.window for s in row])) for row in shares]
@@ -99,7 +99,7 @@ def window(evidence: PaperEvidence) -> ClaimResult | None:
         return None
     text = (
         f"{ends_of(every, '.0%')} of all samples of a terrain, "
-        f"{ends_of(moving, '.0%')} of those that move."
+        f"{ends_of(moving, '.0%')} of the moving ones."
     )
     return ClaimResult(text, {"all": min(every), "moving": min(moving)})
 

@@ -19,7 +19,7 @@ from analysis.study.terrain_fit import TerrainResult
 
 
 def draw_tustin_model(results: StudyResults) -> Figure | None:
-    """Return Fig. 2: the fitted curve of one terrain per kind, its parameters named."""
+    """Draw Fig. 2: the fitted curve of one terrain per kind, with its parameters."""
     chosen = [r for r in representatives(results.study) if r.whole.fit is not None]
     if not chosen:
         return None
@@ -36,7 +36,7 @@ def draw_tustin_model(results: StudyResults) -> Figure | None:
 
 
 def caption_tustin_model(results: StudyResults) -> str:
-    """State the fits that are drawn."""
+    """State the flags of the fits."""
     values = [
         f"{result.terrain}: {'; '.join(fit.flags) or 'no flag'}"
         for result in representatives(results.study)

@@ -1,4 +1,4 @@
-"""Rig health: how loop, sensor and arm were in every trial.
+"""Rig health: control loop, sensor and arm in every trial.
 
-`health` has the numbers. Begin with `section`.
+`health` computes the numbers. Begin with `section`.
 """

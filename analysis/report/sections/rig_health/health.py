@@ -1,4 +1,4 @@
-"""How the rig behaved in one recorded trial, and what it could have measured."""
+"""Health and measurement limits of the rig in one recorded trial."""
 
 from collections.abc import Sequence
 from contextlib import suppress
@@ -46,46 +46,46 @@ PERIOD_EDGES = np.append(np.arange(0.05, 8.0, 0.1), np.inf)  # ms, 2 in mid-bin
 SKEW_EDGES = np.arange(-4.1, 12.2, 0.2)  # ms
 
 _MOVING = 0.005  # m/s
-_SMOOTHING = 11  # samples, as the models see the trial
-_REST = 0.3  # s at the start of a trial that are at rest by the procedure
-_SHORTEST = 50  # samples that the noise is taken of
+_SMOOTHING = 11  # samples, as in the preparation of trials
+_REST = 0.3  # s at the start of a trial, at rest by the procedure
+_SHORTEST = 50  # smallest number of samples for the noise
 
 
 @dataclass(frozen=True, slots=True)
 class RigTrial:
-    """One trial as the rig lived through it.
+    """Health of the rig in one trial.
 
     Attributes:
-        terrain: its terrain.
+        terrain: name of the terrain.
         name: session and trial.
-        started_utc: when it began, ISO 8601; empty where that was not kept.
-        cycles: recorded.
+        started_utc: start time, ISO 8601; empty if not recorded.
+        cycles: number of recorded cycles.
         missed: cycles that the loop could not begin in time.
-        periods: cycles by length [PERIOD_EDGES], shape (bins,);
-            the last bin has no end.
+        periods: histogram of the cycle period over `PERIOD_EDGES`, shape (bins,); the
+            last bin is open.
         period: median time from cycle to cycle [ms].
         longest_gap: longest time between cycles [ms].
-        skews: cycles by the age of their force sample [SKEW_EDGES], shape (bins,).
-        skew: 5 %, 50 % and 95 % of that age: joints later than force [ms].
-        tare: force taken off as sensor offset [N], x y z of the sensor.
-        tare_bracket: how far the next tare is from this trial's [N]; None where none
+        skews: histogram of the age of the force sample over `SKEW_EDGES`, (bins,).
+        skew: 5 %, 50 % and 95 % quantiles of that age (joint minus force time) [ms].
+        tare: force subtracted as sensor offset [N], x y z of the sensor.
+        tare_bracket: change from this trial's tare to the next [N]; None if none
             followed.
         joint7: largest motion of the locked joint [mrad].
-        puck_degc: temperatures of the pucks as last heard [degrees Celsius].
-        motor_degc: temperatures of their motors.
+        puck_degc: last reported temperatures of the pucks [degrees Celsius].
+        motor_degc: last reported temperatures of the motors [degrees Celsius].
         largest_F_t: largest traction measured [N].
         measurable_F_t: largest traction that the sensor can measure at the sole by
-            its ranges [N]; None where it did not say.
+            its ranges [N]; None if the ranges are unknown.
         saturated: share of cycles whose force sample was out of range [-].
         noise: standard deviation of smoothed F_t at rest [N]; None without rest.
-        force_uncertainty: standard uncertainty of mean F_t and F_n by the tares of the
-            session [N]; None without two of them.
-        floor: mean absolute error of smoothed F_t by noise and tares [N], by noise
-            alone where the tares are not known; None without rest.
-        load_bias: median F_n of the moving foot less the set load [N].
-        drag: what the joints' Coulomb friction asks of the hand along x_T [N], by the
-            recorded calibration less what was compensated, else by the figures of the
-            arm model; median over the moving samples.
+        force_uncertainty: standard uncertainty of mean F_t and F_n from the tares of
+            the session [N]; None with fewer than two.
+        floor: mean absolute error of smoothed F_t from noise and tares [N], from noise
+            alone if the tares are not known; None without rest.
+        load_bias: median F_n of the moving foot minus the set load [N].
+        drag: force along x_T needed to overcome the joints' Coulomb friction [N], by
+            the recorded calibration minus the compensation, otherwise by the arm model;
+            median over the moving samples.
         lateral: mean |F_y| while moving [N].
     """
 
@@ -116,11 +116,11 @@ class RigTrial:
 
     @property
     def session(self) -> str:
-        """Name of its session."""
+        """Name of the session."""
         return self.name.partition("/")[0]
 
     def numbers(self) -> dict[str, Any]:
-        """Return everything but the histograms as plain values."""
+        """Return everything except the histograms as plain values."""
         hidden = {"periods", "skews"}
         names = [item.name for item in fields(self) if item.name not in hidden]
         return {name: getattr(self, name) for name in names}
@@ -129,29 +129,29 @@ class RigTrial:
 def with_tares(
     found: Sequence[RigTrial], trials: Sequence[TaredTrial]
 ) -> list[RigTrial]:
-    """Return the health of trials with what the tares of their sessions tell.
+    """Add the results from the tares of the sessions to the health of trials.
 
     Args:
-        found: of each trial by itself.
+        found: health of each trial without tares.
         trials: the same trials, sessions in the order they are given.
     """
-    known = uncertainties_of(trials)
+    uncertainties = uncertainties_of(trials)
     completed: list[RigTrial] = []
-    for one, trial, change in zip(found, trials, tare_changes(trials), strict=True):
-        uncertainty = uncertainty_of(trial, known)
+    for health, trial, change in zip(found, trials, tare_changes(trials), strict=True):
+        uncertainty = uncertainty_of(trial, uncertainties)
         completed.append(
             replace(
-                one,
+                health,
                 tare_bracket=None if change is None else float(np.linalg.norm(change)),
                 force_uncertainty=None if uncertainty is None else uncertainty.mean,
-                floor=_floor(one.noise, uncertainty),
+                floor=_floor(health.noise, uncertainty),
             )
         )
     return completed
 
 
 def health_of(trial: RecordedTrial) -> RigTrial:
-    """Return the health of one trial, without what the tares of its session tell."""
+    """Compute the health of one trial, without the tares of its session."""
     gaps = np.diff(trial.t) * 1e3
     age = _ages(trial)
     q7 = trial.cycles["position"][:, 6]
@@ -190,21 +190,21 @@ def health_of(trial: RecordedTrial) -> RigTrial:
 
 
 def _ages(trial: RecordedTrial) -> Array:
-    """Return the age of the force sample when the joints had answered [ms]."""
+    """Return the age of the force sample at the time of the joint replies [ms]."""
     arm, ft = (trial.cycles[key].astype(np.int64) for key in ("arm_ns", "ft_ns"))
     is_known = (arm > 0) & (ft > 0)
     return (arm - ft)[is_known].astype(np.float64) * 1e-6
 
 
 def _floor(noise: float | None, uncertainty: ForceUncertainty | None) -> float | None:
-    """Return the mean absolute error [N] that no model can be better than."""
+    """Return the lower limit of the mean absolute error of any model [N]."""
     if noise is None:
         return None
     return (uncertainty or ForceUncertainty(0, 0.0)).floor(noise)
 
 
 def _noise(trial: RecordedTrial) -> float | None:
-    """Return the spread of smoothed F_t [N] before the foot moves."""
+    """Return the standard deviation of smoothed F_t [N] before the foot moves."""
     at_rest = trial.t < _REST
     if np.count_nonzero(at_rest) < _SHORTEST:
         return None
@@ -215,8 +215,8 @@ def _noise(trial: RecordedTrial) -> float | None:
 def _measurable(ranges: str, trial: RecordedTrial) -> float | None:
     """Return the largest traction that a sensor with these ranges can measure [N].
 
-    Its origin is taken to be in the tool plate, a little farther from the sole than it
-    is, so the figure is on the safe side.
+    The sensor's origin is assumed in the tool plate, slightly further from the sole
+    than it is, so the result is conservative.
     """
     numbers = _row(ranges)
     if len(numbers) != 6:
@@ -226,9 +226,9 @@ def _measurable(ranges: str, trial: RecordedTrial) -> float | None:
 
 
 def _load_bias(trial: RecordedTrial, is_moving: np.ndarray) -> float | None:
-    """Return how far F_n lies above the virtual mass's weight across the slope [N].
+    """Return the excess of F_n over the normal component of the virtual weight [N].
 
-    Friction of the joints, what the gravity model gets wrong, and the hand.
+    Causes: joint friction, errors of the gravity model, and the hand.
     """
     try:
         mass = float(trial.metadata["trial"]["effective_mass_kg"])
@@ -241,9 +241,9 @@ def _load_bias(trial: RecordedTrial, is_moving: np.ndarray) -> float | None:
 
 
 def _sliding_torques(trial: RecordedTrial) -> Array | None:
-    """Return the friction of sliding motors [N m], shape (7,), as the trial met it.
+    """Return the uncompensated sliding friction of the motors [N m], shape (7,).
 
-    By the calibration in its file; None = it has none.
+    From the calibration in the trial's file; None without one.
     """
     try:
         stored = friction_from_toml(trial.friction_text, trial.name)
@@ -256,9 +256,9 @@ def _sliding_torques(trial: RecordedTrial) -> Array | None:
 
 
 def _drag(trial: RecordedTrial, is_moving: np.ndarray) -> float | None:
-    """Return the force along x_T [N] whose power the joints' Coulomb friction takes.
+    """Return the force along x_T [N] that balances the joints' Coulomb friction.
 
-    F v_t = sum_j c_j |qd_j|: power in is power lost, whatever the joints do.
+    Power balance: F v_t = sum_j c_j |qd_j|.
     """
     if not is_moving.any():
         return None
@@ -266,12 +266,12 @@ def _drag(trial: RecordedTrial, is_moving: np.ndarray) -> float | None:
     torques = _sliding_torques(trial)
     if torques is not None:
         speeds, coulomb = speeds @ trial.constants.j2mp.T, torques
-    lost = np.abs(speeds) @ coulomb
-    return float(np.median(lost / np.abs(trial.traction[is_moving, 0])))
+    dissipated = np.abs(speeds) @ coulomb
+    return float(np.median(dissipated / np.abs(trial.traction[is_moving, 0])))
 
 
 def _row(text: str) -> tuple[float, ...]:
-    """Return the numbers in a metadata value; any other word is left out."""
+    """Parse the numbers in a metadata value; other words are skipped."""
     numbers: list[float] = []
     for part in text.split():
         with suppress(ValueError):

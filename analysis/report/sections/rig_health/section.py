@@ -1,4 +1,4 @@
-"""Rig health: a line per trial, timing, tare, joint 7, temperatures and drift."""
+"""Section on rig health: timing, tare, joint 7, temperatures and drift by trial."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -17,11 +17,11 @@ from analysis.report.sections.rig_health.health import (
 )
 from analysis.report.style import Axes, Figure, name_ticks, new_figure, terrain_colours
 
-_NAMED = 8  # sessions that have their name below a figure
+_NAMED = 8  # largest number of session names below a figure
 
 
 def health(rig: Sequence[RigTrial]) -> ReportTable:
-    """Return one line per trial."""
+    """Return the table with one row per trial."""
     return ReportTable(
         "Rig health by trial",
         (
@@ -53,9 +53,9 @@ def health(rig: Sequence[RigTrial]) -> ReportTable:
             )
             for trial in rig
         ],
-        note="Age: how much earlier the force was sampled than the joints answered. "
+        note="Age: time from the force sample to the joint replies. "
         "Change of tare: distance to the offset of the next tare, which "
-        "brackets the drift of the sensor. – where it is not known.",
+        "brackets the drift of the sensor. –: not known.",
         section=ReportSection.HEALTH,
     )
 
@@ -68,7 +68,7 @@ def _range(values: Sequence[float]) -> str:
 
 
 def draw_timing(results: StudyResults) -> Figure | None:
-    """Return histograms of the period and of the age of the force samples."""
+    """Draw histograms of the period and of the age of the force samples."""
     if not results.rig:
         return None
     figure = new_figure(2.3)
@@ -88,20 +88,20 @@ def draw_timing(results: StudyResults) -> Figure | None:
 
 
 def caption_timing(results: StudyResults) -> str:
-    """State the longest period and the usual age of a force sample."""
+    """State the longest period and the typical age of a force sample."""
     longest = max(trial.longest_gap for trial in results.rig)
     missed = sum(trial.missed for trial in results.rig)
     cycles = sum(trial.cycles for trial in results.rig)
     skews = [trial.skew[1] for trial in results.rig]
     return (
-        f"{cycles} cycles, {missed} missed, longest period {longest:.2f} ms. When the "
-        f"joints have answered, the force sample is {np.median(skews):.2f} ms old "
+        f"{cycles} cycles, {missed} missed, longest period {longest:.2f} ms. At the "
+        f"joint replies the force sample is {np.median(skews):.2f} ms old "
         f"(median over trials; {min(skews):.2f} to {max(skews):.2f} ms)."
     )
 
 
 def draw_rig(results: StudyResults) -> Figure | None:
-    """Return tare bracket, joint 7, temperatures and load bias of every trial."""
+    """Draw tare change, joint 7, temperatures and load bias of every trial."""
     if not results.rig:
         return None
     figure = new_figure(4.2)
@@ -139,14 +139,14 @@ def caption_rig(results: StudyResults) -> str:
     if brackets:
         parts.append(f"the tare changed by at most {max(brackets):.2f} N to the next")
     return (
-        f"{'; '.join(parts)}. Dashed: motion of joint 7 that is warned of. Change of "
-        "tare: to the next trial's. Load: median F_n of the moving foot less the "
-        "weight of the virtual mass."
+        f"{'; '.join(parts)}. Dashed: warning limit of joint 7. Change of tare: to the "
+        "next trial's. Load: median F_n of the moving foot minus the weight of the "
+        "virtual mass."
     )
 
 
 def draw_drift(results: StudyResults) -> Figure | None:
-    """Return tares and load of every trial, session by session in their order."""
+    """Draw tares and load of every trial in order of the sessions."""
     sessions = _by_session(results.rig)
     if len(sessions) < 2:
         return None
@@ -163,18 +163,18 @@ def draw_drift(results: StudyResults) -> Figure | None:
     below.set_ylabel("$F_n$ above the set load [N]")
     step = -(-len(sessions) // _NAMED)
     below.set_xticks(range(0, len(sessions), step), list(sessions)[::step])
-    below.set_xlabel("sessions in their order, trials from left to right")
+    below.set_xlabel("sessions in order, trials from left to right")
     return figure
 
 
 def caption_drift(results: StudyResults) -> str:
-    """State how far tares and load went from the first to the last session."""
+    """State the change of tares and load from the first to the last session."""
     sessions = list(_by_session(results.rig).values())
     first, last = (
         np.median([trial.tare for trial in sessions[k]], axis=0) for k in (0, -1)
     )
-    moved = ", ".join(f"{value:+z.2f}" for value in (last - first).tolist())
-    words = f"From the first to the last session the tare went by {moved} N (x, y, z)"
+    shift = ", ".join(f"{value:+z.2f}" for value in (last - first).tolist())
+    words = f"From first to last session the tare changed by {shift} N (x, y, z)"
     loads = [
         [trial.load_bias for trial in sessions[k] if trial.load_bias is not None]
         for k in (0, -1)
@@ -183,16 +183,16 @@ def caption_drift(results: StudyResults) -> str:
         change = float(np.median(loads[1]) - np.median(loads[0]))
         words += f" and the load by {change:+z.2f} N"
     return (
-        f"{words} (medians of a session). A tare that goes on and on is a sensor that "
-        "is overloaded or warms up; a load that goes away from the set one is gravity "
-        "or friction to calibrate again: traction check says how old they are."
+        f"{words} (medians of a session). A steadily drifting tare indicates a sensor "
+        "that is overloaded or warms up; a load that drifts from the set one calls for "
+        "a new gravity or friction calibration: traction check shows their age."
     )
 
 
 def _by_session(rig: Sequence[RigTrial]) -> dict[str, list[RigTrial]]:
-    """Return the trials by their sessions, both in the order of their beginning."""
+    """Group the trials by session, both in order of their start time."""
     sessions: dict[str, list[RigTrial]] = {}
-    for trial in sorted(rig, key=lambda each: (each.started_utc, each.name)):
+    for trial in sorted(rig, key=lambda entry: (entry.started_utc, entry.name)):
         sessions.setdefault(trial.session, []).append(trial)
     return sessions
 
@@ -201,7 +201,7 @@ def _along_sessions(
     sessions: Mapping[str, Sequence[RigTrial]],
     measure: Callable[[RigTrial], float | None],
 ) -> tuple[list[float], list[float]]:
-    """Return places along the sessions, counted from 0, and what was measured there."""
+    """Return axis positions along the sessions, from 0, and the measured values."""
     pairs = [
         (position + 0.8 * ((k + 0.5) / len(trials) - 0.5), value)
         for position, trials in enumerate(sessions.values())
@@ -252,7 +252,7 @@ RIG_FIGURE = FigureSpec(
     "rig",
     "Tare, joint 7, temperatures and load, trial by trial",
     "Four panels with one dot per trial: change of tare to the next trial, motion "
-    "of the locked joint, warmest puck or motor, load above what was set.",
+    "of the locked joint, warmest puck or motor, load above the set load.",
     draw_rig,
     caption_rig,
 )
@@ -261,7 +261,7 @@ DRIFT_FIGURE = FigureSpec(
     "drift",
     "Drift of tare and load over the sessions",
     "Two panels with one dot per trial, session after session: the tare along the "
-    "sensor's three axes, and the load above what was set.",
+    "sensor's three axes, and the load above the set load.",
     draw_drift,
     caption_drift,
 )

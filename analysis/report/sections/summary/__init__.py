@@ -1,4 +1,4 @@
-"""Summary: what was recorded, how well it is predicted, what to look at first.
+"""Summary: samples, prediction errors and outlier trials.
 
 Begin with `section`.
 """

@@ -1,19 +1,21 @@
-"""Trials to look at first: those that stand out among the trials of their terrain.
+"""Outlier trials: trials that differ from the others of their terrain.
 
-Of every trial some measures are taken, and each is compared with those of the other
-trials of its terrain. Ten trials tell their spread badly, so the other terrains' counts
-as some more of them (as in moderated t statistics, Smyth 2004, Statistical Applications
-in Genetics and Molecular Biology 3):
+Several measures of every trial are compared with those of the other trials of its
+terrain. Ten trials estimate their spread poorly, so the spread on the other terrains
+serves as prior (as in moderated t statistics, Smyth 2004, Statistical Applications in
+Genetics and Molecular Biology 3):
 
     t = (x - median) / (s sqrt(1 + pi / (2 n))),  s^2 = (n s_1^2 + n0 s_0^2) / (n + n0)
 
 s_1 is the scale Q_n of the others (Rousseeuw and Croux 1993, J. Am. Stat. Assoc. 88),
-which bears several spoilt trials; s_0 is the geometric mean of that of other terrains;
-a terrain by itself has its own. t becomes the normal value that is as rare. A trial is
-named beyond the limit of a measure, or where its motion and forces cannot be right.
-What a foot shows that stands, before anybody pushes, tells most of the sensor: its
-weight and the noise hardly differ from trial to trial. Stones and hands do, and more
-often far than normal values. Forces some milliseconds late do not show on plates.
+which is robust to several outliers; s_0 is the geometric mean over other terrains, or
+s_1 for a single terrain. t is converted to the normal score of equal probability. A
+trial is listed if it exceeds the limit of a measure, or if its motion and forces are
+implausible.
+The readings of the foot at rest, before it is pushed, reveal most about the sensor: its
+weight and the noise hardly differ between trials. Stones and hands do differ, with
+heavier tails than a normal distribution. Forces late by some milliseconds do not show
+on plates.
 """
 
 import math
@@ -31,34 +33,34 @@ from analysis.study.models import TUSTIN
 from analysis.study.study import Study
 from analysis.study.terrain_fit import TerrainResult
 
-_HAND = 0.15  # a hand differs by so much, or its double, from push to push [log]
-SENSOR_LIMIT = 4.0  # of a normal value, in what only the sensor changes
-PUSH_LIMIT = 5.0  # in what stones and hand change, too
-_FEWEST = 4  # trials of a terrain that are compared
-_PRIOR = 5.0  # trials that the scale of the other terrains counts as
-_MANY = 30  # trials, beyond which the scale is that of all
-# Q_n: to the standard deviation of normal values, of 2 to 9 of them, and how much of
-# them it uses.
+_HAND = 0.15  # variation from push to push of a hand, up to a factor of two [log]
+SENSOR_LIMIT = 4.0  # limit of the normal score for measures of the sensor alone
+PUSH_LIMIT = 5.0  # limit for measures that also depend on stones and hand
+_FEWEST = 4  # smallest number of trials of a terrain for a comparison
+_PRIOR = 5.0  # weight of the scale of the other terrains [trials]
+_MANY = 30  # trials beyond which the scale of all trials is used
+# Q_n: consistency factor for normal values, small-sample factors for 2 to 9 values, and
+# efficiency.
 _QN_TO_SD = 2.2219
 _QN_FEW = (0.399, 0.994, 0.512, 0.844, 0.611, 0.857, 0.669, 0.872)
 _QN_EFFICIENCY = 0.8
-_SMOOTH = "friction"  # a doubt that smooth ground raises; the ratio is compared
-_TOLD = 3  # measures in one reason
-_STANDING = 0.5  # s at the start in which the foot stands and nobody pushes yet
-_FEWEST_ROWS = 50  # of them
-_MOST_ODD = 10  # trials to look at first
+_SMOOTH = "friction"  # doubt that smooth ground raises; covered by the measure "ratio"
+_MOST_REASONS = 3  # measures listed per trial
+_STANDING = 0.5  # s at the start in which the foot stands and is not pushed
+_FEWEST_ROWS = 50  # smallest number of rows at rest
+_MOST_OUTLIERS = 10  # trials listed
 
 
 @dataclass(frozen=True, slots=True)
 class Measure:
-    """What trials are compared by.
+    """Measure by which trials are compared.
 
     Attributes:
-        words: what stands out, in words.
-        least: scale below which no difference counts.
+        words: name of the measure in words.
+        least: lower limit of the scale.
         is_log: values are logarithms of a ratio.
-        unit: of values that are none.
-        limit: beyond which a trial is named, as a normal value.
+        unit: unit of other values.
+        limit: normal score beyond which a trial is listed.
     """
 
     words: str
@@ -68,11 +70,11 @@ class Measure:
     limit: float = PUSH_LIMIT
 
     def is_known(self, scale: float) -> bool:
-        """Return whether trials differ by less than hands are known to."""
+        """Return whether the scale is below the known variation of hands."""
         return self.least == _HAND and scale < _HAND
 
     def text(self, difference: float) -> str:
-        """Return how far a trial is from the others."""
+        """State the difference of a trial from the others."""
         if self.is_log:
             return f"{self.words} {math.exp(difference):.2g} times the others'"
         return f"{self.words} {difference:+.2g} {self.unit} from the others"
@@ -84,13 +86,13 @@ MEASURES: Mapping[str, Measure] = {
     "ratio": Measure("F_t/F_n", 0.03, is_log=True),
     "speed": Measure("velocity", _HAND, is_log=True),
     "kept": Measure("kept samples", _HAND, is_log=True),
-    "way": Measure("way", 0.05, is_log=True),
+    "way": Measure("travel", 0.05, is_log=True),
     "noise": Measure(
         "change from sample to sample", _HAND, is_log=True, limit=SENSOR_LIMIT
     ),
     "lag": Measure("delay of the force", 1.0, unit="ms", limit=SENSOR_LIMIT),
-    "rest_t": Measure("F_t of the foot that stands", 0.2, unit="N", limit=SENSOR_LIMIT),
-    "rest_n": Measure("F_n of the foot that stands", 0.2, unit="N", limit=SENSOR_LIMIT),
+    "rest_t": Measure("F_t at rest", 0.2, unit="N", limit=SENSOR_LIMIT),
+    "rest_n": Measure("F_n at rest", 0.2, unit="N", limit=SENSOR_LIMIT),
     "rest_noise_t": Measure(
         "noise of F_t at rest", 0.05, is_log=True, limit=SENSOR_LIMIT
     ),
@@ -102,15 +104,14 @@ MEASURES: Mapping[str, Measure] = {
 
 @dataclass(frozen=True, slots=True)
 class OddTrial:
-    """A trial that stands out.
+    """An outlier trial.
 
     Attributes:
-        terrain: its terrain.
-        number: of the trial on its terrain, from 1.
-        name: of the trial.
-        score: how far it stands out, 1 = at the limit of a measure; infinite where it
-            cannot be right.
-        reasons: what stands out, the farthest first.
+        terrain: name of the terrain.
+        number: number of the trial on its terrain, from 1.
+        name: name of the trial.
+        score: largest score, 1 = at the limit of a measure; infinite if implausible.
+        reasons: outlying measures, the largest first.
     """
 
     terrain: str
@@ -121,26 +122,27 @@ class OddTrial:
 
 
 def look_first(study: Study) -> list[OddTrial]:
-    """Return the trials that stand out, the farthest first; none in a sound study."""
+    """Return the outlier trials, the largest score first; none in a sound study."""
     measured = {
-        name: [_measured(result, k) for k in range(len(result.trials))]
+        name: [_measures(result, k) for k in range(len(result.trials))]
         for name, result in study.terrains.items()
     }
-    compared = _compared(measured)
-    odd: list[OddTrial] = []
+    scored = _scores(measured)
+    outliers: list[OddTrial] = []
     for name, result in study.terrains.items():
         for k, trial in enumerate(result.trials):
             doubts = [d.seen for d in doubts_of(trial) if d.name != _SMOOTH]
-            ranked = sorted(compared[name][k], key=lambda found: -abs(found[0]))
-            told = [text for share, text in ranked if abs(share) > 1.0][:_TOLD]
-            if doubts or told:
+            ranked = sorted(scored[name][k], key=lambda entry: -abs(entry[0]))
+            texts = [text for share, text in ranked if abs(share) > 1.0]
+            reasons = (*doubts, *texts[:_MOST_REASONS])
+            if reasons:
                 score = math.inf if doubts else abs(ranked[0][0])
-                odd.append(OddTrial(name, k + 1, trial.name, score, (*doubts, *told)))
-    return sorted(odd, key=lambda trial: -trial.score)
+                outliers.append(OddTrial(name, k + 1, trial.name, score, reasons))
+    return sorted(outliers, key=lambda trial: -trial.score)
 
 
-def _measured(result: TerrainResult, number: int) -> dict[str, float]:
-    """Return the measures of a trial; those that it does not show are missing."""
+def _measures(result: TerrainResult, number: int) -> dict[str, float]:
+    """Compute the measures of a trial; unavailable ones are missing."""
     trial = result.trials[number]
     if not trial.kept:
         return {}
@@ -162,13 +164,13 @@ def _measured(result: TerrainResult, number: int) -> dict[str, float]:
     for fold in result.folds:
         if number in fold.left_out and TUSTIN in fold.models:
             model = fold.models[TUSTIN].model
-            rest = trial.F_t - model.mean(trial.F_n, trial.v_t, trial.further)
-            values["residual"] = float(rest.mean())
+            residual = trial.F_t - model.mean(trial.F_n, trial.v_t, trial.further)
+            values["residual"] = float(residual.mean())
     return values
 
 
 def _standing(smooth: Smoothed) -> dict[str, float]:
-    """Return what the sensor shows of a foot that stands and nobody pushes yet."""
+    """Compute the measures of the foot at rest before it is pushed."""
     until = smooth.t[0] + _STANDING
     end = min(standing_rows(smooth), int(np.searchsorted(smooth.t, until)))
     if end < _FEWEST_ROWS:
@@ -183,110 +185,116 @@ def _standing(smooth: Smoothed) -> dict[str, float]:
 
 
 def _noise(force: Array) -> float:
-    """Return the logarithm of the change from sample to sample."""
+    """Return the logarithm of the mean change from sample to sample."""
     return float(np.log(np.abs(np.diff(force)).mean() + 1e-9))
 
 
 def qn_scale(x: Array) -> float:
-    """Return the scale Q_n of values; about their standard deviation if normal.
+    """Return the robust scale Q_n of values; consistent for normal values.
 
-    A quantile of the distances between any two, which half of the values may spoil.
+    A quantile of the pairwise distances, with a breakdown point of one half.
 
     Args:
-        x: two values at least, shape (n,).
+        x: at least two values, shape (n,).
     """
     from scipy.spatial.distance import pdist
 
     n, half = x.size, x.size // 2 + 1
     nearest = half * (half - 1) // 2 - 1
-    apart = np.partition(pdist(x[:, None], "cityblock"), nearest)
-    corrected = n / (n + (1.4 if n % 2 else 3.8))
+    distances = np.partition(pdist(x[:, None], "cityblock"), nearest)
+    correction = n / (n + (1.4 if n % 2 else 3.8))
     if n - 2 < len(_QN_FEW):
-        corrected = _QN_FEW[n - 2]
-    return _QN_TO_SD * corrected * float(apart[nearest])
+        correction = _QN_FEW[n - 2]
+    return _QN_TO_SD * correction * float(distances[nearest])
 
 
-def _compared(
+def _scores(
     measured: Mapping[str, Sequence[Mapping[str, float]]],
 ) -> dict[str, list[list[tuple[float, str]]]]:
-    """Return for every trial its score and words of every measure that it shows.
+    """Return score and text of every available measure of every trial.
 
     Args:
-        measured: measures of the trials, by terrain.
+        measured: measures of the trials by terrain.
     """
-    found: dict[str, list[list[tuple[float, str]]]] = {
+    scores: dict[str, list[list[tuple[float, str]]]] = {
         name: [[] for _ in trials] for name, trials in measured.items()
     }
     for key, measure in MEASURES.items():
-        shown = {
-            name: {k: each[key] for k, each in enumerate(trials) if key in each}
+        available = {
+            name: {k: row[key] for k, row in enumerate(trials) if key in row}
             for name, trials in measured.items()
         }
-        known = {n: one for n, one in shown.items() if len(one) >= _FEWEST}
-        values = {name: np.array([*one.values()]) for name, one in known.items()}
+        enough = {n: rows for n, rows in available.items() if len(rows) >= _FEWEST}
+        values = {name: np.array([*rows.values()]) for name, rows in enough.items()}
         scales = {name: qn_scale(x) for name, x in values.items()}
         for name, x in values.items():
-            beside = [
+            other_scales = [
                 max(scale, measure.least)
                 for other, scale in scales.items()
                 if other != name
             ]
-            for i, (k, value) in enumerate(known[name].items()):
+            for i, (k, value) in enumerate(enough[name].items()):
                 others = np.delete(x, i)
-                away = value - float(np.median(others))
-                # of many trials one more does not change the scale
+                difference = value - float(np.median(others))
+                # among many trials, leaving one out does not change the scale
                 own = scales[name] if x.size > _MANY else qn_scale(others)
-                if measure.is_known(own) and not beside:
-                    z = away / measure.least
+                if measure.is_known(own) and not other_scales:
+                    z = difference / measure.least
                 else:
-                    z = _normal(away, max(own, measure.least), others.size, beside)
-                found[name][k].append((z / measure.limit, measure.text(away)))
-    return found
+                    scale = max(own, measure.least)
+                    z = _normal_score(difference, scale, others.size, other_scales)
+                scores[name][k].append((z / measure.limit, measure.text(difference)))
+    return scores
 
 
-def _normal(away: float, scale: float, count: int, beside: Sequence[float]) -> float:
-    """Return the normal value that is as rare as a trial so far from the others.
+def _normal_score(
+    difference: float, scale: float, count: int, other_scales: Sequence[float]
+) -> float:
+    """Convert the difference of a trial to a normal score of equal probability.
 
     Args:
-        away: from their median.
-        scale: theirs.
-        count: how many they are.
-        beside: scales of other terrains.
+        difference: difference from the median of the others.
+        scale: scale of the others.
+        count: number of the others.
+        other_scales: scales of other terrains.
     """
     from scipy.special import ndtri, stdtr
 
-    common = math.exp(float(np.log(beside).mean())) if beside else scale
+    common = math.exp(float(np.log(other_scales).mean())) if other_scales else scale
     variance = (count * scale**2 + _PRIOR * common**2) / (count + _PRIOR)
-    t = away / math.sqrt(variance * (1.0 + math.pi / (2 * count)))
+    t = difference / math.sqrt(variance * (1.0 + math.pi / (2 * count)))
     freedom = _QN_EFFICIENCY * (count - 1) + _PRIOR
-    return math.copysign(float(ndtri(stdtr(freedom, -abs(t)))), away)
+    return math.copysign(float(ndtri(stdtr(freedom, -abs(t)))), difference)
 
 
 def look_first_tables(study: Study) -> list[ReportTable]:
-    """Return the trials that stand out, the farthest first; none where none does."""
-    odd = look_first(study)
-    if not odd:
+    """Return the table of outlier trials; none without outliers."""
+    outliers = look_first(study)
+    if not outliers:
         return []
     table = ReportTable(
-        name="Look at these first",
+        name="Outlier trials",
         header=("terrain", "trial", "name", "times the limit", "why"),
         rows=[
             [
                 trial.terrain,
                 str(trial.number),
                 trial.name,
-                "cannot be right" if isinf(trial.score) else f"{trial.score:.1f}",
+                "implausible" if isinf(trial.score) else f"{trial.score:.1f}",
                 "; ".join(trial.reasons),
             ]
-            for trial in odd[:_MOST_ODD]
+            for trial in outliers[:_MOST_OUTLIERS]
         ],
-        note="Distance from the median of the terrain's other trials, as rare as a "
-        "normal value so many standard deviations out. Its limit is "
-        f"{SENSOR_LIMIT:g} in what only the sensor changes, {PUSH_LIMIT:g} in what "
-        "stones and hand change, too; a trial whose motion and forces contradict each "
-        "other is named in any case. One that stands out is not wrong by that: look at "
-        "its curve, then decide."
-        + (f" {len(odd) - _MOST_ODD} more." if odd[_MOST_ODD:] else ""),
+        note="Normal score of the difference from the median of the terrain's other "
+        f"trials, divided by its limit: {SENSOR_LIMIT:g} for measures of the sensor "
+        f"alone, {PUSH_LIMIT:g} for measures that also depend on stones and hand. A "
+        "trial whose motion and forces contradict each other is always listed. An "
+        "outlier is not necessarily wrong: look at its curve, then decide."
+        + (
+            f" {len(outliers) - _MOST_OUTLIERS} more."
+            if outliers[_MOST_OUTLIERS:]
+            else ""
+        ),
         section=ReportSection.SUMMARY,
     )
     return [table]

@@ -1,4 +1,4 @@
-"""Summary: one line per terrain, the Tustin parameters, what a model is worth."""
+"""Section "Summary": samples and errors by terrain, and the Tustin parameters."""
 
 from collections.abc import Iterator, Sequence
 
@@ -15,12 +15,12 @@ from analysis.study.terrain_fit import PooledTustinFit, TerrainResult
 from analysis.tustin.identifiability import Interval
 from analysis.tustin.model import SYMBOLS, UNITS, TustinBounds
 
-_DECADE = 10.0  # ratio of a profile's ends that says nothing about the value
-WORTHWHILE = 0.9  # error over the constant's below which a model says something
+_DECADE = 10.0  # ratio of a profile's ends above which it is uninformative
+WORTHWHILE = 0.9  # error relative to the constant below which a model is useful
 
 
 def summary(study: Study) -> ReportTable:
-    """Return one line per terrain: how much was recorded, how well it is predicted."""
+    """Return the table of samples and errors, one row per terrain."""
     models = compared(study.options.fit.models)
     return ReportTable(
         name="Samples and errors",
@@ -36,17 +36,17 @@ def summary(study: Study) -> ReportTable:
         ),
         rows=[_summary_row(result, models) for result in study.terrains.values()],
         note="F_t/F_n: ratio of the means of a trial, mean of the trials ± their "
-        "standard deviation. MAE: mean absolute error on trials that were left out of "
-        "the fit, mean over trials ± its standard error. Constant: always the median "
-        "F_t of the other trials. F_n ≤ 0: share of the kept samples with the foot off "
-        "the ground, where it hops in a slip, or the tare wrong; a warning where it is "
+        "standard deviation. MAE: mean absolute error on held-out trials, mean over "
+        "trials ± its standard error. Constant: always the median F_t of the other "
+        "trials. F_n ≤ 0: share of the kept samples with the foot off the ground, "
+        "because it hops in a slip or the tare is wrong; a warning if F_n is "
         f"below −{PULLED:g} N in more than {PULLED_WARNING:.0%}.",
         section=ReportSection.SUMMARY,
     )
 
 
 def parameters(study: Study) -> ReportTable:
-    """Return the Tustin fit of all trials of each terrain with its intervals."""
+    """Return the table of Tustin parameters of all trials with their intervals."""
     rows = []
     for name, result in study.terrains.items():
         whole = result.whole
@@ -70,9 +70,9 @@ def parameters(study: Study) -> ReportTable:
 
 
 def verdicts(study: Study) -> list[str]:
-    """Return for every terrain F_t/F_n, and whether a model says more than a constant.
+    """State F_t/F_n of every terrain and whether a model is better than a constant.
 
-    Without errors of a model and of the constant nothing is said.
+    Terrains without errors of a model and of the constant are skipped.
     """
     models = compared(study.options.fit.models)
     return [
@@ -83,7 +83,7 @@ def verdicts(study: Study) -> list[str]:
 
 
 def _parameter_cell(whole: PooledTustinFit, key: str, bounds: TustinBounds) -> str:
-    """Return a parameter with its interval, and its profile where that is open."""
+    """Format a parameter with its interval, and its profile if that is open."""
     if whole.fit is None:
         return "–"
     value, profiles = getattr(whole.fit.parameters, key), whole.fit.profiles
@@ -97,7 +97,7 @@ def _parameter_cell(whole: PooledTustinFit, key: str, bounds: TustinBounds) -> s
 
 
 def is_open(bounds: TustinBounds, key: str, profile: Interval) -> bool:
-    """Return whether a profile reaches an edge of the search or spans a decade."""
+    """Return whether a profile reaches a bound of the search or spans a decade."""
     is_at_edge = any(bounds.reached(key, end) for end in profile)
     return is_at_edge or profile.upper > _DECADE * profile.lower
 
@@ -116,7 +116,7 @@ def _summary_row(result: TerrainResult, models: Sequence[str]) -> list[str]:
 
 
 def _verdict(result: TerrainResult, models: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """Yield what the best model is worth, and the errors that say so, if any do."""
+    """Yield the verdict on the best model and its errors, if there are any."""
     errors = {m: mae for m in models if (mae := result.mae(m)) is not None}
     constant = result.constant_mae
     if not errors or not constant:

@@ -1,4 +1,4 @@
-"""Programs that read terrains, one a module: each has its `TARGET`.
+"""Export formats, one per module; each defines `TARGET`.
 
-A further one is a further module here; the command finds it by its name.
+To add a format, add a module here; the command finds it by its name.
 """

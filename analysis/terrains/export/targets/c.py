@@ -1,4 +1,4 @@
-"""A C99 header: quantiles, risks, sampled paths and belief over terrains."""
+"""C99 header: quantiles, slip risks, sampled paths and belief over terrains."""
 
 from dataclasses import astuple
 from importlib import resources
@@ -26,10 +26,10 @@ def _files(export: TerrainExport) -> Files:
 
 
 def _sections(export: TerrainExport) -> list[str]:
-    """Return the header part by part; what is asked of a terrain stands in queries.h.
+    """Return the sections of the header; queries.h holds the query functions.
 
-    A query over further numbers of a terrain is a function there, a member of
-    `traction_terrain`, and a line of `_terrain`.
+    A new query needs a function there and, for further data of a terrain, a member of
+    `traction_terrain` and a line in `_terrain`.
     """
     queries = resources.files("analysis.terrains.export.targets") / "queries.h"
     return [
@@ -54,10 +54,11 @@ def _head(export: TerrainExport) -> str:
 
 {listed}
 
-   Forces in N, velocities in m/s; a quantile is the F_t that is not reached with its
-   share. Linear between points, of the edge outside. Every function returns 0 inside
-   the measured range, 1 where it was clamped, -1 where an argument is not finite (a
-   risk is 1 then, a force 0). No allocation, no library, no state but the caller's. */
+   Forces in N, velocities in m/s; a quantile is the F_t that is not reached with the
+   probability of its share. Linear between points, clamped outside. Every function
+   returns 0 inside the measured range, 1 if clamped, -1 if an argument is not finite
+   (a risk is then 1, a force 0). No allocation, no library, no state but the
+   caller's. */
 #ifndef TRACTION_TERRAINS_H
 #define TRACTION_TERRAINS_H
 

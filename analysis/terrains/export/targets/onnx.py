@@ -1,11 +1,11 @@
-"""ONNX graphs: the quantiles of a terrain by Gemm, Max, Min and Mul alone.
+"""ONNX graphs: the quantiles of a terrain with only Gemm, Max, Min and Mul.
 
-Runtimes in simulators know neither look-ups nor comparisons. With
+Runtimes in simulators often lack look-ups and comparisons. With
 
-    u_k = min(max((F_n - F_k) / (F_{k+1} - F_k), 0), 1),  s_l likewise of v_t
+    u_k = min(max((F_n - F_k) / (F_{k+1} - F_k), 0), 1),  s_l likewise for v_t
 
-and u_0 = s_0 = 1, bilinear interpolation that is clamped to the table is the sum over
-k and l of D_kl u_k s_l, D the second differences of the table.
+and u_0 = s_0 = 1, bilinear interpolation clamped to the table is the sum over k and l
+of D_kl u_k s_l, with D the second differences of the table.
 """
 
 from importlib import import_module
@@ -27,7 +27,7 @@ def _files(export: TerrainExport) -> Files:
 
 
 def _model(terrain: ExportedTerrain, export: TerrainExport) -> bytes:
-    onnx: Any = import_module("onnx")  # no stubs of its own where it is missing
+    onnx: Any = import_module("onnx")  # optional, so that no type stubs are required
     checker, helper = onnx.checker, onnx.helper
 
     table = terrain.table
@@ -45,12 +45,12 @@ def _model(terrain: ExportedTerrain, export: TerrainExport) -> bytes:
         return output
 
     def steps(name: str, axis: tuple[float, ...], column: int) -> str:
-        """Add 1 and how far each piece of an axis was crossed, 0 to 1."""
+        """Add nodes for u_0 = 1 and u_k, the clamped position in each axis segment."""
         lengths = np.diff(axis)
         weights, offsets = np.zeros((len(axis), 2)), np.ones(len(axis))
         weights[1:, column] = 1.0 / lengths
         offsets[1:] = -np.array(axis[:-1]) / lengths
-        way = node(
+        position = node(
             "Gemm",
             f"{name}_way",
             INPUT,
@@ -58,7 +58,7 @@ def _model(terrain: ExportedTerrain, export: TerrainExport) -> bytes:
             constant(f"{name}_offsets", offsets),
             transB=1,
         )
-        above = node("Max", f"{name}_above", way, "zero")
+        above = node("Max", f"{name}_above", position, "zero")
         return node("Min", f"{name}_steps", above, "one")
 
     constant("zero", np.zeros(1))
@@ -122,8 +122,8 @@ def _about(export: TerrainExport) -> tuple[str, str, str, str, str, str]:
         f"{len(table.shares)}): F_t by share.",
         f"Shares: {shares}. `metadata_props` has terrain, model, range and database.",
         f"Clamped to F_n {table.F_n[0]:g}..{table.F_n[-1]:g} N, v_t "
-        f"{table.v_t[0]:g}..{table.v_t[-1]:g} m/s; nothing says that it was.",
-        "What is not finite gives NaN. Within 1e-5 of the largest force of the table.",
+        f"{table.v_t[0]:g}..{table.v_t[-1]:g} m/s; clamping is not reported.",
+        "Not finite inputs give NaN. Within 1e-5 of the largest force of the table.",
         'onnxruntime.InferenceSession("S0.onnx").run(None, {"x": x})',
     )
 

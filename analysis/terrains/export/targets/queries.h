@@ -20,18 +20,18 @@ typedef struct {
     const traction_real *risk;
 } traction_rest;
 
-/* How normal scores of the forces of one trial hang together. */
+/* Correlation of the normal scores of the forces of one trial. */
 typedef struct {
     traction_real level; /* share of their variance that is the trial's own level */
-    traction_real tau_stick; /* correlation time of the rest while it sticks [s] */
-    traction_real tau_slide; /* the same while it moves [s] */
+    traction_real tau_stick; /* correlation time of the other part, sticking [s] */
+    traction_real tau_slide; /* the same, sliding [s] */
 } traction_copula;
 
 typedef struct {
     const char *name;
     traction_table forces; /* [N], TRACTION_SHARES columns */
     traction_table moments; /* of the recogniser: mean and sd [N] */
-    traction_real rho; /* of its residual, from one sample to the next */
+    traction_real rho; /* correlation of residuals of neighbouring samples */
     const traction_rest *rest; /* 0 = not known */
     const traction_copula *copula; /* 0 = not known */
 } traction_terrain;
@@ -41,17 +41,17 @@ typedef struct {
     const traction_terrain *const *terrains;
 } traction_set;
 
-/* What samples so far say of the terrains; begins with traction_forget. */
+/* Evidence for the terrains from the samples so far; initialise by traction_forget. */
 typedef struct {
     traction_real log_density[TRACTION_TERRAINS];
     traction_real residual[TRACTION_TERRAINS];
     int has_before;
 } traction_belief;
 
-/* A trial that is drawn step by step; begins with traction_begin_trial. */
+/* State of a trial drawn step by step; initialise by traction_begin_trial. */
 typedef struct {
     traction_real level; /* normal score of the trial */
-    traction_real rest; /* of the step before */
+    traction_real rest; /* correlated part at the previous step */
     int has_before;
 } traction_trial;
 
@@ -60,7 +60,7 @@ static inline int traction_is_finite(traction_real x)
     return x - x == (traction_real)0;
 }
 
-/* The point below `value` and the share of the way to the next, clamped. */
+/* Index of the point below `value` and fraction of the interval, clamped. */
 static inline int traction_bracket(const traction_real *axis, int count,
                                    traction_real value, int *lower, traction_real *way)
 {
@@ -199,8 +199,8 @@ static inline int traction_quantiles(const traction_terrain *terrain, traction_r
     return traction_look_up(&terrain->forces, TRACTION_SHARES, F_n, v_t, out);
 }
 
-/* Probability that a sliding foot meets less than F_t. Slower than measured counts as
-   the slowest. */
+/* Probability that a sliding foot gets less than F_t. Velocities below the slowest one
+   measured are raised to it. */
 static inline int traction_risk_sliding(const traction_terrain *terrain,
                                         traction_real F_t, traction_real F_n,
                                         traction_real v_t, traction_real *p)
@@ -226,8 +226,8 @@ static inline int traction_risk_sliding(const traction_terrain *terrain,
     return code;
 }
 
-/* Probability that a push from rest slips before it reaches F_t, at F_n held. -1 too
-   where a force is negative or the terrain was not pushed from rest. */
+/* Probability that a push from rest slips before it reaches F_t at constant F_n. Also
+   -1 if a force is negative or the terrain has no break-away model. */
 static inline int traction_risk_rest(const traction_terrain *terrain, traction_real F_t,
                                      traction_real F_n, traction_real *p)
 {
@@ -267,7 +267,7 @@ static inline traction_real traction_root(traction_real x)
     return x > 0 ? traction_exp(traction_log(x) / 2) : (traction_real)0;
 }
 
-/* Begin a trial with a level of its own; `normal` is a standard normal number. */
+/* Begin a trial and set its level; `normal` is a standard normal number. */
 static inline void traction_begin_trial(traction_trial *trial, traction_real normal)
 {
     trial->level = normal;
@@ -277,9 +277,9 @@ static inline void traction_begin_trial(traction_trial *trial, traction_real nor
 
 /* Draw F_t [N] of the trial's next step, dt [s] after the one before; `normal` is a
    standard normal number, a new one for every step. A foot slower than measured sticks.
-   Beyond the outer shares the force goes on with the slope of the last two, but not
-   across 0. -1 too where dt is not positive or the terrain has no copula; the trial
-   stays as it is then. */
+   Beyond the outer shares the force is extrapolated with the slope of the outer pair,
+   but not across 0. Also -1 if dt is not positive or the terrain has no copula; the
+   trial is then unchanged. */
 static inline int traction_sample(const traction_terrain *terrain,
                                   traction_trial *trial, traction_real F_n,
                                   traction_real v_t, traction_real dt,
@@ -309,7 +309,7 @@ static inline int traction_sample(const traction_terrain *terrain,
     return code;
 }
 
-/* Begin anew: every terrain is as probable as the others. */
+/* Reset the belief: all terrains are equally probable. */
 static inline void traction_forget(traction_belief *belief)
 {
     int i;
@@ -321,8 +321,8 @@ static inline void traction_forget(traction_belief *belief)
 }
 
 /* Take one sample of a sliding foot, every 10 ms, all three smoothed alike. Samples
-   outside the tables (1) and such as are no numbers (-1) are not counted, and the one
-   after them is taken as the first of a row. */
+   outside the tables (1) and samples that are not finite (-1) are not counted, and the
+   next one begins a new sequence. */
 static inline int traction_evidence(const traction_set *set, traction_belief *belief,
                                     traction_real F_n, traction_real v_t,
                                     traction_real F_t)

@@ -106,10 +106,10 @@ def stood(series):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda s: replace(s, F_t=s.F_t + 3.0), "F_t of the foot that stands +3"),
+        (lambda s: replace(s, F_t=s.F_t + 3.0), "F_t at rest +3"),
         pytest.param(
             lambda s: replace(s, F_n=s.F_n + 3.0),
-            "F_n of the foot that stands +3",
+            "F_n at rest +3",
             marks=pytest.mark.slow,
         ),
         pytest.param(
