@@ -56,7 +56,7 @@ def test_a_joint_that_goes_the_other_way_is_too_much(sense):
     proof = Proof(ProofGoal(ProofKind.RAMP, 3, sense), CONSTANTS, reading())
     way = sense * (PROOF_LIMITS.reach[2] + 0.001)
     assert excess(proof, reading(100, j3=way)) is None
-    assert excess(proof, reading(100, j3=-way)).quantity == "the way of joint 3"
+    assert excess(proof, reading(100, j3=-way)).quantity == "the travel of joint 3"
 
 
 def test_another_joint_may_go_less_far_than_one_of_the_same_motors():
@@ -143,7 +143,7 @@ def test_every_other_joint_stays_and_the_partner_nearly(kind, pushed):
 def test_what_is_told_of_a_way_is_the_end_that_was_passed(side):
     proof = Proof(ProofGoal(ProofKind.RAMP, 2, 1.0), CONSTANTS, reading())
     told = excess(proof, reading(j2=side * 0.1))
-    assert told.quantity == "the way of joint 2"
+    assert told.quantity == "the travel of joint 2"
     assert told.value == pytest.approx(side * 0.1)
     assert told.limit == pytest.approx(0.033 if side > 0.0 else -0.008)
 
@@ -271,7 +271,7 @@ def test_seventy_millijoules_end_a_proof():
     ],
 )
 def test_what_is_no_proof_is_refused(goal):
-    with pytest.raises(ValueError, match=r"no joint|is no proof"):
+    with pytest.raises(ValueError, match=r"no joint|is not a valid proof"):
         Proof(goal, CONSTANTS, reading())
 
 
