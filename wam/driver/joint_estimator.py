@@ -58,7 +58,7 @@ class JointEstimator:
         self._t_ns = t_ns
 
     def update(self, t_ns: int, received: Sequence[int | None]) -> int:
-        """Process the replies to the request at `t_ns`; return bits of accepted ones."""
+        """Process the replies to the request at `t_ns`; return the accepted as bits."""
         step = (t_ns - self._t_ns) * 1e-9
         if step <= 0.0:
             step = 1e-9  # two requests at the same time: avoids a division by zero

@@ -186,9 +186,7 @@ class StatusPoller:
             self.contradicted_by.clear()  # the pucks have no power
 
     def begin(self, pendant: PendantWord) -> None:
-        """Reset after a start; monitors with an invalid state are ignored from now on.
-
-        """
+        """Reset after a start; ignore monitors with an invalid state from now on."""
         self.is_lowering = False
         self.contradicted_by.clear()
         self.disobeys = None
