@@ -149,7 +149,7 @@ class Cycle:
     def _is_newest(self, known: int | None) -> bool:
         return known is None or known >= self.status.number
 
-    def _ask(self, event: ArmEvent) -> None:
+    def _set_request(self, event: ArmEvent) -> None:
         self._requested = event
         self._known = self.status.number
         self._move = None
