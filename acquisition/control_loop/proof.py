@@ -100,7 +100,7 @@ class ProofLimits:
         """Return the travel limit of joint 1-7 while another is pushed [rad]."""
         return self.partner if PARTNERS.get(pushed) == joint else self.aside
 
-    def limits(self, goal: ProofGoal) -> list[tuple[float, float]]:
+    def ways(self, goal: ProofGoal) -> list[tuple[float, float]]:
         """Return the travel limits (low, high) of each joint from its start [rad]."""
         if goal.kind in (ProofKind.REST, ProofKind.SILENCE):
             return [(-way, way) for way in self.rest]

@@ -109,7 +109,9 @@ class Recorder:
             reader.read()
             reader.lost = 0
         self._cycles.rewind(int(PRE_ROLL * RATE_HZ))
-        self._wrenches.rewind(_count_since(self._shared.wrenches.last(8192), earliest_ns))
+        self._wrenches.rewind(
+            _count_since(self._shared.wrenches.last(8192), earliest_ns)
+        )
         self._frames.rewind(_count_since(self._shared.frames.last(8192), earliest_ns))
         self.largest_backlog = 0
         self._flushed_ns = now_ns

@@ -56,7 +56,9 @@ def bag_bytes(
         schema = writer.register_schema(type_name, "ros2msg", text)
         channels[topic] = writer.register_channel(topic, "cdr", schema)
     for message in messages:
-        published = message.log_time if message.publish_time is None else message.publish_time
+        published = (
+            message.log_time if message.publish_time is None else message.publish_time
+        )
         number = message.sequence & 0xFFFFFFFF
         writer.add_message(
             channels[message.topic], message.log_time, message.data, published, number

@@ -373,7 +373,9 @@ def _neighbouring_attachment(source: Path, name: str, digest: str) -> bytes | No
     return None
 
 
-def _earlier_recovery(source: Path, target: Path, details: Mapping[str, str]) -> Recovery:
+def _earlier_recovery(
+    source: Path, target: Path, details: Mapping[str, str]
+) -> Recovery:
     """Return the result of an earlier recovery of the same file."""
     earlier = TrialReader(target).metadata.get("recovered", {})
     if earlier.get("source_sha256") != details["source_sha256"]:

@@ -140,7 +140,9 @@ class FakeCanBus(can.BusABC):
         patience_ns = 0 if timeout is None else int(timeout * NS_PER_S)
         deadline_ns = clock.now_ns() + patience_ns if timeout else 0
         while True:
-            remaining = (deadline_ns - clock.now_ns()) / NS_PER_S if timeout else timeout
+            remaining = (
+                (deadline_ns - clock.now_ns()) / NS_PER_S if timeout else timeout
+            )
             message, is_filtered = self._recv_internal(remaining)
             if message is None:
                 if timeout is not None:

@@ -99,7 +99,12 @@ class CableDrives(JointDrives):
         damping = np.array(bristles.damping) + self._shorted
         inertia = self._rotor + dt * (damping + coupling)
         end_speeds = np.array(speeds)
-        push = np.array(self.sent()) + bristle_torques - stiffness * self.twist + coupling * end_speeds
+        push = (
+            np.array(self.sent())
+            + bristle_torques
+            - stiffness * self.twist
+            + coupling * end_speeds
+        )
         self._speeds = motor = (self._rotor * self._speeds + dt * push) / inertia
         return (stiffness * self.twist + coupling * (motor - end_speeds)).tolist()
 

@@ -181,7 +181,9 @@ class ForceTorquePuck:
         """Return the tared force and torque as frame data, and the status byte."""
         wrench = self._gauge_wrench()
         pairs = zip(wrench, RANGES, strict=True)
-        saturated = sum(1 << i for i, (value, top) in enumerate(pairs) if abs(value) >= top)
+        saturated = sum(
+            1 << i for i, (value, top) in enumerate(pairs) if abs(value) >= top
+        )
         self._latched |= saturated
         fx, fy, fz, tx, ty, tz = (
             value - zero for value, zero in zip(wrench, self._zero, strict=True)

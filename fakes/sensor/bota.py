@@ -128,7 +128,11 @@ class BotaFirmware:
 
     def frame(self, measurement: Measurement, status: int) -> bytes:
         """Return the 37 bytes of a sample."""
-        status |= measurement.is_skipping | self.is_raw << 3 | (measurement.saturated > 0) << 1
+        status |= (
+            measurement.is_skipping
+            | self.is_raw << 3
+            | (measurement.saturated > 0) << 1
+        )
         return bota.encode_frame(
             BotaFrame(
                 status,

@@ -197,7 +197,13 @@ class LoadErrors:
         )
         for load, before, last_lag, crept, (creep, hysteresis, max_lag), talk in rows:
             raw_lag = last_lag + load - before
-            lag = max_lag if raw_lag > max_lag else -max_lag if raw_lag < -max_lag else raw_lag
+            lag = (
+                max_lag
+                if raw_lag > max_lag
+                else -max_lag
+                if raw_lag < -max_lag
+                else raw_lag
+            )
             crept_load = crept + share * (load - crept)
             lags.append(lag)
             crept_loads.append(crept_load)

@@ -184,7 +184,9 @@ class SensorStream:
         if self._wire_free_ns > t_ns + period_ns:
             self._is_skipping = True  # the line is too slow for the rate
             return
-        undamaged = data = self.firmware.frame(self._measurement(t_ns, wrench), self.status)
+        undamaged = data = self.firmware.frame(
+            self._measurement(t_ns, wrench), self.status
+        )
         self._is_skipping = False
         if self._fault is not None:
             data = damage(data, *self._fault)

@@ -164,9 +164,7 @@ def _swap_replies(faults: BusFaults) -> None:
 
 
 def _answer_too_late(faults: BusFaults) -> None:
-    faults.delay(
-        position_reply_id(6), _AFTER_NEXT_REQUEST_NS, None, every=_LATE_EVERY
-    )
+    faults.delay(position_reply_id(6), _AFTER_NEXT_REQUEST_NS, None, every=_LATE_EVERY)
 
 
 _JOINT_6, _JOINT_7 = 5, 6

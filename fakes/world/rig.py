@@ -121,7 +121,11 @@ class FakeRig:
         if scene.sensor.is_on_bus:
             network_options = replace(network_options, has_sensor=True)
         self.random = self._rake(0)
-        kind = (SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS) if network_options.has_sensor else ()
+        kind = (
+            (SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS)
+            if network_options.has_sensor
+            else ()
+        )
         self.errors = SensorErrors(self.random.sensor, *kind)
         source = self.plant.sensor_load
         if departure is not None:

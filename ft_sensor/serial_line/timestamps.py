@@ -215,7 +215,9 @@ class SampleTimestamper:
         intervals = [step if 0 < step < LONGEST_STEP_NS else 0 for step in steps[1:]]
         t_ns = arrival_ns - self._timing.wire_ns - sum(intervals)
         samples: list[WrenchSample] = []
-        for reading, step_ns, next_ns in zip(readings, steps, [*intervals, 0], strict=True):
+        for reading, step_ns, next_ns in zip(
+            readings, steps, [*intervals, 0], strict=True
+        ):
             dated_ns = self._fitted_time(t_ns, step_ns)
             samples.append(self._sample(reading, dated_ns, step_ns > 0))
             t_ns += next_ns

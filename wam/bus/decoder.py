@@ -87,7 +87,11 @@ _Key = tuple[int, ReplyKind | int]  # node; kind of reply or property number
 
 def node_name(node: int) -> str:
     """Return the name of a bus node for people, such as "puck 3"."""
-    named_nodes = {HOST: "host", SENSOR_NODE: "F/T sensor", SAFETY_NODE: "safety module"}
+    named_nodes = {
+        HOST: "host",
+        SENSOR_NODE: "F/T sensor",
+        SAFETY_NODE: "safety module",
+    }
     if node in named_nodes:
         return named_nodes[node]
     return f"puck {node}" if node in MOTOR_NODES else f"node {node}"

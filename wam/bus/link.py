@@ -279,4 +279,8 @@ def broken_link(channel: str, error: Exception) -> LinkError:
 def error_number(error: Exception) -> int | None:
     """Return the errno of an exception of the system or of python-can."""
     python_can_errno = getattr(error, "error_code", None)
-    return python_can_errno if isinstance(python_can_errno, int) else getattr(error, "errno", None)
+    return (
+        python_can_errno
+        if isinstance(python_can_errno, int)
+        else getattr(error, "errno", None)
+    )

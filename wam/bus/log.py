@@ -123,9 +123,8 @@ class BusTraffic:
 def format_frame(utc_ns: int, channel: str, can_id: int, data: bytes) -> str:
     """Return the log line of an 11-bit data frame, without the newline."""
     seconds, fraction_ns = divmod(utc_ns, NS_PER_S)
-    return (
-        f"({seconds}.{fraction_ns // 1000:06d}) {channel} {can_id:03X}#{data.hex().upper()}"
-    )
+    time = f"{seconds}.{fraction_ns // 1000:06d}"
+    return f"({time}) {channel} {can_id:03X}#{data.hex().upper()}"
 
 
 def parse_frame(text: str, line: int) -> LoggedFrame:

@@ -1,5 +1,4 @@
-"""Excitation path of the friction calibration: each motor, both senses, slow and fast.
-"""
+"""Excitation path of the friction calibration: each motor, both senses, two speeds."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -132,8 +131,8 @@ def _centres(model: ArmModel, space: FreeSpace) -> list[Array]:
     usable = [centre for centre in candidates if _is_clear_around(model, centre, space)]
     if len(usable) < CENTRES:
         raise SettingsError(
-            f"Only {len(usable)} of {len(candidates)} poses leave room to move back and "
-            f"forth ({CENTRES} are needed).",
+            f"Only {len(usable)} of {len(candidates)} poses leave room to move back "
+            f"and forth ({CENTRES} are needed).",
             hint="Calibrate with a lower container: --terrain NAME.",
         )
     to_motors = np.linalg.inv(model.constants.j2mp)

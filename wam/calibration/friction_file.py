@@ -133,7 +133,9 @@ def truth_to_toml(
     presliding = friction.presliding * coulomb / friction.coulomb  # same stiffness
     at_load = replace(friction, coulomb=coulomb, load_at=load_at, presliding=presliding)
     file = _FrictionFile.model_construct(
-        is_simulated=True, **_joint_values(constants, at_load), motors=at_load.metadata()
+        is_simulated=True,
+        **_joint_values(constants, at_load),
+        motors=at_load.metadata(),
     )
     return file.text("Friction that the simulated arm really has. SI units.")
 

@@ -112,7 +112,9 @@ def fit_friction(
         _fit_motor(motor_rows, float(scale), gravity_deviation)
         for motor_rows, scale in zip(rows, ratios, strict=True)
     ]
-    friction = _friction_of(fits, ratios, [motor_rows.compliance for motor_rows in rows])
+    friction = _friction_of(
+        fits, ratios, [motor_rows.compliance for motor_rows in rows]
+    )
     residual = _residuals(friction, fits, held_out)
     # Held-out error is systematic: unlike noise, it does not average out.
     systematic = (residual * friction.coulomb)[:, None]
@@ -298,7 +300,9 @@ def _solve(A: Array, y: Array, prior: Array) -> tuple[Array, Array]:
     return np.asarray(np.linalg.solve(normal, A.T @ y), dtype=np.float64), normal
 
 
-def _sandwich(A: Array, residuals: Array, block: NDArray[np.int64], normal: Array) -> Array:
+def _sandwich(
+    A: Array, residuals: Array, block: NDArray[np.int64], normal: Array
+) -> Array:
     """Return the covariance of the values, clustered by block."""
     blocks, block_index = np.unique(block, return_inverse=True)
     scores = np.zeros((len(blocks), A.shape[1]))

@@ -59,7 +59,9 @@ def choose_poses(model: ArmModel, count: int, space: FreeSpace) -> list[Array]:
     """
     reachable = _candidates(model, space, count)
     blocks = [regressor(model.constants, q) for q in reachable]
-    return _nearest_neighbour_order([reachable[i] for i in _most_informative(blocks, count)])
+    return _nearest_neighbour_order(
+        [reachable[i] for i in _most_informative(blocks, count)]
+    )
 
 
 def choose_orientations(model: ArmModel, count: int, space: FreeSpace) -> list[Array]:
@@ -74,7 +76,9 @@ def choose_orientations(model: ArmModel, count: int, space: FreeSpace) -> list[A
     reachable = _candidates(model, space, count)
     down = [-model.plate_pose(q)[1][2] for q in reachable]
     blocks = [np.append(direction, 1.0)[None, :] for direction in down]
-    return _nearest_neighbour_order([reachable[i] for i in _most_informative(blocks, count)])
+    return _nearest_neighbour_order(
+        [reachable[i] for i in _most_informative(blocks, count)]
+    )
 
 
 def tilted_pair(model: ArmModel, space: FreeSpace) -> list[Array]:

@@ -194,7 +194,9 @@ def _motor_rows(
             row_speed, sense = np.append(row_speed, 0.0), np.append(sense, break_sense)
             friction = np.append(friction, friction_before[index])
             if motor != _QUICK_MOTOR:
-                compliance = _compliance(break_sense * angle[:index], break_sense * friction_before[:index])
+                compliance = _compliance(
+                    break_sense * angle[:index], break_sense * friction_before[:index]
+                )
     to_motors = np.linalg.inv(model.constants.j2mp)[:, motor]
     gravity = [to_motors @ regressor(model.constants, motion.q[i]) for i in rows]
     return SlidingRows(

@@ -194,7 +194,9 @@ class MotorWatch:
         self._j2mp = np.array(constants.j2mp)
         self._of_torques = np.linalg.inv(self._j2mp).T
         self._breakaway: list[float] = (np.abs(self._of_torques) @ BREAKAWAY).tolist()
-        self._stuck_advance: list[float] = (np.abs(self._j2mp) @ _STUCK_ADVANCE).tolist()
+        self._stuck_advance: list[float] = (
+            np.abs(self._j2mp) @ _STUCK_ADVANCE
+        ).tolist()
         self.begin()
 
     def begin(self) -> None:

@@ -90,7 +90,9 @@ class Proof:
         offset = sense * height * limits.lift_way
         return self._pd_torque(reading, i, offset, abs(goal.torque))
 
-    def _pd_torque(self, reading: ArmReading, i: int, offset: float, limit: float) -> float:
+    def _pd_torque(
+        self, reading: ArmReading, i: int, offset: float, limit: float
+    ) -> float:
         """Return the PD torque of joint `i` to start + `offset`, clipped to `limit`."""
         kp, kd = float(self._constants.kp[i]), float(self._constants.kd[i])
         reference = self._q[i] + offset
@@ -119,5 +121,7 @@ class Proof:
             travel = q - start
             if not low <= travel <= high:
                 limit = low if travel < low else high
-                return MotionExcess(f"the travel of joint {number}", travel, limit, "rad")
+                return MotionExcess(
+                    f"the travel of joint {number}", travel, limit, "rad"
+                )
         return None

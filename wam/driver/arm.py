@@ -420,8 +420,8 @@ class WamArm:
         silent = [n for n in MOTOR_NODES if self._traffic.received[n - 1] is None]
         if late_replies := self.counters.stale - stale:
             raise LinkTimeoutError(
-                f"{pucks_verb(silent)} not report a position in time: {late_replies} replies "
-                "came after the next question.",
+                f"{pucks_verb(silent)} not report a position in time: {late_replies} "
+                "replies came after the next question.",
                 hint="Is the CAN adapter slow (USB), or the bus busy? See: ip -s link.",
             )
         raise LinkTimeoutError(
@@ -434,7 +434,9 @@ def _check_positions_set(
     transmission: Transmission, wanted: Sequence[int], reported: Sequence[int]
 ) -> None:
     """Raise DeviceFaultError unless the reported positions are those that were set."""
-    differences = [actual - target for actual, target in zip(reported, wanted, strict=True)]
+    differences = [
+        actual - target for actual, target in zip(reported, wanted, strict=True)
+    ]
     error = np.abs(transmission.joints(differences))
     if error.max() > HOME_LIMIT:
         joint = int(error.argmax()) + 1

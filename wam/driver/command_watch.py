@@ -117,7 +117,9 @@ class CommandWatch:
             return MotorChange(node, "MODE", PuckMode.TORQUE, value)
         limit = self._limits[node - 1]
         expected = [max(-limit, min(units[node - 1], limit)) for units in self._sent]
-        return None if value in expected else MotorChange(node, "T", expected[-1], value)
+        return (
+            None if value in expected else MotorChange(node, "T", expected[-1], value)
+        )
 
 
 def _t_number(vers: int) -> int:

@@ -120,7 +120,9 @@ def _check_present(stats: dict[int, int], mode: SafetyMode) -> None:
         raise UnfitDeviceError(
             f"{pucks_verb(missing)} not answer ({others}).", hint=hint
         )
-    faulty = [n for n in present if stats[n] not in (PuckStatus.RESET, PuckStatus.READY)]
+    faulty = [
+        n for n in present if stats[n] not in (PuckStatus.RESET, PuckStatus.READY)
+    ]
     if faulty:
         raise DeviceFaultError(
             f"{pucks_verb(faulty)} not work: STAT {stats[faulty[0]]}.",
@@ -128,7 +130,9 @@ def _check_present(stats: dict[int, int], mode: SafetyMode) -> None:
         )
 
 
-def _missing_safety_module(stats: dict[int, int], missing: list[int]) -> UnfitDeviceError:
+def _missing_safety_module(
+    stats: dict[int, int], missing: list[int]
+) -> UnfitDeviceError:
     """Return the error that names the safety module and all silent pucks."""
     others = ",".join(map(str, stats)) or "no device"
     who = "The safety module does"

@@ -121,7 +121,11 @@ def temperature_range(pucks: Sequence[PuckHealth], now_ns: int) -> str:
         for degc in (puck.puck_degc, puck.motor_degc)
         if degc is not None and puck.is_news(now_ns)
     ]
-    range_text = f"{min(temperatures)}-{max(temperatures)} °C" if temperatures else "temperatures unknown"
+    range_text = (
+        f"{min(temperatures)}-{max(temperatures)} °C"
+        if temperatures
+        else "temperatures unknown"
+    )
     silent = [
         f"puck {node} silent for {(now_ns - puck.heard_ns) / NS_PER_S:.0f} s"
         for node, puck in enumerate(pucks, 1)

@@ -25,7 +25,9 @@ def home_error(
         mech_at_home: absolute motor angles when home was defined [counts], seven.
     """
     turn: Array = np.array(cts, dtype=np.float64)
-    difference = np.array(mech, dtype=np.float64) - np.array(mech_at_home, dtype=np.float64)
+    difference = np.array(mech, dtype=np.float64) - np.array(
+        mech_at_home, dtype=np.float64
+    )
     wrapped = (difference + turn / 2) % turn - turn / 2
     return np.asarray(np.linalg.solve(j2mp, 2 * np.pi / turn * wrapped), np.float64)
 

@@ -71,7 +71,11 @@ class JointEstimator:
         for i, (counts, since_ns, last, rate, fastest) in enumerate(rows):
             elapsed = (t_ns - since_ns) * 1e-9
             if counts is None:
-                ahead = elapsed if elapsed < _LONGEST_EXTRAPOLATION else _LONGEST_EXTRAPOLATION
+                ahead = (
+                    elapsed
+                    if elapsed < _LONGEST_EXTRAPOLATION
+                    else _LONGEST_EXTRAPOLATION
+                )
                 positions[i] = last + rate * ahead
                 if elapsed >= _LONGEST_EXTRAPOLATION:
                     raw_rates[i] = 0.0

@@ -247,10 +247,14 @@ def refuse(differences: Sequence[Difference], firmware: Sequence[int]) -> None:
     remedies = [frames for d in severe if (frames := d.frames(firmware[d.node - 1]))]
     if len(remedies) > _MOST_HINTS:
         remedies = [*remedies[:_MOST_HINTS], "and so on"]
-    remedy = f" To set and keep it, the arm idle: {', '.join(remedies)}." if remedies else ""
+    remedy = (
+        f" To set and keep it, the arm idle: {', '.join(remedies)}." if remedies else ""
+    )
     raise UnfitDeviceError(
         f"{'; '.join(d.text for d in severe)}.",
-        hint="Is this the arm and the puck it should be?" + remedy + " If a puck is right "
+        hint="Is this the arm and the puck it should be?"
+        + remedy
+        + " If a puck is right "
         "as it is, write its value into the file that [arm] properties of rig.toml "
         "names.",
     )

@@ -185,8 +185,8 @@ class SafetyModule:
         ignored = self._try_get("IFAULT")
         if ignored:
             raise DeviceFaultError(
-                f"The safety module has IFAULT = {ignored}, expected 0: it would let so "
-                "many samples beyond its speed limit pass.",
+                f"The safety module has IFAULT = {ignored}, expected 0: it would let "
+                "so many samples beyond its speed limit pass.",
                 hint="Start again; if it stays so, switch the arm off and on.",
             )
 

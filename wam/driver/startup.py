@@ -218,10 +218,13 @@ class StartUp:
             self._properties.pause(10 * _MS)
         self._properties.pause(self._boot_ns)
         stats = {node: self._properties.get(node, _STAT) for node in asleep}
-        not_ready = [n for n in MOTOR_NODES if n in stats and stats[n] != PuckStatus.READY]
+        not_ready = [
+            n for n in MOTOR_NODES if n in stats and stats[n] != PuckStatus.READY
+        ]
         if not_ready:
             raise UnfitDeviceError(
-                f"{pucks_verb(not_ready)} not wake up within {self._boot_ns / 1e9:.1f} s.",
+                f"{pucks_verb(not_ready)} not wake up within "
+                f"{self._boot_ns / 1e9:.1f} s.",
                 hint="Switch the arm off and on, then start again.",
             )
 
@@ -273,7 +276,9 @@ class StartUp:
         for vers in sorted({puck.vers for puck in pucks}):
             nodes = ",".join(str(puck.node) for puck in pucks if puck.vers == vers)
             self._note_firmware(f"puck {nodes}", vers)
-        number_pairs = {tuple(_number(p.node, name, p.vers) for name in "PT") for p in pucks}
+        number_pairs = {
+            tuple(_number(p.node, name, p.vers) for name in "PT") for p in pucks
+        }
         if len(number_pairs) > 1:
             raise DeviceFaultError(
                 "The firmware versions of the pucks are incompatible: "

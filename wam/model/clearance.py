@@ -85,7 +85,9 @@ class ArmClearance:
             name: self._add(name, *body) for name, body in _bodies(constants, tool)
         }
         slab = coal.Box(6.0, 6.0, 1.0)
-        indices[_FLOOR] = self._add(_FLOOR, 0, slab, _translation(0.0, 0.0, floor - 0.5))
+        indices[_FLOOR] = self._add(
+            _FLOOR, 0, slab, _translation(0.0, 0.0, floor - 0.5)
+        )
         reached_by = {**_REACHED_BY, _FLOOR: _MOVING}
         for box in obstacles:
             placement = pin.SE3(box.rotation, box.center)
