@@ -1,7 +1,6 @@
-"""Many numbers against their limits at once: the usual answer without a loop of ours.
+"""Fast bounds checks of short sequences, without a Python loop for in-range values.
 
-Seven numbers are looked at in every cycle, a dozen times. What is no number is within
-nothing.
+Called a dozen times per cycle with seven values. NaN is out of range.
 """
 
 from collections.abc import Iterable
@@ -9,12 +8,12 @@ from operator import le
 
 
 def are_within(values: Iterable[float], limits: Iterable[float]) -> bool:
-    """Return whether every magnitude of `values` is at most its limit."""
+    """Return whether |value| <= limit for all `values`."""
     return all(map(le, map(abs, values), limits))
 
 
 def are_between(
     lower: Iterable[float], values: list[float], upper: Iterable[float]
 ) -> bool:
-    """Return whether every one of `values` is between its bounds, or on one."""
+    """Return whether lower <= value <= upper for all `values`."""
     return all(map(le, lower, values)) and all(map(le, values, upper))

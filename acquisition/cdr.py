@@ -1,4 +1,4 @@
-"""CDR writer for the messages of variable size: events, views, batches."""
+"""CDR writer for messages of variable size: events, views, batches."""
 
 import struct
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ class CdrWriter:
     def string(self, text: str) -> "CdrWriter":
         """Append a string: length with its NUL, bytes, NUL.
 
-        What UTF-8 cannot say becomes "?": a strange note must not end a recording.
+        Lone surrogates become "?": an odd note must not end a recording.
         """
         encoded = text.encode(errors="replace") + b"\0"
         self.scalar("I", len(encoded))
@@ -55,8 +55,8 @@ class CdrWriter:
 
     def stamp(self, t_ns: int) -> "CdrWriter":
         """Append a builtin_interfaces/Time of UTC `t_ns`."""
-        seconds, rest = divmod(t_ns, NS_PER_S)
-        return self.scalar("i", seconds).scalar("I", rest)
+        seconds, nanoseconds = divmod(t_ns, NS_PER_S)
+        return self.scalar("i", seconds).scalar("I", nanoseconds)
 
     def header(self, t_ns: int, frame_id: str) -> "CdrWriter":
         """Append a std_msgs/Header."""

@@ -1,4 +1,4 @@
-"""Time: the one place that reads it and the one place that waits."""
+"""Clock: the only module that reads the time and waits."""
 
 import ctypes
 import errno
@@ -12,25 +12,25 @@ NS_PER_S = 1_000_000_000
 NS_PER_MS = 1_000_000
 PERIOD_NS = 2_000_000  # of the control loop, of the records and of the simulated world
 RATE_HZ = NS_PER_S // PERIOD_NS
-_POLL_NS = 100_000  # a link without a descriptor is looked at this often
-_TRIES = 20  # of reading UTC
+_POLL_NS = 100_000  # polling interval of a link without a descriptor
+_TRIES = 20  # readings of UTC
 
 
 @runtime_checkable
 class Readable(Protocol):
-    """Something that bytes or frames arrive at."""
+    """A link that receives bytes or frames."""
 
     def fileno(self) -> int:
         """Return the descriptor to wait on, or -1 if there is none."""
         ...
 
     def is_readable(self) -> bool:
-        """Return whether something has arrived and waits to be read."""
+        """Return whether received data wait to be read."""
         ...
 
 
 class Clock(Protocol):
-    """The one source of time: reads it and waits for it."""
+    """Source of time, real or simulated."""
 
     def now_ns(self) -> int:
         """Return the monotonic time [ns]."""
@@ -41,11 +41,11 @@ class Clock(Protocol):
         ...
 
     def sleep_until(self, t_ns: int) -> None:
-        """Return at monotonic time `t_ns`, at once if it has passed."""
+        """Sleep until monotonic time `t_ns`; return at once if it has passed."""
         ...
 
     def wait(self, link: Readable, deadline_ns: int) -> bool:
-        """Return True when `link` has something to read, False at the deadline."""
+        """Wait for data; return True if `link` is readable, False at the deadline."""
         ...
 
 
@@ -56,14 +56,14 @@ class _Timespec(ctypes.Structure):
 _CLOCK_MONOTONIC = 1
 _TIMER_ABSTIME = 1
 _PR_SET_TIMERSLACK = 29
-_SLACK_NS = 1  # Linux lets a thread sleep 50 us too long otherwise
+_SLACK_NS = 1  # the default timer slack of Linux adds 50 us to a sleep
 
 
 class SystemClock:
-    """The clock of the machine: CLOCK_MONOTONIC, absolute deadlines.
+    """Clock of the machine: CLOCK_MONOTONIC, absolute deadlines.
 
-    `spin_ns` before every deadline it stops sleeping and looks at the time instead:
-    a kernel that wakes late is then outwaited, for the price of a busy core.
+    For the last `spin_ns` before a deadline it busy-waits, which hides late wake-ups of
+    the kernel at the cost of a busy core.
     """
 
     def __init__(self, spin_ns: int = 0) -> None:
@@ -105,11 +105,11 @@ class SystemClock:
         """Wait for `link`, with select where it has a descriptor."""
         descriptor = link.fileno()
         while not link.is_readable():
-            left = deadline_ns - time.monotonic_ns()
-            if left <= 0:
+            remaining_ns = deadline_ns - time.monotonic_ns()
+            if remaining_ns <= 0:
                 return False
             if descriptor >= 0:
-                ready = select.select([descriptor], [], [], left / NS_PER_S)[0]
+                ready = select.select([descriptor], [], [], remaining_ns / NS_PER_S)[0]
                 if ready:
                     return True
             else:
@@ -120,8 +120,8 @@ class SystemClock:
 def utc_offset_ns(clock: Clock) -> tuple[int, int]:
     """Return (offset, uncertainty) [ns] such that UTC = monotonic + offset.
 
-    UTC is read between two readings of the monotonic clock, several times; the tightest
-    pair is kept, and half its width is the uncertainty.
+    UTC is read between two readings of the monotonic clock, repeatedly. The pair with
+    the smallest interval counts; half the interval is the uncertainty.
     """
     best: tuple[int, int] | None = None
     for _ in range(_TRIES):

@@ -1,4 +1,4 @@
-"""What the loop asks of an arm and of a wrist sensor."""
+"""Interfaces of arm and wrist sensor for the control loop."""
 
 from dataclasses import dataclass
 from enum import IntEnum
@@ -19,28 +19,28 @@ class SafetyMode(IntEnum):
     UNKNOWN = 7
 
 
-# In these the windings of the motors are shorted: no torque drives the arm.
+# In these modes the motor windings are shorted: commanded torques have no effect.
 SHORTED = frozenset({SafetyMode.E_STOP, SafetyMode.IDLE})
 
 
 class BusCondition(IntEnum):
-    """What is known of the bus between host and arm."""
+    """Condition of the bus between host and arm."""
 
     SOUND = 0
     DOWN = 1  # the interface refuses to send and receive
-    FULL = 2  # the interface's queue is full: nothing leaves
-    OFF = 3  # the controller has left the bus; what is sent vanishes
-    UNHEARD = 4  # nobody acknowledges what is sent
+    FULL = 2  # the interface's send queue is full
+    OFF = 3  # bus-off: the controller does not take part in the bus
+    UNHEARD = 4  # no node acknowledges frames
 
 
 @dataclass(frozen=True, slots=True)
 class PositionJump:
-    """A position that no motion explains, and which is therefore not believed.
+    """A rejected position: the step from the last accepted one is implausible.
 
     Attributes:
-        motor: its number, 1-7.
-        counts: from its last believed position [encoder counts].
-        speed: of the fastest joint that this motor turns, were it true [rad/s].
+        motor: motor number, 1-7.
+        counts: step from the last accepted position [encoder counts].
+        speed: apparent speed of the fastest joint of this motor [rad/s].
     """
 
     motor: int
@@ -50,13 +50,13 @@ class PositionJump:
 
 @dataclass(frozen=True, slots=True)
 class MotorChange:
-    """A property of a motor's controller that is not what it was at the start.
+    """A property of a motor controller with an unexpected value.
 
     Attributes:
-        motor: its number, 1-7.
-        name: of the property.
-        was: its value at the start.
-        value: its value now.
+        motor: motor number, 1-7.
+        name: name of the property.
+        was: value at the start, or as commanded.
+        value: present value.
     """
 
     motor: int
@@ -67,15 +67,15 @@ class MotorChange:
 
 @dataclass(frozen=True, slots=True)
 class LatePositions:
-    """Positions that came in a cycle in which none was asked for.
+    """Stale positions: received in a cycle without a request.
 
-    They answer an earlier question, and so may all positions before and after them.
+    They answer an earlier request, and so may all positions in the cycles around.
 
     Attributes:
-        motors: bit i set = that of motor i+1 came.
-        age_ns: since the question that they can answer at best [ns].
-        in_a_row: such cycles in a row, this one included; the cycles between them, in
-            which positions are asked for, do not count.
+        motors: bit i set = position of motor i+1 received.
+        age_ns: least possible age: time since the latest request [ns].
+        in_a_row: consecutive cycles without a request in which positions were received,
+            this one included.
     """
 
     motors: int
@@ -88,29 +88,27 @@ class ArmReading:
     """Joint positions of one cycle.
 
     Attributes:
-        host_ns: monotonic time at which the positions were asked for [ns].
-        arm_ns: monotonic time at which the last reply arrived [ns], 0 = none.
+        host_ns: monotonic time of the request [ns].
+        arm_ns: monotonic arrival time of the last reply [ns], 0 = none.
         counts: motor positions as received [encoder counts], seven of them.
         q: joint positions [rad], shape (7,); extrapolated where a reply is missing.
-        qd: joint velocities [rad/s], shape (7,), filtered as the controller uses them.
+        qd: filtered joint velocities as used by the controller [rad/s], shape (7,).
         qd7_raw: unfiltered difference of joint 7 over its last two replies [rad/s].
         fresh: bit i set = the reply of motor i+1 arrived in this cycle, or none was
-            asked for.
-        is_complete: all replies that were asked for arrived.
-        missing_cycles: incomplete cycles in a row, 0 = this one is complete.
-        jump: a position that was not believed in this cycle; None = all were.
-        foreign_id: identifier of a frame that another master sent; None = none ever.
-        has_bus_error: the bus's controller reported an error since the last reading.
-        bus_ns: monotonic time at which the bus had the last reply [ns], 0 = it does
-            not tell.
-        is_unasked: no position was asked for in this cycle, on purpose: all of them
-            are extrapolated by one cycle.
-        late: positions that came although none was asked for; None = none did.
-        change: of a motor's controller since the start; None = none was seen.
-        disobeys: how a motor's controller contradicts what it was told, `was`; told in
-            one cycle. None = none does.
-        doubled: motor, 1-7, whose position came more often than it was asked for; 0 =
-            none.
+            requested.
+        is_complete: all requested replies arrived.
+        missing_cycles: consecutive incomplete cycles, 0 = this one is complete.
+        jump: a position rejected in this cycle, or None.
+        foreign_id: identifier of a frame from another bus master, or None.
+        has_bus_error: the CAN controller reported an error since the last reading.
+        bus_ns: monotonic bus time of the last reply [ns], 0 = not known.
+        is_unasked: a cycle without a request, on purpose: all positions are
+            extrapolated by one cycle.
+        late: stale positions in a cycle without a request, or None.
+        change: changed property of a motor controller since the start, or None.
+        disobeys: mismatch of a motor controller with its command (`was`), reported in
+            one cycle; None = no mismatch.
+        doubled: motor, 1-7, with more replies than requests; 0 = none.
     """
 
     host_ns: int
@@ -135,14 +133,14 @@ class ArmReading:
 
 @dataclass(slots=True)
 class WrenchSample:
-    """One sample of the wrist sensor as it came.
+    """One sample of the wrist sensor as received.
 
     Attributes:
-        t_ns: monotonic time of acquisition as well as it is known [ns].
+        t_ns: best estimate of the monotonic time of acquisition [ns].
         counter: device time or counter as received; 0 = the device has none.
         wrench: fx fy fz tx ty tz in the sensor frame [N, N m], calibrated, not tared.
         status: device status bits as received.
-        is_valid: the device vouches for the numbers.
+        is_valid: the device reports valid data.
         saturated: bit i set = axis i (fx fy fz tx ty tz) is beyond its range.
     """
 
@@ -155,37 +153,37 @@ class WrenchSample:
 
 
 class Arm(Protocol):
-    """A robot arm with seven joints that takes joint torques."""
+    """A torque-controlled robot arm with seven joints."""
 
     @property
     def sent_ns(self) -> int:
-        """Return when torques were last handed over [monotonic ns], 0 = never."""
+        """Time of the last torques sent [monotonic ns], 0 = never."""
         ...
 
     @property
     def bus_condition(self) -> BusCondition:
-        """Return what became of the bus at the last question."""
+        """Condition of the bus at the last request."""
         ...
 
     def read(self, now_ns: int) -> ArmReading:
-        """Ask for the joint positions and return them; waits 1.5 ms at most.
+        """Request the joint positions and return them; waits 1.5 ms at most.
 
-        Now and then it does not ask, to see whether an earlier question is answered.
+        Some cycles send no request, to detect stale replies.
         """
         ...
 
     def listen(self, now_ns: int) -> ArmReading:
-        """Ask for no position, so that the safety circuit misses its heartbeat.
+        """Send no position request, so that the safety circuit misses its heartbeat.
 
-        The state of the circuit is asked for, and idle again. Returns an incomplete
-        reading; does not wait.
+        Still requests the state of the circuit and repeats the idle command. Returns
+        an incomplete reading without waiting.
         """
         ...
 
     def send(self, tau: Vector, tau_gravity: Vector) -> Vector:
-        """Send joint torques [N m] and return them as sent: clipped, rounded.
+        """Send joint torques [N m] and return them as sent: clipped and rounded.
 
-        When a motor's limit cuts, `tau_gravity` is kept and the rest scaled.
+        Beyond a motor's limit `tau_gravity` is kept and the remainder scaled.
         """
         ...
 
@@ -195,26 +193,26 @@ class Arm(Protocol):
 
     @property
     def safety_heard_ns(self) -> int:
-        """Return when the safety circuit last reported its state [ns], 0 = never."""
+        """Time of the safety circuit's last report [monotonic ns], 0 = never."""
         ...
 
     def safety_warnings(self) -> tuple[str, ...]:
-        """Return the monitors that warn, such as "velocity"; does not wait."""
+        """Return the monitors in warning, such as "velocity"; does not wait."""
         ...
 
     def safety_faults(self) -> tuple[str, ...]:
         """Return the monitors in fault, such as "torque"; does not wait.
 
-        After `idle` they say why the safety circuit stopped the arm, if it did.
+        After `idle` they give the reason if the safety circuit stopped the arm.
         """
         ...
 
     def idle(self) -> bool:
-        """Idle the arm, then send zero torque; return whether it is confirmed."""
+        """Idle the arm, then send zero torque; return whether idle is confirmed."""
         ...
 
     def close(self) -> None:
-        """Give the bus back; the arm is idle afterwards."""
+        """Idle the arm and release the bus."""
         ...
 
 
@@ -222,11 +220,11 @@ class WrenchSensor(Protocol):
     """A six-axis force/torque sensor in the wrist."""
 
     def open(self) -> None:
-        """Configure the device and start its stream; raises when it is silent."""
+        """Configure the device and start its stream; raises if it is silent."""
         ...
 
     def poll(self, now_ns: int) -> list[WrenchSample]:
-        """Return every sample that has arrived since the last call, oldest first."""
+        """Return the samples since the last call, oldest first."""
         ...
 
     def describe(self) -> dict[str, str]:
@@ -234,9 +232,9 @@ class WrenchSensor(Protocol):
         ...
 
     def stream_metadata(self) -> dict[str, str]:
-        """Return what became of its samples since it was opened, as text."""
+        """Return the counters of the stream since it was opened, as text."""
         ...
 
     def close(self) -> None:
-        """Stop the stream and give the port back."""
+        """Stop the stream and close the port."""
         ...

@@ -1,21 +1,21 @@
-"""The errors of Traction: one root, one child per kind of failure."""
+"""Exceptions of Traction: one base class, one subclass per kind of failure."""
 
 from pathlib import Path
 from typing import Any
 
-# What an arm without brakes does when its windings are shorted.
+# State of an arm without brakes while its windings are shorted.
 IDLE_ARM = "idle; it sinks slowly, support it"
 
 
 class TractionError(Exception):
-    """A failure that a person can understand and act on.
+    """Base of all errors with a message for the operator.
 
     Attributes:
         message: what happened, with numbers and limits.
         hint: what to do about it.
-        arm_state: what the arm is doing now; empty if no arm is involved.
-        saved: what was saved; empty if nothing was at stake.
-        exit_code: exit code of the command line for this kind of failure.
+        arm_state: what the arm is doing now; "" if no arm is involved.
+        saved: what was saved; "" if not applicable.
+        exit_code: exit code of the command line.
     """
 
     exit_code = 1
@@ -30,7 +30,7 @@ class TractionError(Exception):
         self.saved = saved
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Let another process raise it here, whatever its constructor takes."""
+        """Support transfer between processes for any constructor signature."""
         return _restored, (type(self), self.args), vars(self)
 
     def __str__(self) -> str:
@@ -45,17 +45,17 @@ def _restored(kind: type[TractionError], args: tuple[object, ...]) -> TractionEr
 
 
 class SettingsError(TractionError):
-    """A setting, argument or table that cannot be used."""
+    """An invalid setting, argument or table."""
 
     exit_code = 2
 
 
 class MissingLibraryError(SettingsError):
-    """A library that only some functions need is not installed.
+    """An optional library is not installed.
 
     Args:
-        library: its name in the package index.
-        extra: the extra of Traction that installs it.
+        library: name in the package index.
+        extra: extra of Traction that installs it.
     """
 
     def __init__(self, library: str, extra: str) -> None:
@@ -66,23 +66,23 @@ class MissingLibraryError(SettingsError):
 
 
 class PreflightError(TractionError):
-    """The rig is not fit to run."""
+    """The rig is not ready to run."""
 
     exit_code = 3
 
 
 class UnfitDeviceError(PreflightError):
-    """A device of the rig, its cable or its power does not let it run."""
+    """A fault of a device, its cable or its power that prevents running."""
 
 
 class LinkError(TractionError):
-    """A bus or port cannot be opened, or broke."""
+    """A bus or port cannot be opened or has failed."""
 
     exit_code = 4
 
 
 class LinkFullError(LinkError):
-    """A bus takes nothing more: what was sent before has not left."""
+    """The send queue of a bus is full."""
 
 
 class LinkTimeoutError(LinkError):
@@ -90,7 +90,7 @@ class LinkTimeoutError(LinkError):
 
 
 class DeviceFaultError(TractionError):
-    """A device answered that it is in trouble, or answered nonsense."""
+    """A device reported a fault or an invalid value."""
 
     exit_code = 4
 
@@ -102,11 +102,11 @@ class SessionError(TractionError):
 
 
 class TrialFileError(TractionError):
-    """A trial file cannot be written, or is not what it should be.
+    """A trial file cannot be written or is invalid.
 
     Attributes:
-        path: the file.
-        reason: why, in words.
+        path: path of the file.
+        reason: reason as text.
     """
 
     exit_code = 6

@@ -1,4 +1,4 @@
-"""Libraries that only some commands need, by the extra that installs them."""
+"""Optional libraries, by the extra that installs them."""
 
 from collections.abc import Mapping
 from importlib.util import find_spec
@@ -18,13 +18,13 @@ EXTRAS: Mapping[str, Mapping[str, str]] = {
 
 
 def require_extra(extra: str) -> None:
-    """Refuse before anything is done what would fail at its end; imports nothing.
+    """Check early that the libraries of an extra are installed; imports nothing.
 
     Args:
         extra: one of `EXTRAS`.
 
     Raises:
-        MissingLibraryError: a library of it is not installed.
+        MissingLibraryError: a library is not installed.
     """
     for module, library in EXTRAS[extra].items():
         if not _is_installed(module):

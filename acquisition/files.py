@@ -1,9 +1,8 @@
-"""Files that are read without surprises and written whole or not at all.
+"""Safe reading of untrusted files and atomic, durable writing.
 
-A file that was copied from elsewhere, or lies where others may write, can be anything:
-`open_regular` and `read_regular` open nothing but a regular file, wait for nothing and
-take no more than a stated size. What is written reaches the disk before it gets its
-name, so that neither a kill nor a power cut leaves a part of it.
+`open_regular` and `read_regular` open regular files only, never block, and read up to a
+given size. Content is synchronised to the disk before it gets its final name, so that
+neither a kill nor a power cut leaves a partial file.
 """
 
 import os
@@ -16,37 +15,37 @@ from pathlib import Path
 
 
 def _flags(*names: str) -> int:
-    """Return flags of `os.open`; systems lack those of what they do not have."""
+    """Return flags of `os.open`; those missing on this platform are 0."""
     return sum(getattr(os, f"O_{name}", 0) for name in names)
 
 
-NO_LINK = _flags("NOFOLLOW")  # at the last name of a path
-# follows no link, waits for no pipe, takes no terminal
+NO_LINK = _flags("NOFOLLOW")  # for the last component of a path
+# do not follow a link, block on a pipe, or acquire a terminal
 UNFOLLOWED = NO_LINK | _flags("NONBLOCK", "CLOEXEC", "NOCTTY", "BINARY")
 FOLDER = _flags("RDONLY", "DIRECTORY", "CLOEXEC")
 _NEW = _flags("WRONLY", "CREAT", "EXCL", "CLOEXEC", "BINARY")
-_PIECE = 1 << 20  # bytes that are read at once
+_PIECE = 1 << 20  # bytes per read
 
 
 class UnfitFileError(ValueError):
-    """What lies at a path is not a regular file, or too large; the text says which."""
+    """A path is not a regular file, or the file is too large; the text says which."""
 
 
 class NotRegularError(UnfitFileError):
-    """It is a folder, a pipe, a device or a socket."""
+    """A path is a folder, pipe, device or socket."""
 
 
 def open_regular(path: Path, *, is_link_followed: bool = False) -> BufferedReader:
-    """Return the regular file `path`, open for reading; nothing is waited for.
+    """Open the regular file `path` for reading, without blocking.
 
     Args:
-        path: of the file.
-        is_link_followed: a symbolic link stands for its file, as where a person names
-            the file; else it cannot be opened.
+        path: path of the file.
+        is_link_followed: follow symbolic links, as for a path given by a person;
+            otherwise a link is an error.
 
     Raises:
-        NotRegularError: it is not a regular file; no device or pipe is opened.
-        OSError: it is missing, a link, or cannot be opened.
+        NotRegularError: not a regular file; no device or pipe is opened.
+        OSError: the file is missing, a link, or cannot be opened.
     """
     status = path.stat() if is_link_followed else path.lstat()
     if not stat.S_ISLNK(status.st_mode):  # a link is refused by `open`
@@ -54,7 +53,7 @@ def open_regular(path: Path, *, is_link_followed: bool = False) -> BufferedReade
     flags = UNFOLLOWED & ~NO_LINK if is_link_followed else UNFOLLOWED
     file = os.fdopen(os.open(path, os.O_RDONLY | flags), "rb")
     try:
-        _check_regular(os.fstat(file.fileno()))  # it may have been exchanged meanwhile
+        _check_regular(os.fstat(file.fileno()))  # may have been replaced since stat
     except BaseException:
         file.close()
         raise
@@ -62,35 +61,35 @@ def open_regular(path: Path, *, is_link_followed: bool = False) -> BufferedReade
 
 
 def read_regular(path: Path, most: int, *, is_link_followed: bool = False) -> bytes:
-    """Return the whole of a file, as `open_regular` opens it.
+    """Return the content of a regular file.
 
     Args:
-        path: of the file.
-        most: bytes that it may have.
+        path: path of the file.
+        most: largest accepted size [bytes].
         is_link_followed: as for `open_regular`.
 
     Raises:
-        UnfitFileError: it is not a regular file, or larger.
-        OSError: it is missing, a link, or cannot be read.
+        UnfitFileError: not a regular file, or too large.
+        OSError: the file is missing, a link, or cannot be read.
     """
     parts: list[bytes] = []
-    left = most + 1
+    remaining = most + 1
     with open_regular(path, is_link_followed=is_link_followed) as file:
-        # Piece by piece: a read takes the memory that it is asked for, not the file's.
-        while left > 0 and (part := file.read(min(left, _PIECE))):
+        # In pieces: read(n) allocates n bytes, however small the file is.
+        while remaining > 0 and (part := file.read(min(remaining, _PIECE))):
             parts.append(part)
-            left -= len(part)
-    if left <= 0:
+            remaining -= len(part)
+    if remaining <= 0:
         raise UnfitFileError(f"is larger than {most / 1e6:.0f} MB")
     return b"".join(parts)
 
 
 @contextmanager
 def open_directory(path: Path) -> Generator[int]:
-    """Give a descriptor of the folder `path`.
+    """Open the folder `path` and yield its descriptor.
 
     Raises:
-        OSError: it is missing or no folder.
+        OSError: the folder is missing, or not a folder.
     """
     descriptor = os.open(path, FOLDER)
     try:
@@ -100,18 +99,18 @@ def open_directory(path: Path) -> Generator[int]:
 
 
 def create_file(folder: int, name: str, content: bytes, mode: int = 0o644) -> None:
-    """Write `content`, down to the disk, into a new file; never replaces one.
+    """Write and synchronise a new file; never replaces an existing one.
 
-    The name itself is for good once the folder is synchronised.
+    The name is durable after the folder is synchronised, too.
 
     Args:
         folder: descriptor of the folder.
-        name: in the folder.
-        content: of the file.
-        mode: permissions, less the process's umask.
+        name: name in the folder.
+        content: content of the file.
+        mode: permissions before the umask.
 
     Raises:
-        OSError: it exists, or the disk is full or gone; no part of it stays.
+        OSError: the file exists, or the disk is full or gone; no partial file remains.
     """
     descriptor = os.open(name, _NEW, mode, dir_fd=folder)
     with removed_at_error(folder, name), os.fdopen(descriptor, "wb") as file:
@@ -121,12 +120,12 @@ def create_file(folder: int, name: str, content: bytes, mode: int = 0o644) -> No
 
 
 def replace_file(folder: int, name: str, content: bytes, mode: int = 0o644) -> None:
-    """Write `content` to a file: a reader sees the old one or the new, never a part.
+    """Replace a file atomically: a reader sees the old content or the new.
 
-    Arguments are those of `create_file`. What a kill leaves is called .XXX.NAME.tmp.
+    Arguments as for `create_file`. A kill may leave a file .XXX.NAME.tmp.
 
     Raises:
-        OSError: the disk is full or gone; the old file stays.
+        OSError: the disk is full or gone; the old file remains.
     """
     temporary = f".{secrets.token_hex(4)}.{name}.tmp"
     create_file(folder, temporary, content, mode)
@@ -136,7 +135,7 @@ def replace_file(folder: int, name: str, content: bytes, mode: int = 0o644) -> N
 
 @contextmanager
 def removed_at_error(folder: int, name: str) -> Generator[None]:
-    """Take the new file `name` away if what follows fails."""
+    """Remove the new file `name` if the body fails."""
     try:
         yield
     except BaseException:
@@ -146,10 +145,10 @@ def removed_at_error(folder: int, name: str) -> Generator[None]:
 
 
 def publish_file(written: Path, path: Path) -> None:
-    """Give the file `written` the name `path`, read-only; never replaces a file.
+    """Rename `written` to `path`, read-only; never replaces an existing file.
 
-    The new name reaches the disk before the old one goes: a file system may reorder
-    the two, and a power cut between them would leave a file without a name.
+    The new name is synchronised before the old one is removed: a file system may
+    reorder the two, and a power cut in between would lose the file.
 
     Raises:
         OSError: `path` exists, or the disk is full or gone.
@@ -162,7 +161,7 @@ def publish_file(written: Path, path: Path) -> None:
 
 
 def sync_directory(path: Path) -> None:
-    """Force the names in a folder to the disk.
+    """Synchronise a folder's entries to the disk.
 
     Raises:
         OSError: the disk is gone.
@@ -172,10 +171,10 @@ def sync_directory(path: Path) -> None:
 
 
 def make_directories(path: Path) -> None:
-    """Make a folder and what is missing above it; every name reaches the disk.
+    """Create a folder and its missing parents, synchronised to the disk.
 
     Raises:
-        OSError: one cannot be made.
+        OSError: a folder cannot be created.
     """
     missing = [folder for folder in (path, *path.parents) if not folder.exists()]
     path.mkdir(parents=True, exist_ok=True)

@@ -1,21 +1,21 @@
-"""The version of every file that Traction writes, and what is said of another one.
+"""Format version of all files written by Traction.
 
-All formats are 1.0; `docs/data.md` says what is in each. What was recorded in it stays
-readable in every later version.
+All formats are version 1.0, described in `docs/data.md`. Later versions of the program
+must keep reading it.
 """
 
 FORMAT = "1.0"
 
 
 def format_problem(stated: object) -> str:
-    """Return why a file that states this version is not read; "" if it is.
+    """Return why a file of the version `stated` is not readable; "" if it is.
 
     Args:
-        stated: what the file says of its version; None = nothing.
+        stated: version in the file; None = missing.
     """
     if stated == FORMAT:
         return ""
-    known = f"this program reads version {FORMAT}"
+    supported = f"this program reads version {FORMAT}"
     if stated is None:
-        return f"states no version; {known}"
-    return f"is of version {str(stated)[:20]!r}; {known}"
+        return f"states no version; {supported}"
+    return f"is of version {str(stated)[:20]!r}; {supported}"

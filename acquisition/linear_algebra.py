@@ -1,14 +1,14 @@
-"""What OpenBLAS and the C library are told for matrices of a few hundred rows.
+"""Settings of OpenBLAS and malloc for matrices of a few hundred rows.
 
-By the environment, before numpy loads OpenBLAS: one thread, since more would wait for
-busy cores; and where a processor is newer than the library, which of its kernels to
-take. OpenBLAS 0.3.31 knows AMD's families up to 25 and takes later ones for a Haswell
-of 2013, whose products take a third longer.
+Environment variables, set before numpy loads OpenBLAS: one thread, because more would
+wait for busy cores; and the kernel to use on processors newer than the library.
+OpenBLAS 0.3.31 knows AMD families up to 25 and treats later ones as a Haswell of 2013,
+whose matrix products take a third longer.
 
-Such matrices are too large for the heap of the C library as it comes: every temporary
-one is mapped, cleared and unmapped again, and with threads beside it each unmapping
-interrupts the other cores. Two workers of a Dask cluster on two cores were 1.26 times
-as fast as one by that; `python -m benchmarks` has the figure of today.
+By default glibc maps, clears and unmaps every temporary matrix of this size, and with
+other threads each unmapping interrupts the other cores (TLB shootdown). Two workers of
+a Dask cluster on two cores were only 1.26 times as fast as one because of that;
+`python -m benchmarks` measures it.
 """
 
 import ctypes
@@ -19,19 +19,19 @@ from pathlib import Path
 ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OPENBLAS", "OMP")}
 
 _TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3  # parameters of mallopt(3)
-_KEPT = 256 * 2**20  # bytes of freed memory at the end of the heap
-_LARGEST = 32 * 2**20  # bytes from the heap at most; glibc takes no more
+_KEPT = 256 * 2**20  # free bytes kept at the end of the heap
+_LARGEST = 32 * 2**20  # largest block from the heap [bytes]; the maximum of glibc
 _CPU = Path("/proc/cpuinfo")
-_FIRST = 8192  # bytes that hold what is said of the first core
-_LAST_KNOWN = 25  # family of AMD's processors
+_FIRST = 8192  # bytes; enough for the first core's entry
+_LAST_KNOWN = 25  # newest AMD family supported by OpenBLAS
 _AVX512 = frozenset({"avx512f", "avx512dq", "avx512bw", "avx512vl", "avx512cd"})
 
 
 def openblas_settings(cpu: Path = _CPU) -> dict[str, str]:
-    """Return variables of the environment and their values.
+    """Return environment variables for OpenBLAS on this processor.
 
     Args:
-        cpu: where Linux describes the processor; elsewhere it is not there.
+        cpu: description of the processor by Linux; missing on other systems.
     """
     try:
         with cpu.open("rb") as file:
@@ -53,13 +53,13 @@ def openblas_settings(cpu: Path = _CPU) -> dict[str, str]:
 
 @cache
 def keep_memory() -> bool:
-    """Let the C library keep large blocks that are freed, for the next matrix.
+    """Let malloc keep large freed blocks for the next matrix.
 
     Returns:
-        whether it can be asked to; without, work takes longer.
+        Whether mallopt succeeded; otherwise computations are slower.
     """
     with suppress(OSError, AttributeError):
         mallopt = ctypes.CDLL(None).mallopt
-        asked = ((_MMAP_THRESHOLD, _LARGEST), (_TRIM_THRESHOLD, _KEPT))
-        return all(mallopt(name, size) for name, size in asked)
+        options = ((_MMAP_THRESHOLD, _LARGEST), (_TRIM_THRESHOLD, _KEPT))
+        return all(mallopt(name, size) for name, size in options)
     return False

@@ -1,16 +1,16 @@
-"""Advisory locks of open files; the death of a process opens those it has.
+"""Advisory file locks (flock), released when the process ends.
 
-An operating system without them locks nothing: everything is free.
+On a system without flock every lock succeeds.
 """
 
 
 def try_lock(descriptor: int, *, is_shared: bool = False, without: bool = True) -> bool:
-    """Take the lock of an open file; return False where another process has it.
+    """Try to lock an open file; return False if another process holds the lock.
 
     Args:
-        descriptor: of the file or folder.
-        is_shared: others may have it at the same time, if they share it too.
-        without: what is returned where a file system has no locks.
+        descriptor: descriptor of the file or folder.
+        is_shared: shared lock instead of an exclusive one.
+        without: result on a file system without locks.
     """
     try:
         _lock(descriptor, is_shared=is_shared, is_awaited=False)
@@ -22,7 +22,7 @@ def try_lock(descriptor: int, *, is_shared: bool = False, without: bool = True) 
 
 
 def wait_for_lock(descriptor: int) -> None:
-    """Take the lock of an open file as soon as nobody else has it.
+    """Lock an open file exclusively, waiting for its release.
 
     Raises:
         OSError: the file system has no locks.

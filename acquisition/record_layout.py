@@ -1,10 +1,10 @@
-"""Records of a fixed layout: a numpy dtype declares one, a struct of it packs one."""
+"""Records of fixed layout: a numpy dtype and the equivalent struct.Struct."""
 
 import struct
 
 import numpy as np
 
-GAP = "gap"  # name of a field that only fills a place
+GAP = "gap"  # name of a padding field
 
 _CODES = {
     "<u8": "Q",
@@ -18,9 +18,9 @@ _CODES = {
 
 
 def struct_of(dtype: "np.dtype[np.void]") -> struct.Struct:
-    """Return what packs one record of `dtype`, its arrays number by number.
+    """Return the struct that packs one record of `dtype`, with arrays flattened.
 
-    A writer that packs one record at a time takes a fifth of numpy's time.
+    Packing a single record takes a fifth of numpy's time.
     """
     code = "<"
     for name in dtype.names or ():

@@ -1,4 +1,4 @@
-"""The record of one cycle: flags, channels and the layout it is stored in."""
+"""Record of one cycle: flags, channels and storage layout."""
 
 from dataclasses import dataclass
 from enum import IntFlag
@@ -30,8 +30,8 @@ class Flag(IntFlag):
     CONTACT = 1 << 12
     SIMULATED = 1 << 13
     # 1 << 14 to 1 << 20: the reply of motor 1..7 is fresh
-    BUS_ERROR = 1 << 21  # the bus's controller reported an error in this cycle
-    # No position was asked for, on purpose: all are extrapolated, none is missing.
+    BUS_ERROR = 1 << 21  # the CAN controller reported an error in this cycle
+    # Cycle without a position request, on purpose: all positions are extrapolated.
     ARM_UNASKED = 1 << 22
 
 
@@ -41,7 +41,7 @@ MOTOR_FRESH_SHIFT = 14  # bits 14-20: the reply of motor 1..7 is fresh
 
 @dataclass(frozen=True, slots=True)
 class ChannelMeaning:
-    """What one field of a recorded message means."""
+    """Unit, frame and sign convention of a field of a recorded message."""
 
     field: str
     unit: str
@@ -98,10 +98,10 @@ CHANNELS = (
 
 
 class Sample:
-    """One record of the loop, filled in place cycle after cycle.
+    """Record of the loop, updated in place in every cycle.
 
-    Every attribute is a numpy view into one payload of traction_msgs/Cycle: scalars
-    have shape (1,), vectors their own length. `payload()` copies the bytes out.
+    Every attribute is a numpy view of one payload of traction_msgs/Cycle: scalars have
+    shape (1,), vectors their own length.
     """
 
     __slots__ = (
@@ -158,11 +158,11 @@ class Sample:
             getattr(self, name)[:] = np.nan
 
     def payload(self) -> memoryview:
-        """Return the bytes of the record as they stand now, without a copy."""
+        """Return the payload of the record, without a copy."""
         return self._bytes
 
 
-# Plain numbers: Python makes a new object of every `|` between members of a Flag.
+# Plain integers: `|` of Flag members creates a new object each time.
 _TORQUE_CLIPPED = int(Flag.TORQUE_CLIPPED)
 _JOINT7_LOCKED = int(Flag.JOINT7_LOCKED)
 _CONTACT = int(Flag.CONTACT)
@@ -174,11 +174,11 @@ _SAFETY_FAULT = int(Flag.SAFETY_FAULT)
 _DEADLINE_MISSED = int(Flag.DEADLINE_MISSED)
 _BUS_ERROR = int(Flag.BUS_ERROR)
 _ARM_UNASKED = int(Flag.ARM_UNASKED)
-_ROUNDING = 0.05  # what is sent may differ from what was wanted by this [N m]
+_ROUNDING = 0.05  # difference of sent and desired torque by rounding [N m]
 
 
 def reading_bits(reading: ArmReading, *, is_late: bool) -> int:
-    """Return which motors answered, and whether the cycle began in time."""
+    """Return the flag bits of the joint reading and of a late cycle."""
     flags = reading.fresh << MOTOR_FRESH_SHIFT
     if reading.is_complete:
         flags |= _ARM_FRESH
@@ -192,7 +192,7 @@ def reading_bits(reading: ArmReading, *, is_late: bool) -> int:
 
 
 def safety_bits(arm: Arm, mode: SafetyMode) -> int:
-    """Return the `mode` of the safety circuit, and what it complains of."""
+    """Return the flag bits of safety mode, warnings and faults."""
     flags = int(mode)
     if arm.safety_warnings():
         flags |= _SAFETY_WARNING
@@ -202,7 +202,7 @@ def safety_bits(arm: Arm, mode: SafetyMode) -> int:
 
 
 def wrench_bits(wrench: WrenchSample | None, *, is_new: bool) -> int:
-    """Return how good the force sample in use is."""
+    """Return the flag bits of the force sample in use."""
     flags = _FT_FRESH if is_new else 0
     if wrench is not None and wrench.saturated:
         flags |= _FT_SATURATED
@@ -210,7 +210,7 @@ def wrench_bits(wrench: WrenchSample | None, *, is_new: bool) -> int:
 
 
 def control_bits(*, is_locked: bool, was_clipped: bool, has_contact: bool) -> int:
-    """Return what the control law did and whether the foot touches."""
+    """Return the flag bits of joint-7 lock, clipping and contact."""
     flags = _JOINT7_LOCKED if is_locked else 0
     if was_clipped:
         flags |= _TORQUE_CLIPPED
@@ -220,6 +220,6 @@ def control_bits(*, is_locked: bool, was_clipped: bool, has_contact: bool) -> in
 
 
 def is_clipped(sent: Vector, wanted: Vector) -> bool:
-    """Return whether torques [N m], shapes (7,), were cut on their way out."""
-    cuts = map(sub, sent.tolist(), wanted.tolist())
-    return not are_within(cuts, repeat(_ROUNDING))
+    """Return whether torques [N m], shapes (7,), were clipped when sent."""
+    differences = map(sub, sent.tolist(), wanted.tolist())
+    return not are_within(differences, repeat(_ROUNDING))

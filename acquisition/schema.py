@@ -124,22 +124,22 @@ ENCAPSULATION = b"\x00\x01\x00\x00"  # CDR, little endian
 
 
 def schema_text(type_name: str) -> str:
-    """Return the complete ros2msg definition of `type_name` with what it uses."""
+    """Return the complete ros2msg definition of `type_name` with its dependencies."""
     return _complete(_TEXTS[type_name])
 
 
 def _complete(text: str) -> str:
-    """Return a definition with those of everything that it uses."""
+    """Append the definitions of all types type_name, recursively."""
     blocks = [text]
-    seen: set[str] = set()
+    included: set[str] = set()
     queue = _used_types(text)
     while queue:
-        used = queue.pop(0)
-        if used in seen:
+        type_name = queue.pop(0)
+        if type_name in included:
             continue
-        seen.add(used)
-        definition = _DEPENDENCIES[used]
-        blocks.append("=" * 80 + f"\nMSG: {used}\n{definition}")
+        included.add(type_name)
+        definition = _DEPENDENCIES[type_name]
+        blocks.append("=" * 80 + f"\nMSG: {type_name}\n{definition}")
         queue += _used_types(definition)
     return "\n".join(blocks)
 
@@ -162,16 +162,16 @@ def _used_types(text: str) -> list[str]:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Bytes of a message whose size is fixed because its frame_id is.
+    """Layout of a message of fixed size, given a constant frame_id.
 
     Attributes:
         type_name: ROS 2 name of the message.
-        dtype: packed numpy dtype of the whole payload, encapsulation header included;
-            header fields are called `sec`, `nanosec`, `frame_id`. Alignment gaps are
-            fields too (`padding_28` ends at byte 28), or a copy would fill them with
-            whatever is in memory and two equal runs would differ.
-        template: a payload with header and frame_id set and zeros elsewhere.
-        definition: the complete ros2msg definition.
+        dtype: packed numpy dtype of the whole payload including the encapsulation
+            header; header fields are `sec`, `nanosec`, `frame_id`. Alignment gaps are
+            fields, too (`padding_28` ends at byte 28): otherwise copies would contain
+            uninitialised memory and equal runs would differ.
+        template: payload with header and frame_id set and zeros elsewhere.
+        definition: complete ros2msg definition.
     """
 
     type_name: str
@@ -181,7 +181,7 @@ class Layout:
 
     @property
     def size(self) -> int:
-        """Bytes of one payload."""
+        """Size of one payload [bytes]."""
         return self.dtype.itemsize
 
 

@@ -1,4 +1,4 @@
-"""What settings and calibrations in TOML are made of, and how they are parsed."""
+"""Field types and parser of settings and calibrations in TOML."""
 
 import io
 import re
@@ -11,24 +11,24 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from acquisition.files import NotRegularError, UnfitFileError, read_regular
 
-# strict: a number in quotes, or `true`, is a mistake and no number
+# strict: a number in quotes, or `true`, is an error
 Number = Annotated[float, Field(strict=True)]
 Whole = Annotated[int, Field(strict=True)]
-Near = Annotated[Number, Field(ge=-10, le=10)]  # metres and radians of this room
+Near = Annotated[Number, Field(ge=-10, le=10)]  # m or rad
 Six = tuple[Number, Number, Number, Number, Number, Number]
 File = Annotated[str, Field(min_length=1, max_length=4096)]  # beside rig.toml
 
 
 @dataclass(frozen=True, slots=True)
 class Usual:
-    """Beside the bounds of a number: its unit, and where it lies on a sound rig.
+    """Unit and usual range of a number, in addition to its bounds.
 
     Attributes:
-        low: smallest that is not warned of.
-        high: largest that is not warned of.
-        unit: of the number; "" = none.
-        real: largest on a real arm; None = that of the field. A busy computer makes
-            simulated devices late.
+        low: smallest value without a warning.
+        high: largest value without a warning.
+        unit: unit; "" = none.
+        real: largest value on a real arm; None = the field's bound. Simulated devices
+            may be late on a busy computer and need more.
     """
 
     low: float
@@ -37,23 +37,22 @@ class Usual:
     real: float | None = None
 
 
-_DEEPEST = 20  # tables in tables; a settings file has four
-# tomllib takes memory with the square of the length of a dotted key
+_DEEPEST = 20  # nesting levels; a settings file has four
+# tomllib's memory use is quadratic in the length of a dotted key
 _PARTS = re.compile(r"[,=\n]")
 _DOTTED = re.compile(r"""\.\s*[\w"'-]""")
 _LARGEST_WHOLE = 2**63 - 1  # of TOML
-_LARGEST = 1_000_000  # bytes; what a person writes has a few thousand
+_LARGEST = 1_000_000  # bytes; a hand-written file has a few thousand
 
 
 def read_text(path: Path) -> str:
-    """Return the UTF-8 text of a small file that a person or a calibration wrote.
+    """Return the text of a small UTF-8 file, without a byte-order mark.
 
-    A byte-order mark, which some editors put before it, is left out.
-    Pipes and devices are not opened: they would be read for ever.
+    Pipes and devices are not opened.
 
     Raises:
-        OSError: it cannot be read.
-        ValueError: it is not a file, larger than 1 MB, or no text.
+        OSError: the file cannot be read.
+        ValueError: not a regular file, larger than 1 MB, or not UTF-8.
     """
     try:
         data = read_regular(path, _LARGEST, is_link_followed=True)
@@ -67,13 +66,13 @@ def read_text(path: Path) -> str:
 
 
 def parse_toml(text: str) -> dict[str, Any]:
-    """Return the table in `text`.
+    """Parse TOML.
 
-    Python would take integers of any size; TOML has none beyond 64 bits, and neither
-    arrays nor messages can hold them.
+    tomllib accepts integers of any size; here they are limited to the 64 bits of TOML,
+    which arrays and messages can hold.
 
     Raises:
-        ValueError: the text is no TOML, nests too deeply, or has too large an integer.
+        ValueError: invalid TOML, too deep nesting, or an integer beyond 64 bits.
     """
     if any(len(_DOTTED.findall(part)) > _DEEPEST for part in _PARTS.split(text)):
         raise ValueError("it nests too deeply")
@@ -86,7 +85,7 @@ def parse_toml(text: str) -> dict[str, Any]:
         raise ValueError(f"it {what}") from error
     level: list[object] = [table]
     for _ in range(_DEEPEST):
-        level = [inner for value in level for inner in _inner(value)]
+        level = [inner for value in level for inner in _children(value)]
         if any(type(v) is int and abs(v) > _LARGEST_WHOLE for v in level):
             raise ValueError(f"it {_TOO_LARGE}")
     if any(isinstance(value, dict | list) for value in level):
@@ -97,13 +96,13 @@ def parse_toml(text: str) -> dict[str, Any]:
 _TOO_LARGE = "has an integer beyond 64 bits"
 
 
-def _inner(value: object) -> list[object]:
+def _children(value: object) -> list[object]:
     if isinstance(value, dict):
         return list(cast("dict[str, object]", value).values())
     return cast("list[object]", value) if isinstance(value, list) else []
 
 
 class SettingsSection(BaseModel):
-    """A table of a settings file: unknown keys and infinite numbers are mistakes."""
+    """A table of a settings file: unknown keys and infinite numbers are errors."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)

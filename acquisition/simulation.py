@@ -1,4 +1,4 @@
-"""What a simulated rig offers beyond a real one, whichever process it runs in."""
+"""Interface to control a simulated rig, in this process or another."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,50 +8,49 @@ from acquisition.sample import Record
 
 PendantAction = Literal["activate", "idle", "estop"]
 
-ENDS = 100  # numbers of touches above it: the near end, the far end, and again
+ENDS = 100  # touch numbers above it alternate between near end and far end
 
 
 class Hands(Protocol):
-    """A person who brings a simulated arm to poses and loads its foot."""
+    """A simulated person who moves the arm by hand and loads its foot."""
 
     @property
     def is_hand_done(self) -> bool:
-        """Whether the hand has come to the end of its last order, and holds still."""
+        """Whether the hand has finished its last action and holds still."""
         ...
 
     def pose(self, q: Sequence[float], seconds: float) -> None:
-        """Let two hands bring the joints truly to `q` [rad] in `seconds`, shape (7,).
+        """Bring the joints to the true positions `q` [rad], shape (7,), in `seconds`.
 
-        They bear the arm's weight and hold it there until another order, or `let_go`.
-        No stop lets a joint further than it gives. The container is out of the way.
+        Two hands support the arm's weight and hold it there until the next action or
+        `let_go`. Joint stops give way only elastically. The container is removed.
         """
         ...
 
     def turn_to_stop(self, joint: int, side: Literal["low", "high"]) -> None:
-        """Let two hands turn joint 1-7 until its mechanical stop bears.
+        """Turn joint 1-7 against its mechanical stop and hold it there.
 
-        They hold it there, and the other joints where they are. The container is out
-        of the way.
+        The other joints are held in place. The container is removed.
         """
         ...
 
     def let_go(self) -> None:
-        """Let the hand let go of the arm."""
+        """Release the arm."""
         ...
 
     def hang(self, mass: float) -> None:
-        """Hang `mass` [kg] on a string from the centre of the sole; 0 takes it off.
+        """Hang `mass` [kg] on a string from the centre of the sole; 0 removes it.
 
-        It pulls where gravity truly does.
+        The string follows the true direction of gravity.
         """
         ...
 
     def push_with(self, force: Sequence[float], seconds: float) -> None:
-        """Push the sole with `force` [N] in the base frame, shape (3,), so long [s]."""
+        """Push the sole with `force` [N], base frame, shape (3,), for `seconds`."""
         ...
 
     def twist(self, torque: float, seconds: float) -> None:
-        """Twist the foot about joint 7 with `torque` [N m] so long [s]."""
+        """Twist the foot about joint 7 with `torque` [N m] for `seconds`."""
         ...
 
 
@@ -60,7 +59,7 @@ class SimulationControl(Hands, Protocol):
 
     @property
     def fault_names(self) -> tuple[str, ...]:
-        """Names that `inject` knows."""
+        """Names of the faults for `inject`."""
         ...
 
     def prepare(self, trial: int) -> None:
@@ -68,27 +67,27 @@ class SimulationControl(Hands, Protocol):
         ...
 
     def lift(self) -> None:
-        """Let the hand lift the foot above the far end."""
+        """Lift the foot above the far end."""
         ...
 
     def rest(self) -> None:
-        """Let the hand stop pushing and lie on the arm."""
+        """Stop pushing; the hand rests on the arm."""
         ...
 
     def take(self) -> None:
-        """Let the hand take the arm where it is and hold it there."""
+        """Grasp the arm and hold it in place."""
         ...
 
     def put_down(self) -> None:
-        """Let the hand put the foot down there."""
+        """Put the foot down."""
         ...
 
     def touch(self, number: int) -> None:
-        """Let the hand touch the ground: the corners 1 to 4, then points between."""
+        """Touch the ground: corners 1 to 4, then points in between."""
         ...
 
     def push(self) -> None:
-        """Let the hand push the foot across; the truth is written from here on."""
+        """Push the foot across the container; truth is recorded from now on."""
         ...
 
     def pendant(self, button: PendantAction) -> None:
@@ -96,11 +95,11 @@ class SimulationControl(Hands, Protocol):
         ...
 
     def inject(self, fault: str) -> None:
-        """Let a device fail."""
+        """Inject a fault."""
         ...
 
     def clear_faults(self) -> None:
-        """End every fault that can be ended without the arm."""
+        """Clear the faults that do not need a restart of the arm."""
         ...
 
     def take_truth(self) -> Record:
@@ -108,23 +107,23 @@ class SimulationControl(Hands, Protocol):
         ...
 
     def parameters(self) -> dict[str, str]:
-        """Return the true parameters of the ground, and what moves the arm."""
+        """Return the true parameters of ground, arm and hand."""
         ...
 
     def friction(self) -> dict[str, list[float]]:
-        """Return the true friction of the seven motors, by the names of its model."""
+        """Return the true friction parameters of the seven motors, by name."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class ServedDevices:
-    """Where the devices of a simulated rig can be reached.
+    """Addresses of the devices of a simulated rig.
 
     Attributes:
-        interface: of its CAN bus, in python-can's words.
-        channel: of its CAN bus.
-        bitrate: of its CAN bus [bit/s].
-        port: path of its serial sensor.
+        interface: python-can's name of the CAN adapter.
+        channel: CAN channel.
+        bitrate: bit rate of the CAN bus [bit/s].
+        port: path of the serial sensor.
     """
 
     interface: str

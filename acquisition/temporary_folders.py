@@ -1,7 +1,7 @@
-"""Temporary folders that a kill does not leave behind for good.
+"""Temporary folders that are cleaned up even after a kill.
 
-A folder carries the number of its process in its name and is locked while it is used.
-Whoever makes the next one removes those of the same user whose process is gone.
+A folder has its process id in its name and is locked while in use. Creating a folder
+removes those of the same user whose process has ended.
 """
 
 import os
@@ -20,10 +20,10 @@ _PID = re.compile(r"-(?P<pid>[1-9]\d{0,9})-\w+$")
 
 @contextmanager
 def temporary_folder(prefix: str, parent: Path) -> Generator[Path]:
-    """Give a new folder PREFIX-PID-... in `parent`; at the end it is removed.
+    """Create a folder PREFIX-PID-... in `parent`, yield it, and remove it at the end.
 
     Raises:
-        OSError: it cannot be made.
+        OSError: the folder cannot be created.
     """
     remove_abandoned(prefix, parent)
     path = Path(tempfile.mkdtemp(prefix=f"{prefix}-{os.getpid()}-", dir=parent))
@@ -37,9 +37,9 @@ def temporary_folder(prefix: str, parent: Path) -> Generator[Path]:
 
 
 def remove_abandoned(prefix: str, parent: Path) -> None:
-    """Remove the folders PREFIX-PID-... in `parent` that a killed process left.
+    """Remove the folders PREFIX-PID-... in `parent` left by killed processes.
 
-    Folders of other users, and of processes that run, stay; so do other files.
+    Folders of other users or running processes are kept.
     """
     with suppress(OSError):
         for path in parent.glob(f"{prefix}-*-*"):
@@ -49,10 +49,7 @@ def remove_abandoned(prefix: str, parent: Path) -> None:
 
 
 def _is_running(pid: int) -> bool:
-    """Return whether another process has this number; this one knows its own.
-
-    One that has ended and was not yet collected by its parent runs no more.
-    """
+    """Return whether another process with this id runs; False for zombies."""
     if pid == os.getpid():
         return False
     try:
@@ -66,15 +63,15 @@ def _is_running(pid: int) -> bool:
 
 
 def _remove(path: Path) -> None:
-    """Remove a folder of this user that nobody has locked."""
+    """Remove a folder of this user that is not locked."""
     try:
         descriptor = os.open(path, FOLDER | NO_LINK)
     except OSError:
         return
     try:
         is_own = os.fstat(descriptor).st_uid == os.getuid()
-        # What is locked is in use, e.g. by a process of another container; without
-        # locks nobody can tell.
+        # A locked folder is in use, e.g. by a process of another container. Without
+        # file locks this is unknown, so the folder is kept.
         if is_own and try_lock(descriptor, without=False):
             shutil.rmtree(path, ignore_errors=True)
     finally:

@@ -1,4 +1,4 @@
-"""Calibrations in TOML: one model of a file reads it and writes it."""
+"""Calibration files in TOML: one model both reads and writes a file."""
 
 import json
 from collections.abc import Iterable, Mapping
@@ -10,24 +10,23 @@ from acquisition.formats import FORMAT, format_problem
 from acquisition.settings import SettingsSection, parse_toml
 from acquisition.validation import first_problem
 
-_FEW = 3  # rows of a matrix that stay in one line
+_FEW = 3  # largest number of matrix rows written on one line
 
 
 class TomlTable(SettingsSection):
-    """A table of such a file: keys that it does not know are left alone.
+    """A table of a file; unknown keys are ignored.
 
-    The description of a field is the comment above it.
+    The description of a field is written as a comment above it.
     """
 
     model_config = ConfigDict(extra="ignore")
 
     @classmethod
     def parse(cls, text: str) -> Self:
-        """Return what `text` holds.
+        """Parse and validate a table.
 
         Raises:
-            ValueError: it is no such table; the message names the key and what is
-                wrong.
+            ValueError: not a valid table; the message names key and problem.
         """
         return cls._of(parse_toml(text))
 
@@ -40,15 +39,15 @@ class TomlTable(SettingsSection):
 
 
 class TomlFile(TomlTable):
-    """A whole file, which states its version."""
+    """A complete file with its version."""
 
     @classmethod
     def parse(cls, text: str) -> Self:
-        """Return what `text` holds.
+        """Parse and validate a file.
 
         Raises:
-            ValueError: it is of another version, or no such file; the message names the
-                key and what is wrong.
+            ValueError: another version or not a valid file; the message names key and
+                problem.
         """
         table = parse_toml(text)
         if problem := format_problem(table.get("version")):
@@ -56,16 +55,16 @@ class TomlFile(TomlTable):
         return cls._of({key: table[key] for key in table if key != "version"})
 
     def text(self, comment: str) -> str:
-        """Return the text of the file; floats keep every bit.
+        """Return the text of the file; floats are written exactly.
 
         Args:
-            comment: its first line.
+            comment: comment in the first line.
         """
         return f'# {comment}\nversion = "{FORMAT}"\n{_lines(self, "").lstrip()}'
 
 
 def _lines(table: BaseModel | Mapping[str, object], name: str) -> str:
-    """Return the values of a table, then the tables in it."""
+    """Return the lines of a table's values, then of its subtables."""
     values, tables = "", ""
     for key, (value, comment) in _items(table).items():
         above = f"# {comment}\n" if comment else ""
@@ -81,20 +80,20 @@ def _lines(table: BaseModel | Mapping[str, object], name: str) -> str:
 def _items(
     table: BaseModel | Mapping[str, object],
 ) -> dict[str, tuple[object, str | None]]:
-    """Return values and comments by key; what was never given is left out."""
+    """Return values and comments by key, without fields that were not set."""
     if not isinstance(table, BaseModel):
         return {key: (value, None) for key, value in table.items()}
-    known = vars(table)
+    values = vars(table)
     return {
-        key: (known[key], field.description)
+        key: (values[key], field.description)
         for key, field in type(table).model_fields.items()
-        if key in known
+        if key in values
     }
 
 
 def _value(value: object) -> str:
     if isinstance(value, str):
-        # JSON escapes what TOML does, but for one character.
+        # JSON escapes the same characters as TOML, except for DEL.
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, bool):
         return str(value).lower()

@@ -1,8 +1,8 @@
-"""What models of files share: lists and tables that may be hostile, and what is wrong.
+"""Field types for lists and tables of untrusted files, and error messages.
 
-A file of a few megabytes can hold a million wrong values, and pydantic notes every one
-of them in a kilobyte. In these lists it looks at none after the first, and these tables
-have few keys.
+A file of a few megabytes can hold a million invalid values, and pydantic stores a
+kilobyte for each. These lists stop at the first error, and these tables have a limited
+number of keys.
 """
 
 from collections.abc import Sized
@@ -17,22 +17,22 @@ _K = TypeVar("_K")
 _V = TypeVar("_V")
 
 
-def _few(table: object) -> object:
+def _limit_keys(table: object) -> object:
     if isinstance(table, Sized) and len(table) > _MOST_KEYS:
         raise ValueError(f"{len(table)} entries, the most are {_MOST_KEYS}")
     return table
 
 
 Many = Annotated[tuple[_V, ...], FailFast()]
-Entries = Annotated[dict[_K, _V], BeforeValidator(_few)]
+Entries = Annotated[dict[_K, _V], BeforeValidator(_limit_keys)]
 
 
 def first_problem(error: ValueError) -> str:
-    """Return what is wrong with a file; of several the first, and where."""
+    """Return location and text of the first problem in a file."""
     if not isinstance(error, ValidationError):
         return str(error)
     first = error.errors(include_url=False, include_input=False)[0]
-    location = ".".join(_shown(part) for part in first["loc"])
+    location = ".".join(_printable(part) for part in first["loc"])
     if first["type"] == "missing":
         return f"{location} is missing"
     what = first["msg"].removeprefix("Value error, ")
@@ -41,7 +41,7 @@ def first_problem(error: ValueError) -> str:
     return f"{location}: {what}" if location else what
 
 
-def _shown(part: int | str) -> str:
-    """Return a part of a location; a key of a hostile file is not printed as it is."""
+def _printable(part: int | str) -> str:
+    """Return a part of a location with control characters escaped, shortened."""
     text = str(part)
     return (text if text.isprintable() else ascii(text))[:_LONGEST_KEY]

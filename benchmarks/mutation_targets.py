@@ -155,11 +155,11 @@ _BELOW = "a difference of nanoseconds or part of a millisecond where millisecond
 _TUNED = "one of many equally good choices: the resulting poses are tested instead"
 _BODIES = (
     "return [('the base', (0, *_capsule(0.12, -BASE_HEIGHT, -0.1))), "
-    "('the shoulder', ({}, coal.Sphere(0.15), _at(0.0, 0.0, 0.0))), "
+    "('the shoulder', ({}, coal.Sphere(0.15), _translation(0.0, 0.0, 0.0))), "
     "('the upper arm', (3, *_capsule(0.08, 0.08, upper))), "
-    "('the elbow', (4, coal.Sphere(0.09), _at(0.0, 0.0, 0.0))), "
+    "('the elbow', (4, coal.Sphere(0.09), _translation(0.0, 0.0, 0.0))), "
     "('the forearm', (5, *_capsule(0.065, 0.0, fore))), "
-    "('the wrist', (6, coal.Sphere(0.065), _at(0.0, 0.0, 0.0))), "
+    "('the wrist', (6, coal.Sphere(0.065), _translation(0.0, 0.0, 0.0))), "
     "('the foot', (7, *_capsule(0.045, 0.0, end, x, y)))]"
 )
 _SHORTCUT = "a fast path that skips the loop; the loop gives the same result"
@@ -205,8 +205,8 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     ): _BELOW,
     (
         f"{_CONTROL}/position_control.py",
-        "elif abs(angles[i] - self._wanted[i]) > self._in_vain[i]: -> "
-        "elif abs(angles[i] - self._wanted[i]) >= self._in_vain[i]:",
+        "elif abs(angles[i] - self._wanted[i]) > self._stuck_advance[i]: -> elif "
+        "abs(angles[i] - self._wanted[i]) >= self._stuck_advance[i]:",
     ): _AT_REST,
     (
         f"{_CONTROL}/soft_walls.py",
@@ -214,8 +214,8 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     ): "whether the walls are checked again once all are armed",
     (
         f"{_DRIVER}/property_watch.py",
-        "known = nearest_documented(firmware[node - 1]) -> "
-        "known = nearest_documented(firmware[node - 2])",
+        "documented = nearest_documented(firmware[node - 1]) -> documented = "
+        "nearest_documented(firmware[node - 2])",
     ): "watched properties have the same number in every documented firmware",
     (
         f"{_DRIVER}/property_watch.py",
@@ -252,8 +252,8 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     ): _UNREAD,
     (
         f"{_DRIVER}/home.py",
-        "wrapped = (apart + turn / 2) % turn - turn / 2 -> "
-        "wrapped = (apart - turn / 2) % turn - turn / 2",
+        "wrapped = (difference + turn / 2) % turn - turn / 2 -> wrapped = "
+        "(difference - turn / 2) % turn - turn / 2",
     ): "plus and minus half a turn are equal modulo a whole turn",
     (
         f"{_DRIVER}/safety_module.py",
@@ -277,14 +277,14 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     ): _BELOW,
     (
         "ft_sensor/tare.py",
-        "lasted = float(times[-1] - times[0]) * count / (count - 1) if count > 1 "
-        "else 0.0 -> lasted = float(times[-1] - times[0]) * count / (count - 1) "
-        "if count > 1 else 1.0",
+        "duration = float(times[-1] - times[0]) * count / (count - 1) if count > "
+        "1 else 0.0 -> duration = float(times[-1] - times[0]) * count / (count - "
+        "1) if count > 1 else 1.0",
     ): _BELOW,
     (
         "ft_sensor/tare.py",
-        "grace = lasted / count / 2 if count else 0.0 -> "
-        "grace = lasted / count / 2 if count else 1.0",
+        "grace = duration / count / 2 if count else 0.0 -> grace = duration / "
+        "count / 2 if count else 1.0",
     ): _BELOW,
     (
         f"{_CONTROL}/friction_compensation.py",
@@ -296,8 +296,8 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     ): "before the first push the fading torque is always 0",
     (
         f"{_CONTROL}/friction_compensation.py",
-        "if load and (less := (load_at - abs(load_torque))) > 0.0: -> "
-        "if load and (less := (load_at - abs(load_torque))) >= 0.0:",
+        "if load and (unload := (load_at - abs(load_torque))) > 0.0: -> if load "
+        "and (unload := (load_at - abs(load_torque))) >= 0.0:",
     ): "a load reduced by 0 removes nothing",
     (
         f"{_CONTROL}/friction_compensation.py",
@@ -306,13 +306,13 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     ): "a quotient has the sign of the product",
     (
         f"{_CONTROL}/friction_compensation.py",
-        "way = 1 if z > _BENT else -1 if z < -_BENT else 0 -> "
-        "way = 1 if z > _BENT else -1 if z <= -_BENT else 0",
+        "sign = 1 if z > _BENT else -1 if z < -_BENT else 0 -> sign = 1 if z > "
+        "_BENT else -1 if z <= -_BENT else 0",
     ): _AT_REST,
     (
         f"{_CONTROL}/friction_compensation.py",
-        "if len(turned) == _SWINGS and now_ns - turned[0] < _SWING_NS: -> "
-        "if len(turned) == _SWINGS and now_ns - turned[0] <= _SWING_NS:",
+        "if len(changes) == _SWINGS and now_ns - changes[0] < _SWING_NS: -> if "
+        "len(changes) == _SWINGS and now_ns - changes[0] <= _SWING_NS:",
     ): _BELOW,
     (
         f"{_CONTROL}/friction_compensation.py",
@@ -325,12 +325,12 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     ): _UNREAD,
     (
         f"{_CONTROL}/friction_compensation.py",
-        "self._bent = [0] * 7 -> self._bent = [0] * 8",
+        "self._last_sign = [0] * 7 -> self._last_sign = [0] * 8",
     ): _EIGHTH,
     (
         f"{_CONTROL}/friction_compensation.py",
-        "self._turned: list[list[int]] = [[] for _ in range(7)] -> "
-        "self._turned: list[list[int]] = [[] for _ in range(8)]",
+        "self._sign_changes_ns: list[list[int]] = [[] for _ in range(7)] -> "
+        "self._sign_changes_ns: list[list[int]] = [[] for _ in range(8)]",
     ): _EIGHTH,
     (
         f"{_CONTROL}/friction_compensation.py",
@@ -348,18 +348,18 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     ): "an unbent bristle exerts no force, whatever its level",
     (
         f"{_CONTROL}/friction_compensation.py",
-        "way = 1 if z > _BENT else -1 if z < -_BENT else 0 -> "
-        "way = 1 if z > _BENT else -2 if z < -_BENT else 0",
+        "sign = 1 if z > _BENT else -1 if z < -_BENT else 0 -> sign = 1 if z > "
+        "_BENT else -2 if z < -_BENT else 0",
     ): _MARK,
     (
         f"{_CONTROL}/friction_compensation.py",
-        "way = 1 if z > _BENT else -1 if z < -_BENT else 0 -> "
-        "way = 2 if z > _BENT else -1 if z < -_BENT else 0",
+        "sign = 1 if z > _BENT else -1 if z < -_BENT else 0 -> sign = 2 if z > "
+        "_BENT else -1 if z < -_BENT else 0",
     ): _MARK,
     (
         f"{_CONTROL}/friction_compensation.py",
-        "way = 1 if z > _BENT else -1 if z < -_BENT else 0 -> "
-        "way = 1 if z >= _BENT else -1 if z < -_BENT else 0",
+        "sign = 1 if z > _BENT else -1 if z < -_BENT else 0 -> sign = 1 if z >= "
+        "_BENT else -1 if z < -_BENT else 0",
     ): _AT_REST,
     (
         f"{_CONTROL}/position_control.py",
@@ -424,8 +424,9 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     ): "the first cycle sends the request either way",
     (
         f"{_DRIVER}/joint_estimator.py",
-        "ahead = elapsed if elapsed < _LONGEST_GUESS else _LONGEST_GUESS -> "
-        "ahead = elapsed if elapsed <= _LONGEST_GUESS else _LONGEST_GUESS",
+        "ahead = elapsed if elapsed < _LONGEST_EXTRAPOLATION else "
+        "_LONGEST_EXTRAPOLATION -> ahead = elapsed if elapsed <= "
+        "_LONGEST_EXTRAPOLATION else _LONGEST_EXTRAPOLATION",
     ): _AT_REST,
     (
         "wam/model/clearance.py",
@@ -437,8 +438,9 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     ): "the floor reaches beyond the arm either way",
     (
         "wam/model/clearance.py",
-        "indices[_FLOOR] = self._add(_FLOOR, 0, slab, _at(0.0, 0.0, floor - 0.5)) -> "
-        "indices[_FLOOR] = self._add(_FLOOR, 0, slab, _at(0.0, 1.0, floor - 0.5))",
+        "indices[_FLOOR] = self._add(_FLOOR, 0, slab, _translation(0.0, 0.0, "
+        "floor - 0.5)) -> indices[_FLOOR] = self._add(_FLOOR, 0, slab, "
+        "_translation(0.0, 1.0, floor - 0.5))",
     ): "the floor reaches beyond the arm either way",
     (
         "wam/model/clearance.py",
@@ -512,7 +514,8 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     ): _AT_REST,
     (
         f"{_CONTROL}/proof.py",
-        "limit = low if way < low else high -> limit = low if way <= low else high",
+        "limit = low if travel < low else high -> limit = low if travel <= low "
+        "else high",
     ): "a joint at the end of its range was already accepted before",
     (
         f"{_CONTROL}/position_control.py",
@@ -589,7 +592,7 @@ for _text, _other in (
         "every sum and difference with NaN is NaN"
     )
 _BOUNDED = (
-    "value = low if wanted < low else high if wanted > high else wanted",
+    "value = low if desired < low else high if desired > high else desired",
     "bounded.append(-limit if value < -limit else limit if value > limit else value)",
 )
 for _text in _BOUNDED:

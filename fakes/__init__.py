@@ -1,6 +1,6 @@
-"""Simulated devices at the wire, shipped because `--fake` is a feature.
+"""Simulated devices, from the physics to the bytes on the wire, for `--fake`.
 
-`plant` moves the arm, `ground` pushes back, `pucks` answer on `bus`, `sensor` emits
-bytes; `world` joins them, `serving` gives them to other processes. Begin with
-`world.rig`.
+`plant` is the arm's dynamics, `ground` the contact model, `pucks` answer on `bus`,
+`sensor` emits bytes; `world` combines them, `serving` offers them to other processes.
+Begin with `world.rig`.
 """

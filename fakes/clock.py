@@ -1,4 +1,4 @@
-"""Stepped time: waiting is what makes the simulated world go on."""
+"""Stepped time: waiting advances the simulated world."""
 
 from typing import Protocol
 
@@ -9,24 +9,24 @@ EPOCH_UTC_NS = 1_800_000_000_000_000_000  # 2027-01-15T08:00:00Z
 
 
 class World(Protocol):
-    """Simulated devices that are driven by a given time."""
+    """Simulated devices, functions of the given time."""
 
     def advance(self, t_ns: int) -> None:
-        """Let everything happen that happens up to `t_ns`."""
+        """Advance to `t_ns`."""
         ...
 
     def next_event_ns(self) -> int | None:
-        """Return when a device says something next, None if never."""
+        """Return the time of the next output of a device, None if there is none."""
         ...
 
 
 class SteppedClock:
-    """Implements acquisition.clock.Clock without the machine's time.
+    """Simulated clock; implements acquisition.clock.Clock.
 
-    Start and epoch are fixed, so two runs with the same seed have the same times.
+    Start and epoch are fixed, so runs with the same seed have the same times.
 
     Attributes:
-        lag_ns: so late a sleep ends, as on a computer that is busy elsewhere [ns].
+        lag_ns: delay of the end of a sleep, as on a busy computer [ns].
     """
 
     def __init__(self) -> None:
@@ -35,7 +35,7 @@ class SteppedClock:
         self.lag_ns = 0
 
     def attach(self, world: World) -> None:
-        """Let `world` go on while a caller waits; it needs the clock to be made."""
+        """Set the world to advance while a caller waits."""
         self._world = world
 
     def now_ns(self) -> int:
@@ -47,22 +47,22 @@ class SteppedClock:
         return self._now_ns - START_NS + EPOCH_UTC_NS
 
     def sleep_until(self, t_ns: int) -> None:
-        """Let the world go on to `t_ns`."""
+        """Advance the world to `t_ns`."""
         if t_ns > self._now_ns:
-            self._go_to(t_ns + self.lag_ns)
+            self._advance_to(t_ns + self.lag_ns)
 
     def wait(self, link: Readable, deadline_ns: int) -> bool:
-        """Go from event to event until `link` is readable or `deadline_ns` comes."""
+        """Advance from event to event until `link` is readable or at `deadline_ns`."""
         while not link.is_readable():
             event = self._world.next_event_ns() if self._world else None
             if event is None or event > deadline_ns:
                 if deadline_ns > self._now_ns:
-                    self._go_to(deadline_ns)
+                    self._advance_to(deadline_ns)
                 return link.is_readable()
-            self._go_to(max(event, self._now_ns + 1))
+            self._advance_to(max(event, self._now_ns + 1))
         return True
 
-    def _go_to(self, t_ns: int) -> None:
+    def _advance_to(self, t_ns: int) -> None:
         self._now_ns = t_ns
         if self._world is not None:
             self._world.advance(t_ns)

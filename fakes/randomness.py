@@ -1,4 +1,4 @@
-"""Random processes of the simulated world, one generator per trial."""
+"""Random generators and processes of the simulated world."""
 
 import math
 import zlib
@@ -11,9 +11,9 @@ import numpy as np
 
 
 class TrialGenerators(NamedTuple):
-    """The generator of one trial, divided so that none waits for another's draws.
+    """Independent generators of one trial.
 
-    How often the sensor is read then changes nothing for ground and hand.
+    Separate, so that the number of sensor reads does not affect ground and hand.
     """
 
     ground: np.random.Generator
@@ -27,27 +27,27 @@ def trial_generator(seed: int, terrain: str, trial: int) -> np.random.Generator:
 
 
 def trial_generators(seed: int, terrain: str, trial: int) -> TrialGenerators:
-    """Return the generator of one trial, divided among ground, hand and sensor."""
+    """Return the generators of one trial for ground, hand and sensor."""
     return TrialGenerators(*trial_generator(seed, terrain, trial).spawn(3))
 
 
 def friction_generator(seed: int) -> np.random.Generator:
-    """Return the generator of the arm's friction: the same in every trial of a seed."""
+    """Return the generator of the arm's friction, independent of the trial."""
     return trial_generator(seed, "friction", 0)
 
 
 def winding_generator(seed: int) -> np.random.Generator:
-    """Return the generator of the arm's motor windings, as `friction_generator`."""
+    """Return the generator of the motor windings, independent of the trial."""
     return trial_generator(seed, "windings", 0)
 
 
 def sound_rig_generator(seed: int) -> np.random.Generator:
-    """Return the generator of what differs between sound rigs."""
+    """Return the generator of the tolerances between sound rigs."""
     return trial_generator(seed, "sound rig", 0)
 
 
 class NormalStream:
-    """Standard normal numbers one by one, drawn in blocks."""
+    """Stream of standard normal numbers, drawn in blocks."""
 
     def __init__(self, generator: np.random.Generator, block: int = 4096) -> None:
         self._generator = generator
@@ -63,10 +63,10 @@ class NormalStream:
 
 
 class DrawnAhead:
-    """Numbers from 0 to below 1, drawn in blocks of which the rest can be given back.
+    """Uniform numbers in [0, 1), drawn in blocks whose remainder can be given back.
 
-    Whoever draws from the generator after `give_back` draws what he would have drawn
-    if the numbers had been taken one by one.
+    After `give_back` the generator is in the state as if the numbers had been drawn one
+    by one.
     """
 
     def __init__(self, generator: np.random.Generator, block: int = 64) -> None:
@@ -84,24 +84,24 @@ class DrawnAhead:
         return next(self._rest)
 
     def give_back(self) -> None:
-        """Let the generator stand right behind the last number that was taken."""
-        left = length_hint(self._rest)
-        if left:
+        """Reset the generator to the state after the last number taken."""
+        remaining = length_hint(self._rest)
+        if remaining:
             self._generator.bit_generator.state = self._state
-            self._generator.random(self._block - left)
+            self._generator.random(self._block - remaining)
             self._rest = iter(())
 
 
-@lru_cache(maxsize=64)  # every 10 ms a sensor asks for the same seven again
+@lru_cache(maxsize=64)  # a sensor calls it every 10 ms with the same seven arguments
 def exact_step(sd: float, time: float, dt: float) -> tuple[float, float]:
-    """Return (a, b) of a step x <- a x + b n of an Ornstein-Uhlenbeck process.
+    """Return (a, b) of the step x <- a x + b n of an Ornstein-Uhlenbeck process.
 
-    a = exp(-dt / time), b = sd sqrt(1 - a^2): exact for any length of step.
+    a = exp(-dt / time), b = sd sqrt(1 - a^2): exact for any step length.
 
     Args:
         sd: standard deviation of the process.
-        time: over which it forgets [s].
-        dt: length of the step [s].
+        time: correlation time [s].
+        dt: step length [s].
     """
     keep = math.exp(-dt / time)
     return keep, sd * math.sqrt(1.0 - keep * keep)
@@ -110,7 +110,7 @@ def exact_step(sd: float, time: float, dt: float) -> tuple[float, float]:
 class OrnsteinUhlenbeck:
     """Zero-mean Ornstein-Uhlenbeck process of standard deviation `sd`.
 
-    It begins anywhere in its stationary distribution; see `exact_step`.
+    Starts from its stationary distribution; see `exact_step`.
     """
 
     def __init__(
@@ -129,8 +129,8 @@ class OrnsteinUhlenbeck:
 class Tremor:
     """Unit-rms noise through a resonator at 9.5 Hz, damping ratio 0.15.
 
-    x'' + 2 zeta omega x' + omega^2 x = noise, by semi-implicit Euler. Its first step
-    draws where it begins.
+    x'' + 2 zeta omega x' + omega^2 x = noise, by semi-implicit Euler. The first step
+    draws the initial state.
     """
 
     def __init__(self, dt: float, normals: NormalStream) -> None:

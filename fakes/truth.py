@@ -1,4 +1,4 @@
-"""What really happened in the simulation, and how it is written down."""
+"""Ground truth of the simulation and its record layout."""
 
 from collections.abc import Sequence
 
@@ -9,14 +9,14 @@ from acquisition.schema import TRUTH
 from ft_sensor.payload import TerrainFrame
 from wam.model.constants import Array
 
-MOST_ROWS = 60_000  # two minutes; a trial lasts half of one at most
+MOST_ROWS = 60_000  # two minutes; a trial takes 30 s at most
 
 
 class Truth:
-    """What really happened, one row per cycle; terrain frame unless stated.
+    """Ground truth, one row per cycle; terrain frame unless stated.
 
-    Columns: q [rad] 0-6, sole [m] 7-9, its velocity [m/s] 10-12, ground's force on the
-    foot against x, along y, along z [N] 13-15, hand's force [N] 16-18.
+    Columns: q [rad] 0-6, sole position [m] 7-9, sole velocity [m/s] 10-12, ground's
+    force on the foot along -x, y, z [N] 13-15, hand's force [N] 16-18.
     """
 
     COLUMNS = 19
@@ -27,17 +27,17 @@ class Truth:
         self._values: list[float] = []
 
     def add(self, t_ns: int, values: Sequence[float]) -> None:
-        """Append one row; a record without a reader stays bounded."""
+        """Append one row, up to `MOST_ROWS`."""
         if len(self.t_ns) >= MOST_ROWS:
             return
         self.t_ns.append(t_ns)
         self._values.extend(values)
 
     def take(self, rows: int) -> "Truth":
-        """Return the oldest rows that were not taken yet, `rows` at most.
+        """Return the oldest rows not yet taken, `rows` at most.
 
-        They stay in memory until the next truth begins: to move all others down for
-        every few rows would keep the bus waiting.
+        They stay in memory, because removing rows at the front would move all others
+        and delay the bus.
         """
         taken = Truth()
         start, stop = self._taken, self._taken + rows
@@ -52,7 +52,7 @@ class Truth:
 
 
 def truth_records(truth: Truth, frame: TerrainFrame) -> Record:
-    """Return `truth` in the layout of traction_msgs/Truth, base frame."""
+    """Convert `truth` to traction_msgs/Truth records, base frame."""
     count = len(truth.t_ns)
     buffer = bytearray(TRUTH.template * count)
     records: Record = np.frombuffer(buffer, TRUTH.dtype)

@@ -1,16 +1,16 @@
-"""The time of a simulated world that other processes see on the wall clock."""
+"""Clock of a simulated world that is served to other processes in real time."""
 
 from acquisition.clock import PERIOD_NS, Clock, Readable
 
-TICK_NS = PERIOD_NS  # a served world goes on at least this often
+TICK_NS = PERIOD_NS  # longest interval between two advances of a served world
 _LONGEST_STEP_NS = 10 * TICK_NS
 
 
 class WorldClock:
-    """Implements acquisition.clock.Clock: the machine's time without its stalls.
+    """Machine time without stalls; implements acquisition.clock.Clock.
 
-    A process that the kernel did not run for long must not look like a lost heartbeat
-    or a fall of the arm, so a single step of the world is never longer than 20 ms.
+    A stall of this process must not look like a lost heartbeat or a falling arm, so a
+    single step of the world never exceeds 20 ms.
     """
 
     def __init__(self, clock: Clock) -> None:
@@ -18,7 +18,7 @@ class WorldClock:
         self._world_ns = self._machine_ns = clock.now_ns()
 
     def now_ns(self) -> int:
-        """Return the world's time [ns], as it was when `go_on` was called last."""
+        """Return the world's time at the last call of `go_on` [ns]."""
         return self._world_ns
 
     def utc_ns(self) -> int:
@@ -26,19 +26,19 @@ class WorldClock:
         return self._clock.utc_ns()
 
     def sleep_until(self, t_ns: int) -> None:
-        """Sleep until the world's time may have come to `t_ns`."""
-        self._clock.sleep_until(self._on_machine(t_ns))
+        """Sleep until the world's time can have reached `t_ns`."""
+        self._clock.sleep_until(self._machine_time(t_ns))
 
     def wait(self, link: Readable, deadline_ns: int) -> bool:
-        """Return True when `link` has something to read, False at the deadline."""
-        return self._clock.wait(link, self._on_machine(deadline_ns))
+        """Wait for data; return True if `link` is readable, False at the deadline."""
+        return self._clock.wait(link, self._machine_time(deadline_ns))
 
     def go_on(self) -> int:
-        """Let the world's time pass and return it."""
+        """Advance the world's time and return it."""
         now_ns = self._clock.now_ns()
         self._world_ns += min(now_ns - self._machine_ns, _LONGEST_STEP_NS)
         self._machine_ns = now_ns
         return self._world_ns
 
-    def _on_machine(self, t_ns: int) -> int:
+    def _machine_time(self, t_ns: int) -> int:
         return t_ns - self._world_ns + self._machine_ns

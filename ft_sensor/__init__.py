@@ -1,6 +1,6 @@
-"""Wrist force/torque sensor: protocols, true force, tare.
+"""Wrist force/torque sensor: protocols, contact force, tare.
 
-`reading` is what every make tells, `payload` turns a raw wrench into the force at the
-foot in the terrain's frame, `tare` is the reading without load. Makes live in
+`reading` is the common format of all makes, `payload` converts a raw wrench to the
+contact force in the terrain frame, `tare` is the reading without load. Makes are in
 `vendors`. Begin with `payload`.
 """

@@ -1,12 +1,12 @@
-"""True force: from the sensor's reading to the ground's force on the foot.
+"""Contact force: from the sensor's reading to the ground's force on the foot.
 
-Pure, used live in the loop and offline by the analysis. With f the load on the sensor,
-m_b and c_b everything below the gauges and g_w = (0, 0, -g):
+Pure functions, used live in the loop and offline by the analysis. With f the load on
+the sensor, m_b and c_b mass and centre of mass below the gauges, g_w = (0, 0, -g):
 
     F_c = s (f_raw - b) - m_b R_WS^T g_w        in the sensor frame
     n_c = s (n_raw - b_n) - c_b x m_b R_WS^T g_w
 
-Force and torque leave the sensor frame in `to_base` only.
+Only `to_base` transforms out of the sensor frame.
 """
 
 from collections.abc import Sequence
@@ -34,13 +34,13 @@ def cross_matrix(a: Array) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class Payload:
-    """What the sensor carries and how it is mounted.
+    """Payload and mounting of the sensor.
 
     Attributes:
-        mass: of everything below the gauges [kg].
-        com: its centre in the sensor frame [m], shape (3,).
+        mass: mass of everything below the gauges [kg].
+        com: centre of mass in the sensor frame [m], shape (3,).
         rotation: sensor frame to frame 7, shape (3, 3).
-        sign: +1 if the sensor reads the load on it, -1 if the reaction.
+        sign: +1 if the sensor reads the load, -1 if it reads the reaction.
         bias: reading without load [N, N m], shape (6,); set by a tare.
     """
 
@@ -50,7 +50,7 @@ class Payload:
     sign: float
     bias: Array
     _weighing: Array = field(init=False, repr=False, compare=False)  # (3, 6)
-    # An array: to multiply by a number takes numpy twice as long.
+    # An array, because numpy takes twice as long to multiply by a Python float.
     _signs: Array = field(init=False, repr=False, compare=False)  # (6,)
 
     def __post_init__(self) -> None:
@@ -60,22 +60,22 @@ class Payload:
         object.__setattr__(self, "_signs", np.full(6, self.sign))
 
     def tared(self, reading: Floats, rotation_base_7: Array) -> "Payload":
-        """Return the payload with the bias that a reading in the air gives.
+        """Return the payload with the bias from a reading without contact.
 
         Args:
             reading: mean raw wrench with the foot free [N, N m], shape (6,).
-            rotation_base_7: orientation of frame 7 meanwhile, shape (3, 3).
+            rotation_base_7: orientation of frame 7 during the reading, shape (3, 3).
         """
         weight = self.weight(rotation_base_7)
         return replace(self, bias=np.asarray(reading) - self.sign * weight)
 
     def weight(self, rotation_base_7: Floats) -> Floats:
-        """Return force and moment of the payload's weight in the sensor frame.
+        """Return the payload's gravity wrench in the sensor frame, shape (..., 6).
 
         Args:
             rotation_base_7: orientation(s) of frame 7, shape (..., 3, 3).
         """
-        # The base's z axis in frame 7 is the last row of its orientation.
+        # The last row of the orientation is the base's z axis in frame 7.
         return rotation_base_7[..., 2, :].dot(self._weighing)
 
     def contact(self, raw: Floats, rotation_base_7: Floats) -> Floats:
@@ -96,7 +96,7 @@ class Payload:
 
 
 def payload_of(tool: Tool) -> Payload:
-    """Return the payload that `tool` describes, not tared."""
+    """Return the payload of `tool`, not tared."""
     c, s = np.cos(tool.sensor_angle), np.sin(tool.sensor_angle)
     rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     origin = np.array([0.0, 0.0, tool.sensor_height])
@@ -129,7 +129,7 @@ class TerrainFrame:
         return rows @ yaw.T
 
     def from_other_end(self) -> "TerrainFrame":
-        """Return the same plane crossed the other way, from its near end."""
+        """Return the frame of the opposite direction, which starts at the near end."""
         near = np.array(self.far_end) + self.travel * self.axes()[0]
         x, y, z = near.tolist()
         return TerrainFrame(-self.incline, self.heading + np.pi, (x, y, z), self.travel)
@@ -150,15 +150,15 @@ def traction(axes: Array, velocity: Floats, force: Floats) -> Floats:
 
     Args:
         axes: rows x_T, y_T, z_T, shape (3, 3).
-        velocity: of the sole in the base frame [m/s], shape (..., 3).
-        force: of the ground on the foot in the base frame [N], shape (..., 3).
+        velocity: velocity of the sole in the base frame [m/s], shape (..., 3).
+        force: ground's force on the foot in the base frame [N], shape (..., 3).
     """
     v_t = velocity @ axes[0]
     return np.stack([v_t, -(force @ axes[0]), force @ axes[2]], axis=-1)
 
 
 class LiveFoot(FootObserver):
-    """Foot pose and traction of a sample."""
+    """Computes foot pose and traction in every cycle."""
 
     def __init__(
         self, model: ArmModel, payload: Payload, terrain: TerrainFrame
@@ -169,7 +169,7 @@ class LiveFoot(FootObserver):
         self._of_force = np.stack((-self._x_T, z_T))  # F_t and F_n
 
     def set_bias(self, bias: Sequence[float]) -> None:
-        """Take the sensor's reading without load [N, N m], six numbers."""
+        """Set the sensor's reading without load [N, N m], six numbers."""
         self.payload = replace(self.payload, bias=np.array(bias))
 
     def observe(
@@ -177,7 +177,7 @@ class LiveFoot(FootObserver):
     ) -> float:
         """Write foot pose, twist, wrench and traction; return the sole's speed [m/s].
 
-        Without a fresh wrench the last forces are repeated.
+        Without a new wrench the last forces stay in the sample.
         """
         pose, rotation, twist = self._model.sole_motion(reading.q, reading.qd)
         sample.foot_position[...] = pose[:3]

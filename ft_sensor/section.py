@@ -1,4 +1,4 @@
-"""[ft_sensor] of rig.toml: what every make of sensor has."""
+"""Section [ft_sensor] of rig.toml: settings common to all makes."""
 
 from typing import Annotated, Literal
 
@@ -11,9 +11,9 @@ from ft_sensor.serial_line.sensor import SerialDevice
 
 
 class SensorSection(SettingsSection):
-    """The line of the wrist sensor and how it is mounted.
+    """Serial line and mounting of the wrist sensor.
 
-    A make adds `kind`, the usual speed of its line, and options of its own.
+    A make adds `kind`, a default speed of its line, and its own options.
     """
 
     port: str = Field(examples=["/dev/ttyUSB0"])
@@ -32,11 +32,11 @@ class SensorSection(SettingsSection):
 
     @property
     def is_on_bus(self) -> bool:
-        """Whether it is asked over the arm's bus and has no port."""
+        """Whether the sensor is polled on the arm's bus and has no port."""
         return False
 
     def known_ranges(self) -> Wrench | None:
-        """Return what it measures at most [N, N m]; None = it has to be asked."""
+        """Return the measuring ranges [N, N m]; None = read from the sensor."""
         return None
 
     def open_port(self, port: str) -> OpenedPort:
@@ -44,9 +44,9 @@ class SensorSection(SettingsSection):
         return open_port(port, self.baudrate)
 
     def build(self, line: PortSettings) -> SerialDevice | None:
-        """Return the serial sensor at the end of `line`; None if it is on the bus.
+        """Return the serial sensor on `line`; None if it is on the arm's bus.
 
         Raises:
-            SettingsError: something that the make needs is missing, or cannot be.
+            SettingsError: a setting of the make is missing or invalid.
         """
         raise NotImplementedError

@@ -1,4 +1,4 @@
-"""The tare: what the sensor shows while the foot touches nothing."""
+"""Tare: mean reading of the sensor without contact."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,16 +15,16 @@ Wrench = tuple[float, float, float, float, float, float]
 
 MIN_DURATION = 1.0  # [s]
 WINDOW = 0.2  # [s]
-SLOWEST = float(RATE_HZ)  # no sensor in use sends less [Hz]
-_FEWEST = 0.5  # share of its samples that a window must hold
+SLOWEST = float(RATE_HZ)  # lowest sample rate of a sensor [Hz]
+_FEWEST = 0.5  # least share of a window's nominal samples
 _AGAIN = "[space] to try again."
 
 
 class TareError(TractionError):
-    """Samples that no tare can be taken from.
+    """Samples not suitable for a tare.
 
     Attributes:
-        spread: how far the force varied [N]; None where something else was wrong.
+        spread: variation of the force [N]; None for other reasons.
     """
 
     exit_code = 3
@@ -36,13 +36,12 @@ class TareError(TractionError):
 
 @dataclass(frozen=True, slots=True)
 class TareResult:
-    """The resting wrench.
+    """Mean wrench at rest.
 
     Attributes:
         t_ns: monotonic time of the last sample [ns].
         wrench: mean fx fy fz tx ty tz in the sensor frame [N, N m].
-        spread: largest minus smallest 0.2 s mean of a force component, the worst of
-            the three [N].
+        spread: largest range of the 0.2 s means over the three force components [N].
     """
 
     t_ns: int
@@ -57,9 +56,9 @@ def take_mean(
 ) -> TareResult:
     """Return the mean of at least one second of raw samples, oldest first.
 
-    White noise averages away in 0.2 s means; what still varies between them is a
-    touch or a drift. Device-side zeroing is not used: it is lost at power-off. Each
-    0.2 s must hold half of the samples that `rate` [Hz] promises.
+    White noise averages out in 0.2 s means; variation between them is contact or drift.
+    Zeroing in the device is not used: it is lost at power-off. Each 0.2 s must hold at
+    least half of the samples expected at `rate` [Hz].
 
     Raises:
         TareError: too few samples or a gap, a flagged or non-finite sample, or a
@@ -97,33 +96,32 @@ def _refuse_flagged(samples: Sequence[WrenchSample]) -> None:
         )
 
 
-def _windows(samples: Sequence[WrenchSample], least: float) -> NDArray[np.int64]:
-    """Return the number of the 0.2 s window of each sample, shape (n,).
+def _windows(samples: Sequence[WrenchSample], minimum: float) -> NDArray[np.int64]:
+    """Return the index of each sample's 0.2 s window, shape (n,).
 
-    A sample stands for one period, so n samples last n / (n - 1) times the time from
-    the first to the last. The last window includes the remainder: what goes into the
-    mean is looked at.
+    n samples represent n periods: n / (n - 1) times the time from first to last. The
+    last window includes the remainder, so that every sample in the mean is checked.
     """
     times = np.array([sample.t_ns for sample in samples], dtype=np.int64)
     count = len(times)
-    lasted = float(times[-1] - times[0]) * count / (count - 1) if count > 1 else 0.0
-    # Half a period of grace: arrival times jitter by that much.
-    grace = lasted / count / 2 if count else 0.0
-    if lasted + grace < MIN_DURATION * NS_PER_S:
+    duration = float(times[-1] - times[0]) * count / (count - 1) if count > 1 else 0.0
+    # Half a period of tolerance for jitter of the timestamps.
+    grace = duration / count / 2 if count else 0.0
+    if duration + grace < MIN_DURATION * NS_PER_S:
         raise TareError(
-            f"{count} F/T samples over {lasted / NS_PER_S:.2f} s are too few for a "
+            f"{count} F/T samples over {duration / NS_PER_S:.2f} s are too few for a "
             f"tare (at least {MIN_DURATION:g} s).",
             hint=_AGAIN,
         )
     window_ns = WINDOW * NS_PER_S
     windows = ((times - times[0]) / window_ns).astype(np.int64)
-    whole = int((lasted + grace) / window_ns)
+    whole = int((duration + grace) / window_ns)
     windows = np.minimum(windows, whole - 1)
     fewest = min(int(np.count_nonzero(windows == k)) for k in range(whole))
-    if fewest < least:
+    if fewest < minimum:
         raise TareError(
             f"Only {fewest} F/T samples in one {WINDOW:g} s of the tare "
-            f"(at least {least:.0f}).",
+            f"(at least {minimum:.0f}).",
             hint=f"Check the sensor's rate and cable. {_AGAIN}",
         )
     return windows

@@ -1,7 +1,7 @@
-"""The weight of the free foot in the sensor, against what payload and mounting say.
+"""Check of payload and mounting by the measured weight of the free foot.
 
-Gravity shows size and direction, so a wrong mass, the other sign and a sensor turned
-about its axis differ: each changes the expected forces in a way of its own.
+The gravity force has magnitude and direction, so a wrong mass, a wrong sign and a
+sensor turned about its axis can be told apart.
 """
 
 from collections.abc import Sequence
@@ -13,13 +13,13 @@ import numpy as np
 from ft_sensor.payload import Floats, Payload
 from wam.model.constants import Array
 
-LARGEST_TURN = np.radians(12.0)  # that a sound sensor, cable and zero may show
-_NOISE = 0.3  # N across z: what drift, cable and hysteresis make of two readings
-_EXPLAINED = 0.5  # of the error: a cause leaves no more than that
+LARGEST_TURN = np.radians(12.0)  # apparent turn of a sound sensor, cable and zero
+_NOISE = 0.3  # N normal to z, by drift, cable and hysteresis
+_EXPLAINED = 0.5  # largest share of the error that remains for an accepted cause
 
 
 class WeightCause(StrEnum):
-    """What explains that the weight is not seen as expected."""
+    """Cause of a difference between measured and expected weight."""
 
     MASS = "mass"
     SIGN = "sign"
@@ -29,15 +29,14 @@ class WeightCause(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class WeightChange:
-    """How the weight of the free foot is seen, compared with what is expected.
+    """Measured weight of the free foot compared with the expected one.
 
     Attributes:
-        error: largest difference from what payload and mounting say [N].
-        turned: angle about z by which the sensor itself would have to be turned to see
-            it so [rad], -pi..pi.
-        scale: by which the mass would have to be multiplied; below 0: the other sign.
-        across: how much of the expected weight is across z, where a turn shows [N].
-        cause: what explains it best.
+        error: largest difference from the expected weight [N].
+        turned: turn of the sensor about z that fits best [rad], -pi..pi.
+        scale: factor of the mass that fits best; negative: wrong sign.
+        across: expected weight normal to z, on which a turn has an effect [N].
+        cause: best explanation.
     """
 
     error: float
@@ -48,34 +47,34 @@ class WeightChange:
 
     @property
     def is_turned(self) -> bool:
-        """Whether the sensor is surely turned, however light the foot is."""
-        is_clear = self.across * abs(np.sin(self.turned)) > _NOISE
-        is_far = abs(self.turned) > LARGEST_TURN
-        return self.cause is WeightCause.TURNED and is_far and bool(is_clear)
+        """Whether a turn of the sensor is significant, given the foot's weight."""
+        is_significant = self.across * abs(np.sin(self.turned)) > _NOISE
+        is_large = abs(self.turned) > LARGEST_TURN
+        return self.cause is WeightCause.TURNED and is_large and bool(is_significant)
 
 
 def compare_weights(expected: Floats, seen: Floats) -> WeightChange:
-    """Compare forces that the sensor shows with those that are expected.
+    """Compare measured with expected forces.
 
     Args:
-        expected: by payload, mounting and joints, without a bias [N], shape (n, 3).
-        seen: by the sensor, without its bias [N], shape (n, 3).
+        expected: by payload, mounting and pose, without bias [N], shape (n, 3).
+        seen: measured, without bias [N], shape (n, 3).
     """
     x, y = expected[:, 0], expected[:, 1]
     u, v = seen[:, 0], seen[:, 1]
-    # The sensor's frame turns, so the weight turns in it the other way.
+    # The weight turns opposite to the sensor frame.
     angle = -float(np.arctan2((x * v - y * u).sum(), (x * u + y * v).sum()))
     c, s = np.cos(angle), np.sin(angle)
     turned = expected @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     size = float((expected * expected).sum())
     scale = float((expected * seen).sum()) / size if size > 0.0 else 1.0
     by_scale = WeightCause.SIGN if scale < 0.0 else WeightCause.MASS
-    left = {
+    residuals = {
         by_scale: float(np.linalg.norm(seen - scale * expected)),
         WeightCause.TURNED: float(np.linalg.norm(seen - turned)),
     }
-    cause = min(left, key=lambda each: left[each])
-    if left[cause] > _EXPLAINED * float(np.linalg.norm(seen - expected)):
+    cause = min(residuals, key=lambda candidate: residuals[candidate])
+    if residuals[cause] > _EXPLAINED * float(np.linalg.norm(seen - expected)):
         cause = WeightCause.UNKNOWN
     return WeightChange(
         error=float(np.linalg.norm(seen - expected, axis=1).max()),
@@ -91,12 +90,12 @@ def weight_change(
 ) -> WeightChange:
     """Compare the change of the reading between two poses with that of the weight.
 
-    The sensor's bias is in both poses and cancels.
+    The sensor's bias cancels.
 
     Args:
-        payload: what the sensor carries, and its mounting.
-        rotations: orientation of frame 7 in both poses, shape (3, 3) each.
-        readings: mean raw wrench there, the foot free [N, N m], shape (6,) each.
+        payload: payload and mounting.
+        rotations: orientations of frame 7 in both poses, shape (3, 3) each.
+        readings: mean raw wrenches, the foot free [N, N m], shape (6,) each.
     """
     first, second = (payload.sign * payload.weight(R)[:3] for R in rotations)
     seen = (readings[1] - readings[0])[:3]
@@ -104,12 +103,12 @@ def weight_change(
 
 
 def weight_seen(payload: Payload, rotation: Array, known: Array) -> WeightChange:
-    """Compare the weight that a tare took away with that of the payload.
+    """Compare the weight removed by a tare with that of the payload.
 
     Args:
-        payload: tared.
-        rotation: orientation of frame 7 in the tare, shape (3, 3).
-        known: what the sensor shows without any load [N, N m], shape (6,).
+        payload: tared payload.
+        rotation: orientation of frame 7 during the tare, shape (3, 3).
+        known: reading of the sensor without any load [N, N m], shape (6,).
     """
     expected = payload.sign * payload.weight(rotation)[:3]
     seen = expected + (payload.bias - known)[:3]

@@ -1,6 +1,6 @@
 """Barrett WAM, seven degrees of freedom: CAN protocol, driver, model, control law.
 
-`bus` speaks the protocol, `driver` is the arm as the loop sees it, `model` its
-kinematics and gravity, `control` the torques, `calibration` what is measured of it.
+`bus` is the protocol, `driver` the arm as the control loop sees it, `model` kinematics
+and gravity, `control` the joint torques, `calibration` the identification of the arm.
 Begin with `driver.arm`.
 """

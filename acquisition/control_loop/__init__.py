@@ -1,6 +1,6 @@
-"""The 500 Hz loop: read, judge, command, sample.
+"""The 500 Hz control loop: read, check, command, record.
 
-`loop` keeps the grid of deadlines, `cycle` is the work of one period, `guard` turns
-limits and observations into verdicts, `states` says what the arm may be doing and what
-each event does to it. Begin with `cycle`; nothing here waits, logs or opens a file.
+`loop` keeps the grid of deadlines, `cycle` is the work of one period, `guard` derives
+verdicts from limits and observations, `states` is the state machine of the arm. Begin
+with `cycle`; nothing here waits, logs or opens a file.
 """

@@ -1,4 +1,4 @@
-"""The load on the foot: the newest sample of it, and where it is too much."""
+"""Contact load on the foot: newest force sample and limit checks."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,11 +15,11 @@ from acquisition.sample import Sample
 
 
 class WrenchFeed:
-    """Drains a sensor and keeps what a cycle needs of it.
+    """Polls a sensor and keeps its newest valid sample.
 
     Attributes:
-        newest: the newest sample that the device vouches for; None = none yet.
-        since_ns: when it was taken, or when the waiting began [ns]; 0 = not polled.
+        newest: newest valid sample, or None.
+        since_ns: its time, or that of the first poll [ns]; 0 = not polled.
     """
 
     def __init__(
@@ -33,9 +33,9 @@ class WrenchFeed:
         self.since_ns = 0
 
     def poll(self, now_ns: int, stale_ms: float) -> bool:
-        """Drain the sensor; return whether the newest sample is not older than that.
+        """Poll the sensor; return whether the newest sample is at most `stale_ms` old.
 
-        A port that is gone is a sensor that is silent: its last sample grows old.
+        A lost port counts as a silent sensor: its last sample gets stale.
         """
         try:
             samples = self._sensor.poll(now_ns)
@@ -53,20 +53,20 @@ class WrenchFeed:
         return self.newest is not None and age_ns <= stale_ms * NS_PER_MS
 
 
-# A load counts when it lasts: a stone that strikes the foot is over within 5 ms.
+# A load must last to count: the impact of a stone is over within 5 ms.
 LASTING_NS = 10 * NS_PER_MS
-GROWTH_NS = 500 * NS_PER_MS  # a force grows within this time
-STANDING = 0.002  # m, a foot that moves less within that time stands
-_STEP_NS = 50 * NS_PER_MS  # between two points that are remembered
-_POINTS = GROWTH_NS // _STEP_NS  # of a whole window
+GROWTH_NS = 500 * NS_PER_MS  # window of the growth check
+STANDING = 0.002  # m; a foot that moves less within the window is at rest
+_STEP_NS = 50 * NS_PER_MS  # between stored points
+_POINTS = GROWTH_NS // _STEP_NS  # points of a full window
 
 
 class Contact(NamedTuple):
-    """What the ground does to the foot, in one cycle with a fresh force.
+    """Contact load in one cycle with a fresh force sample.
 
     Attributes:
-        force: its magnitude [N].
-        moment: its magnitude about the sensor's origin [N m].
+        force: magnitude of the force [N].
+        moment: magnitude of the moment about the sensor's origin [N m].
         is_saturated: an axis of the sensor is beyond its range.
         sole: centre of the sole in the base frame [m].
     """
@@ -78,7 +78,7 @@ class Contact(NamedTuple):
 
 
 class ForcePoint(NamedTuple):
-    """Force [N] and place of the sole [m] at a time [ns]."""
+    """Force [N] and position of the sole [m] at a time [ns]."""
 
     t_ns: int
     force: float
@@ -87,13 +87,13 @@ class ForcePoint(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class ContactState:
-    """What is remembered of the load.
+    """State of the contact checks between cycles.
 
     Attributes:
-        since_ns: since when force and moment are beyond the limits of a trial and
-            those of hold, the sensor is saturated, and the force is beyond the limit
-            of a move [ns]; 0 = it is not.
-        points: of the last 0.5 s, oldest first.
+        since_ns: start times of: force and moment beyond the limits of a trial, force
+            and moment beyond those of hold, sensor saturated, force beyond the limit
+            of a move [ns]; 0 = within the limit.
+        points: points of the last 0.5 s, oldest first.
     """
 
     since_ns: tuple[int, int, int, int, int, int] = (0, 0, 0, 0, 0, 0)
@@ -101,7 +101,7 @@ class ContactState:
 
 
 def contact_of(sample: Sample, saturated: int) -> Contact:
-    """Return the load that a sample shows; `saturated`: bits of the sensor's axes."""
+    """Return the contact load of a sample; `saturated`: bits of the sensor's axes."""
     fx, fy, fz, tx, ty, tz = sample.wrench.tolist()
     x, y, z = sample.foot_position.tolist()
     force, moment = hypot(fx, fy, fz), hypot(tx, ty, tz)
@@ -117,15 +117,14 @@ def check_contact(
     is_recording: bool,
     is_moving: bool = False,
 ) -> tuple[ContactState, GuardVerdict]:
-    """Return the next state and the verdict on the load of this cycle.
+    """Return the next state and the verdict on the contact load of this cycle.
 
-    What is beyond the limits of hold is judged whenever it is known, what is beyond
-    that of a move while the arm moves by itself, the rest in a trial. Without a fresh
-    force (None) nothing is known.
+    The limits of hold always apply, that of a move while the arm makes a move, the
+    others in a trial. Without a fresh force (None) nothing is checked.
     """
     if seen is None:
         return state, OK
-    state = _remember(limits, state, now_ns, seen, is_recording=is_recording)
+    state = _next_state(limits, state, now_ns, seen, is_recording=is_recording)
     verdict = _check_hold(limits, state, now_ns, seen)
     if verdict is None and is_moving:
         verdict = _check_move(limits, state, now_ns, seen)
@@ -137,12 +136,12 @@ def check_contact(
 def _check_hold(
     limits: GuardLimits, state: ContactState, now_ns: int, seen: Contact
 ) -> GuardVerdict | None:
-    """Return the verdict of the limits that end in hold."""
+    """Check the limits that lead to hold."""
     _, _, force_ns, moment_ns, _, _ = state.since_ns
-    if _lasts(force_ns, now_ns):
+    if _is_lasting(force_ns, now_ns):
         detail = ContactExcess(seen.force, limits.contact_force_hold)
         return verdict_for(Fault.CONTACT_FORCE, detail, is_lasting=True)
-    if _lasts(moment_ns, now_ns):
+    if _is_lasting(moment_ns, now_ns):
         detail = ContactExcess(seen.moment, limits.contact_moment_hold)
         return verdict_for(Fault.CONTACT_MOMENT, detail, is_lasting=True)
     return None
@@ -151,8 +150,8 @@ def _check_hold(
 def _check_move(
     limits: GuardLimits, state: ContactState, now_ns: int, seen: Contact
 ) -> GuardVerdict | None:
-    """Return the verdict of the limit of a move that the arm makes by itself."""
-    if not _lasts(state.since_ns[5], now_ns):
+    """Check the limit of a move."""
+    if not _is_lasting(state.since_ns[5], now_ns):
         return None
     detail = ContactExcess(seen.force, limits.contact_force_move)
     return verdict_for(Fault.CONTACT_MOVE, detail)
@@ -161,12 +160,12 @@ def _check_move(
 def _check_trial(
     limits: GuardLimits, state: ContactState, now_ns: int, seen: Contact
 ) -> GuardVerdict | None:
-    """Return the verdict of the limits that end a trial."""
+    """Check the limits that end a trial."""
     force_ns, moment_ns, _, _, saturated_ns, _ = state.since_ns
-    if _lasts(force_ns, now_ns):
+    if _is_lasting(force_ns, now_ns):
         detail = ContactExcess(seen.force, limits.contact_force)
         return verdict_for(Fault.CONTACT_FORCE, detail)
-    if _lasts(moment_ns, now_ns):
+    if _is_lasting(moment_ns, now_ns):
         detail = ContactExcess(seen.moment, limits.contact_moment)
         return verdict_for(Fault.CONTACT_MOMENT, detail)
     saturated_ms = (now_ns - saturated_ns) / NS_PER_MS if saturated_ns else 0.0
@@ -181,11 +180,11 @@ def _check_trial(
     return None
 
 
-def _lasts(since_ns: int, now_ns: int) -> bool:
+def _is_lasting(since_ns: int, now_ns: int) -> bool:
     return 0 < since_ns <= now_ns - LASTING_NS
 
 
-def _remember(
+def _next_state(
     limits: GuardLimits,
     state: ContactState,
     now_ns: int,
@@ -218,9 +217,9 @@ def _since(before_ns: int, now_ns: int, *, is_beyond: bool) -> int:
 
 
 def _growth(points: tuple[ForcePoint, ...], seen: Contact) -> float:
-    """Return by how much the force grew while the sole stood [N]; 0 if it moved.
+    """Return the growth of the force while the sole was at rest [N]; 0 if it moved.
 
-    The least force of the last 50 ms counts: a knock is no growth.
+    The smallest force of the last 50 ms counts, so that an impact is not growth.
     """
     if len(points) < _POINTS:
         return 0.0

@@ -1,4 +1,4 @@
-"""One cycle: read, check, command, sample. It has no waiting of its own."""
+"""One cycle of the control loop: read, check, command, record; no waiting."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -46,9 +46,9 @@ from acquisition.sample import (
 )
 
 _ZERO = np.zeros(7)
-CONTACT_FORCE = 0.5  # F_n above which the foot counts as touching [N]
+CONTACT_FORCE = 0.5  # F_n above which the foot is in contact [N]
 
-# Named once: to look a member of an Enum up takes longer than to compare it.
+# Bound once: an Enum member lookup takes longer than the comparison.
 _UNPOWERED = frozenset({ArmState.IDLE, ArmState.UNKNOWN})
 _IDLE = ArmState.IDLE
 _UNKNOWN = ArmState.UNKNOWN
@@ -58,12 +58,12 @@ _REQUEST_IDLE = ArmEvent.REQUEST_IDLE
 
 @dataclass(frozen=True, slots=True)
 class CycleOutputs:
-    """Where the results of a cycle go.
+    """Receivers of a cycle's results.
 
     Attributes:
-        on_sample: takes the bytes of every sample; they change in the next cycle.
-        on_wrenches: takes the sensor's own samples as they arrive.
-        extra_flags: bits that every sample carries.
+        on_sample: called with the bytes of every sample, valid until the next cycle.
+        on_wrenches: called with the sensor's samples as they arrive.
+        extra_flags: flag bits set in every sample.
     """
 
     on_sample: Callable[[memoryview], None]
@@ -72,14 +72,14 @@ class CycleOutputs:
 
 
 class Cycle:
-    """The work of one period, with the devices, the law and the guard given.
+    """The work of one period: connects devices, control law and guard.
 
     Attributes:
-        law: torques from positions; may be replaced between two cycles.
-        limits: of the guard; may be replaced between two cycles.
-        is_recording: a trial is being recorded; the guard's limits for it count.
-        replies_ns: when the last joint reply of this cycle arrived [ns], 0 = none did.
-        status: what the console sees.
+        law: control law; may be replaced between cycles.
+        limits: limits of the guard; may be replaced between cycles.
+        is_recording: a trial is being recorded; its limits apply.
+        replies_ns: arrival time of the last joint reply in this cycle [ns], 0 = none.
+        status: status for the console.
     """
 
     def __init__(
@@ -115,15 +115,15 @@ class Cycle:
         self.status = ControlStatus()
 
     def request(self, state: ArmState, known: int | None = None) -> None:
-        """Ask for a state; it is entered at the next complete reading, IDLE at once.
+        """Request a state; it is entered at the next complete reading, IDLE at once.
 
-        IDLE is never refused, and clears no verdict. Another state is refused unless
-        the newest verdict is known to whoever asks, and while one stands that idles:
-        only `start` ends that.
+        IDLE is never refused and clears no verdict. Other states are refused unless
+        the caller knows the newest verdict, and while an idling verdict is active,
+        which only `start` clears.
 
         Args:
-            state: what the arm is to do.
-            known: number of the newest verdict that was told or acted on; None = all.
+            state: requested state.
+            known: number of the newest verdict known to the caller; None = all.
         """
         if state is not ArmState.IDLE:
             if self.status.is_idled or not self._is_newest(known):
@@ -131,25 +131,25 @@ class Cycle:
             self.status.clear()
         else:
             self._is_starting = False
-        self._ask(REQUESTS[state])
+        self._set_request(REQUESTS[state])
 
     def start(self, known: int | None = None) -> None:
-        """Ask an idle arm for hold, and for a person who activates it then.
+        """Request hold of an idle arm, to be activated by a person at the pendant.
 
-        Its torques are sent at once: they are there when the pendant activates the
-        arm, or it would fall for a moment. Refused if the arm is active already, or the
-        newest verdict not `known`, as of `request`.
+        Torques are sent at once, because the arm would drop for a moment if they came
+        after the activation. Refused if the arm is already active, or the newest
+        verdict is not `known` (see `request`).
         """
         if self.status.safety is SafetyMode.ACTIVE or not self._is_newest(known):
             return
         self.status.clear()
         self._is_starting = True
-        self._ask(ArmEvent.REQUEST_HOLD)
+        self._set_request(ArmEvent.REQUEST_HOLD)
 
     def _is_newest(self, known: int | None) -> bool:
         return known is None or known >= self.status.number
 
-    def _ask(self, event: ArmEvent) -> None:
+    def _set_request(self, event: ArmEvent) -> None:
         self._requested = event
         self._known = self.status.number
         self._move = None
@@ -157,24 +157,24 @@ class Cycle:
         self._silent_until_ns = 0
 
     def move_to(self, goal: Sequence[float], speed: float) -> None:
-        """Ask for a move to joint positions `goal` [rad], seven; only in hold.
+        """Request a move to joint positions `goal` [rad], seven; only in hold.
 
-        No joint is faster than `speed` [rad/s]. While a verdict stands no move begins:
-        hold has to be asked for before.
+        `speed` limits all joints [rad/s]. No move begins while a verdict is active:
+        request hold first.
         """
         self._move = np.array(goal), speed
 
     def prove(self, goal: ProofGoal) -> None:
-        """Ask for a proof; else as `move_to`. Any verdict ends it in idle."""
+        """Request a proof, like `move_to`. Any verdict ends it in idle."""
         self._proof = goal
 
     def set_bias(self, bias: Sequence[float]) -> None:
-        """Take the sensor's reading without load [N, N m], six numbers."""
+        """Set the sensor's reading without load [N, N m], six numbers."""
         self._observer.set_bias(bias)
         self._is_tared = True
 
     def report(self, verdict: GuardVerdict) -> None:
-        """Let the next cycle obey a verdict of the processes around it."""
+        """Pass a verdict of another process to the next cycle."""
         self._reported = verdict
 
     def __call__(self, tick: Tick) -> None:
@@ -193,26 +193,27 @@ class Cycle:
         sample = self._sample
         verdict = self._judge(tick, reading, tau)
         if verdict.action is not _NONE:
-            self._obey(verdict, reading)
-            # Of the state that was entered: what the guard refused is not sent.
+            self._act_on(verdict, reading)
+            # Torques of the state just entered; the refused ones are not sent.
             tau, tau_gravity = self._torque(reading)
-        # What the pucks have now: the last cycle's, from which no torque may jump.
+        # Torques of the last cycle, the start of the rate limit.
         sent = sample.torque_command
-        # Without all replies the motors keep their torques; a false one is taken back.
+        # In an incomplete cycle the motors keep their torques, except after a jump: the
+        # torques of a false position must be replaced.
         is_known = reading.is_complete or reading.jump is not None
         if is_known and status.state not in _UNPOWERED:
             bounded = bounded_torque(tau, sent, self.limits.torque)
             sent = self._arm.send(bounded, tau_gravity)
-        # The torque has left; what follows is looked at by the next cycle's guard.
+        # Torques are sent; the following results are checked in the next cycle.
         is_new = self._feed.poll(tick.now_ns, self.limits.ft_stale_ms)
         self._observe(reading, self._feed.newest if is_new else None)
         self._fill(tick, reading, sent, tau_gravity, tau, is_new)
         self._on_sample(sample.payload())
 
     def _read(self, now_ns: int) -> ArmReading:
-        """Ask for the positions; starve the heartbeat of an arm that did not idle.
+        """Read the positions, or only listen to let the heartbeat time out.
 
-        And that of one whose heartbeat is proved.
+        The latter stops an arm that did not confirm idle, and tests the heartbeat.
         """
         is_wanted = self._requested not in (None, _REQUEST_IDLE)
         is_starved = (self.status.state is _UNKNOWN and not is_wanted) or (
@@ -221,7 +222,7 @@ class Cycle:
         return self._arm.listen(now_ns) if is_starved else self._arm.read(now_ns)
 
     def _observe(self, reading: ArmReading, wrench: WrenchSample | None) -> None:
-        """See what the foot does; without a tare its load is not known."""
+        """Compute foot motion and contact load; the load is unknown without a tare."""
         sample = self._sample
         self._speed = self._observer.observe(reading, wrench, sample)
         self._energy = self.law.kinetic_energy(reading)
@@ -230,9 +231,9 @@ class Cycle:
             self._contact = contact_of(sample, wrench.saturated)
 
     def _enter_requested(self, reading: ArmReading) -> None:
-        """Obey a request: torques need all seven positions, idle needs none.
+        """Enter the requested state: torques need all seven positions, idle none.
 
-        A verdict that came meanwhile was not known to whoever asked.
+        The request is dropped if a verdict came after it.
         """
         event = self._requested
         if event is None or (reading.missing_cycles and event is not _REQUEST_IDLE):
@@ -244,7 +245,7 @@ class Cycle:
             self._is_starting = False
 
     def _begin_move(self, reading: ArmReading) -> None:
-        """Begin the move or proof asked for; none if a fault stands."""
+        """Begin the requested move or proof unless a verdict is active."""
         if reading.missing_cycles:
             return
         move, self._move = self._move, None
@@ -257,15 +258,15 @@ class Cycle:
             elif proof is not None:
                 self.law.prove(proof, reading)
                 self._silent_until_ns = reading.host_ns + proof.silence_ns
-                # It was laid onto its stops, from wherever it was.
+                # The arm lies on its stops: disarm the position limits.
                 self._guard = replace(self._guard, armed=0)
         except ValueError:
             self.report(verdict_for(Fault.MOVE_REFUSED))
 
     def _handle(self, event: ArmEvent, reading: ArmReading) -> None:
-        """Do what the table of states says of `event` in the present state.
+        """Make the transition of the state table for `event`.
 
-        Unless idle is confirmed no zero torque follows: the arm would fall.
+        Zero torque follows only a confirmed idle: otherwise the arm would drop.
         """
         transition = TRANSITIONS[self.status.state, event]
         if transition.idles:
@@ -322,23 +323,23 @@ class Cycle:
         return verdict
 
     def _judge_proof(self, reading: ArmReading, verdict: GuardVerdict) -> GuardVerdict:
-        """Return what the guard says of a proof, or else what the proof itself does."""
+        """Return the guard's verdict in a proof, or else that of the proof's limits."""
         is_powered = self.status.safety is SafetyMode.ACTIVE
         is_silent = reading.host_ns < self._silent_until_ns
         if is_silent and verdict.fault is Fault.CAN_SILENCE:
-            verdict = OK  # nothing was asked
+            verdict = OK  # no request was sent
         excess = self.law.proof_excess(reading, self._energy, is_powered=is_powered)
         if excess is None or verdict.action is not _NONE:
             return verdict
         return verdict_for(Fault.PROOF_MOTION, excess)
 
-    def _obey(self, verdict: GuardVerdict, reading: ArmReading) -> None:
-        """Enter the state the guard asks for and latch the verdict."""
-        if self.law.is_proving():  # nothing else is known to bear this arm
+    def _act_on(self, verdict: GuardVerdict, reading: ArmReading) -> None:
+        """Enter the state demanded by the verdict and latch it."""
+        if self.law.is_proving():  # no other state is known to support this arm
             verdict = replace(verdict, action=Action.IDLE)
         self._handle(VERDICTS[verdict.action], reading)
         if isinstance(verdict.detail, CircuitCauses):
-            # Known only now: idling the arm asks the module for its monitors.
+            # Known only now: idling the arm reads the module's monitors.
             causes = CircuitCauses(self._arm.safety_faults())
             verdict = replace(verdict, detail=causes)
         if verdict.action is Action.IDLE:

@@ -1,4 +1,4 @@
-"""The numbers of each kind of fault, as recorded and as put into its message."""
+"""Details of each kind of fault, as recorded and as used in its message."""
 
 from dataclasses import dataclass
 
@@ -7,30 +7,30 @@ from acquisition.devices import MotorChange, PositionJump
 
 @dataclass(frozen=True, slots=True)
 class NoDetail:
-    """A fault without numbers."""
+    """A fault without details."""
 
 
-_BUTTON = "other"  # the monitor that a pressed E-stop button shows
+_BUTTON = "other"  # monitor in fault while an E-stop button is pressed
 
 
 @dataclass(frozen=True, slots=True)
 class CircuitCauses:
-    """Monitors of the safety circuit that show a fault after it stopped the arm."""
+    """Monitors of the safety circuit in fault after it stopped the arm."""
 
     causes: tuple[str, ...] = ()
 
     @property
     def tripped(self) -> tuple[str, ...]:
-        """Monitors that stopped the arm; () = a person did, at the pendant."""
+        """Monitors that stopped the arm; () = a person at the pendant."""
         return tuple(cause for cause in self.causes if cause != _BUTTON)
 
 
 @dataclass(frozen=True, slots=True)
 class ReplySilence:
-    """Silence of the arm.
+    """Missing replies of the arm.
 
     Attributes:
-        ms: how long replies have been missing [ms].
+        ms: time without complete replies [ms].
         silent: bit i set = motor i+1 did not answer in the last cycle.
     """
 
@@ -40,11 +40,11 @@ class ReplySilence:
 
 @dataclass(frozen=True, slots=True)
 class LateReplies:
-    """Positions that answer an earlier question.
+    """Stale positions: replies to an earlier request.
 
     Attributes:
-        ms: their age, at least [ms].
-        motors: bit i set = that of motor i+1 was late.
+        ms: least possible age [ms].
+        motors: bit i set = reply of motor i+1 was stale.
     """
 
     ms: float
@@ -53,33 +53,33 @@ class LateReplies:
 
 @dataclass(frozen=True, slots=True)
 class DoubledPuck:
-    """Number of a motor, 1-7, whose position comes more often than it is asked for."""
+    """Motor, 1-7, with more position replies than requests."""
 
     motor: int
 
 
 @dataclass(frozen=True, slots=True)
 class SafetySilence:
-    """Age of the safety module's last answer [ms]."""
+    """Age of the safety module's last report [ms]."""
 
     ms: float
 
 
 @dataclass(frozen=True, slots=True)
 class StuckMotor:
-    """Number of a motor, 1-7, that a move turns in vain."""
+    """Motor, 1-7, that a move drives without moving it."""
 
     motor: int
 
 
 @dataclass(frozen=True, slots=True)
 class StillMotor:
-    """A motor that stands still in a trial.
+    """A motor that does not turn in a trial.
 
     Attributes:
-        motor: its number, 1-7.
-        mm: how far the sole went meanwhile [mm].
-        limit: how far it may go [mm].
+        motor: motor number, 1-7.
+        mm: travel of the sole since the motor last turned [mm].
+        limit: limit of that travel [mm].
     """
 
     motor: int
@@ -89,20 +89,20 @@ class StillMotor:
 
 @dataclass(frozen=True, slots=True)
 class ForeignFrame:
-    """Identifier of a frame of another master on the arm's bus."""
+    """Identifier of a frame from another master on the arm's bus."""
 
     can_id: int
 
 
 @dataclass(frozen=True, slots=True)
 class MotionExcess:
-    """Motion that no sound arm makes in what it is asked for.
+    """Motion beyond that of a sound arm in its present state.
 
     Attributes:
-        quantity: what went beyond its limit, in words.
-        value: of it.
-        limit: of it.
-        unit: of both.
+        quantity: name of the quantity, for the message.
+        value: measured value.
+        limit: limit.
+        unit: unit of both.
     """
 
     quantity: str
@@ -116,7 +116,7 @@ class JointExcess:
     """A joint beyond its limit.
 
     Attributes:
-        joint: its number, 1-7.
+        joint: joint number, 1-7.
         value: position [rad], or magnitude of speed [rad/s] or torque [N m].
         limit: of the same quantity.
     """
@@ -160,7 +160,7 @@ class ContactExcess:
 
 @dataclass(frozen=True, slots=True)
 class Saturation:
-    """How long the sensor has been beyond its range, and its limit [ms]."""
+    """Time of the sensor beyond its range, and its limit [ms]."""
 
     ms: float
     limit: float
@@ -168,7 +168,7 @@ class Saturation:
 
 @dataclass(frozen=True, slots=True)
 class ForceGrowth:
-    """By how much the force grew within 0.5 s, and its limit [N]."""
+    """Growth of the force within 0.5 s, and its limit [N]."""
 
     value: float
     limit: float
@@ -176,7 +176,7 @@ class ForceGrowth:
 
 @dataclass(frozen=True, slots=True)
 class LoopGap:
-    """How long no cycle of the loop was in time, and the limit [ms]."""
+    """Time without a punctual cycle of the loop, and its limit [ms]."""
 
     ms: float
     limit: float
@@ -184,7 +184,7 @@ class LoopGap:
 
 @dataclass(frozen=True, slots=True)
 class LateCycles:
-    """Late cycles within a second, and how many are tolerated."""
+    """Number of late cycles within a second, and its limit."""
 
     late: int
     limit: int

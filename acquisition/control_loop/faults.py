@@ -1,7 +1,7 @@
-"""Every fault that stops the arm: its recorded name, its numbers, what the arm does.
+"""Catalogue of the faults that stop the arm: recorded name, details, action.
 
-`FAULTS` is the catalogue: one row per fault. The texts for the operator have the same
-names in `experiments/data/messages.toml`; tests hold the two against each other.
+`FAULTS` has one row per fault. The operator's texts have the same names in
+`experiments/data/messages.toml`; tests compare the two.
 """
 
 from collections.abc import Mapping
@@ -35,9 +35,9 @@ from acquisition.devices import MotorChange, PositionJump
 
 
 class Action(Enum):
-    """What has to be done, from the mildest to the most severe.
+    """Reaction to a fault, in order of severity.
 
-    END_TRIAL ends a trial and leaves the arm as it is; the console asks for hold.
+    END_TRIAL ends a trial and leaves the state of the arm; the console requests hold.
     """
 
     NONE = "none"
@@ -51,7 +51,7 @@ _SEVERITY = {action: severity for severity, action in enumerate(Action)}
 
 
 class Fault(StrEnum):
-    """Why the arm was stopped; the value is the name in recordings and messages."""
+    """Reason of a stop; the value is its name in recordings and messages."""
 
     E_STOP = "estop"
     PENDANT_IDLE = "pendant-idle"
@@ -94,13 +94,13 @@ class Fault(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class FaultSpec:
-    """What holds for every occurrence of a fault.
+    """Properties of a fault.
 
     Attributes:
-        actions: what the arm does; of two, the second when the fault lasts or goes
-            beyond a second limit.
-        detail: the type of its numbers.
-        ends_session: no trial can follow, the arm has to be activated anew.
+        actions: reaction; a second one applies if the fault lasts or exceeds a second
+            limit.
+        detail: type of its details.
+        ends_session: no trial can follow; the arm has to be activated again.
     """
 
     actions: tuple[Action, ...]
@@ -162,12 +162,12 @@ _NO_DETAIL = NoDetail()
 
 @dataclass(frozen=True, slots=True)
 class GuardVerdict:
-    """The guard's decision.
+    """Decision of the guard.
 
     Attributes:
-        action: what the arm does from this cycle on.
-        fault: why; None where nothing is wrong.
-        detail: the numbers of the fault, of the type that `FAULTS` names.
+        action: reaction from this cycle on.
+        fault: reason, or None.
+        detail: details of the fault, of the type in `FAULTS`.
     """
 
     action: Action
@@ -176,17 +176,17 @@ class GuardVerdict:
 
     @property
     def severity(self) -> int:
-        """How much is taken: 0 nothing, 1 the trial, 2 hold, 3 damp, 4 idle."""
+        """Severity of the action: 0 none, 1 end of trial, 2 hold, 3 damp, 4 idle."""
         return _SEVERITY[self.action]
 
     @property
     def strictness(self) -> tuple[bool, int]:
-        """Order of verdicts that stand together: what ends a session comes first."""
+        """Sort key of simultaneous verdicts: those that end the session rank higher."""
         return self.ends_session, self.severity
 
     @property
     def reason(self) -> str:
-        """The recorded name of the fault; empty for none."""
+        """Recorded name of the fault; "" for none."""
         return "" if self.fault is None else self.fault.value
 
     @property
@@ -201,18 +201,18 @@ OK = GuardVerdict(Action.NONE)
 def verdict_for(
     fault: Fault, detail: FaultDetail = _NO_DETAIL, *, is_lasting: bool = False
 ) -> GuardVerdict:
-    """Return the verdict of a fault, with the action that the catalogue names."""
+    """Return the verdict of a fault with its action from the catalogue."""
     action = FAULTS[fault].actions[-1 if is_lasting else 0]
     return GuardVerdict(action, fault, detail)
 
 
 def to_plain(verdict: GuardVerdict) -> list[Any]:
-    """Return a verdict as values for JSON."""
+    """Convert a verdict to JSON values."""
     return [verdict.action.value, verdict.reason, asdict(verdict.detail)]
 
 
 def from_plain(plain: list[Any]) -> GuardVerdict:
-    """Return the verdict of `to_plain` values that went through JSON."""
+    """Convert JSON values of `to_plain` back to a verdict."""
     action, reason, values = plain
     if not reason:
         return GuardVerdict(Action(action))

@@ -1,4 +1,4 @@
-"""The guard: limits and the state of the arm in, a verdict out. Pure."""
+"""Guard of the arm: pure functions from limits and observations to a verdict."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -39,12 +39,12 @@ from acquisition.control_loop.states import ArmState
 from acquisition.devices import SHORTED, ArmReading, SafetyMode, Vector
 
 _NO_LOAD = ContactState()
-_ALL_JOINTS = 0x7F  # one bit each, bit i of joint or motor i+1
-_TREMBLE = 1  # counts by which an encoder at rest flickers
+_ALL_JOINTS = 0x7F  # bit i = joint or motor i+1
+_FLICKER = 1  # counts of encoder flicker at rest
 
 
 class MotorRest(NamedTuple):
-    """Where a motor stands [encoder counts], and the sole since it does [m]."""
+    """Position of a motor at rest [encoder counts], and of the sole at its stop [m]."""
 
     counts: int
     sole: Point
@@ -52,18 +52,17 @@ class MotorRest(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class GuardState:
-    """What the guard remembers between cycles.
+    """State of the guard between cycles.
 
     Attributes:
-        armed: bit i set = the position limit of joint i+1 counts.
+        armed: bit i set = the position limit of joint i+1 is armed.
         late: times of the late cycles of the last second [ns].
-        late_since_ns: since when every cycle has been late [ns]; 0 = the last was not.
-        may_drive: since torques are commanded idle was not confirmed once:
-            from then on an idle arm is a stop, and no longer the state before
-            activation.
-        contact: what is remembered of the load on the foot.
-        rests: in a trial, where each motor turned last.
-        motion: how what is asked of a driven arm began; None = it is not driven.
+        late_since_ns: start of an unbroken series of late cycles [ns]; 0 = none.
+        may_drive: the safety circuit was seen not idle since torques are commanded:
+            from then on idle is a stop, not the state before activation.
+        contact: state of the contact checks.
+        rests: in a trial, last change of each motor's position.
+        motion: start of the present state of a driven arm; None = not driven.
     """
 
     armed: int = 0
@@ -76,27 +75,27 @@ class GuardState:
 
 
 class Observation(NamedTuple):
-    """What the guard looks at in one cycle; a tuple, because it is made in each.
+    """Inputs of the guard in one cycle; a tuple for speed.
 
     Attributes:
         reading: joint positions and velocities.
-        safety: state of the safety circuit, as last heard.
-        safety_age_ns: age of its last answer [ns].
+        safety: last reported state of the safety circuit.
+        safety_age_ns: age of that report [ns].
         foot_speed: speed of the sole [m/s].
-        joint7_offset: displacement of joint 7 from where it was locked [rad].
+        joint7_offset: displacement of joint 7 from its locked position [rad].
         ft_age_ns: age of the force sample [ns].
         tau: joint torques about to be sent [N m], shape (7,).
         is_recording: a trial is being recorded.
         is_commanded: the state of the arm commands torques (not idle).
         is_late: this cycle began after its deadline.
-        contact: the load on the foot; None = it is not known.
-        stuck_motor: the motor that a move turns in vain, 1-7; 0 = none.
+        contact: contact load; None = not known.
+        stuck_motor: motor that a move drives without moving it, 1-7; 0 = none.
         sole: centre of the sole in the base frame [m].
-        is_moving: the arm moves by itself, or keeps the goal of a move.
-        state: what is asked of the arm.
-        energy: its kinetic energy [J].
-        is_starting: torques are ready for a person who activates the arm.
-        skipped: cycles that did not run before this one.
+        is_moving: the arm makes a move or keeps its goal.
+        state: state of the arm.
+        energy: kinetic energy [J].
+        is_starting: torques are sent for an arm about to be activated.
+        skipped: number of skipped cycles before this one.
     """
 
     reading: ArmReading
@@ -121,16 +120,15 @@ class Observation(NamedTuple):
 
 @dataclass(slots=True)
 class Facts:
-    """All that a check may look at; not frozen, which would cost time in each cycle.
+    """Inputs of a check; not frozen, for speed.
 
     Attributes:
-        limits: where the guard steps in.
-        state: what is remembered, this cycle included.
-        seen: the observation of this cycle.
-        load: the verdict on the load on the foot.
-        motion: of an arm that is driven; None = it is not.
-        q: joint positions [rad], seven plain numbers, which are compared faster than
-            numpy looks at an array.
+        limits: limits of the guard.
+        state: state of the guard including this cycle.
+        seen: observation of this cycle.
+        load: verdict on the contact load.
+        motion: motion of a driven arm; None = not driven.
+        q: joint positions [rad], seven Python floats, faster to compare than an array.
         qd: joint velocities [rad/s], seven.
         tau: joint torques about to be sent [N m], seven.
     """
@@ -150,16 +148,16 @@ def check(
 ) -> tuple[GuardState, GuardVerdict]:
     """Return the next state and the most severe verdict of this cycle.
 
-    Torques that are commanded are judged unless idle is confirmed since before: a
-    safety circuit of unknown state may drive the arm. E-stop is always reported. An
-    arm without torques must not be active nor recorded, and no other master may be
-    there; one that is asked for torques must be active, or wait for its activation.
-    Among equally severe verdicts the first of `CHECKS` counts.
+    All checks run while torques are commanded, unless the circuit has been idle since
+    they began: a circuit of unknown state may drive the arm. E-stop is always reported.
+    Without torques the arm must be neither active nor recorded, and the bus without
+    another master; with torques it must be active or about to be activated. Among
+    equally severe verdicts the first of `CHECKS` counts.
     """
     may_drive = seen.is_commanded and (state.may_drive or seen.safety not in SHORTED)
     is_live = may_drive and seen.safety not in SHORTED
     motion = _driven(seen) if is_live else None
-    state = _remember(limits, state, seen, motion, may_drive=may_drive)
+    state = _next_state(limits, state, seen, motion, may_drive=may_drive)
     is_stopped = seen.is_commanded and seen.safety is SafetyMode.E_STOP
     if not (may_drive or is_stopped):
         return state, _check_idle(seen)
@@ -184,11 +182,11 @@ def check(
 
 
 def _check_idle(seen: Observation) -> GuardVerdict:
-    """Look at an arm that is idle, or is not active yet.
+    """Check an arm that is idle or not yet active.
 
-    Questions without torques keep the safety circuit content: once active, the arm
-    would fall. Torques behind a circuit that nobody is asked to activate would drive it
-    at the next press of the pendant.
+    Position requests alone feed the heartbeat: an arm activated without torques would
+    drop. Torques commanded without a requested activation would drive the arm when the
+    pendant is next pressed.
     """
     if seen.reading.disobeys is not None:
         return verdict_for(Fault.PUCK_DISOBEYS, seen.reading.disobeys)
@@ -204,7 +202,7 @@ def _check_idle(seen: Observation) -> GuardVerdict:
     return OK
 
 
-def _remember(
+def _next_state(
     limits: GuardLimits,
     state: GuardState,
     seen: Observation,
@@ -212,7 +210,7 @@ def _remember(
     *,
     may_drive: bool,
 ) -> GuardState:
-    """Return the next state but for the load; the same object if nothing changed."""
+    """Return the next state except `contact`; the same object if nothing changed."""
     armed = _armed(limits, state.armed, seen.reading)
     late = _late_cycles(state.late, seen)
     since_ns = (state.late_since_ns or seen.reading.host_ns) if seen.is_late else 0
@@ -238,7 +236,7 @@ def _driven(seen: Observation) -> DrivenMotion:
 
 
 def _armed(limits: GuardLimits, armed: int, reading: ArmReading) -> int:
-    """Return the joints whose position limit counts, as bits; none is taken back."""
+    """Return the bits of the joints with armed position limits; never disarms."""
     if armed == _ALL_JOINTS or not reading.is_complete:
         return armed
     is_inside = (reading.q > np.array(limits.q_lower) + limits.armed_inside) & (
@@ -257,26 +255,26 @@ def _late_cycles(late: tuple[int, ...], seen: Observation) -> tuple[int, ...]:
 
 
 def _rests(rests: tuple[MotorRest, ...], seen: Observation) -> tuple[MotorRest, ...]:
-    """Return where each motor turned last; a motor that is not heard is none."""
+    """Return the last move of each motor; a silent motor counts as moving."""
     counts, fresh = seen.reading.counts, seen.reading.fresh
     if not rests:
         return tuple(MotorRest(now, seen.sole) for now in counts)
     pairs = enumerate(zip(rests, counts, strict=True))
-    turned = [
+    moved = [
         i
         for i, (rest, now) in pairs
-        if not -_TREMBLE <= now - rest.counts <= _TREMBLE or not fresh >> i & 1
+        if not -_FLICKER <= now - rest.counts <= _FLICKER or not fresh >> i & 1
     ]
-    if not turned:
+    if not moved:
         return rests
-    newer = list(rests)
-    for i in turned:
-        newer[i] = MotorRest(counts[i], seen.sole)
-    return tuple(newer)
+    updated = list(rests)
+    for i in moved:
+        updated[i] = MotorRest(counts[i], seen.sole)
+    return tuple(updated)
 
 
 def _check_safety(facts: Facts) -> GuardVerdict:
-    """Idle with the safety circuit; a silent one is given time to answer first."""
+    """Idle if the safety circuit has; allow a silent circuit some time."""
     seen = facts.seen
     if seen.safety is SafetyMode.UNKNOWN:
         age_ms = seen.safety_age_ns / NS_PER_MS
@@ -290,7 +288,7 @@ def _check_safety(facts: Facts) -> GuardVerdict:
 
 
 def _check_silence(facts: Facts) -> GuardVerdict:
-    """Hold, then idle, an arm whose positions are missing or cannot be true."""
+    """Hold, then idle, if positions are missing or implausible."""
     limits, reading = facts.limits, facts.seen.reading
     missing = reading.missing_cycles
     if missing < limits.hold_after_missing:
@@ -304,7 +302,7 @@ def _check_silence(facts: Facts) -> GuardVerdict:
 
 
 def _check_late(facts: Facts) -> GuardVerdict:
-    """Hold, then idle, an arm that tells where it was and not where it is."""
+    """Hold, then idle, if positions are stale."""
     late = facts.seen.reading.late
     if late is None:
         return OK
@@ -314,7 +312,7 @@ def _check_late(facts: Facts) -> GuardVerdict:
 
 
 def _check_master(facts: Facts) -> GuardVerdict:
-    """Give up an arm that takes torques of another program as well."""
+    """Idle if another bus master is present, which may send torques, too."""
     foreign_id = facts.seen.reading.foreign_id
     if foreign_id is None:
         return OK
@@ -322,15 +320,15 @@ def _check_master(facts: Facts) -> GuardVerdict:
 
 
 def _check_doubled(facts: Facts) -> GuardVerdict:
-    """Give up an arm whose positions may be another sender's."""
+    """Idle if positions may come from another sender."""
     motor = facts.seen.reading.doubled
     return verdict_for(Fault.PUCK_DOUBLED, DoubledPuck(motor)) if motor else OK
 
 
 def _check_change(facts: Facts) -> GuardVerdict:
-    """Give up an arm whose torques or counts mean something else than at the start.
+    """Idle if the units of torques or counts have changed since the start.
 
-    Silence goes before: a controller that restarts answers as another one.
+    Missing replies take precedence: a restarting puck reports other values.
     """
     reading = facts.seen.reading
     if reading.change is None or reading.missing_cycles:
@@ -339,7 +337,7 @@ def _check_change(facts: Facts) -> GuardVerdict:
 
 
 def _check_obedience(facts: Facts) -> GuardVerdict:
-    """Give up an arm of which a motor does not do what it is told."""
+    """Idle if a motor does not execute its command."""
     disobeys = facts.seen.reading.disobeys
     if disobeys is None:
         return OK
@@ -347,7 +345,7 @@ def _check_obedience(facts: Facts) -> GuardVerdict:
 
 
 def _check_move(facts: Facts) -> GuardVerdict:
-    """Idle a move that turns a motor in vain: it would be pulled on for ever."""
+    """Idle if a move drives a motor that does not move: its torque would stay."""
     motor = facts.seen.stuck_motor
     if not motor:
         return OK
@@ -355,9 +353,9 @@ def _check_move(facts: Facts) -> GuardVerdict:
 
 
 def _check_numbers(facts: Facts) -> GuardVerdict:
-    """Refuse what is no number: no limit is exceeded by NaN, as no comparison holds."""
+    """Idle on NaN or infinity: comparisons with NaN never exceed a limit."""
     seen = facts.seen
-    # One sum shows them all: infinities of both signs leave NaN.
+    # One sum detects all: infinities of opposite sign give NaN.
     total = sum(facts.q) + sum(facts.qd) + sum(facts.tau)
     if isfinite(total + seen.foot_speed + seen.joint7_offset):
         return OK
@@ -365,7 +363,7 @@ def _check_numbers(facts: Facts) -> GuardVerdict:
 
 
 def _check_position(facts: Facts) -> GuardVerdict:
-    """Damp an arm of which a joint left its range after it had been well within."""
+    """Damp if a joint leaves its range after having been well inside."""
     lower, upper = facts.limits.q_lower, facts.limits.q_upper
     if are_between(lower, facts.q, upper):
         return OK
@@ -379,7 +377,7 @@ def _check_position(facts: Facts) -> GuardVerdict:
 
 
 def _check_speed(facts: Facts) -> GuardVerdict:
-    """Damp an arm of which a joint or the sole is too fast."""
+    """Damp if a joint or the sole is too fast."""
     limits, foot_speed = facts.limits, facts.seen.foot_speed
     excess = _first_excess(facts.qd, limits.speed)
     if excess is not None:
@@ -391,13 +389,13 @@ def _check_speed(facts: Facts) -> GuardVerdict:
 
 
 def _check_torque(facts: Facts) -> GuardVerdict:
-    """Damp an arm whose law asks for too much, before it is sent."""
+    """Damp if the control law demands too much torque, before it is sent."""
     excess = _first_excess(facts.tau, facts.limits.torque)
     return OK if excess is None else verdict_for(Fault.TORQUE_LIMIT, excess)
 
 
 def _check_motion(facts: Facts) -> GuardVerdict:
-    """Idle an arm that does not do what it is asked for, by its energy and way."""
+    """Idle if energy or travel does not fit the state of the arm."""
     now, memory, limits = facts.motion, facts.state.motion, facts.limits
     if now is None or memory is None:
         return OK
@@ -415,45 +413,45 @@ def _first_excess(values: list[float], limits: Sequence[float]) -> JointExcess |
 
 
 def _check_rests(facts: Facts) -> GuardVerdict:
-    """End a trial in which the sole goes on and a motor does not."""
+    """Idle in a trial if the sole moves while a motor does not turn."""
     sole = facts.seen.sole
     for i, rest in enumerate(facts.state.rests):
-        way, most = dist(rest.sole, sole), facts.limits.still_ways[i]
-        if way > most:
-            detail = StillMotor(i + 1, 1e3 * way, 1e3 * most)  # mm
+        travel, limit = dist(rest.sole, sole), facts.limits.still_ways[i]
+        if travel > limit:
+            detail = StillMotor(i + 1, 1e3 * travel, 1e3 * limit)  # mm
             return verdict_for(Fault.MOTOR_STILL, detail)
     return OK
 
 
 def _check_joint7(facts: Facts) -> GuardVerdict:
-    """End a trial whose foot has turned against the lock of joint 7."""
-    most = facts.limits.joint7_mrad
+    """Hold if the foot turns against the lock of joint 7 in a trial."""
+    limit = facts.limits.joint7_mrad
     mrad = abs(facts.seen.joint7_offset) * 1e3
-    if facts.seen.is_recording and mrad > most:
-        return verdict_for(Fault.JOINT7_SLIP, Joint7Slip(mrad, most))
+    if facts.seen.is_recording and mrad > limit:
+        return verdict_for(Fault.JOINT7_SLIP, Joint7Slip(mrad, limit))
     return OK
 
 
 def _check_force_age(facts: Facts) -> GuardVerdict:
-    """End a trial whose force is not measured any more."""
-    most = facts.limits.ft_stop_ms
+    """Hold if the force is stale in a trial."""
+    limit = facts.limits.ft_stop_ms
     age_ms = facts.seen.ft_age_ns / NS_PER_MS
-    if facts.seen.is_recording and age_ms > most:
-        return verdict_for(Fault.FT_STALE, ForceAge(age_ms, most))
+    if facts.seen.is_recording and age_ms > limit:
+        return verdict_for(Fault.FT_STALE, ForceAge(age_ms, limit))
     return OK
 
 
 def _check_load(facts: Facts) -> GuardVerdict:
-    """Stop for the load on the foot, which is judged in `contact`."""
+    """Return the verdict on the contact load, from `contact`."""
     return facts.load
 
 
 def _check_cadence(facts: Facts) -> GuardVerdict:
-    """Hold when too many cycles of a second were late, this one among them.
+    """Hold if too many cycles within a second were late, including this one.
 
-    Where none has been in time for a while the arm is idled: it is driven by what it
-    did long ago. Where none ran at all the module's heartbeat has idled it, and if it
-    is active then somebody activated it that was not asked to.
+    Idle if no cycle has been punctual for a while: the torques are based on old
+    positions. Also idle after a gap: the heartbeat has idled the arm meanwhile, and an
+    active arm was activated without a request.
     """
     state, limits, now_ns = facts.state, facts.limits, facts.seen.reading.host_ns
     since_ns, late = state.late_since_ns, state.late
@@ -470,8 +468,8 @@ def _check_cadence(facts: Facts) -> GuardVerdict:
     return OK
 
 
-# Of equally severe verdicts the first counts: what takes the arm away, then motion,
-# then what only ends the trial.
+# Of equally severe verdicts the first counts: first loss of the arm, then motion, then
+# causes that only end the trial.
 CHECKS: tuple[Callable[[Facts], GuardVerdict], ...] = (
     _check_safety,
     _check_silence,

@@ -1,4 +1,4 @@
-"""What a cycle asks of the control law and of the observer of the foot."""
+"""Interfaces of the control law and of the observer of the foot."""
 
 from collections.abc import Sequence
 from typing import Protocol
@@ -11,10 +11,10 @@ from acquisition.sample import Sample
 
 
 class ControlLaw(Protocol):
-    """Torques from positions."""
+    """Control law: joint torques from joint positions."""
 
     def enter(self, state: ArmState, reading: ArmReading) -> None:
-        """Begin `state` without a jump in torque."""
+        """Enter `state` without a jump in torque."""
         ...
 
     def torque(self, reading: ArmReading) -> tuple[Vector, Vector]:
@@ -22,45 +22,45 @@ class ControlLaw(Protocol):
         ...
 
     def move_to(self, goal: Vector, speed: float, reading: ArmReading) -> float:
-        """Go to `goal` [rad], shape (7,), in hold; return how long it takes [s].
+        """Start a move to `goal` [rad], shape (7,), in hold; return its duration [s].
 
-        No joint is faster than `speed` [rad/s].
+        `speed` limits the joints [rad/s].
 
         Raises:
-            ValueError: the arm is not in hold, or `goal` cannot be reached so.
+            ValueError: the arm is not in hold, or `goal` is not reachable.
         """
         ...
 
     def prove(self, goal: ProofGoal, reading: ArmReading) -> None:
-        """Give the arm what `goal` says and nothing else, in hold.
+        """Start the proof `goal` in hold; its torques replace the control law.
 
         Raises:
-            ValueError: the arm is not in hold, or `goal` is none.
+            ValueError: the arm is not in hold, or `goal` is invalid.
         """
         ...
 
     def is_proving(self) -> bool:
-        """Return whether the arm is in a proof: any verdict ends it in idle."""
+        """Return whether the arm is in a proof: any fault then leads to idle."""
         ...
 
     def proof_excess(
         self, reading: ArmReading, energy: float, *, is_powered: bool
     ) -> MotionExcess | None:
-        """Return what an arm in a proof does that it should not; None = nothing.
+        """Return the limit of motion that an arm in a proof exceeds, or None.
 
         Args:
-            reading: of this cycle.
+            reading: reading of this cycle.
             energy: kinetic energy of the arm [J].
-            is_powered: its motors have power.
+            is_powered: the motors have power.
         """
         ...
 
     def is_moving(self) -> bool:
-        """Return whether a move is made, or its goal is kept."""
+        """Return whether a move is under way or its goal is kept."""
         ...
 
     def stuck_motor(self) -> int:
-        """Return the motor that a move turns in vain, 1-7; 0 = none."""
+        """Return the motor that a move drives without moving it, 1-7; 0 = none."""
         ...
 
     def kinetic_energy(self, reading: ArmReading) -> float:
@@ -68,12 +68,12 @@ class ControlLaw(Protocol):
         ...
 
     def joint7_offset(self, reading: ArmReading) -> float:
-        """Return how far joint 7 is from where it was locked [rad]."""
+        """Return the offset of joint 7 from its locked position [rad]."""
         ...
 
 
 class FootObserver(Protocol):
-    """Fills in what follows from joints and wrench: foot and traction."""
+    """Computes foot pose and traction from joints and wrench."""
 
     def observe(
         self, reading: ArmReading, wrench: WrenchSample | None, sample: Sample
@@ -82,5 +82,5 @@ class FootObserver(Protocol):
         ...
 
     def set_bias(self, bias: Sequence[float]) -> None:
-        """Take the sensor's reading without load [N, N m], six numbers."""
+        """Set the sensor's reading without load [N, N m], six numbers."""
         ...

@@ -1,4 +1,4 @@
-"""The loop: absolute deadlines on a fixed grid, late cycles skipped and counted."""
+"""Timing of the loop: absolute deadlines on a fixed grid, overruns skip cycles."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -6,18 +6,18 @@ from typing import NamedTuple
 
 from acquisition.clock import PERIOD_NS, Clock
 
-LATE_NS = 500_000  # a cycle that begins later than this missed its deadline
+LATE_NS = 500_000  # a cycle that begins later than this is late
 
 
 class Tick(NamedTuple):
-    """When a cycle runs; a tuple is made in half the time of a frozen dataclass.
+    """Timing of a cycle; a tuple takes half the time of a frozen dataclass to create.
 
     Attributes:
-        number: cycle number; counts the skipped ones too.
-        now_ns: when it began [ns].
-        deadline_ns: when it should have begun [ns].
-        is_late: it began more than 0.5 ms after its deadline, or cycles were skipped.
-        skipped: cycles that did not run before it.
+        number: cycle number, skipped cycles included.
+        now_ns: start of the cycle [ns].
+        deadline_ns: scheduled start [ns].
+        is_late: started more than 0.5 ms after its deadline, or after skipped cycles.
+        skipped: number of cycles skipped before it.
     """
 
     number: int
@@ -29,7 +29,7 @@ class Tick(NamedTuple):
 
 @dataclass(slots=True)
 class LoopStats:
-    """What the loop has to say about its own time keeping."""
+    """Timing statistics of the loop."""
 
     cycles: int = 0
     skipped: int = 0
@@ -38,12 +38,11 @@ class LoopStats:
 
 
 class Loop:
-    """Calls `cycle` on a grid of `period_ns`; the grid never moves.
+    """Calls `cycle` on a fixed grid of `period_ns`.
 
-    `stats` is filled in as it goes on, for whoever else reads it.
-
-    A cycle that overruns makes the loop skip whole periods: there is no burst of
-    catch-up cycles, and the numbers of the skipped cycles are missing in the record.
+    After an overrun the loop skips whole periods: there is no burst of catch-up cycles,
+    and the numbers of skipped cycles are missing in the record. `stats` is updated in
+    every step.
     """
 
     def __init__(

@@ -1,10 +1,9 @@
-"""Motion of a driven arm against what was asked of it: energy, speed and travel.
+"""Runaway detection: energy, speed and travel of a driven arm in each state.
 
-An arm whose model, motors or encoders are not what they are taken for moves by itself:
-it runs away in hold, or damping does not slow it down. No single limit of speed tells
-that from a hand that pushes. The kinetic energy does, with how long the arm has been
-asked to stand still and how far the sole has gone since. What a sound arm does in
-sessions and calibrations stays below half of each limit.
+With a wrong model, motor or encoder an arm moves by itself: it runs away in hold, or
+damping does not slow it down. A speed limit alone cannot tell that from a person who
+pushes. Kinetic energy can, together with the time in the state and the travel of the
+sole since. In sessions and calibrations a sound arm stays below half of each limit.
 """
 
 from collections.abc import Sequence
@@ -18,35 +17,35 @@ from acquisition.control_loop.details import MotionExcess
 from acquisition.control_loop.faults import OK, Fault, GuardVerdict, verdict_for
 from acquisition.control_loop.states import ArmState
 
-_LAG_NS = 10_000_000  # of the filter of velocities
+_LAG_NS = 10_000_000  # lag of the velocity filter
 Point = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
 class MotionLimits:
-    """Where an arm is taken for one that moves by itself.
+    """Limits of the motion of a driven arm.
 
     Attributes:
-        activation_time: how long after the motors got power a person may still carry
-            the arm [s].
+        activation_time: time after power-on in which a person may still support the
+            arm [s].
         activation_energy: kinetic energy in that time [J].
         activation_speed: speed of the sole in that time [m/s].
-        activation_travel: of the sole in that time [m].
-        hold_settle: after which an arm that is to hold must have been slowed down [s].
-        hold_energy: of an arm that holds, beyond what it came with until then [J].
-        hold_speed: of its joints, after that [rad/s], seven.
-        hold_travel: of its sole, however slowly it is dragged [m].
-        damp_time: after which damping must have slowed the arm down [s].
-        damp_share: of the energy at its begin that may be left then.
-        damp_rest: energy that may be left in any case [J].
-        damp_escape_time: after which no energy may be won [s].
-        damp_escape: energy that may be won beyond the least one since [J].
-        damp_escape_share: and of the energy at its begin.
-        damp_travel: of the sole while damping [m].
-        still_time: after which a damped sole must stand [s].
-        still_speed: of a sole that stands [m/s].
-        float_energy: of an arm that floats in a hand [J].
-        guide_energy: of one that a hand guides, or that moves by itself [J].
+        activation_travel: travel of the sole in that time [m].
+        hold_settle: time in which hold must have stopped the arm [s].
+        hold_energy: kinetic energy in hold; until then plus the initial one [J].
+        hold_speed: joint speeds in hold after that time [rad/s], seven.
+        hold_travel: travel of the sole in hold, at any speed [m].
+        damp_time: time in which damping must have slowed the arm [s].
+        damp_share: share of the initial energy that may remain then.
+        damp_rest: energy that may remain in any case [J].
+        damp_escape_time: time after which the energy must not grow [s].
+        damp_escape: allowed growth beyond the minimum so far [J].
+        damp_escape_share: additional growth as a share of the initial energy.
+        damp_travel: travel of the sole while damping [m].
+        still_time: time after which a damped sole must be at rest [s].
+        still_speed: speed of a sole at rest [m/s].
+        float_energy: kinetic energy in float [J].
+        guide_energy: kinetic energy in guide or in a move [J].
     """
 
     activation_time: float = 0.5
@@ -71,15 +70,15 @@ class MotionLimits:
 
 
 class DrivenMotion(NamedTuple):
-    """What a driven arm does in one cycle.
+    """Motion of a driven arm in one cycle.
 
     Attributes:
         now_ns: time of the cycle [ns].
-        state: what is asked of the arm.
-        is_moving: it moves or stands by itself, in hold.
+        state: state of the arm.
+        is_moving: in hold, a move is under travel or its goal kept.
         energy: kinetic energy [J].
-        foot_speed: of the sole [m/s].
-        sole: where it is [m].
+        foot_speed: speed of the sole [m/s].
+        sole: position of the sole [m].
         qd: joint velocities [rad/s], seven.
     """
 
@@ -93,16 +92,16 @@ class DrivenMotion(NamedTuple):
 
 
 class MotionMemory(NamedTuple):
-    """How what is asked of a driven arm began.
+    """Start of the present state of a driven arm.
 
     Attributes:
-        powered_ns: since when its motors have had power [ns].
-        since_ns: since when the same has been asked for [ns].
-        state: that.
+        powered_ns: time of power-on [ns].
+        since_ns: start of the state [ns].
+        state: state of the arm.
         is_moving: in hold, a move.
-        sole: where it was then [m].
-        energy: that it had then [J]; filtered velocities show it a little later.
-        least: the least since [J].
+        sole: position of the sole at the start [m].
+        energy: kinetic energy at the start, maximum over the filter's lag [J].
+        least: smallest energy since [J].
     """
 
     powered_ns: int
@@ -115,7 +114,7 @@ class MotionMemory(NamedTuple):
 
 
 def follow(memory: MotionMemory | None, now: DrivenMotion) -> MotionMemory:
-    """Return what is remembered after the cycle; None before = power comes now."""
+    """Return the memory after this cycle; None before means power-on now."""
     if (
         memory is None
         or now.state is not memory.state
@@ -147,10 +146,10 @@ def check_motion(
     """Return the verdict on the motion of a driven arm.
 
     Args:
-        limits: where it is taken for one that moves by itself.
-        memory: of `follow`, this cycle included.
-        now: what it does.
-        speed_limits: of the joints [rad/s], seven.
+        limits: limits of the motion.
+        memory: result of `follow` including this cycle.
+        now: motion in this cycle.
+        speed_limits: joint speed limits [rad/s], seven.
     """
     state = now.state
     if state is ArmState.FLOAT:
@@ -169,7 +168,7 @@ def check_motion(
 def _check_activated(
     limits: MotionLimits, memory: MotionMemory, now: DrivenMotion
 ) -> GuardVerdict:
-    """Idle an arm that starts off when its motors get power."""
+    """Idle if the arm starts to move at power-on."""
     fault = Fault.ACTIVATION_MOTION
     if now.foot_speed > limits.activation_speed:
         return _speed(fault, now.foot_speed, limits.activation_speed)
@@ -181,14 +180,14 @@ def _check_activated(
 def _check_held(
     limits: MotionLimits, memory: MotionMemory, now: DrivenMotion
 ) -> GuardVerdict:
-    """Idle an arm that does not stay where it holds."""
-    fault, most = Fault.HOLD_MOTION, limits.hold_energy
+    """Idle if the arm does not stay in place in hold."""
+    fault, limit = Fault.HOLD_MOTION, limits.hold_energy
     seconds = (now.now_ns - memory.since_ns) / NS_PER_S
     is_settled = seconds >= limits.hold_settle or memory.since_ns == memory.powered_ns
     if not is_settled:
-        most += memory.energy
-    if now.energy > most:
-        return _energy(fault, now.energy, most)
+        limit += memory.energy
+    if now.energy > limit:
+        return _energy(fault, now.energy, limit)
     joint = _first_beyond(now.qd, limits.hold_speed) if is_settled else None
     if joint is not None:
         return _joint_speed(fault, joint, now.qd, limits.hold_speed)
@@ -201,22 +200,22 @@ def _check_damped(
     now: DrivenMotion,
     speed_limits: Sequence[float],
 ) -> GuardVerdict:
-    """Idle an arm that its damping does not slow down."""
-    fault, begun = Fault.DAMP_MOTION, memory.energy
+    """Idle if damping does not slow the arm down."""
+    fault, initial = Fault.DAMP_MOTION, memory.energy
     seconds = (now.now_ns - memory.since_ns) / NS_PER_S
     if seconds >= limits.still_time and now.foot_speed > limits.still_speed:
         return _speed(fault, now.foot_speed, limits.still_speed)
     if seconds >= limits.damp_time:
-        most = limits.damp_share * begun + limits.damp_rest
-        if now.energy > most:
-            return _energy(fault, now.energy, most)
+        limit = limits.damp_share * initial + limits.damp_rest
+        if now.energy > limit:
+            return _energy(fault, now.energy, limit)
         joint = _first_beyond(now.qd, speed_limits)
         if joint is not None:
             return _joint_speed(fault, joint, now.qd, speed_limits)
     if seconds >= limits.damp_escape_time:
-        most = memory.least + limits.damp_escape + limits.damp_escape_share * begun
-        if now.energy > most:
-            return _energy(fault, now.energy, most)
+        limit = memory.least + limits.damp_escape + limits.damp_escape_share * initial
+        if now.energy > limit:
+            return _energy(fault, now.energy, limit)
     return _travel(fault, dist(now.sole, memory.sole), limits.damp_travel)
 
 
@@ -247,7 +246,7 @@ def _joint_speed(
     return verdict_for(fault, detail)
 
 
-def _travel(fault: Fault, way: float, limit: float) -> GuardVerdict:
-    if way <= limit:
+def _travel(fault: Fault, travel: float, limit: float) -> GuardVerdict:
+    if travel <= limit:
         return OK
-    return verdict_for(fault, MotionExcess("the sole's way", way, limit, "m"))
+    return verdict_for(fault, MotionExcess("the sole's travel", travel, limit, "m"))

@@ -1,7 +1,8 @@
-"""Proofs of an arm that is not known yet: little torque, idle at the first surprise.
+"""Proofs: powered tests of an unknown arm with small torques and tight limits.
 
-An arm lies on its stops and is given no torque, that of one joint, or a share of its
-weight. It may move only where it was pushed, and no further than here.
+The arm lies on its stops and gets zero torque, that of one joint, or a share of gravity
+compensation. It may move only in the pushed direction and within these limits; any
+excess leads to idle.
 """
 
 from collections.abc import Sequence
@@ -12,13 +13,13 @@ from acquisition.clock import NS_PER_S
 
 
 class ProofKind(IntEnum):
-    """What is given to the arm.
+    """Torques applied to the arm.
 
-    REST: nothing. RAMP: a torque of one joint that grows evenly, until the joint has
-    moved. LIFT: a bounded torque that takes one joint slowly off its stop and back, and
-    a small one that keeps the other joint of its motors where it is.
-    GRAVITY: a share of the compensation of gravity that grows to the whole. SILENCE:
-    nothing, and no position is asked for: the heartbeat of the module has to brake.
+    REST: none. RAMP: a linearly growing torque of one joint until it moves. LIFT: a
+    bounded torque that moves one joint slowly off its stop and back, and a small one
+    that holds the joint coupled to it. GRAVITY: gravity compensation, ramped up from 0.
+    SILENCE: none, and no position requests: the module's heartbeat monitor has to brake
+    the arm.
     """
 
     REST = 0
@@ -30,14 +31,14 @@ class ProofKind(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class ProofGoal:
-    """One proof.
+    """Parameters of one proof.
 
     Attributes:
-        kind: what is given.
-        joint: the joint that is pushed, 1-7; 0 = none.
-        torque: RAMP: at the end of the ramp; LIFT: the largest; its sign is that of the
-            motion to come [N m].
-        seconds: in which a ramp grows; SILENCE: that it lasts [s].
+        kind: kind of torque.
+        joint: pushed joint, 1-7; 0 = none.
+        torque: RAMP: torque at the end of the ramp; LIFT: largest torque; the sign is
+            that of the expected motion [N m].
+        seconds: duration of a ramp, or of SILENCE [s].
     """
 
     kind: ProofKind
@@ -47,40 +48,40 @@ class ProofGoal:
 
     @property
     def silence_ns(self) -> int:
-        """How long no position is asked for [ns]."""
+        """Time without position requests [ns]."""
         return round(self.seconds * NS_PER_S) if self.kind is ProofKind.SILENCE else 0
 
     @property
     def values(self) -> tuple[float, float, float, float]:
-        """The numbers in order."""
+        """The parameters as numbers, for another process."""
         return float(self.kind), float(self.joint), self.torque, self.seconds
 
     @classmethod
     def of(cls, values: Sequence[float]) -> "ProofGoal":
-        """Return the proof with these numbers."""
+        """Return the proof with these `values`."""
         kind, joint, torque, seconds = values[:4]
         return cls(ProofKind(int(kind)), int(joint), torque, seconds)
 
 
-PARTNERS = {2: 3, 3: 2, 5: 6, 6: 5}  # joints that two motors turn together
+PARTNERS = {2: 3, 3: 2, 5: 6, 6: 5}  # joints coupled by a differential
 
 
 @dataclass(frozen=True, slots=True)
 class ProofLimits:
-    """How far joints may go in a proof.
+    """Limits of the motion in a proof.
 
     Attributes:
-        rest: of each joint without torque [rad], seven.
-        reach: of the joint that is pushed; then it has moved [rad], seven.
-        aside: of every other joint [rad].
-        partner: of the other joint of the same two motors [rad]: where their friction
-            differs, one of them slides first and turns it.
-        lift_way: of a joint that is lifted [rad].
-        lift_speed: of it [rad/s].
-        beyond: of what is aimed at, on the way it is pushed [rad].
-        gravity: of each joint under its compensation, as a multiple of `rest`.
+        rest: travel of each joint without torque [rad], seven.
+        reach: travel at which the pushed joint counts as moved [rad], seven.
+        aside: travel of every other joint [rad].
+        partner: travel of the joint coupled by the differential [rad]: with unequal
+            friction one motor slides first and turns it.
+        lift_way: travel of a lifted joint [rad].
+        lift_speed: speed of a lifted joint [rad/s].
+        beyond: overshoot beyond the goal in the pushed direction [rad].
+        gravity: travel under gravity compensation as a multiple of `rest`.
         energy: kinetic energy of the arm [J].
-        silence: longest time that no position is asked for [s]: twice what a module may
+        silence: longest time without position requests [s]: twice the time a module may
             take to brake.
     """
 
@@ -96,23 +97,23 @@ class ProofLimits:
     silence: float = 0.3
 
     def aside_of(self, pushed: int, joint: int) -> float:
-        """Return how far joint 1-7 may go while another is pushed [rad]."""
+        """Return the travel limit of joint 1-7 while another is pushed [rad]."""
         return self.partner if PARTNERS.get(pushed) == joint else self.aside
 
     def ways(self, goal: ProofGoal) -> list[tuple[float, float]]:
-        """Return between which ways each joint may be [rad], from where it began."""
+        """Return the travel limits (low, high) of each joint from its start [rad]."""
         if goal.kind in (ProofKind.REST, ProofKind.SILENCE):
             return [(-way, way) for way in self.rest]
         if goal.kind is ProofKind.GRAVITY:
             return [(-self.gravity * way, self.gravity * way) for way in self.rest]
         i = goal.joint - 1
         asides = [self.aside_of(goal.joint, joint) for joint in range(1, 8)]
-        ways = [(-aside, aside) for aside in asides]
+        limits = [(-aside, aside) for aside in asides]
         reach = self.lift_way if goal.kind is ProofKind.LIFT else self.reach[i]
-        # The other way it may give as little as shows that it is the other way.
+        # In the wrong direction only the travel that detects the motion is allowed.
         low, high = -self.reach[i], reach + self.beyond
-        ways[i] = (low, high) if goal.torque > 0.0 else (-high, -low)
-        return ways
+        limits[i] = (low, high) if goal.torque > 0.0 else (-high, -low)
+        return limits
 
 
 PROOF_LIMITS = ProofLimits()

@@ -1,4 +1,4 @@
-"""What a process asks of the kernel to keep time, and what it was granted."""
+"""Real-time settings of a process: requests to the kernel and their results."""
 
 import ctypes
 import errno
@@ -15,21 +15,21 @@ _NEEDS = {
     "memory locked": "root, CAP_IPC_LOCK or `ulimit -l unlimited`",
     "processors awake": "root or a udev rule for /dev/cpu_dma_latency",
 }
-_LATENCY = Path("/dev/cpu_dma_latency")  # longest wake-up that is allowed [us]
+_LATENCY = Path("/dev/cpu_dma_latency")  # limit of the wake-up latency [us]
 _NO_SLEEP = struct.pack("=i", 0)
 
 
 @dataclass(frozen=True, slots=True)
 class RealtimeRequest:
-    """What a process would like.
+    """Requested real-time settings.
 
     Attributes:
-        priority: of SCHED_FIFO, 0 = ordinary scheduling.
-        core: processor to stay on; None = any.
-        nice: for ordinary scheduling.
-        is_locked: keep all memory resident and let no garbage collector run.
-        is_awake: let no processor sleep so deeply that it wakes late, as long as the
-            process lives; not asked of a kernel whose processors never sleep.
+        priority: SCHED_FIFO priority, 0 = normal scheduling.
+        core: core to be bound to; None = any.
+        nice: nice value for normal scheduling.
+        is_locked: lock all memory and disable the garbage collector.
+        is_awake: forbid deep sleep states of the processors while the process lives;
+            skipped if the kernel has no such interface.
     """
 
     priority: int = 0
@@ -41,7 +41,7 @@ class RealtimeRequest:
 
 @dataclass(frozen=True, slots=True)
 class Grant:
-    """One thing asked for: what, whether it was granted, why not."""
+    """Result of one request: name, whether granted, reason of a refusal."""
 
     what: str
     is_granted: bool
@@ -53,7 +53,7 @@ class Grant:
 
 
 def choose_cores() -> tuple[int | None, int | None]:
-    """Return (core of the loop, core of everything else); None where one is all."""
+    """Return (core of the loop, core of everything else); None if only one core."""
     if not hasattr(os, "sched_getaffinity"):
         return None, None
     cores = sorted(os.sched_getaffinity(0))
@@ -61,7 +61,7 @@ def choose_cores() -> tuple[int | None, int | None]:
 
 
 def request(wanted: RealtimeRequest) -> list[Grant]:
-    """Ask the kernel for what `wanted` says; what it refuses is in the answer."""
+    """Apply the settings `wanted`; refusals are part of the result."""
     grants: list[Grant] = []
     if wanted.core is not None:
         core = wanted.core
@@ -87,13 +87,13 @@ def request(wanted: RealtimeRequest) -> list[Grant]:
 
 
 def die_with_parent(signal_number: int) -> None:
-    """Let the kernel send this process a signal when its parent dies."""
+    """Send this process a signal when its parent dies."""
     pr_set_pdeathsig = 1
     ctypes.CDLL(None, use_errno=True).prctl(pr_set_pdeathsig, signal_number)
 
 
 def page_faults() -> int:
-    """Return how many pages this process had to wait for, minor ones included."""
+    """Return the number of page faults of this process, minor ones included."""
     import resource
 
     usage = resource.getrusage(resource.RUSAGE_SELF)
@@ -112,9 +112,9 @@ def _lock_memory() -> None:
 
 
 def _stay_awake() -> None:
-    """Ask for wake-ups without delay; the kernel forgets it with the descriptor.
+    """Request zero wake-up latency, in effect while the descriptor is open.
 
-    It stays open until the process ends, and no child inherits it.
+    The descriptor is left open until the process ends; children do not inherit it.
     """
     os.write(os.open(_LATENCY, os.O_WRONLY), _NO_SLEEP)
 

@@ -1,4 +1,4 @@
-"""States of the arm as one table: which event leads where from each of them."""
+"""State machine of the arm as one transition table."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,13 +9,12 @@ from acquisition.devices import SafetyMode
 
 
 class ArmState(IntEnum):
-    """What the arm is doing.
+    """State of the arm.
 
     IDLE: windings shorted, confirmed; the arm is damped and sinks. FLOAT: gravity
-    compensation and the virtual mass, as in a trial. HOLD: it stands still where it is.
-    DAMP: the same after a fault of motion. UNKNOWN: idle was asked for and is not
-    confirmed. GUIDE: it stands still with half the torque, for a hand that carries it
-    to the next trial.
+    compensation and virtual mass, as in a trial. HOLD: keeps its position. DAMP: the
+    same after a motion fault. UNKNOWN: idle was requested but not confirmed. GUIDE:
+    keeps its position with half the torque, to be led by hand to the next trial.
     """
 
     IDLE = 0
@@ -27,7 +26,7 @@ class ArmState(IntEnum):
 
 
 class ArmEvent(Enum):
-    """What can change the state of the arm."""
+    """Events that can change the state of the arm."""
 
     REQUEST_IDLE = "idle requested"
     REQUEST_FLOAT = "float requested"
@@ -60,11 +59,11 @@ VERDICTS: Mapping[Action, ArmEvent] = {
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """What an event does in a state.
+    """Effect of an event in a state.
 
     Attributes:
-        to: the state that is entered, possibly the same anew; None = nothing changes.
-        idles: the safety circuit is put to idle first; `IDLE_CONFIRMED` or
+        to: next state, possibly the same, which is entered again; None = no change.
+        idles: the safety circuit is idled first; `IDLE_CONFIRMED` or
             `IDLE_UNCONFIRMED` follows in the same cycle.
     """
 
@@ -82,27 +81,27 @@ def _always(transition: Transition) -> Mapping[ArmState, Transition]:
 
 
 def _only(to: ArmState, *states: ArmState) -> Mapping[ArmState, Transition]:
-    """Return the row of an event that leads to `to` from `states` and else nowhere."""
+    """Return the row of an event that leads to `to` from `states` only."""
     return {state: Transition(to) if state in states else _STAY for state in ArmState}
 
 
 _ROWS: Mapping[ArmEvent, Mapping[ArmState, Transition]] = {
     ArmEvent.REQUEST_IDLE: _always(_GO_IDLE),
-    # A state may be entered anew: the law then starts from the pose of this cycle.
+    # A state may be entered again: the law then starts from the present pose.
     ArmEvent.REQUEST_FLOAT: _always(Transition(ArmState.FLOAT)),
     ArmEvent.REQUEST_HOLD: _always(Transition(ArmState.HOLD)),
     ArmEvent.REQUEST_DAMP: _always(Transition(ArmState.DAMP)),
     ArmEvent.REQUEST_GUIDE: _always(Transition(ArmState.GUIDE)),
     ArmEvent.VERDICT_END_TRIAL: _always(_STAY),
-    # No verdict makes an earlier fault milder, and none gives an idle arm torques.
-    # Hold is entered from hold too: the arm may be moving by itself in it.
+    # A verdict never weakens an earlier reaction and never drives an idle arm.
+    # Hold is entered from hold, too, because it ends a move.
     ArmEvent.VERDICT_HOLD: _only(ArmState.HOLD, *_MOVABLE),
     ArmEvent.VERDICT_DAMP: _only(ArmState.DAMP, *_MOVABLE),
     ArmEvent.VERDICT_IDLE: _always(_GO_IDLE),
     ArmEvent.IDLE_CONFIRMED: _always(Transition(ArmState.IDLE)),
     ArmEvent.IDLE_UNCONFIRMED: _always(Transition(ArmState.UNKNOWN)),
-    # A late confirmation. While the arm is powered the guard judges the circuit.
-    # It idles anew: only then does zero torque replace what the pucks still have.
+    # Late confirmation of idle. (While the arm is powered the guard reacts to the
+    # circuit.) Idling again replaces the torques in the pucks by zero.
     ArmEvent.CIRCUIT_IDLE: {
         state: _GO_IDLE if state is ArmState.UNKNOWN else _STAY for state in ArmState
     },
@@ -113,7 +112,7 @@ TRANSITIONS: Mapping[tuple[ArmState, ArmEvent], Transition] = {
 
 
 def transition_lines() -> list[str]:
-    """Return the table for people: one line per pair, state by state."""
+    """Return the transition table as text, one line per state and event."""
     lines: list[str] = []
     for (state, event), transition in TRANSITIONS.items():
         result = "-"
@@ -127,15 +126,15 @@ def transition_lines() -> list[str]:
 
 @dataclass(slots=True)
 class ControlStatus:
-    """What the console sees of the loop.
+    """Status of the loop for the console.
 
     Attributes:
-        state: what the arm is doing.
-        safety: what the safety circuit says.
-        verdict: the strictest verdict that stands; None = none does.
+        state: state of the arm.
+        safety: state of the safety circuit.
+        verdict: strictest active verdict, or None.
         ft_age_ns: age of the force sample [ns].
-        number: how many verdicts there were; a request names the newest it knows.
-        others: the verdicts that stand besides, the strictest first.
+        number: number of verdicts so far; a request states the newest it knows.
+        others: other active verdicts, the strictest first.
     """
 
     state: ArmState = ArmState.IDLE
@@ -147,19 +146,16 @@ class ControlStatus:
 
     @property
     def standing(self) -> tuple[GuardVerdict, ...]:
-        """All verdicts that stand, the strictest first."""
+        """All active verdicts, the strictest first."""
         return () if self.verdict is None else (self.verdict, *self.others)
 
     @property
     def is_idled(self) -> bool:
-        """Whether a verdict stands that idles the arm."""
+        """Whether an active verdict idles the arm."""
         return any(verdict.action is Action.IDLE for verdict in self.standing)
 
     def latch(self, verdict: GuardVerdict) -> None:
-        """Let a verdict stand; a fault that stands already is not told again.
-
-        It is new where its fault stands not at all, or with a milder action.
-        """
+        """Activate a verdict unless its fault is active with at least its severity."""
         standing = self.standing
         if any(
             verdict.fault is other.fault and verdict.severity <= other.severity
@@ -167,7 +163,7 @@ class ControlStatus:
         ):
             return
         kept = [other for other in standing if other.fault is not verdict.fault]
-        # Sorting is stable, reversed too: of equally strict ones the earliest is first.
+        # reverse=True keeps the sort stable: of equally strict ones the earliest first.
         self.verdict, *others = sorted(
             [*kept, verdict], key=lambda v: v.strictness, reverse=True
         )
@@ -175,5 +171,5 @@ class ControlStatus:
         self.number += 1
 
     def clear(self) -> None:
-        """Let no verdict stand any more."""
+        """Clear all verdicts."""
         self.verdict, self.others = None, ()

@@ -1,4 +1,4 @@
-"""When what happened in each cycle, and what a series of cycles says of the loop."""
+"""Time stamps of each cycle and latency statistics of the loop."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -23,11 +23,11 @@ TIMING_DTYPE = np.dtype(
 )
 _TIMING: Final = struct_of(TIMING_DTYPE)
 QUANTILES = (50.0, 99.0, 99.9, 100.0)
-SLOW_EXCHANGE_NS = 1_300_000  # p99 of the seventh position; the cycle may not close
+SLOW_EXCHANGE_NS = 1_300_000  # p99 of the exchange above which cycles may overrun
 
 
 def pack_timing(tick: Tick, replies_ns: int, sent_ns: int, ended_ns: int) -> bytes:
-    """Return the bytes of one record of the buffer of timings."""
+    """Return the bytes of one timing record."""
     return _TIMING.pack(
         tick.number,
         tick.deadline_ns,
@@ -41,7 +41,7 @@ def pack_timing(tick: Tick, replies_ns: int, sent_ns: int, ended_ns: int) -> byt
 
 @dataclass(frozen=True, slots=True)
 class LatencyQuantiles:
-    """Quantiles of a time [us]: of 50, 99 and 99.9 percent, and the largest."""
+    """Quantiles of a time [us]: 50 %, 99 %, 99.9 % and maximum."""
 
     p50: float
     p99: float
@@ -51,17 +51,17 @@ class LatencyQuantiles:
 
 @dataclass(frozen=True, slots=True)
 class LoopReport:
-    """What a series of cycles says about the loop.
+    """Latencies of a series of cycles.
 
     Attributes:
-        cycles: cycles that ran.
-        missed: cycles that began late or were skipped.
-        rate: cycles per second [Hz].
-        late: wake-up after the deadline.
-        exchange: release to the seventh position; None if none was complete.
-        compute: last reply to torques handed over; None as above.
-        torque_out: release to torques handed over; None as above.
-        total: release to the end of the cycle.
+        cycles: number of cycles run.
+        missed: number of cycles that began late or were skipped.
+        rate: cycle rate [Hz].
+        late: deadline to wake-up.
+        exchange: wake-up to the last of seven positions; None if never complete.
+        compute: last reply to torques sent; None as above.
+        torque_out: deadline to torques sent; None as above.
+        total: deadline to the end of the cycle.
     """
 
     cycles: int
@@ -81,7 +81,7 @@ def spread(times_ns: NDArray[np.int64]) -> LatencyQuantiles:
 
 
 def loop_report(timings: Record) -> LoopReport | None:
-    """Return what the records of the buffer of timings say; None for fewer than two."""
+    """Return the latency report of timing records; None for fewer than two."""
     if len(timings) < 2:
         return None
     columns = {

@@ -1,8 +1,8 @@
-"""What the processes of a session share: ring buffers, slots, commands, requests.
+"""Communication of the processes of a session: ring buffers, slots, commands, requests.
 
-While the loop runs, processes meet only in one piece of shared memory (`layout`, made
-of `ring_buffer` and `latest_value`): the console sends `commands` by `loop_client`,
-`loop_server` obeys and publishes. Between trials they send each other `requests` over a
-socket pair; `child` spawns and watches them, `simulation` has what a simulated rig is
-asked for. Begin with `layout`.
+While the loop runs, processes communicate only through one block of shared memory
+(`layout`, made of `ring_buffer` and `latest_value`): the console sends `commands`
+through `loop_client`, `loop_server` executes them and publishes its status. Between
+trials they exchange `requests` over a socket pair; `child` spawns and monitors
+processes, `simulation` has the requests to a simulated rig. Begin with `layout`.
 """

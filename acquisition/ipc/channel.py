@@ -11,7 +11,7 @@ LARGEST = 64 << 20  # bytes of one message
 
 
 class ChannelClosedError(Exception):
-    """The other side has gone."""
+    """The peer has closed the channel."""
 
 
 class Channel:
@@ -23,12 +23,12 @@ class Channel:
     @classmethod
     def pair(cls) -> tuple["Channel", "Channel"]:
         """Return two connected ends."""
-        one, other = socket.socketpair(socket.AF_UNIX, socket.SOCK_STREAM)
-        return cls(one), cls(other)
+        first, second = socket.socketpair(socket.AF_UNIX, socket.SOCK_STREAM)
+        return cls(first), cls(second)
 
     @classmethod
     def adopt(cls, descriptor: int) -> "Channel":
-        """Return the end that was inherited as `descriptor`."""
+        """Return the end inherited as `descriptor`."""
         return cls(socket.socket(fileno=descriptor))
 
     def fileno(self) -> int:
@@ -36,14 +36,14 @@ class Channel:
         return self._socket.fileno()
 
     def is_readable(self, seconds: float = 0.0) -> bool:
-        """Return whether something arrives, or the other side leaves, in `seconds`."""
+        """Wait up to `seconds` for data or end of file; return whether there is any."""
         return bool(select.select([self._socket], [], [], seconds)[0])
 
     def send(self, value: object) -> None:
         """Send one value.
 
         Raises:
-            ChannelClosedError: the other side has gone.
+            ChannelClosedError: the peer has closed the channel.
         """
         data = json.dumps(value).encode()
         try:
@@ -55,21 +55,21 @@ class Channel:
         """Wait for one value and return it.
 
         Raises:
-            ChannelClosedError: the other side has gone, or sent no JSON.
+            ChannelClosedError: the peer has closed the channel, or sent invalid data.
         """
-        (length,) = _LENGTH.unpack(self._exactly(_LENGTH.size))
+        (length,) = _LENGTH.unpack(self._receive_exactly(_LENGTH.size))
         if length > LARGEST:
             raise ChannelClosedError
         try:
-            return json.loads(self._exactly(length))
+            return json.loads(self._receive_exactly(length))
         except ValueError as error:
             raise ChannelClosedError from error
 
     def close(self) -> None:
-        """Hang up."""
+        """Close this end."""
         self._socket.close()
 
-    def _exactly(self, size: int) -> bytes:
+    def _receive_exactly(self, size: int) -> bytes:
         parts: list[bytes] = []
         while size:
             try:

@@ -1,7 +1,7 @@
-"""Processes beside the console: spawned, watched, stopped; they die with it.
+"""Child processes of the console: start, supervision, stop; they end with it.
 
-A child is a new interpreter that inherits three descriptors - shared memory, channel,
-a file for its standard error - and nothing else: no terminal, no signals of its group.
+A child is a new interpreter that inherits three descriptors only - shared memory,
+channel, a file for its standard error - and neither terminal nor process group.
 """
 
 import ctypes
@@ -30,15 +30,15 @@ _START = (
     "from acquisition.ipc.child import main; main(sys.argv[2:])"
 )
 _RAISED = re.compile(r"[A-Za-z_][\w.]*(Error|Exception|Interrupt)\b")
-_STDERR_CHARACTERS = 4000  # characters of a child's standard error
-_PATIENCE = 3.0  # s a child gets to end by itself
+_STDERR_CHARACTERS = 4000  # characters kept of a child's standard error
+_PATIENCE = 3.0  # s for a child to end before it is killed
 
 
 class ProcessLostError(TractionError):
-    """A process beside the console ended unasked.
+    """A child process ended unexpectedly.
 
     Attributes:
-        name: which one.
+        name: name of the process.
     """
 
     exit_code = 4
@@ -54,12 +54,12 @@ class ProcessLostError(TractionError):
 
 @dataclass(frozen=True, slots=True)
 class ChildContext:
-    """What a child process gets at its start.
+    """Resources of a child process.
 
     Attributes:
-        shared: the shared memory.
-        channel: to the console.
-        settings: its configuration.
+        shared: shared memory.
+        channel: channel to the console.
+        settings: configuration of the child.
     """
 
     shared: SharedLayout
@@ -71,8 +71,8 @@ class Child:
     """A process that runs `module:function` with a `ChildContext`.
 
     Attributes:
-        name: what it is called in messages.
-        channel: to it.
+        name: name in messages.
+        channel: channel to the process.
     """
 
     def __init__(
@@ -102,20 +102,20 @@ class Child:
 
     @property
     def pid(self) -> int:
-        """Number of the process."""
+        """Process id."""
         return self._process.pid
 
     @property
     def is_alive(self) -> bool:
-        """Whether it runs."""
+        """Whether the process is running."""
         return self._process.poll() is None
 
     def ask(self, request: Request[Answer]) -> Answer:
-        """Return the answer of its `Dispatcher` to a request.
+        """Send a request to the process's `Dispatcher` and return the answer.
 
         Raises:
-            TractionError: what it raised.
-            ProcessLostError: it has ended.
+            TractionError: raised by the process.
+            ProcessLostError: the process has ended.
         """
         try:
             return ask(self.channel, request)
@@ -124,16 +124,16 @@ class Child:
             raise ProcessLostError(self.name, self.how_it_ended()) from None
 
     def how_it_ended(self) -> str:
-        """Return how it ended, in words: a signal, or the last line it wrote."""
+        """Return how the process ended: a signal, or its last error line."""
         code = self._process.poll()
         if code is not None and code < 0:
             return f"killed by {signal.Signals(-code).name}"
-        words = self.stderr_text().strip().splitlines()
-        raised = [line for line in words if _RAISED.match(line)]
-        return (raised or words or [f"exit code {code}"])[-1]
+        error_lines = self.stderr_text().strip().splitlines()
+        raised = [line for line in error_lines if _RAISED.match(line)]
+        return (raised or error_lines or [f"exit code {code}"])[-1]
 
     def stderr_text(self) -> str:
-        """Return the end of what it wrote to its standard error."""
+        """Return the tail of the process's standard error."""
         size = os.fstat(self._stderr).st_size
         start = max(0, size - _STDERR_CHARACTERS)
         return os.pread(self._stderr, _STDERR_CHARACTERS, start).decode(
@@ -141,7 +141,7 @@ class Child:
         )
 
     def stop(self) -> None:
-        """Hang up and wait until it ends; after 3 s it is killed. Safe to repeat."""
+        """Close the channel and wait for the end, kill after 3 s; idempotent."""
         self.channel.close()
         if not self._wait(_PATIENCE):
             self._process.kill()
@@ -159,11 +159,11 @@ class Child:
 
 
 def main(arguments: list[str]) -> None:
-    """Run one child: TARGET, descriptors of memory and channel, pid of the parent."""
+    """Entry point of a child: TARGET, memory and channel descriptors, parent's pid."""
     target, shared, channel, parent = arguments
     die_with_parent(signal.SIGTERM)
     if os.getppid() != int(parent):
-        return  # it died before the line above
+        return  # the parent died before die_with_parent
     module, function = target.split(":")
     run: Callable[[ChildContext], None] = getattr(
         importlib.import_module(module), function
@@ -179,6 +179,6 @@ def main(arguments: list[str]) -> None:
 
 
 def name_process(name: str) -> None:
-    """Call this process `name` (15 characters) where processes are listed."""
+    """Set the name of this process in process lists (15 characters)."""
     pr_set_name = 15
     ctypes.CDLL(None, use_errno=True).prctl(pr_set_name, name.encode()[:15], 0, 0, 0)

@@ -1,4 +1,4 @@
-"""Commands from the console to the loop, and the loop's answer: its status."""
+"""Commands from the console to the loop, and the loop's status."""
 
 import json
 import struct
@@ -15,7 +15,7 @@ from acquisition.ipc.latest_value import Slot
 from acquisition.ipc.ring_buffer import RingBuffer
 from acquisition.record_layout import struct_of
 
-_VALUES = 12  # numbers that a command has at most
+_VALUES = 12  # largest number of values of a command
 COMMAND_DTYPE = np.dtype(
     [("number", "<u8"), ("form", "<u8"), ("values", "<f8", (_VALUES,))]
 )
@@ -26,11 +26,11 @@ _NOTHING = (0.0,) * _VALUES
 
 @dataclass(frozen=True, slots=True)
 class EnterState:
-    """Go into a state of the arm; see `Cycle.request`.
+    """Request a state of the arm; see `Cycle.request`.
 
     Attributes:
-        state: wanted.
-        known: number of the newest verdict that the console knows.
+        state: requested state.
+        known: number of the newest verdict known to the console.
     """
 
     state: ArmState
@@ -39,7 +39,7 @@ class EnterState:
 
 @dataclass(frozen=True, slots=True)
 class AwaitActivation:
-    """Hold, until a person activates the arm; `known` as of `EnterState`."""
+    """Hold until a person activates the arm; `known` as in `EnterState`."""
 
     known: int
 
@@ -53,18 +53,18 @@ class WatchTrial:
 
 @dataclass(frozen=True, slots=True)
 class SetBias:
-    """Take `bias` for what the sensor reads without load [N, N m], six numbers."""
+    """Set the sensor's reading without load [N, N m], six numbers."""
 
     bias: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class MoveJoints:
-    """Go to joint positions.
+    """Move to joint positions.
 
     Attributes:
         goal: joint positions [rad], seven.
-        speed: that no joint exceeds [rad/s].
+        speed: joint speed limit [rad/s].
     """
 
     goal: tuple[float, ...]
@@ -73,14 +73,14 @@ class MoveJoints:
 
 @dataclass(frozen=True, slots=True)
 class GiveProof:
-    """Give the arm what `goal` says, in hold."""
+    """Start a proof, in hold."""
 
     goal: ProofGoal
 
 
 @dataclass(frozen=True, slots=True)
 class LeaveLoop:
-    """End the loop; the arm is idle by then, or is made so."""
+    """End the loop, with the arm idle."""
 
 
 Command = (
@@ -95,11 +95,11 @@ Command = (
 
 
 class PostedCommand(NamedTuple):
-    """A command as it was posted.
+    """A numbered command.
 
     Attributes:
-        number: counts the commands from 1; the status says which was obeyed last.
-        command: what is asked for.
+        number: sequence number from 1; the status reports the last one executed.
+        command: the command.
     """
 
     number: int
@@ -107,7 +107,7 @@ class PostedCommand(NamedTuple):
 
 
 class CommandQueue:
-    """Both ends of the commands; the console posts, the loop takes."""
+    """Command queue; the console posts, the loop takes."""
 
     def __init__(self, buffer: RingBuffer) -> None:
         self._buffer = buffer
@@ -115,7 +115,7 @@ class CommandQueue:
         self.posted = buffer.written
 
     def post(self, command: Command) -> int:
-        """Leave a command and return its number."""
+        """Post a command and return its number."""
         self.posted += 1
         form, values = _encode(command)
         padded = (*values, *_NOTHING[len(values) :])
@@ -123,7 +123,7 @@ class CommandQueue:
         return self.posted
 
     def take(self) -> list[PostedCommand]:
-        """Return the commands that have come since the last call, oldest first."""
+        """Return the commands posted since the last call, oldest first."""
         if not self._reader.backlog:
             return []
         return [
@@ -136,17 +136,17 @@ class CommandQueue:
 
 @dataclass(slots=True)
 class LoopStatus:
-    """What the console sees of the loop.
+    """Status of the loop for the console.
 
     Attributes:
-        obeyed: number of the last command that was obeyed.
-        is_running: the loop goes on.
-        bus_condition: what became of the arm's bus at the last question.
-        cycles: cycles run.
-        skipped: cycles that were skipped because one took too long.
+        obeyed: number of the last executed command.
+        is_running: the loop is running.
+        bus_condition: condition of the arm's bus at the last request.
+        cycles: number of cycles run.
+        skipped: cycles skipped after an overrun.
         late: cycles that began late.
-        worst_late_ns: the worst of them [ns].
-        control: state of the arm and the guard's verdict.
+        worst_late_ns: largest delay [ns].
+        control: state of the arm and the guard's verdicts.
     """
 
     obeyed: int = 0
@@ -190,7 +190,7 @@ class StatusSlot:
         self._slot.write(head + self._text)
 
     def read(self) -> LoopStatus:
-        """Return the newest status; the first one before the loop ran."""
+        """Return the newest status; defaults before the first cycle."""
         raw = self._slot.read()
         if len(raw) < _STATUS.size:
             return LoopStatus()
@@ -229,7 +229,7 @@ class StatusSlot:
 
 
 def _encode(command: Command) -> tuple[int, tuple[float, ...]]:
-    """Return the form of a command and its numbers."""
+    """Return type number and values of a command."""
     match command:
         case EnterState(state, known):
             return 1, (state, known)
@@ -248,7 +248,7 @@ def _encode(command: Command) -> tuple[int, tuple[float, ...]]:
 
 
 def _decode(form: int, values: tuple[float, ...]) -> Command:
-    """Return the command that `_encode` has written."""
+    """Return the command encoded by `_encode`."""
     match form:
         case 1:
             return EnterState(ArmState(int(values[0])), int(values[1]))

@@ -1,4 +1,4 @@
-"""The flight record: the last two seconds with raw frames, written on a fault."""
+"""Ring buffer of raw CAN frames for the flight record of a fault."""
 
 from collections.abc import Iterable
 from typing import Final
@@ -24,19 +24,17 @@ _FRAME: Final = struct_of(FRAME_DTYPE)
 
 
 class FrameTape:
-    """Writes the frames of the bus into a ring buffer that outlives its writer."""
+    """Writes the frames of the bus to a ring buffer that outlives its writer."""
 
     def __init__(self, buffer: RingBuffer, clock: Clock) -> None:
         self._clock = clock
         self._target = (buffer.counter, buffer.memory, *buffer.layout, _FRAME.pack_into)
 
     def add(self, frames: Iterable[tuple[int, bytes, int]]) -> None:
-        """Keep frames that were sent or arrived just now, oldest first.
-
-        The oldest on the tape are forgotten.
+        """Append frames just sent or received, oldest first; overwrites the oldest.
 
         Args:
-            frames: identifier, data and monotonic time [ns] of each, 0 = of now.
+            frames: (identifier, data, monotonic time [ns]), time 0 = now.
         """
         now_ns = self._clock.now_ns()
         counter, memory, slots, stride, pack_into = self._target
@@ -49,7 +47,7 @@ class FrameTape:
 
 
 def last_frames(buffer: RingBuffer, seconds: float = SECONDS) -> Record:
-    """Return the frames of the last `seconds` before the newest one, oldest first."""
+    """Return the frames of the `seconds` up to the newest one, oldest first."""
     frames = buffer.last(buffer.slots)
     if not len(frames):
         return frames

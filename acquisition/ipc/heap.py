@@ -1,12 +1,12 @@
-"""The heap of this process, given back to the kernel after a trial."""
+"""Return of free heap memory to the kernel after a trial."""
 
 import ctypes
 
 
 def give_back_heap() -> None:
-    """Return memory that is free to the kernel, where the C library can do so.
+    """Return free heap memory to the kernel, if the C library has malloc_trim.
 
-    What a finished trial has used would otherwise stay with its process in pieces.
+    Otherwise the fragmented heap of a finished trial stays with the process.
     """
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
     if trim is not None:

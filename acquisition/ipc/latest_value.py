@@ -1,20 +1,19 @@
-"""A slot with the latest value of something: one writer, any readers, no locks."""
+"""Shared slot with the latest value (a seqlock): one writer, any number of readers."""
 
 from acquisition.ipc.shared_memory import LINE
 
 _LENGTH_BYTES = 8
-_TRIES = 100  # a reader that is beaten this often takes what is there for nothing
+_TRIES = 100  # reads disturbed by the writer until the value counts as empty
 
 
 class Slot:
-    """The newest value of something, as bytes of changing length: one writer.
+    """Latest value as bytes of variable length.
 
-    A counter is odd while the value is being written; a reader looks at it before and
-    after.
+    A counter is odd during a write; a reader compares it before and after reading.
     """
 
     def __init__(self, memory: memoryview) -> None:
-        """Lay the slot over `memory`, whose size is the largest value plus 64."""
+        """Map the slot to `memory`, whose size is that of the largest value plus 64."""
         self._counter = memory[:8].cast("Q")
         self._length = memory[_LENGTH_BYTES : 2 * _LENGTH_BYTES].cast("Q")
         self._bytes = memory[LINE:]
@@ -28,7 +27,7 @@ class Slot:
         """Replace the value.
 
         Raises:
-            ValueError: it does not fit.
+            ValueError: the value is too long.
         """
         if len(value) > len(self._bytes):
             raise ValueError(f"{len(value)} bytes, the slot has {len(self._bytes)}")
@@ -39,7 +38,7 @@ class Slot:
         counter[0] += 1
 
     def read(self) -> bytes:
-        """Return the newest whole value; empty before the first one."""
+        """Return the latest complete value; empty before the first one."""
         for _ in range(_TRIES):
             before = self._counter[0]
             value = bytes(self._bytes[: self._length[0]])

@@ -1,7 +1,7 @@
-"""The shared memory of loop, recorder, sensor reader and console, laid out.
+"""Layout of the shared memory of loop, recorder, sensor reader and console.
 
-Memory is laid out once, here, so that a process which is given the descriptor finds
-everything in it. Each area has one writer.
+The layout is fixed, so that a process needs only the descriptor. Each area has one
+writer.
 """
 
 import zlib
@@ -23,7 +23,7 @@ WRENCH_SLOTS = 32_768  # 6.5 s of the fastest sensor
 
 
 class ProcessRole(IntEnum):
-    """Who shows by its beats that it is alive."""
+    """Process with a heartbeat."""
 
     CONSOLE = 0
     CONTROL = 1
@@ -32,17 +32,17 @@ class ProcessRole(IntEnum):
 
 
 class Heartbeats:
-    """When each process was last seen alive [monotonic ns], 0 = never."""
+    """Time of each process's last heartbeat [monotonic ns], 0 = never."""
 
     def __init__(self, memory: memoryview) -> None:
         self._times = memory.cast("Q")
 
     def beat(self, role: ProcessRole, now_ns: int) -> None:
-        """Note that `role` is alive now."""
+        """Set the heartbeat of `role`."""
         self._times[role] = now_ns
 
     def last_ns(self, role: ProcessRole) -> int:
-        """Return when `role` was last alive, 0 = never."""
+        """Return the last heartbeat of `role` [monotonic ns], 0 = never."""
         return self._times[role]
 
 
@@ -65,24 +65,24 @@ _AREAS: Mapping[str, int] = {  # in the order of the memory [bytes]
     **{name: lines(RingBuffer.size_of(*spec)) for name, spec in _BUFFERS.items()},
 }
 _SIZE = sum(_AREAS.values())
-# What tells one layout from another; it is never 0, which new memory is.
+# Checksum of the layout; never 0, which is the content of new memory.
 _IDENTITY = 1 + zlib.crc32(repr([(d.descr, n) for d, n in _BUFFERS.values()]).encode())
 
 
 class SharedLayout:
-    """The shared memory of one rig.
+    """Shared memory of one rig.
 
     Attributes:
-        memory: what it lies in.
+        memory: underlying memory.
         cycles: records of the loop (traction_msgs/Cycle).
-        wrenches: every sample of the wrist sensor.
-        frames: every frame of the bus.
-        timings: when what happened in each cycle.
-        commands: the console's commands to the loop.
-        status: state of the loop, newest value.
-        recorder: state of the recorder, newest value.
-        health: newest reports of the pucks.
-        heartbeats: who is alive.
+        wrenches: samples of the wrist sensor.
+        frames: frames of the bus.
+        timings: timing records of the cycles.
+        commands: commands of the console to the loop.
+        status: status of the loop, latest value.
+        recorder: status of the recorder, latest value.
+        health: metadata of the devices, latest value.
+        heartbeats: heartbeats of the processes.
     """
 
     def __init__(self, memory: SharedMemory) -> None:
@@ -112,11 +112,11 @@ class SharedLayout:
 
     @classmethod
     def of_process(cls, pid: int) -> "SharedLayout | None":
-        """Return the memory of a running process, to be read only; None for none.
+        """Return the memory of a running process, read-only; None if it has none.
 
         Raises:
-            PermissionError: the process belongs to somebody else.
-            LinkError: it runs another version of this program.
+            PermissionError: the process belongs to another user.
+            LinkError: the process runs another version of this program.
         """
         memory = SharedMemory.of_process(pid)
         if memory is None:
@@ -124,7 +124,7 @@ class SharedLayout:
         identity = memory.view[:8].cast("Q")[0]
         if len(memory.view) != _SIZE or identity != _IDENTITY:
             memory.close()
-            if not identity:  # it is being made
+            if not identity:  # being created
                 return None
             raise LinkError(
                 f"Process {pid} runs another version of this program.",
@@ -133,5 +133,5 @@ class SharedLayout:
         return cls(memory)
 
     def close(self) -> None:
-        """Give the descriptor back."""
+        """Close the descriptor."""
         self.memory.close()

@@ -1,4 +1,4 @@
-"""The console's side of the loop: let time pass, ask for states, see the newest."""
+"""Console side of the loop: advance time, send commands, read status and samples."""
 
 import json
 from collections.abc import Callable, Sequence
@@ -23,27 +23,27 @@ from acquisition.ipc.layout import ProcessRole, SharedLayout
 from acquisition.ipc.ring_buffer import RingBufferReader
 from acquisition.sample import Record
 
-PORTION = 10  # cycles between two looks of the console: 20 ms
+PORTION = 10  # cycles between two updates of the console: 20 ms
 
 
 class Advance(Protocol):
-    """How time passes for the console."""
+    """Function that lets time pass for the console."""
 
     def __call__(self, cycles: int) -> None:
-        """Return when `cycles` periods have passed.
+        """Return after `cycles` periods.
 
         Raises:
-            TractionError: the loop, the recorder or another process is in trouble.
+            TractionError: the loop, the recorder or another process has failed.
         """
         ...
 
 
 class LoopClient:
-    """What the console has of the loop, wherever it runs.
+    """Console's client of the loop, in this process or another.
 
     Attributes:
         advance_cycles: lets a number of cycles pass.
-        on_tick: called after every 20 ms that pass.
+        on_tick: functions called every 20 ms.
     """
 
     def __init__(
@@ -60,26 +60,26 @@ class LoopClient:
 
     @property
     def loop(self) -> LoopStatus:
-        """The loop's newest status."""
+        """Newest status of the loop."""
         return self._status_slot.read()
 
     @property
     def status(self) -> ControlStatus:
-        """State of the arm and the verdicts that stand."""
+        """State of the arm and the active verdicts."""
         loop = self.loop
         if loop.obeyed < self._asked and loop.control.number <= self._known:
-            loop.control.clear()  # known when the request was made
+            loop.control.clear()  # known at the request, about to be cleared by it
         return loop.control
 
     def note(self, control: ControlStatus) -> None:
-        """Take the verdicts of a status as known: they are told, or acted on.
+        """Mark the verdicts of a status as known (reported, or acted on).
 
-        The loop refuses a request for torques by who does not know the newest one.
+        The loop refuses a request for torques if the newest verdict is not known.
         """
         self._known = max(self._known, control.number)
 
     def is_news(self, control: ControlStatus) -> bool:
-        """Return whether a verdict stands that is not known yet."""
+        """Return whether an active verdict is not yet known."""
         return control.verdict is not None and control.number > self._known
 
     @property
@@ -88,30 +88,30 @@ class LoopClient:
         return self.loop.late
 
     def advance(self, seconds: float) -> None:
-        """Let `seconds` pass, at least one cycle; the loop sees that we are alive."""
-        left = max(1, round(seconds * NS_PER_S / PERIOD_NS))
-        while left > 0:
-            portion = min(left, PORTION)
+        """Let `seconds` pass, at least one cycle, with heartbeats to the loop."""
+        remaining = max(1, round(seconds * NS_PER_S / PERIOD_NS))
+        while remaining > 0:
+            portion = min(remaining, PORTION)
             self.beat()
             self.advance_cycles(portion)
-            left -= portion
-            for look in self.on_tick:
-                look()
+            remaining -= portion
+            for callback in self.on_tick:
+                callback()
 
     def beat(self) -> None:
-        """Show the loop that the console is alive."""
+        """Send a heartbeat of the console."""
         self._shared.heartbeats.beat(ProcessRole.CONSOLE, self._clock.now_ns())
 
     def request(self, state: ArmState) -> None:
-        """Ask the loop for a state of the arm; see `Cycle.request`."""
+        """Request a state of the arm; see `Cycle.request`."""
         self._asked = self._commands.post(EnterState(state, self._known))
 
     def start(self) -> None:
-        """Ask the loop to hold, until a person activates the arm; see `Cycle.start`."""
+        """Request hold until a person activates the arm; see `Cycle.start`."""
         self._asked = self._commands.post(AwaitActivation(self._known))
 
     def idle(self, seconds: float = 1.0) -> bool:
-        """Ask for idle and wait; return whether the arm is confirmed idle."""
+        """Request idle and wait; return whether idle is confirmed."""
         self.request(ArmState.IDLE)
         end_ns = self._clock.now_ns() + int(seconds * NS_PER_S)
         while self._clock.now_ns() < end_ns and self.loop.is_running:
@@ -122,18 +122,18 @@ class LoopClient:
         return self.status.state is ArmState.IDLE
 
     def move_to(self, goal: Sequence[float], speed: float) -> None:
-        """Ask for a move to joint positions `goal` [rad], seven; only in hold.
+        """Request a move to joint positions `goal` [rad], seven; only in hold.
 
-        No joint is faster than `speed` [rad/s] on the way.
+        `speed` limits all joints [rad/s].
         """
         self._asked = self._commands.post(MoveJoints(tuple(goal), speed))
 
     def prove(self, goal: ProofGoal) -> None:
-        """Ask for a proof, in hold."""
+        """Request a proof, in hold."""
         self._asked = self._commands.post(GiveProof(goal))
 
     def set_bias(self, bias: Sequence[float]) -> None:
-        """Tell the loop what the sensor reads without load [N, N m], six numbers."""
+        """Set the sensor's reading without load [N, N m], six numbers."""
         self._commands.post(SetBias(tuple(bias)))
 
     def watch_trial(self, *, is_recording: bool) -> None:
@@ -141,7 +141,7 @@ class LoopClient:
         self._commands.post(WatchTrial(is_recording))
 
     def leave(self) -> None:
-        """Ask the loop to end."""
+        """Request the end of the loop."""
         self._commands.post(LeaveLoop())
 
     def last(self, seconds: float) -> Record:

@@ -1,4 +1,4 @@
-"""The loop in shared memory: commands in, status and times out, others watched."""
+"""Loop side of the shared memory: executes commands, publishes status, supervises."""
 
 import json
 from collections.abc import Callable, Mapping
@@ -27,12 +27,12 @@ from acquisition.ipc.commands import (
 from acquisition.ipc.layout import ProcessRole, SharedLayout
 
 MS = 1_000_000
-SILENT_NS = 500 * MS  # of console or recorder: the arm holds
-LONELY_NS = 60_000 * MS  # of the console: a bell sounds for help
-ORPHAN_NS = 1_000 * MS  # an arm whose console has died holds this long, then goes idle
+SILENT_NS = 500 * MS  # without a heartbeat of console or recorder: hold
+LONELY_NS = 60_000 * MS  # without a heartbeat of the console: bell
+ORPHAN_NS = 1_000 * MS  # hold after the death of the console, then idle
 _FACTS_EVERY = _SOUND_EVERY = RATE_HZ  # cycles, once a second
 
-# Named once: to look a member of an Enum up takes longer than to compare it.
+# Bound once: an Enum member lookup takes longer than the comparison.
 _CONSOLE, _CONTROL, _RECORDER = (
     ProcessRole.CONSOLE,
     ProcessRole.CONTROL,
@@ -48,11 +48,11 @@ def no_sound() -> None:
 
 @dataclass(frozen=True, slots=True)
 class LoopHooks:
-    """What the loop knows of the machine it runs on.
+    """Services of the machine for the loop.
 
     Attributes:
-        now_ns: tells the monotonic time [ns].
-        metadata: what the devices say about themselves; asked once a second.
+        now_ns: returns the monotonic time [ns].
+        metadata: returns the metadata of the devices; called once a second.
         sound: sounds a bell for a person.
     """
 
@@ -62,10 +62,10 @@ class LoopHooks:
 
 
 class LoopServer:
-    """Wraps a cycle for the loop: obeys the commands, publishes, watches the others.
+    """Wraps a cycle: executes commands, publishes status, supervises other processes.
 
     Attributes:
-        is_over: the loop is to end after this cycle.
+        is_over: the loop must end after this cycle.
     """
 
     def __init__(
@@ -85,9 +85,9 @@ class LoopServer:
         self._orphaned_ns = 0
 
     def __call__(self, tick: Tick) -> None:
-        """Run one cycle with everything around it."""
+        """Execute commands, run one cycle, and publish its results."""
         for posted in self._commands.take():
-            self._obey(posted)
+            self._execute(posted)
         self._watch(tick.now_ns)
         self._cycle(tick)
         self._cycles += 1
@@ -96,11 +96,11 @@ class LoopServer:
         self._publish(tick)
 
     def leave(self) -> None:
-        """Say that the loop has ended."""
+        """Publish that the loop has ended."""
         self._status.is_running = False
         self._status_slot.write(self._status)
 
-    def _obey(self, posted: PostedCommand) -> None:
+    def _execute(self, posted: PostedCommand) -> None:
         cycle = self._cycle
         match posted.command:
             case EnterState(state, known):
@@ -124,11 +124,11 @@ class LoopServer:
         self._shared.health.write(json.dumps(dict(self._hooks.metadata())).encode())
 
     def orphan(self) -> None:
-        """The console's process has died: hold, idle and end by itself."""
+        """React to the death of the console: hold, then idle, then end the loop."""
         self._is_orphaned = True
 
     def _watch(self, now_ns: int) -> None:
-        """Stop the arm when those who look after it have gone."""
+        """Stop the arm if console or recorder miss their heartbeat."""
         heartbeats = self._shared.heartbeats
         console_ns = now_ns - heartbeats.last_ns(_CONSOLE)
         if console_ns > SILENT_NS:
@@ -144,7 +144,7 @@ class LoopServer:
             self._idle_alone(now_ns)
 
     def _idle_alone(self, now_ns: int) -> None:
-        """Nobody will ever ask for anything again: hold, then idle, then end."""
+        """Hold, then idle the arm and end the loop, without a console."""
         if not self._orphaned_ns:
             self._orphaned_ns = now_ns
             self._cycle.report(verdict_for(Fault.CONSOLE_LOST))

@@ -1,11 +1,10 @@
 """Requests between processes: typed messages as JSON over a `Channel`, never pickled.
 
-For what happens between trials; nothing here belongs into a running loop.
+For use between trials only, not in a running loop.
 
-A request is a dataclass: its fields are all that is sent, and `Request[X]` says that it
-is answered by an X. A `Dispatcher` is the table of the requests that a process answers,
-each with the function that carries it out. Fields and answers are checked against their
-types on both sides.
+A request is a dataclass whose fields are sent; a `Request[X]` has an answer of type X.
+A `Dispatcher` maps the requests that a process answers to functions. Fields and answers
+are validated against their types on both sides.
 """
 
 from collections.abc import Callable, Mapping
@@ -26,28 +25,28 @@ Handlers = Mapping[type["Request[Any]"], Callable[..., object]]
 
 
 class RequestError(TractionError):
-    """A request that the other side does not answer, or not with these fields."""
+    """An unknown request, or one with invalid fields."""
 
 
 class Request(Generic[Answer]):
-    """What is asked of another process; derived classes are frozen dataclasses."""
+    """Base of requests to another process; subclasses are frozen dataclasses."""
 
     __slots__ = ()
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")
 
 
 class Dispatcher:
-    """Carries requests out: the table of what is answered, and by which function."""
+    """Table of the requests that a process answers, with their functions."""
 
     def __init__(self, *tables: Handlers) -> None:
-        """Join tables.
+        """Merge tables.
 
         Args:
-            tables: functions by the requests that they carry out; each takes the
-                fields of its request, in their order.
+            tables: functions by request class; each takes the fields of its request in
+                order.
 
         Raises:
-            ValueError: two requests have one name.
+            ValueError: two requests have the same name.
         """
         self._handlers: dict[str, tuple[type[Request[Any]], Callable[..., Any]]] = {}
         for request, handler in (row for table in tables for row in table.items()):
@@ -56,19 +55,19 @@ class Dispatcher:
             self._handlers[request.__name__] = request, handler
 
     def carry_out(self, request: Request[Answer]) -> Answer:
-        """Return the answer to a request of this thread.
+        """Execute a request of this process and return the answer.
 
         Raises:
-            RequestError: it is not in the table.
+            RequestError: the request is not in the table.
         """
         _, handler = self._row(type(request).__name__)
         return handler(*_values_of(request))
 
     def answer(self, channel: Channel) -> None:
-        """Wait for one request and answer it; errors a person can understand too.
+        """Wait for one request and send the answer or a TractionError.
 
         Raises:
-            ChannelClosedError: the other side has gone.
+            ChannelClosedError: the peer has closed the channel.
         """
         sent = channel.receive()
         try:
@@ -78,7 +77,7 @@ class Dispatcher:
         channel.send({"value": value, "error": error})
 
     def _answer(self, sent: object) -> object:
-        """Carry out what has arrived; return the answer as a JSON value."""
+        """Execute a received request; return the answer as a JSON value."""
         try:
             name, values = _SENT.validate_python(sent)
             kind, handler = self._row(name)
@@ -95,11 +94,11 @@ class Dispatcher:
 
 
 def ask(channel: Channel, request: Request[Answer]) -> Answer:
-    """Send a request to the `Dispatcher` behind `channel` and return its answer.
+    """Send a request to the `Dispatcher` behind `channel` and return the answer.
 
     Raises:
-        TractionError: what the other side raised.
-        ChannelClosedError: the other side has gone.
+        TractionError: raised by the peer.
+        ChannelClosedError: the peer has closed the channel.
     """
     kind = type(request)
     channel.send([kind.__name__, _adapter(kind).dump_python(request, mode="json")])
@@ -119,13 +118,13 @@ def _adapter(kind: Any) -> TypeAdapter[Any]:  # noqa: ANN401 - any type
 
 
 def _answer_adapter(kind: type[Request[Any]]) -> TypeAdapter[Any]:
-    """Return what checks and converts the X of a `Request[X]`."""
+    """Return the adapter for the answer type X of a `Request[X]`."""
     (base,) = kind.__orig_bases__  # pyright: ignore[reportAttributeAccessIssue, reportUnknownMemberType, reportUnknownVariableType]
     return _adapter(get_args(base)[0])
 
 
 def _encode_error(error: TractionError) -> dict[str, str]:
-    told = {
+    fields = {
         "type": type(error).__name__,
         "message": error.message,
         "hint": error.hint,
@@ -133,8 +132,8 @@ def _encode_error(error: TractionError) -> dict[str, str]:
         "saved": error.saved,
     }
     if isinstance(error, TrialFileError):
-        told["path"], told["reason"] = str(error.path), error.reason
-    return told
+        fields["path"], fields["reason"] = str(error.path), error.reason
+    return fields
 
 
 def _decode_error(fields: Mapping[str, str]) -> TractionError:

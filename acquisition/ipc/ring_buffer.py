@@ -1,7 +1,7 @@
-"""A ring buffer of records for one writer and any number of readers, without locks.
+"""Lock-free ring buffer of records for one writer and any number of readers.
 
-A record is written before the counter is raised, so a reader never takes one that is
-half written; what the writer has overwritten is counted as lost.
+A record is written before the counter is incremented, so a reader never sees a partial
+record; overwritten records count as lost.
 """
 
 import numpy as np
@@ -13,19 +13,20 @@ LayoutType = np.dtype[np.void]
 
 
 class RingBuffer:
-    """Fixed records in memory that may be shared: a ring with one writer, any readers.
+    """Ring buffer of fixed-size records in possibly shared memory.
 
-    The record being written is never handed out, so `slots - 1` records can be read.
+    The slot being written is never read, so `slots - 1` records are available.
 
     Attributes:
-        slots: number of slots for records; record n goes to slot n % slots.
-        layout: number of slots, and bytes from one to the next.
-        memory: the slots, for a writer that packs its records there.
-        counter: one number, of records written: a writer raises it behind each record.
+        slots: number of slots; record n is in slot n % slots.
+        layout: number of slots and their stride [bytes].
+        memory: memory of the slots, for a writer that packs records in place.
+        counter: number of records written, shape (1,); the writer increments it after
+            each record.
     """
 
     def __init__(self, memory: memoryview, dtype: LayoutType, slots: int) -> None:
-        """Lay the buffer over `memory` of at least `size_of(dtype, slots)` bytes."""
+        """Map the buffer to `memory` of at least `size_of(dtype, slots)` bytes."""
         self.slots = slots
         self._size = dtype.itemsize
         self._stride = lines(dtype.itemsize)
@@ -38,7 +39,7 @@ class RingBuffer:
 
     @staticmethod
     def size_of(dtype: LayoutType, slots: int) -> int:
-        """Return how much memory such a buffer needs [bytes]."""
+        """Return the size of the memory of such a buffer [bytes]."""
         return LINE + slots * lines(dtype.itemsize)
 
     @property
@@ -59,11 +60,11 @@ class RingBuffer:
         return RingBufferReader(self)
 
     def since(self, position: int) -> tuple[Record, int]:
-        """Return (records from `position` on, number lost because overwritten)."""
+        """Return (records from `position` on, number of overwritten ones)."""
         end = self.written
         start = min(end, max(position, end - self.slots + 1))
         records = self._records[np.arange(start, end) % self.slots]
-        # While they were copied the writer may have come round.
+        # The writer may have overwritten some during the copy.
         intact = self.written - self.slots + 1
         if intact > start:
             records = records[intact - start :]
@@ -71,15 +72,15 @@ class RingBuffer:
         return records, start - position
 
     def last(self, count: int) -> Record:
-        """Return the newest records, `count` at most, oldest first."""
+        """Return up to `count` newest records, oldest first."""
         return self.since(max(0, self.written - count))[0]
 
 
 class RingBufferReader:
-    """Reads a ring buffer from where it last stopped.
+    """Sequential reader of a ring buffer.
 
     Attributes:
-        lost: records that were overwritten before they were read.
+        lost: number of records overwritten before they were read.
     """
 
     def __init__(self, buffer: RingBuffer) -> None:
@@ -89,16 +90,16 @@ class RingBufferReader:
 
     @property
     def backlog(self) -> int:
-        """Records that have been written and not read."""
+        """Number of unread records."""
         return self._buffer.written - self._position
 
     def rewind(self, records: int) -> None:
-        """Go back so that the next read begins `records` records earlier."""
+        """Move the read position back by up to `records` records."""
         oldest = max(0, self._buffer.written - self._buffer.slots + 1)
         self._position = max(oldest, self._position - records)
 
     def read(self) -> Record:
-        """Return every record that is new, in order; counts what was lost."""
+        """Return all new records in order; counts lost ones."""
         records, lost = self._buffer.since(self._position)
         self._position += len(records) + lost
         self.lost += lost

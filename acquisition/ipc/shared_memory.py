@@ -1,9 +1,9 @@
-"""Memory that processes share: how it is found, sized, and which machines may.
+"""Shared memory of processes: allocation, lookup, and the supported machines.
 
-Ring buffers and latest-value slots in it have one writer and no locks: the payload is
-written before the counter. That order of stores is kept between processors by x86
-alone: on other machines, ARM among them, a counter may be seen before its record.
-Processes are refused there; a rig in one thread has no second processor to mind.
+Ring buffers and latest-value slots have one writer and no locks: the payload is written
+before the counter. Only x86 keeps the order of stores between processors; on others,
+such as ARM, a counter may become visible before its record. Processes are refused
+there; a rig in one thread is not affected.
 """
 
 import mmap
@@ -19,7 +19,7 @@ LINE = 64  # bytes of a cache line
 ORDERED_MACHINES = frozenset({"x86_64", "AMD64", "i386", "i686"})
 _STEPPED = "Simulations run here with --fake, without --processes."
 _MEMORY_NAME = "traction"
-_MEMORY_LINK = f"/memfd:{_MEMORY_NAME} (deleted)"  # as /proc shows it
+_MEMORY_LINK = f"/memfd:{_MEMORY_NAME} (deleted)"  # link target in /proc/PID/fd
 
 
 def lines(size: int) -> int:
@@ -28,10 +28,10 @@ def lines(size: int) -> int:
 
 
 def require_ordered_stores() -> None:
-    """Refuse a system without what processes need, or whose stores may be reordered.
+    """Refuse a system without memfd, or with weakly ordered stores.
 
     Raises:
-        PreflightError: it is no Linux, or no x86.
+        PreflightError: not Linux, or not x86.
     """
     if not hasattr(os, "memfd_create"):
         raise PreflightError(
@@ -51,7 +51,7 @@ def require_ordered_stores() -> None:
 
 
 def _anonymous_file() -> int:
-    """Return the descriptor of an empty file in memory, or of one without a name."""
+    """Return the descriptor of an empty anonymous file."""
     if hasattr(os, "memfd_create"):
         return os.memfd_create(_MEMORY_NAME, os.MFD_CLOEXEC)
     with tempfile.TemporaryFile() as file:
@@ -59,18 +59,18 @@ def _anonymous_file() -> int:
 
 
 class SharedMemory:
-    """A mapped file in memory without a name; it is gone with its last user.
+    """A mapped anonymous file in memory, freed with its last user.
 
-    A child gets the descriptor, never a name, so nobody else can open it and nothing
-    is left in /dev/shm when every process is killed.
+    A child inherits the descriptor; without a name nothing is left in /dev/shm even if
+    every process is killed.
 
     Attributes:
-        descriptor: of the file, to be inherited by a child.
-        view: the memory itself, writable unless it was only looked up.
+        descriptor: descriptor of the file, to be inherited by a child.
+        view: the memory; read-only if of another process.
     """
 
     def __init__(self, descriptor: int, *, is_writable: bool = True) -> None:
-        """Map the file behind `descriptor`, which belongs to this object now."""
+        """Map the file of `descriptor` and take ownership of it."""
         self.descriptor = descriptor
         access = mmap.ACCESS_WRITE if is_writable else mmap.ACCESS_READ
         size = os.fstat(descriptor).st_size
@@ -86,37 +86,37 @@ class SharedMemory:
 
     @classmethod
     def of_process(cls, pid: int) -> "SharedMemory | None":
-        """Return the memory of another process of the same user, to be read only.
+        """Return the memory of another process of the same user, read-only.
 
-        It is opened anew, for reading, through /proc: nothing is asked of its owner,
-        and nothing can be written. Of several it is the newest. None where the process
-        has none, or has gone.
+        The file is opened for reading through /proc/PID/fd, without the help of its
+        owner; the newest if there are several. None if the process has none or has
+        ended.
 
         Raises:
-            PermissionError: the process belongs to somebody else.
+            PermissionError: the process belongs to another user.
         """
         folder = Path(f"/proc/{pid}/fd")
-        found: list[tuple[int, int, Path]] = []
+        candidates: list[tuple[int, int, Path]] = []
         with suppress(FileNotFoundError, ProcessLookupError):
             for link in folder.iterdir():
                 with suppress(FileNotFoundError):
                     if os.readlink(link) == _MEMORY_LINK:  # noqa: PTH115
-                        made_ns = link.stat().st_ctime_ns
-                        found.append((made_ns, int(link.name), link))
-            if found:
-                *_, link = max(found)
+                        created_ns = link.stat().st_ctime_ns
+                        candidates.append((created_ns, int(link.name), link))
+            if candidates:
+                *_, link = max(candidates)
                 descriptor = os.open(link, os.O_RDONLY | os.O_CLOEXEC)
                 if os.fstat(descriptor).st_size:
                     return cls(descriptor, is_writable=False)
-                os.close(descriptor)  # it is being made
+                os.close(descriptor)  # being created
         return None
 
     def touch(self) -> None:
-        """Look at every page, so that none has to be waited for later."""
+        """Read every page once, to avoid page faults later."""
         bytes(self.view[:: mmap.PAGESIZE])
 
     def close(self) -> None:
-        """Close the descriptor; views of the memory stay valid until they are gone."""
+        """Close the descriptor; existing views of the memory stay valid."""
         if self.descriptor >= 0:
             os.close(self.descriptor)
             self.descriptor = -1

@@ -1,4 +1,4 @@
-"""A wrist sensor that another process reads, as the loop sees it."""
+"""Wrist sensor read by another process, through shared memory."""
 
 from typing import Final
 
@@ -23,35 +23,35 @@ _WRENCH: Final = struct_of(WRENCH_DTYPE)
 
 
 class SharedSensor:
-    """Takes samples from shared memory; is an `acquisition.devices.WrenchSensor`."""
+    """Samples from shared memory; implements `acquisition.devices.WrenchSensor`."""
 
     def __init__(self, buffer: RingBuffer) -> None:
         self._reader = buffer.reader()
 
     def open(self) -> None:
-        """Do nothing: the process that has the port has opened it."""
+        """Do nothing: the reader process has opened the port."""
 
     def poll(self, now_ns: int) -> list[WrenchSample]:
-        """Return every sample since the last call, oldest first."""
+        """Return the samples since the last call, oldest first."""
         del now_ns
         if not self._reader.backlog:
             return []
         return unpack_wrenches(self._reader.read())
 
     def describe(self) -> dict[str, str]:
-        """Return nothing: the process that has the port knows."""
+        """Return nothing: the reader process has the description."""
         return {}
 
     def stream_metadata(self) -> dict[str, str]:
-        """Return nothing: the process that has the port knows."""
+        """Return nothing: the reader process has the counters."""
         return {}
 
     def close(self) -> None:
-        """Do nothing: the process that has the port closes it."""
+        """Do nothing: the reader process closes the port."""
 
 
 def publish(samples: list[WrenchSample], buffer: RingBuffer) -> None:
-    """Write samples into a ring buffer, oldest first."""
+    """Write samples to a ring buffer, oldest first."""
     for sample in samples:
         buffer.write(pack_wrench(sample))
 

@@ -1,4 +1,4 @@
-"""A simulated rig in another process: what is asked of it, and both ends of that."""
+"""Requests to a simulated rig in another process, with handlers and client."""
 
 import base64
 from collections.abc import Callable, Sequence
@@ -18,12 +18,12 @@ Side = Literal["low", "high"]
 
 @dataclass(frozen=True, slots=True)
 class AskDevices(Request[ServedDevices]):
-    """Where can the devices be reached?"""
+    """Request the addresses of the devices."""
 
 
 @dataclass(frozen=True, slots=True)
 class OrderHand(Request[None]):
-    """Let the hand do something that needs no number; see `SimulationControl`."""
+    """Start an action of the hand without parameters; see `SimulationControl`."""
 
     order: Order
 
@@ -112,9 +112,9 @@ class ClearFaults(Request[None]):
 
 @dataclass(frozen=True, slots=True)
 class TakeTruth(Request[str]):
-    """Take the oldest records of the truth that were not taken yet, as base64.
+    """Take the oldest unread truth records, as base64; empty at the end.
 
-    They are few, or the bus of the simulation would wait meanwhile; none ends them.
+    The number is limited, because the simulated bus waits meanwhile.
     """
 
 
@@ -131,11 +131,11 @@ class AskFriction(Request[dict[str, list[float]]]):
 def simulation_handlers(
     simulation: SimulationControl, truth_part: Callable[[], Record]
 ) -> Handlers:
-    """Return what carries the requests out, all but `AskDevices`.
+    """Return the handlers of all requests except `AskDevices`.
 
     Args:
-        simulation: that of this process.
-        truth_part: returns a few traction_msgs/Truth records that were not taken yet.
+        simulation: simulation in this process.
+        truth_part: returns the next few unread traction_msgs/Truth records.
     """
     orders: dict[Order, Callable[[], None]] = {
         "lift": simulation.lift,
@@ -173,7 +173,7 @@ def simulation_handlers(
 
 
 class Asks(Protocol):
-    """Sends a request and returns its answer, e.g. `Child.ask`."""
+    """Function that sends a request and returns its answer, e.g. `Child.ask`."""
 
     def __call__(self, request: Request[Answer], /) -> Answer:
         """Return the answer."""
@@ -188,24 +188,24 @@ class RemoteSimulation:
 
     @property
     def is_hand_done(self) -> bool:
-        """Whether the hand has come to the end of its last order."""
+        """Whether the hand has finished its last action."""
         return self._ask(AskHandDone())
 
     def pose(self, q: Sequence[float], seconds: float) -> None:
-        """Let two hands bring the joints truly to `q` [rad] in `seconds`."""
-        self._ask(PoseArm([float(each) for each in q], seconds))
+        """Bring the joints to the true positions `q` [rad] in `seconds`."""
+        self._ask(PoseArm([float(value) for value in q], seconds))
 
     def turn_to_stop(self, joint: int, side: Side) -> None:
-        """Let two hands turn joint 1-7 until its stop bears, and hold it there."""
+        """Turn joint 1-7 against its mechanical stop and hold it there."""
         self._ask(TurnToStop(joint, side))
 
     def hang(self, mass: float) -> None:
-        """Hang `mass` [kg] on a string from the centre of the sole; 0 = nothing."""
+        """Hang `mass` [kg] on a string from the centre of the sole; 0 removes it."""
         self._ask(HangMass(mass))
 
     def push_with(self, force: Sequence[float], seconds: float) -> None:
         """Push the sole with `force` [N], base frame, for `seconds`."""
-        self._ask(PushFoot([float(each) for each in force], seconds))
+        self._ask(PushFoot([float(value) for value in force], seconds))
 
     def twist(self, torque: float, seconds: float) -> None:
         """Twist the foot about joint 7 with `torque` [N m] for `seconds`."""
@@ -216,31 +216,31 @@ class RemoteSimulation:
         self._ask(RakeGround(trial))
 
     def lift(self) -> None:
-        """Let the hand lift the foot above the far end."""
+        """Lift the foot above the far end."""
         self._ask(OrderHand("lift"))
 
     def rest(self) -> None:
-        """Let the hand stop pushing and lie on the arm."""
+        """Stop pushing; the hand rests on the arm."""
         self._ask(OrderHand("rest"))
 
     def take(self) -> None:
-        """Let the hand take the arm where it is and hold it there."""
+        """Grasp the arm and hold it in place."""
         self._ask(OrderHand("take"))
 
     def let_go(self) -> None:
-        """Let the hand let go of the arm."""
+        """Release the arm."""
         self._ask(OrderHand("let_go"))
 
     def put_down(self) -> None:
-        """Let the hand put the foot down at the far end."""
+        """Put the foot down at the far end."""
         self._ask(OrderHand("put_down"))
 
     def touch(self, number: int) -> None:
-        """Let the hand touch the ground: the corners 1 to 4, then points between."""
+        """Touch the ground: corners 1 to 4, then points in between."""
         self._ask(TouchGround(number))
 
     def push(self) -> None:
-        """Let the hand push the foot across; the truth is written from here on."""
+        """Push the foot across the container; truth is recorded from now on."""
         self._ask(OrderHand("push"))
 
     def pendant(self, button: PendantAction) -> None:
@@ -249,15 +249,15 @@ class RemoteSimulation:
 
     @property
     def fault_names(self) -> tuple[str, ...]:
-        """Names that `inject` knows."""
+        """Names of the faults for `inject`."""
         return self._ask(AskFaults())
 
     def inject(self, fault: str) -> None:
-        """Let a device fail."""
+        """Inject a fault."""
         self._ask(InjectFault(fault))
 
     def clear_faults(self) -> None:
-        """End every fault that can be ended without the arm."""
+        """Clear the faults that do not need a restart of the arm."""
         self._ask(ClearFaults())
 
     def take_truth(self) -> Record:
@@ -268,9 +268,9 @@ class RemoteSimulation:
         return np.frombuffer(bytearray(parts), TRUTH.dtype)
 
     def parameters(self) -> dict[str, str]:
-        """Return the true parameters of the ground, and what moves the arm."""
+        """Return the true parameters of ground, arm and hand."""
         return self._ask(AskGround())
 
     def friction(self) -> dict[str, list[float]]:
-        """Return the true friction of the seven motors, by the names of its model."""
+        """Return the true friction parameters of the seven motors, by name."""
         return self._ask(AskFriction())

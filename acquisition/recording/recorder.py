@@ -1,4 +1,4 @@
-"""The recorder: drains the shared memory into a trial file, every 20 ms."""
+"""Recorder: drains the shared memory to a trial file every 20 ms."""
 
 import contextlib
 import json
@@ -23,12 +23,12 @@ from acquisition.trial_file.writer import (
 )
 
 FLUSH_NS = 250_000_000
-_BATCH_NS = 20_000_000  # of sensor samples or frames in one message
-PRE_ROLL = 1.0  # what is kept from before the trigger [s]
+_BATCH_NS = 20_000_000  # time span of the samples or frames in one message
+PRE_ROLL = 1.0  # recorded time before the trigger [s]
 
 
 class TrialRecording(Protocol):
-    """What the console asks of a recorder, here or in a process of its own."""
+    """Interface of a recorder, in this process or another."""
 
     @property
     def is_recording(self) -> bool:
@@ -37,31 +37,31 @@ class TrialRecording(Protocol):
 
     @property
     def largest_backlog(self) -> int:
-        """Cycles that waited at most since the trial began."""
+        """Largest number of unwritten cycles since the trial began."""
         ...
 
     def start(self, path: Path, header: TrialHeader) -> None:
         """Begin a file with the last second of samples.
 
         Raises:
-            TrialFileError: it exists or cannot be written.
+            TrialFileError: the file exists or cannot be written.
         """
         ...
 
     def event(self, level: int, name: str, text: str) -> None:
-        """Write an event of now into the file, if one is open."""
+        """Write an event with the present time, if a file is open."""
         ...
 
     def finish(self, stop_reason: str) -> VerifiedFile:
         """End, verify and publish the file.
 
         Raises:
-            TrialFileError: it could not be written or verified; it keeps `.partial`.
+            TrialFileError: writing or verification failed; the file keeps `.partial`.
         """
         ...
 
     def abandon(self) -> None:
-        """Stop recording; what there is goes to the disk and stays as `.partial`."""
+        """Stop recording; the data so far are kept as `.partial`."""
         ...
 
 
@@ -71,8 +71,8 @@ class Recorder:
     `drain` is called every 20 ms or so.
 
     Attributes:
-        failure: why the last file could not be written; None = nothing failed.
-        largest_backlog: cycles that waited at most since the trial began.
+        failure: error of the last file, or None.
+        largest_backlog: largest number of unwritten cycles since the trial began.
     """
 
     def __init__(self, shared: SharedLayout, clock: Clock) -> None:
@@ -109,35 +109,37 @@ class Recorder:
             reader.read()
             reader.lost = 0
         self._cycles.rewind(int(PRE_ROLL * RATE_HZ))
-        self._wrenches.rewind(_since(self._shared.wrenches.last(8192), earliest_ns))
-        self._frames.rewind(_since(self._shared.frames.last(8192), earliest_ns))
+        self._wrenches.rewind(
+            _count_since(self._shared.wrenches.last(8192), earliest_ns)
+        )
+        self._frames.rewind(_count_since(self._shared.frames.last(8192), earliest_ns))
         self.largest_backlog = 0
         self._flushed_ns = now_ns
         self.failure = None
         self._writer = writer
 
     def drain(self) -> None:
-        """Write what is new and force it to the disk every 0.25 s; show being alive.
+        """Write new data, flush every 0.25 s, and send a heartbeat.
 
-        A file that cannot be written is left as `.partial`; see `failure`.
+        After an error the file is left as `.partial`; see `failure`.
         """
         if self._writer is not None:
             try:
                 self._write_new(self._writer)
             except TrialFileError as error:
                 self.failure = error
-                self._let_go()
+                self._close_partial()
         self._shared.heartbeats.beat(ProcessRole.RECORDER, self._clock.now_ns())
 
     def event(self, level: int, name: str, text: str) -> None:
-        """Write an event of now into the file, if one is open."""
+        """Write an event with the present time, if a file is open."""
         if self._writer is None:
             return
         try:
             self._writer.write_event(self._clock.now_ns(), level, name, text)
         except TrialFileError as error:
             self.failure = error
-            self._let_go()
+            self._close_partial()
 
     def finish(self, stop_reason: str) -> VerifiedFile:
         """End, verify and publish the file; see `seal`."""
@@ -152,23 +154,23 @@ class Recorder:
             return seal(writer, stop_reason)
 
     def abandon(self) -> None:
-        """Stop recording; what there is goes to the disk and stays as `.partial`."""
+        """Stop recording; the data so far are kept as `.partial`."""
         writer = self._writer
         if writer is not None:
             with contextlib.suppress(TrialFileError):
                 self._write_new(writer)
                 writer.flush()
-            self._let_go()
+            self._close_partial()
 
-    def _let_go(self) -> None:
-        """Leave the file as it stands."""
+    def _close_partial(self) -> None:
+        """Close the file as `.partial`."""
         if self._writer is not None:
             self._writer.close_partial()
             self._writer = None
             self._claim.close()
 
     def publish_state(self) -> None:
-        """Write to the shared memory how the recorder is doing."""
+        """Publish the recorder's status in the shared memory."""
         failure = self.failure
         state = {
             "is_recording": self.is_recording,
@@ -195,10 +197,10 @@ class Recorder:
 
 
 def seal(writer: TrialWriter, stop_reason: str) -> VerifiedFile:
-    """End a file, read it back, and give it its final name.
+    """End a file, verify it, and give it its final name.
 
     Raises:
-        TrialFileError: it could not be written or verified; it keeps `.partial`.
+        TrialFileError: writing or verification failed; the file keeps `.partial`.
     """
     try:
         writer.finish(stop_reason)
@@ -210,13 +212,13 @@ def seal(writer: TrialWriter, stop_reason: str) -> VerifiedFile:
     return verified
 
 
-def _since(records: Record, earliest_ns: int) -> int:
-    """Return how many of `records` are not older than `earliest_ns`."""
+def _count_since(records: Record, earliest_ns: int) -> int:
+    """Return the number of `records` at or after `earliest_ns`."""
     return int(np.count_nonzero(records["t_ns"].astype(np.int64) >= earliest_ns))
 
 
 def _batches(records: Record) -> list[Record]:
-    """Return records with a time, oldest first, in pieces of about 20 ms."""
+    """Split records, oldest first, into batches of about 20 ms."""
     if not len(records):
         return []
     span_ns = int(records["t_ns"][-1]) - int(records["t_ns"][0])

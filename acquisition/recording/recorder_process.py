@@ -1,4 +1,4 @@
-"""The recorder as a process of its own: its main loop, and the console's view of it."""
+"""Recorder in a separate process: its main loop, and its client in the console."""
 
 import json
 import signal
@@ -52,7 +52,7 @@ class AbandonRecording(Request[None]):
 
 
 def recorder_handlers(recorder: TrialRecording) -> Handlers:
-    """Return what carries the requests to a recorder out."""
+    """Return the handlers of requests to a recorder."""
     return {
         StartRecording: recorder.start,
         WriteEvent: recorder.event,
@@ -62,12 +62,12 @@ def recorder_handlers(recorder: TrialRecording) -> Handlers:
 
 
 def main(context: ChildContext) -> None:
-    """Record what the shared memory gets until the console hangs up.
+    """Record from the shared memory until the console closes the channel.
 
-    A trial that is open then is ended properly: nothing is lost with the console.
+    An open trial is then ended properly: nothing is lost with the console.
     """
     name_process("traction-record")
-    # When the console dies, the open file still has to be ended.
+    # The open file has to be ended after the death of the console.
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     request(RealtimeRequest(nice=NICE, core=context.settings.get("core")))
     recorder = Recorder(context.shared, SystemClock())
@@ -90,7 +90,7 @@ def main(context: ChildContext) -> None:
 class RemoteRecorder:
     """A recorder in another process; implements `TrialRecording`.
 
-    What it says while a trial runs is in the shared memory: no call waits for it.
+    During a trial its status is read from shared memory, without blocking calls.
     """
 
     def __init__(self, child: Child, shared: SharedLayout) -> None:
@@ -109,7 +109,7 @@ class RemoteRecorder:
         self._is_recording = True
 
     def event(self, level: int, name: str, text: str) -> None:
-        """Write an event of now into the file, if one is open."""
+        """Write an event with the present time, if a file is open."""
         self._child.ask(WriteEvent(level, name, text))
 
     def finish(self, stop_reason: str) -> VerifiedFile:
@@ -118,7 +118,7 @@ class RemoteRecorder:
         return self._child.ask(FinishRecording(stop_reason))
 
     def abandon(self) -> None:
-        """Stop recording; what there is goes to the disk and stays as `.partial`."""
+        """Stop recording; the data so far are kept as `.partial`."""
         if self._is_recording:
             self._is_recording = False
             if self._child.is_alive:
@@ -126,11 +126,11 @@ class RemoteRecorder:
 
     @property
     def largest_backlog(self) -> int:
-        """Cycles that waited at most since the trial began."""
+        """Largest number of unwritten cycles since the trial began."""
         return int(self._state().get("largest_backlog", 0))
 
     def check(self) -> None:
-        """Raise what went wrong while a trial is recorded.
+        """Raise the recorder's error during a trial.
 
         Raises:
             TrialFileError: the file cannot be written any more.

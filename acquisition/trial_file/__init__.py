@@ -1,6 +1,6 @@
-"""Trial files: MCAP written, read, verified and salvaged.
+"""Trial files in MCAP: writer, reader, verification, recovery.
 
-`writer` appends whole chunks that survive a power cut, `reader` returns arrays that
-have been checked, `verify` reads a file back completely, `recover` saves what is sound
-in a damaged one. The only package that imports mcap. Begin with `writer`.
+`writer` appends whole chunks that survive a power cut, `reader` returns validated
+arrays, `verify` reads a file back completely, `recover` copies the sound records of a
+damaged one. The only package that imports mcap. Begin with `writer`.
 """

@@ -1,4 +1,4 @@
-"""MCAP files for other programs: any topics, with their definitions inside."""
+"""MCAP files for other programs: any topics, with embedded definitions."""
 
 import io
 from collections.abc import Iterable, Mapping
@@ -15,11 +15,11 @@ class BagMessage:
     """One message of a bag.
 
     Attributes:
-        topic: on which it was sent.
+        topic: topic of the message.
         log_time: UTC [ns].
         data: CDR payload.
         publish_time: UTC [ns]; None = the log time.
-        sequence: number of the message.
+        sequence: sequence number.
     """
 
     topic: str
@@ -38,10 +38,10 @@ def bag_bytes(
     """Return an MCAP file that `ros2 bag play`, rosbags and Foxglove read.
 
     Args:
-        topics: ROS 2 types of `acquisition.schema` by topic.
-        messages: in order.
-        metadata: texts by name of the record.
-        attachments: content by name of the file.
+        topics: ROS 2 types of `acquisition.schema`, by topic.
+        messages: messages in order.
+        metadata: metadata by name of the record.
+        attachments: contents by file name.
     """
     out = io.BytesIO()
     writer = Writer(out, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
@@ -55,11 +55,13 @@ def bag_bytes(
         text = schema_text(type_name).encode()
         schema = writer.register_schema(type_name, "ros2msg", text)
         channels[topic] = writer.register_channel(topic, "cdr", schema)
-    for each in messages:
-        published = each.log_time if each.publish_time is None else each.publish_time
-        number = each.sequence & 0xFFFFFFFF
+    for message in messages:
+        published = (
+            message.log_time if message.publish_time is None else message.publish_time
+        )
+        number = message.sequence & 0xFFFFFFFF
         writer.add_message(
-            channels[each.topic], each.log_time, each.data, published, number
+            channels[message.topic], message.log_time, message.data, published, number
         )
     writer.finish()
     return out.getvalue()

@@ -1,4 +1,4 @@
-"""The checksums of data section and summary, which no mcap reader compares."""
+"""Checksums of data section and summary, which the mcap library does not verify."""
 
 import struct
 import zlib
@@ -16,12 +16,12 @@ _DATA_END = struct.Struct("<BQI")  # opcode, length, crc
 
 @dataclass(frozen=True, slots=True)
 class Sections:
-    """Where the parts of an MCAP file lie.
+    """Offsets of the sections of an MCAP file.
 
     Attributes:
-        data_end: offset of the record that ends the data section.
-        summary: offset of the summary, right behind that record.
-        footer: offset of the footer, right behind the summary.
+        data_end: record that ends the data section.
+        summary: summary, directly after that record.
+        footer: footer, directly after the summary.
     """
 
     data_end: int
@@ -30,14 +30,13 @@ class Sections:
 
 
 def check_sections(data: bytes, path: Path) -> Sections:
-    """Hold both sections of a whole MCAP file against their CRC-32.
+    """Verify the CRC-32 of both sections of an MCAP file.
 
-    The data section is all up to its end record, which stands right before the
-    summary; the summary reaches to the checksum in the footer. Only these two notice
-    a damaged attachment or metadata record.
+    The data section extends to its end record, directly before the summary; the summary
+    to the checksum in the footer. Only these two detect a damaged metadata record.
 
     Raises:
-        TrialFileError: a magic or checksum is wrong, missing, or not in its place.
+        TrialFileError: a magic or checksum is wrong, missing or misplaced.
     """
     _check_magic(data, path)
     footer = len(data) - len(MAGIC) - _FOOTER.size
@@ -58,7 +57,7 @@ def check_sections(data: bytes, path: Path) -> Sections:
 
 
 def _check_sum(part: str, actual: int, stated: int, path: Path) -> None:
-    """Refuse a section that is not what its checksum says; 0 = it has none."""
+    """Refuse a section with a wrong or missing (0) checksum."""
     if actual == stated:
         return
     if stated:

@@ -1,4 +1,4 @@
-"""What a trial file holds beside its messages: summary, metadata, attachments."""
+"""Contents of a trial file other than messages: summary, metadata, attachments."""
 
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
@@ -32,11 +32,11 @@ from acquisition.trial_file.records import (
 )
 from acquisition.trial_file.unpacking import DamageError
 
-RECORD_LIMIT = 16 * 2**20  # bytes of one record, and of one chunk unpacked
+RECORD_LIMIT = 16 * 2**20  # bytes of a record, and of an unpacked chunk
 MAX_CHUNKS = 100_000
 MAX_NAMED = 1_000  # metadata records and attachments
 MAX_METADATA = 2**20  # bytes of one metadata record
-MAX_SUMMARY = 8 * 2**20  # bytes; two hours of chunks need half of it
+MAX_SUMMARY = 8 * 2**20  # bytes; two hours of chunks take half of it
 _SUMMARY: Mapping[int, type[McapRecord]] = {
     Opcode.CHUNK_INDEX: ChunkIndex,
     Opcode.STATISTICS: Statistics,
@@ -46,13 +46,13 @@ _SUMMARY: Mapping[int, type[McapRecord]] = {
     Opcode.ATTACHMENT_INDEX: AttachmentIndex,
 }
 _UNPACKED_FLOOR = 64 * 2**20
-_UNPACKED_RATIO = 100  # an arm at rest packs twenty times, zeros a thousand times
+_UNPACKED_RATIO = 100  # compression of an arm at rest is 20, of zeros 1000
 _UNPACKED_MOST = 192 * 2**20  # ten minutes of cycles
 
 
 @contextmanager
 def as_trial_file_error(path: Path) -> Generator[None]:
-    """Turn whatever a damaged file can raise into a TrialFileError."""
+    """Convert any error caused by a damaged file to a TrialFileError."""
     try:
         yield
     except TrialFileError:
@@ -67,30 +67,30 @@ def as_trial_file_error(path: Path) -> Generator[None]:
 
 
 def read_file(path: Path) -> bytes:
-    """Return the whole file; a pipe or device is not waited for.
+    """Return the content of a file; never blocks on a pipe or device.
 
     Raises:
-        TrialFileError: it cannot be read, is not a regular file, or is beyond all size.
+        TrialFileError: the file cannot be read, is not a regular file, or is too large.
     """
     with as_trial_file_error(path):
         return read_data(path)
 
 
 def unpacked_limit(file_bytes: int) -> int:
-    """Return how many bytes all chunks of a file of `file_bytes` may unpack to."""
+    """Return the limit of the total unpacked size of a file's chunks [bytes]."""
     return min(_UNPACKED_MOST, _UNPACKED_FLOOR + _UNPACKED_RATIO * file_bytes)
 
 
 @dataclass(frozen=True, slots=True)
 class Contents:
-    """A whole MCAP file whose sections have the right checksums.
+    """A complete MCAP file with verified checksums.
 
     Attributes:
-        data: its data section, a view of all that was read.
-        size: bytes of the file.
-        summary: channels, schemas, statistics and where the chunks lie.
+        data: data section.
+        size: size of the file [bytes].
+        summary: channels, schemas, statistics and chunk offsets.
         metadata: metadata by name.
-        attachments: content by name; the names are no paths.
+        attachments: contents by name; the names are not paths.
     """
 
     data: memoryview
@@ -101,7 +101,7 @@ class Contents:
 
 
 def read_contents(path: Path) -> Contents:
-    """Read the whole file and check all that its summary states.
+    """Read the whole file and check the claims of its summary.
 
     Raises:
         TrialFileError: the file is missing, foreign, truncated, damaged or hostile.
@@ -175,7 +175,7 @@ def _check_chunks(summary: Summary, end: int, size: int, path: Path) -> None:
 
 
 def _check_named(summary: Summary, size: int, path: Path) -> None:
-    """Refuse more metadata and attachments than can lie beside each other."""
+    """Refuse more metadata and attachments than fit in the file."""
     indexes = (summary.metadata_indexes, summary.attachment_indexes)
     if max(len(raw) for raw in indexes) > MAX_NAMED:
         raise TrialFileError(path, f"states over {MAX_NAMED} attachments")

@@ -1,8 +1,7 @@
-"""Files of a data folder: regular ones only, of a limited size, inside the folder.
+"""Safe access to a data folder: regular files of limited size inside the folder.
 
-A folder that was copied from elsewhere may hold anything. No symbolic link, pipe,
-device or file with a second name outside the session is opened, and no folder below
-the session's is reached through a link.
+A copied folder is untrusted. Symbolic links, pipes, devices and files with a hard link
+outside the session are not opened, and no subfolder is reached through a link.
 """
 
 import contextlib
@@ -19,14 +18,14 @@ from acquisition.files import FOLDER, NO_LINK, UNFOLLOWED, open_directory
 from acquisition.locks import try_lock
 
 SUBFOLDERS = ("trials", "rejected", "faults")
-# Most bytes of a file, by how its name ends.
+# Largest size of a file [bytes], by suffix.
 SIZE_LIMITS: Mapping[str, int] = {
     ".lock": 4 * 2**10,
     ".json": 2**20,
     ".toml": 2**20,
     ".jsonl": 4 * 2**20,
     ".patch": 16 * 2**20,
-    ".mcap": 64 * 2**20,  # a trial of 30 s has 5; the file is read as a whole
+    ".mcap": 64 * 2**20,  # a trial of 30 s has 5 MiB; the file is read as a whole
     ".partial": 64 * 2**20,
 }
 _OTHERS = 16 * 2**20
@@ -43,7 +42,7 @@ _HINT = "Nothing in a data folder may lead out of it. The file was not opened."
 
 
 def size_limit(path: Path) -> int:
-    """Return how many bytes a file of this name may have."""
+    """Return the size limit of a file by its name [bytes]."""
     name = path.name.removesuffix(".tmp")
     suffix = ".lock" if name == ".lock" else Path(name).suffix
     return SIZE_LIMITS.get(suffix, _OTHERS)
@@ -51,11 +50,11 @@ def size_limit(path: Path) -> int:
 
 @contextmanager
 def open_folder(path: Path) -> Generator[int]:
-    """Give a descriptor of the folder `path`; a subfolder of a session is no link.
+    """Open the folder `path` and yield its descriptor.
 
     Raises:
-        TrialFileError: a subfolder is a symbolic link.
-        OSError: it is missing or no folder.
+        TrialFileError: a subfolder of a session is a symbolic link.
+        OSError: the folder is missing, or not a folder.
     """
     if path.name not in SUBFOLDERS:
         with open_directory(path) as descriptor:
@@ -72,7 +71,7 @@ def open_folder(path: Path) -> Generator[int]:
 
 @contextmanager
 def claimed_folder(path: Path) -> Generator[None]:
-    """Say that a trial file in `path` is being written; a kill ends the claim too.
+    """Hold a lock while a trial file in `path` is written; a kill releases it.
 
     Raises:
         TrialFileError: the folder is missing, or a symbolic link.
@@ -89,10 +88,10 @@ def claimed_folder(path: Path) -> Generator[None]:
 
 
 def is_claimed(path: Path) -> bool:
-    """Return whether a process writes a trial file in `path` now.
+    """Return whether a process is writing a trial file in `path`.
 
     Raises:
-        TrialFileError: the folder cannot be opened: nothing is known then.
+        TrialFileError: the folder cannot be opened.
     """
     try:
         with open_folder(path) as folder:
@@ -103,12 +102,12 @@ def is_claimed(path: Path) -> bool:
 
 
 def open_data(path: Path, flags: int = os.O_RDONLY) -> int:
-    """Return a descriptor of the regular file `path`; nothing is waited for.
+    """Open the regular file `path` without blocking; return its descriptor.
 
     Raises:
-        TrialFileError: it is not a regular file, has a name outside the session, or is
-            larger than its kind may be.
-        OSError: it is missing, or cannot be opened.
+        TrialFileError: not a regular file, hard-linked outside the session, or larger
+            than the limit of its kind.
+        OSError: the file is missing or cannot be opened.
     """
     with open_folder(path.parent) as folder:
         with contextlib.suppress(FileNotFoundError):
@@ -123,24 +122,24 @@ def open_data(path: Path, flags: int = os.O_RDONLY) -> int:
 
 
 def read_data(path: Path) -> bytes:
-    """Return the whole of a file, as `open_data` opens it.
+    """Return the content of a file opened by `open_data`.
 
     Raises:
-        TrialFileError: as `open_data`.
-        OSError: it is missing, or cannot be read.
+        TrialFileError: as for `open_data`.
+        OSError: the file is missing or cannot be read.
     """
     with os.fdopen(open_data(path), "rb") as file:
-        return file.read(os.fstat(file.fileno()).st_size)  # even if it grows now
+        return file.read(os.fstat(file.fileno()).st_size)  # bounded if it grows
 
 
 def check_absent(path: Path, error: OSError) -> None:
-    """Return if `error` says that there is no file at `path`.
+    """Return if `error` means that there is no file at `path`; raise otherwise.
 
-    A file that cannot be read now, for want of a descriptor or of permission, is no
-    missing one: what is decided on that would be decided wrongly.
+    A file that cannot be read, for lack of descriptors or permission, must not be
+    treated as missing.
 
     Raises:
-        TrialFileError: it says anything else.
+        TrialFileError: any other error.
     """
     if error.errno not in _ABSENT:
         reason = f"cannot be read ({error.strerror})"
@@ -148,12 +147,12 @@ def check_absent(path: Path, error: OSError) -> None:
 
 
 def list_folder(folder: Path, pattern: str = "*") -> list[Path]:
-    """Return what lies in `folder` under names that match `pattern`, sorted.
+    """Return the paths in `folder` that match `pattern`, sorted.
 
-    A folder that is missing holds nothing; one that cannot be listed is no empty one.
+    Empty for a missing folder.
 
     Raises:
-        TrialFileError: it cannot be listed.
+        TrialFileError: the folder cannot be listed.
     """
     try:
         paths = list(folder.iterdir())
@@ -164,7 +163,7 @@ def list_folder(folder: Path, pattern: str = "*") -> list[Path]:
 
 
 def check_folders(session: Path) -> None:
-    """Refuse a session whose folders lead elsewhere.
+    """Refuse a session whose subfolders are links.
 
     Raises:
         TrialFileError: trials/, rejected/ or faults/ is not a folder.
@@ -179,8 +178,7 @@ def is_there(path: Path) -> bool:
     """Return whether there is a regular file at `path`.
 
     Raises:
-        TrialFileError: there is something else, or it is reached through a link; or
-            nobody can tell.
+        TrialFileError: not a regular file, reached through a link, or not accessible.
     """
     try:
         with open_folder(path.parent) as folder:
@@ -209,26 +207,26 @@ def _check_kind(path: Path, status: os.stat_result, *, is_folder: bool = False) 
 def _check_open(descriptor: int, path: Path) -> None:
     status = os.fstat(descriptor)
     _check_kind(path, status)
-    if status.st_nlink > 1 and _names(path, status) < status.st_nlink:
+    if status.st_nlink > 1 and _link_count(path, status) < status.st_nlink:
         raise TrialFileError(path, "has another name elsewhere", hint=_HINT)
     if status.st_size > size_limit(path):
         raise _too_large(path, status.st_size)
 
 
-def _names(path: Path, wanted: os.stat_result) -> int:
-    """Return how many names of a file lie in the session of `path`."""
+def _link_count(path: Path, target: os.stat_result) -> int:
+    """Return the number of hard links of a file within the session of `path`."""
     is_below = path.parent.name in SUBFOLDERS
     session = path.parent.parent if is_below else path.parent
-    names = 0
+    count = 0
     for folder in (session, *(session / name for name in SUBFOLDERS)):
         try:
             with open_folder(folder) as descriptor:
                 for entry in os.scandir(descriptor):
                     other = entry.stat(follow_symlinks=False)
-                    names += os.path.samestat(other, wanted)
+                    count += os.path.samestat(other, target)
         except OSError:
             continue
-    return names
+    return count
 
 
 def _too_large(path: Path, size: int) -> TrialFileError:

@@ -1,4 +1,4 @@
-"""MCAP files of other programs: what they hold, where a trial was expected."""
+"""Diagnosis of MCAP files of other programs given instead of a trial."""
 
 from itertools import islice
 from pathlib import Path
@@ -10,16 +10,16 @@ from acquisition.trial_file.contents import read_file
 from acquisition.trial_file.records import MAGIC
 from acquisition.trial_file.salvage import SoundRecords
 
-_LOOKED_AT = 5_000  # records; channels stand before their messages
+_LOOKED_AT = 5_000  # records read; channels precede their messages
 _NAMED = 4  # topics in one message
 _LONGEST_TOPIC = 40  # characters
 
 
 def foreign_reason(path: Path) -> str:
-    """Return why an MCAP file is no trial: what it holds instead.
+    """Return the reason why an MCAP file is not a trial, with its topics.
 
     Returns:
-        "" for a trial that is damaged, and for what is no MCAP file at all.
+        "" for a damaged trial, and for other than MCAP files.
     """
     try:
         data = read_file(path)
@@ -35,6 +35,6 @@ def foreign_reason(path: Path) -> str:
             topics.append(record.topic)
     if not topics or "/cycle" in topics:
         return ""
-    shown = ", ".join(topic[:_LONGEST_TOPIC] for topic in topics[:_NAMED])
-    more = f" and {len(topics) - _NAMED} more" if len(topics) > _NAMED else ""
-    return f"is no trial of Traction: it holds topics {shown}{more}"
+    topic_list = ", ".join(topic[:_LONGEST_TOPIC] for topic in topics[:_NAMED])
+    remainder = f" and {len(topics) - _NAMED} more" if len(topics) > _NAMED else ""
+    return f"is no trial of Traction: it holds topics {topic_list}{remainder}"

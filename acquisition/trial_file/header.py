@@ -1,27 +1,27 @@
-"""What a trial file is made with, and what the writer counts."""
+"""Header of a trial file, and the writer's counters."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from acquisition.clock import RATE_HZ
 
-_DIGEST = "sha256:"  # begins the keys of attachments in the provenance
+_DIGEST = "sha256:"  # prefix of the attachments' keys in the provenance
 
 
 @dataclass(frozen=True, slots=True)
 class TrialHeader:
-    """What is known before the first cycle.
+    """Data of a trial known before the first cycle.
 
     Attributes:
         trial: metadata `trial` (session, terrain, operator, ...), strings.
-        utc_offset_ns: UTC = monotonic + this, one number for the whole file [ns].
-        offset_uncertainty_ns: half width of the reading that gave it [ns].
+        utc_offset_ns: UTC = monotonic + offset, constant in the file [ns].
+        offset_uncertainty_ns: uncertainty of the offset [ns].
         rate_hz: nominal rate of the loop.
         provenance: software, machine and device identities, strings.
-        attachments: file name to content, e.g. `config.toml`.
+        attachments: contents by file name, e.g. `config.toml`.
         robot_description: URDF of the arm.
-        views_every: every how many cycles the 50 Hz views are written, 0 = never.
-        has_frames: the raw frames of the bus are recorded too.
+        views_every: period of the 50 Hz views in cycles, 0 = none.
+        has_frames: raw frames of the bus are recorded, too.
     """
 
     trial: Mapping[str, str]
@@ -37,7 +37,7 @@ class TrialHeader:
 
 @dataclass(slots=True)
 class WriterCounts:
-    """What the writer has put into the file so far."""
+    """Counters of the data written so far."""
 
     cycles: int = 0
     missed: int = 0
@@ -49,12 +49,12 @@ class WriterCounts:
 
 
 def digest_fields(digests: Mapping[str, str]) -> dict[str, str]:
-    """Return SHA-256 digests of attachments by name as metadata `provenance`."""
+    """Return SHA-256 digests of attachments as fields of metadata `provenance`."""
     return {f"{_DIGEST}{name}": digest for name, digest in digests.items()}
 
 
 def attachment_digests(provenance: Mapping[str, str]) -> dict[str, str]:
-    """Return which attachments were written: their SHA-256 digests by name."""
+    """Return the SHA-256 digests of the attachments by name."""
     return {
         key.removeprefix(_DIGEST): digest
         for key, digest in provenance.items()

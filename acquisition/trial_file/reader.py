@@ -1,4 +1,4 @@
-"""TrialReader: whole chunks into numpy arrays, damaged and hostile files refused."""
+"""TrialReader: trial files to numpy arrays; refuses damaged and hostile files."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -61,16 +61,15 @@ class TopicRows:
 
 
 class TrialReader:
-    """Reads one trial file; everything it returns has been checked.
+    """Reads and validates one trial file.
 
-    The file is read once and kept in memory; sizes are checked before anything is
-    allocated for them.
+    The file is read once and kept in memory; sizes are checked before allocation.
 
     Attributes:
-        path: the file.
-        size: its length in bytes.
+        path: path of the file.
+        size: size of the file [bytes].
         metadata: metadata by name.
-        attachments: content by name; the names are no paths.
+        attachments: contents by name; the names are not paths.
 
     Raises:
         TrialFileError: the file is missing, foreign, truncated, damaged or hostile.
@@ -128,8 +127,8 @@ class TrialReader:
                 if channel in index.message_index_offsets
             ]
             count = self.topic_counts()[topic]
-            room = sum(chunk.uncompressed_size for chunk in chunks)
-            if count > MAX_ROWS or count * (_HEAD.itemsize + layout.size) > room:
+            available = sum(chunk.uncompressed_size for chunk in chunks)
+            if count > MAX_ROWS or count * (_HEAD.itemsize + layout.size) > available:
                 raise TrialFileError(self.path, f"claims {count} messages of {topic}")
             heads = np.empty(count, _HEAD)
             data = np.empty(count, layout.dtype)
@@ -144,7 +143,7 @@ class TrialReader:
             return TopicRows(data, heads["log_time"].copy(), heads["sequence"].copy())
 
     def _copy(self, index: ChunkIndex, channel: int, heads: Record, out: Record) -> int:
-        """Copy the messages of `channel` in one chunk; return how many there were."""
+        """Copy the messages of `channel` in one chunk; return their number."""
         data = self._unpacked(index)
         offsets = self._message_offsets(index, channel)
         count = len(offsets)
@@ -162,14 +161,14 @@ class TrialReader:
     def _check_rows(
         self, heads: Record, data: Record, layout: Layout, channel: int
     ) -> None:
-        """Require that every row is a message of `channel` in this very layout."""
+        """Require that every row is a message of `channel` in this layout."""
         length = _HEAD.itemsize - HEAD_BYTES + layout.size
         good = (heads["op"] == Opcode.MESSAGE) & (heads["length"] == length)
         if not bool((good & (heads["channel"] == channel)).all()):
             raise TrialFileError(self.path, "has an index that points at no message")
-        wanted = np.frombuffer(layout.template, layout.dtype)
+        template = np.frombuffer(layout.template, layout.dtype)
         names = ("encapsulation", "frame_id_length", "frame_id")
-        if not all(bool((data[name] == wanted[name]).all()) for name in names):
+        if not all(bool((data[name] == template[name]).all()) for name in names):
             raise TrialFileError(self.path, "has messages of an unknown layout")
 
     def _unpacked(self, index: ChunkIndex) -> memoryview:
@@ -194,7 +193,7 @@ class TrialReader:
         return np.frombuffer(pairs, "<u8")[1::2]
 
     def _channel(self, topic: str, layout: Layout) -> int:
-        """Return the channel of a topic whose messages have this layout."""
+        """Return the channel of a topic; raise unless it has this layout."""
         for number, channel in self.summary.channels.items():
             if channel.topic == topic:
                 schema = self.summary.schemas.get(channel.schema_id)
@@ -211,10 +210,10 @@ class TrialReader:
 def _gather(
     data: memoryview, start: int, offsets: NDArray[np.intp], out: Record
 ) -> None:
-    """Set out[i] to the bytes of `data` from offsets[i] + start on.
+    """Set out[i] to the bytes of `data` at offsets[i] + start.
 
-    A view with a window at every byte takes the index; `np.take` would copy all
-    windows first.
+    Indexes a strided view with a window at every byte; `np.take` would first copy all
+    windows.
     """
     size = out.dtype.itemsize
     count = len(data) - start - size + 1

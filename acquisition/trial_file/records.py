@@ -1,13 +1,13 @@
-"""Scanner of MCAP records: trials, what is left of them, and logs of other programs.
+"""Scanner of MCAP records, for trials, damaged trials, and logs of other programs.
 
-`records_of` frames the records in a buffer, `record_at` one of them, `records_in` those
-of a file of any size, one at a time. A length is checked against what there is
-before anything is read or allocated for it. `parse_chunk` and `unpacked` open a chunk
-within bounds and hold it against its checksum; `parse` gives the other records as the
-values of the mcap library. Who reads decides what damage means: the reader of trials
-refuses the file, `salvage` goes on behind it, a log ends there.
+`records_of` iterates over the records in a buffer, `record_at` returns one of them,
+`records_in` iterates over those of a file of any size. Lengths are checked before
+anything is read or allocated. `parse_chunk` and `unpacked` unpack a chunk within bounds
+and verify its checksum; `parse` returns other records as values of the mcap library.
+The caller decides on damage: the reader of trials refuses the file, `salvage` continues
+after it, a log ends there.
 
-Form: https://mcap.dev/spec.
+Format: https://mcap.dev/spec.
 """
 
 import io
@@ -27,14 +27,14 @@ from mcap.records import ChunkIndex, McapRecord, Message, Metadata
 from acquisition.trial_file.unpacking import DamageError, Unpacker
 
 MAGIC = b"\x89MCAP0\r\n"
-HEAD_BYTES = 9  # opcode and length, which the length does not count
+HEAD_BYTES = 9  # opcode and length, not included in the length
 MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
-# What a damaged record can raise where it is read.
+# Exceptions that a damaged record can cause.
 DAMAGE = (McapError, struct.error, ValueError, KeyError, MemoryError, OverflowError)
 _MIB = 2**20
 _HEAD = struct.Struct("<BQ")  # opcode, length
 _CHUNK = struct.Struct("<QQQII")  # start, end, size, crc, length of the compression
-_STORED = struct.Struct("<Q")  # bytes of a chunk as it is stored
+_STORED = struct.Struct("<Q")  # stored size of a chunk
 _LONGEST_NAME = 16  # of a compression
 _CRC = struct.Struct("<I")  # at the end of an attachment
 _LENGTH = struct.Struct("<I")  # of a text, and of the texts of a mapping
@@ -48,12 +48,12 @@ _Record = TypeVar("_Record", bound=McapRecord)
 
 
 class RawRecord(NamedTuple):
-    """A record as it is stored.
+    """A record as stored.
 
     Attributes:
-        opcode: its kind.
-        body: its content.
-        end: offset behind it.
+        opcode: kind of the record.
+        body: content.
+        end: offset of the next record.
     """
 
     opcode: int
@@ -64,15 +64,15 @@ class RawRecord(NamedTuple):
 def records_of(
     data: memoryview, at: int = 0, what: str = "data"
 ) -> Iterator[RawRecord]:
-    """Give the records that fill a buffer.
+    """Yield the records in a buffer.
 
     Args:
         data: the buffer.
-        at: where the first one begins.
-        what: the buffer is called if it is damaged.
+        at: offset of the first record.
+        what: name of the buffer in an error.
 
     Raises:
-        DamageError: the last one leads out of it.
+        DamageError: the last record is incomplete.
     """
     size = len(data)
     while at < size:
@@ -85,7 +85,7 @@ def records_of(
 
 
 def record_at(data: memoryview, offset: int) -> RawRecord | None:
-    """Return the record at `offset`, None where the buffer does not hold all of it."""
+    """Return the record at `offset`, None if it is incomplete."""
     try:
         return next(records_of(data, offset), None)
     except DamageError:
@@ -96,7 +96,7 @@ def body_at(data: memoryview, offset: int, opcode: Opcode) -> memoryview:
     """Return the body of the record of kind `opcode` at `offset`.
 
     Raises:
-        DamageError: there is none.
+        DamageError: there is no such record.
     """
     raw = record_at(data, offset)
     if raw is None or raw.opcode != opcode:
@@ -105,14 +105,14 @@ def body_at(data: memoryview, offset: int, opcode: Opcode) -> memoryview:
 
 
 def records_in(file: BufferedReader, largest: int) -> Iterator[RawRecord]:
-    """Give the records of a file up to the end of its data; one is in memory.
+    """Yield the records of a file's data section, one in memory at a time.
 
     Args:
-        file: an MCAP file, behind its magic.
-        largest: bytes that a record may have.
+        file: an MCAP file, positioned after its magic.
+        largest: largest accepted record [bytes].
 
     Raises:
-        DamageError: a record is larger, or cut off, or the data have no end.
+        DamageError: a record is too large or truncated, or the end record is missing.
         OSError: the file cannot be read.
     """
     at, size = file.tell(), os.fstat(file.fileno()).st_size
@@ -131,15 +131,15 @@ def records_in(file: BufferedReader, largest: int) -> Iterator[RawRecord]:
 
 @dataclass(frozen=True, slots=True)
 class Chunk:
-    """A chunk as it is stored.
+    """A chunk as stored.
 
     Attributes:
-        start_ns: smallest log time in it, as it says [ns].
-        end_ns: largest log time in it, as it says [ns].
-        size: bytes unpacked, as it says.
+        start_ns: stated smallest log time [ns].
+        end_ns: stated largest log time [ns].
+        size: stated unpacked size [bytes].
         crc: CRC-32 of the unpacked bytes; 0 = none.
         compression: "", "lz4" or "zstd".
-        packed: the stored bytes.
+        packed: stored bytes.
     """
 
     start_ns: int
@@ -151,14 +151,14 @@ class Chunk:
 
 
 def parse_chunk(body: memoryview, largest: int) -> Chunk:
-    """Take the body of a chunk record apart.
+    """Parse the body of a chunk record.
 
     Args:
-        body: of the record.
-        largest: bytes that it may state unpacked.
+        body: body of the record.
+        largest: largest accepted unpacked size [bytes].
 
     Raises:
-        DamageError: it states impossible sizes or an unknown compression.
+        DamageError: impossible sizes or unknown compression.
     """
     if len(body) < _CHUNK.size:
         raise DamageError("a chunk of impossible length")
@@ -177,10 +177,10 @@ def parse_chunk(body: memoryview, largest: int) -> Chunk:
 
 
 def unpacked(chunk: Chunk, unpacker: Unpacker) -> memoryview:
-    """Return the records in a chunk; never more bytes than the chunk states.
+    """Return the unpacked records of a chunk, at most the stated size.
 
     Raises:
-        DamageError: its content is damaged or of another size than stated.
+        DamageError: the content is damaged or of another size than stated.
     """
     data = unpacker.unpack(chunk.packed, chunk.compression, chunk.size)
     if chunk.crc and zlib.crc32(data) != chunk.crc:
@@ -192,30 +192,30 @@ def parse(kind: type[_Record], body: memoryview) -> _Record:
     """Return a record as a value of the mcap library, e.g. `parse(Metadata, body)`.
 
     Raises:
-        one of `DAMAGE`: it is no such record.
+        one of `DAMAGE`: not a valid record of this kind.
     """
-    own = _PARSERS.get(kind)
-    if own is not None:
-        return own(body)
-    # From memory: whatever length a field states, no more than the body is read.
+    parser = _PARSERS.get(kind)
+    if parser is not None:
+        return parser(body)
+    # From memory: a false length of a field cannot read beyond the body.
     stream = ReadDataStream(io.BytesIO(body))
     return cast("Any", kind).read(stream)
 
 
 def message_of(body: memoryview) -> Message:
-    """Return a message; raises struct.error where it is too short for one."""
+    """Parse a message; raises struct.error if it is too short."""
     channel, sequence, log_time, publish_time = MESSAGE.unpack_from(body)
     content = bytes(body[MESSAGE.size :])
     return Message(channel, log_time, content, publish_time, sequence)
 
 
 def message_index(body: memoryview) -> tuple[int, memoryview]:
-    """Return the channel of a message index, and its pairs of log time and offset.
+    """Return the channel of a message index and its (log time, offset) pairs.
 
-    Each is eight bytes; the offset is that of a record in the chunk.
+    Each value has eight bytes; offsets are those of records in the chunk.
 
     Raises:
-        DamageError: they do not fill it.
+        DamageError: wrong length.
     """
     if len(body) >= _MESSAGE_INDEX.size:
         channel, size = _MESSAGE_INDEX.unpack_from(body)
@@ -226,16 +226,16 @@ def message_index(body: memoryview) -> tuple[int, memoryview]:
 
 
 def has_checksum(attachment: memoryview) -> bool:
-    """Return whether the body of an attachment is as it was written."""
+    """Return whether the checksum of an attachment is correct."""
     stated = _CRC.unpack(attachment[-_CRC.size :])[0]
     return zlib.crc32(attachment[: -_CRC.size]) == stated
 
 
 def is_whole_metadata(body: memoryview) -> bool:
-    """Return whether metadata fill their body; they have no checksum of their own.
+    """Return whether metadata fill their body exactly; they have no checksum.
 
     Raises:
-        one of `DAMAGE`: they are no metadata.
+        one of `DAMAGE`: not valid metadata.
     """
     name_bytes, metadata = _LENGTH.unpack_from(body)[0], _metadata(body)
     end = 2 * _LENGTH.size + name_bytes
@@ -244,7 +244,7 @@ def is_whole_metadata(body: memoryview) -> bool:
 
 
 def _metadata(body: memoryview) -> Metadata:
-    """Take metadata apart; their texts fill what they state."""
+    """Parse metadata and check the stated lengths."""
     name, at = _text_at(body, 0)
     (size,) = _LENGTH.unpack_from(body, at)
     at, end = at + _LENGTH.size, at + _LENGTH.size + size
@@ -260,7 +260,7 @@ def _metadata(body: memoryview) -> Metadata:
 
 
 def _text_at(body: memoryview, at: int) -> tuple[str, int]:
-    """Return a text and the offset behind it; several hundred are in a file."""
+    """Return the string at an offset and the offset after it."""
     (length,) = _LENGTH.unpack_from(body, at)
     start, end = at + _LENGTH.size, at + _LENGTH.size + length
     if end > len(body):
@@ -269,7 +269,7 @@ def _text_at(body: memoryview, at: int) -> tuple[str, int]:
 
 
 def _chunk_index(body: memoryview) -> ChunkIndex:
-    """Take a chunk index apart in four steps; there are hundreds in a file."""
+    """Parse a chunk index with few calls; a file has hundreds of them."""
     start_ns, end_ns, offset, length, offset_bytes = _INDEX_HEAD.unpack_from(body)
     at = _INDEX_HEAD.size + offset_bytes
     offsets = dict(_INDEX_OFFSET.iter_unpack(body[_INDEX_HEAD.size : at]))

@@ -1,4 +1,4 @@
-"""Recovery: what is sound of a broken trial file, as a new file beside it."""
+"""Recovery of damaged trial files: sound records are copied to a new file."""
 
 import hashlib
 import json
@@ -31,19 +31,19 @@ from acquisition.trial_file.salvage import Gap, Salvaged, SoundRecords
 from acquisition.trial_file.verify import VerifiedFile, verify_file
 from acquisition.trial_file.writer import CHUNK_BYTES
 
-_MOST_BESIDE = 50  # files that are looked into
-_LONGEST_MISSED = 50_000_000  # ns; a loop that misses cycles for longer has ended
-_SECTION = "has data whose checksum is wrong"  # and no chunk or attachment is
-ROOM = ".recover"  # begins the name of a folder in which a copy grows
+_MOST_NEIGHBOURS = 50  # neighbouring files searched for an attachment
+_LONGEST_MISSED = 50_000_000  # ns; a longer gap is a loss, not missed cycles
+_SECTION = "has data whose checksum is wrong"  # reason if all records seem sound
+ROOM = ".recover"  # prefix of the temporary folder of a copy
 
 
 @dataclass(frozen=True, slots=True)
 class LostSpan:
-    """A part of a recording that is gone.
+    """A lost part of a recording.
 
     Attributes:
-        start: since the first cycle of the recording [s].
-        seconds: how long it was [s].
+        start: start relative to the first cycle [s].
+        seconds: duration [s].
     """
 
     start: float
@@ -54,12 +54,12 @@ _LOSSES = TypeAdapter(tuple[LostSpan, ...])
 
 
 class TrialCopy:
-    """A trial file that grows from salvaged records.
+    """A trial file written from salvaged records.
 
     Attributes:
-        messages: how many there are so far.
+        messages: number of messages so far.
         metadata: names of the metadata records so far.
-        details: what the metadata record `recovered` is going to say.
+        details: contents of the metadata record `recovered`.
     """
 
     def __init__(self, file: IO[bytes], details: Mapping[str, str]) -> None:
@@ -79,13 +79,13 @@ class TrialCopy:
         self._numbers: list[int] = []
         self._times: list[int] = []
         self._late = 0
-        self._gaps: dict[int, list[Gap]] = {}  # by how many cycles are before them
+        self._gaps: dict[int, list[Gap]] = {}  # by number of cycles before the gap
         self._digests: dict[str, str] = {}
         self._attached: set[str] = set()
         self._stop_reason = "recovered"
 
     def add(self, record: Salvaged) -> None:
-        """Append a record in the order of the source.
+        """Append a record, in the order of the source.
 
         Raises:
             OSError: the disk is full or gone.
@@ -106,10 +106,10 @@ class TrialCopy:
             case Gap():
                 self._gaps.setdefault(len(self._numbers), []).append(record)
             case _:
-                pass  # a schema or channel that is known already
+                pass  # a repeated schema or channel
 
     def finish(self, salvage: SoundRecords) -> None:
-        """Write what was saved and lost, and the summary.
+        """Write the metadata of the recovery and the summary.
 
         Raises:
             OSError: the disk is full or gone.
@@ -137,7 +137,7 @@ class TrialCopy:
 
     @property
     def missing_attachments(self) -> dict[str, str]:
-        """Digests of the attachments that were written once and are not here."""
+        """Digests of the original attachments missing in the copy, by name."""
         return {
             name: digest
             for name, digest in self._digests.items()
@@ -146,30 +146,30 @@ class TrialCopy:
 
     @property
     def losses(self) -> list[LostSpan]:
-        """What is missing of the recording, in order."""
+        """Lost parts of the recording, in order."""
         if not self._times:
             return []
         first = self._edges(0)[0] + PERIOD_NS if 0 in self._gaps else self._times[0]
-        # A chunk that is gone leaves no other trace than its hole in the cycles.
+        # A lost chunk may show only as a gap between cycles.
         steps = np.diff(np.array(self._times))
         holes = (np.flatnonzero(steps > _LONGEST_MISSED) + 1).tolist()
-        found: list[LostSpan] = []
+        spans: list[LostSpan] = []
         for at in sorted({*self._gaps, *holes}):
             before, after = self._edges(at)
             lost_ns = after - before - PERIOD_NS
-            if lost_ns > PERIOD_NS:  # more than a cycle that was missed
+            if lost_ns > PERIOD_NS:  # more than one missed cycle
                 start_s = max(0, before + PERIOD_NS - first) / NS_PER_S
-                found.append(LostSpan(round(start_s, 3), round(lost_ns / NS_PER_S, 3)))
-        return found
+                spans.append(LostSpan(round(start_s, 3), round(lost_ns / NS_PER_S, 3)))
+        return spans
 
     def _edges(self, at: int) -> tuple[int, int]:
-        """Return the log times of the cycles before and behind gaps [ns].
+        """Return the log times of the cycles before and after a gap [ns].
 
-        At the ends of the recording they are those that lost chunks have stated; none
-        is left of a gap of unknown length.
+        At the ends of the recording they are taken from the headers of lost chunks; a
+        gap of unknown length has length 0.
 
         Args:
-            at: how many cycles are before them.
+            at: number of cycles before the gap.
         """
         stated = [
             (gap.first_ns, gap.last_ns)
@@ -186,14 +186,14 @@ class TrialCopy:
         return before, behind
 
     def _add_metadata(self, record: Metadata) -> None:
-        """Append a metadata record; those of `finish` take the place of two."""
+        """Append a metadata record, except the two that `finish` writes."""
         if record.name == "result":
             self._stop_reason = record.metadata.get("stop_reason", "recovered")
         elif record.name != "recovered" and record.name not in self.metadata:
             self.metadata.add(record.name)
             if record.name == "provenance":
                 self._digests = attachment_digests(record.metadata)
-            self._writer.flush()  # or it would overtake the messages before it
+            self._writer.flush()  # keeps the order: messages are buffered
             self._writer.add_metadata(record.name, record.metadata)
 
     def _add_attachment(self, record: Attachment) -> None:
@@ -233,21 +233,21 @@ class TrialCopy:
 
 @dataclass(frozen=True, slots=True)
 class Recovery:
-    """What became of a file that was to be recovered.
+    """Result of a recovery.
 
     Attributes:
-        source: that file, untouched.
-        path: the new file; the source itself where it was whole.
-        verified: what reading that file back has shown.
-        messages: how many it holds.
-        bytes_dropped: of the source, damaged ones.
-        losses: recording that was in them, as far as can be seen.
-        missing_attachments: names of those that `path` does not hold; of a source that
-            is broken, no other file beside it does either.
-        reason: what is broken in the source; empty where it is whole.
-        is_doubtful: something is broken that has no checksum of its own: a description,
-            or an index.
-        is_new: the file was written now.
+        source: damaged file, unchanged.
+        path: new file; the source itself if it is not damaged.
+        verified: result of verifying `path`.
+        messages: number of messages in `path`.
+        bytes_dropped: damaged bytes of the source.
+        losses: lost parts of the recording, as far as known.
+        missing_attachments: names of attachments missing in `path`, and in all files
+            next to a damaged source.
+        reason: first damage of the source; "" if none.
+        is_doubtful: the damage is in a part without its own checksum: metadata or an
+            index.
+        is_new: the file was written by this call.
     """
 
     source: Path
@@ -263,26 +263,25 @@ class Recovery:
 
     @property
     def seconds_dropped(self) -> float:
-        """Recording that is gone, as far as can be seen [s]."""
+        """Duration of the lost parts, as far as known [s]."""
         return sum(loss.seconds for loss in self.losses)
 
 
 def recovered_path(source: Path) -> Path:
-    """Return where the recovered trial goes, e.g. T07.recovered.mcap."""
+    """Return the path of the recovered trial, e.g. T07.recovered.mcap."""
     stem = source.name.removesuffix(".partial").removesuffix(".mcap")
     return source.with_name(f"{stem}.recovered.mcap")
 
 
 def recover_file(source: Path) -> Recovery:
-    """Save every sound record of `source` into a new file.
+    """Copy every sound record of `source` to a new file.
 
-    An attachment that is damaged is taken from a file beside it that holds the very
-    same, by its digest. The new file is marked as incomplete, verified and read-only.
-    A source that is whole needs none, and one that was recovered before is not
-    recovered again.
+    A damaged attachment is replaced by the identical one (by digest) of a neighbouring
+    file, if any. The new file is marked as incomplete, verified and read-only. Nothing
+    is written for an undamaged source or one recovered before.
 
     Raises:
-        TrialFileError: nothing can be saved, or another file stands in the way.
+        TrialFileError: nothing can be saved, or another file has the target's name.
     """
     data = read_file(source)
     try:
@@ -290,7 +289,7 @@ def recover_file(source: Path) -> Recovery:
     except TrialFileError as error:
         reason = error.reason
     else:
-        return _sound(source, verified)
+        return _undamaged(source, verified)
     target = recovered_path(source)
     details = {
         "source": os.fsencode(source.name).decode(errors="replace"),
@@ -299,7 +298,7 @@ def recover_file(source: Path) -> Recovery:
         "reason": reason,
     }
     if target.exists():
-        return _earlier(source, target, details)
+        return _earlier_recovery(source, target, details)
     try:
         with temporary_folder(ROOM, source.parent) as room:
             return _recover(data, source, details, room / target.name)
@@ -339,7 +338,7 @@ def _recover(
 def _write(
     salvage: SoundRecords, source: Path, details: Mapping[str, str], written: Path
 ) -> TrialCopy:
-    """Write what `salvage` gives into `written`, down to the disk."""
+    """Write the salvaged records to the file `written` and synchronise it."""
     with written.open("xb") as file:
         copy = TrialCopy(file, details)
         try:
@@ -353,7 +352,7 @@ def _write(
                 why += "; what says which trial it is was there"
             raise TrialFileError(source, f"has nothing to save: it {why}")
         for name, digest in copy.missing_attachments.items():
-            content = _attachment_beside(source, name, digest)
+            content = _neighbouring_attachment(source, name, digest)
             if content is not None:
                 copy.add(Attachment(0, 0, name, "text/plain", content))
         copy.finish(salvage)
@@ -362,9 +361,9 @@ def _write(
     return copy
 
 
-def _attachment_beside(source: Path, name: str, digest: str) -> bytes | None:
-    """Return an attachment of a trial that another file beside it holds as well."""
-    for path in sorted(source.parent.glob("*.mcap"))[:_MOST_BESIDE]:
+def _neighbouring_attachment(source: Path, name: str, digest: str) -> bytes | None:
+    """Return the attachment with this digest from a neighbouring file, or None."""
+    for path in sorted(source.parent.glob("*.mcap"))[:_MOST_NEIGHBOURS]:
         try:
             content = read_contents(path).attachments.get(name)
         except TrialFileError:
@@ -374,8 +373,10 @@ def _attachment_beside(source: Path, name: str, digest: str) -> bytes | None:
     return None
 
 
-def _earlier(source: Path, target: Path, details: Mapping[str, str]) -> Recovery:
-    """Return what an earlier recovery of this very file has given."""
+def _earlier_recovery(
+    source: Path, target: Path, details: Mapping[str, str]
+) -> Recovery:
+    """Return the result of an earlier recovery of the same file."""
     earlier = TrialReader(target).metadata.get("recovered", {})
     if earlier.get("source_sha256") != details["source_sha256"]:
         raise TrialFileError(
@@ -400,8 +401,8 @@ def _earlier(source: Path, target: Path, details: Mapping[str, str]) -> Recovery
     )
 
 
-def _sound(source: Path, verified: VerifiedFile) -> Recovery:
-    """Return what there is of a file that needs no recovery, or had one."""
+def _undamaged(source: Path, verified: VerifiedFile) -> Recovery:
+    """Return the result for an undamaged or already recovered file."""
     reader = TrialReader(source)
     written = attachment_digests(reader.metadata["provenance"])
     return Recovery(

@@ -1,4 +1,4 @@
-"""The sound records of a broken MCAP file; what is damaged between them is skipped."""
+"""Sound records of a damaged MCAP file; damaged parts are skipped."""
 
 import re
 import struct
@@ -32,11 +32,11 @@ from acquisition.trial_file.records import (
 from acquisition.trial_file.unpacking import DamageError, Unpacker
 from acquisition.trial_file.writer import topics_by_sizes
 
-_CHUNK_TIMES = struct.Struct("<QQ")  # start, end: the first of a chunk's body
-_CRC = struct.Struct("<I")  # of the data, at their end
-_LONGEST_NS = 3600 * 10**9  # a chunk that claims to be later than this is not believed
-# A record that can prove itself, or the end of the data, of less than 16 MiB.
-_PROVABLE = re.compile(rb"(?=[\x06\x09\x0c\x0f].{3}\x00{5})", re.DOTALL)
+_CHUNK_TIMES = struct.Struct("<QQ")  # start, end: beginning of a chunk's body
+_CRC = struct.Struct("<I")  # of the data section, in its end record
+_LONGEST_NS = 3600 * 10**9  # largest plausible step to the time of a lost chunk
+# Heads of records that can be verified, or of the end of data, below 16 MiB.
+_VERIFIABLE = re.compile(rb"(?=[\x06\x09\x0c\x0f].{3}\x00{5})", re.DOTALL)
 _DEFINITION = re.compile(rb"(?=[\x03\x04].{3}\x00{5})", re.DOTALL)
 _CHUNK_INDEX = re.compile(rb"(?=\x08.{3}\x00{5})", re.DOTALL)
 _INDEX_HEAD = struct.Struct("<QQQ")  # of a chunk index: start, end, offset
@@ -46,15 +46,15 @@ _KINDS = range(Opcode.HEADER, Opcode.DATA_END + 1)
 
 @dataclass(frozen=True, slots=True)
 class Gap:
-    """Something that was skipped, in its place among the sound records.
+    """A skipped part, in its place among the sound records.
 
     Attributes:
         start: offset of the first damaged byte.
         end: offset of the next sound record, or of the end of the data.
-        reason: what is wrong there.
-        first_ns: earliest log time in what was lost, as its head says [ns]; 0 = no
-            head of a chunk is left.
-        last_ns: latest log time.
+        reason: kind of damage.
+        first_ns: earliest log time of lost chunks by their heads or index [ns]; 0 =
+            unknown.
+        last_ns: latest log time of lost chunks [ns].
     """
 
     start: int
@@ -70,16 +70,15 @@ Salvaged = Schema | Channel | Message | Metadata | Attachment | Gap
 class SoundRecords:
     """Iterates once over the sound records of `data`, in order.
 
-    A chunk's records come when all of it proved sound and later than what was before,
-    or not at all. What is damaged
-    is skipped up to the next record whose framing or checksum holds; a `Gap` stands in
-    its place. Channels that were defined in a lost chunk are taken from the summary,
-    or from what this program writes.
+    A chunk's records are yielded only if the whole chunk is sound and later than those
+    before. Damaged data are skipped up to the next record with valid framing or
+    checksum, and replaced by a `Gap`. Channels defined in a lost chunk are taken from
+    the summary, or from the definitions of this program.
 
     Attributes:
-        reason: what is broken first; empty when all of the data were sound.
-        gaps: what was skipped.
-        last_ns: largest log time so far [ns]; -1 = there was none.
+        reason: first damage; "" if all data were sound.
+        gaps: skipped parts.
+        last_ns: largest log time so far [ns]; -1 = none.
         left_out: names of damaged attachments.
     """
 
@@ -98,7 +97,7 @@ class SoundRecords:
 
     @property
     def lost_bytes(self) -> int:
-        """Bytes of the source that were skipped."""
+        """Number of skipped bytes."""
         return sum(gap.end - gap.start for gap in self.gaps)
 
     def __iter__(self) -> Generator[Salvaged]:
@@ -130,12 +129,12 @@ class SoundRecords:
             except TrialFileError as error:
                 reason = f"{error.reason} (byte {at})"
                 self.reason = self.reason or reason
-                end = self._behind(raw, at)
+                end = self._resume_offset(raw, at)
                 yield self._gap(at, end, reason)
                 at = end
 
     def _gap(self, start: int, end: int, reason: str) -> Gap:
-        """Return what was skipped, with the times that heads of lost chunks state."""
+        """Return a gap with the stated times of its lost chunks."""
         first_ns = last_ns = 0
         for start_ns, end_ns in self._stated_times(start, end):
             first_ns = min(first_ns or start_ns, start_ns)
@@ -145,11 +144,11 @@ class SoundRecords:
         return gap
 
     def _stated_times(self, start: int, end: int) -> Iterator[tuple[int, int]]:
-        """Give first and last time of the chunks that lay in a gap.
+        """Yield the stated (start, end) times of the chunks in a gap.
 
-        The summary knows them, or else what is left of their heads.
+        From the summary's chunk indexes and from remaining chunk heads.
         """
-        for index in self._behind_data(_CHUNK_INDEX):
+        for index in self._after_data(_CHUNK_INDEX):
             if len(index.body) < _INDEX_HEAD.size:
                 continue
             start_ns, end_ns, offset = _INDEX_HEAD.unpack_from(index.body)
@@ -167,28 +166,28 @@ class SoundRecords:
                 return
             at = raw.end
 
-    def _behind(self, raw: RawRecord | None, at: int) -> int:
-        """Return where reading goes on behind the broken record at `at`."""
+    def _resume_offset(self, raw: RawRecord | None, at: int) -> int:
+        """Return the offset at which to continue after the damaged record at `at`."""
         if raw is not None and self._is_framed(raw.end):
             return raw.end
         return self._next_sound(at + 1)
 
     def _is_framed(self, at: int) -> bool:
-        """Whether a record of a known kind begins at `at`, or the data end there."""
+        """Return whether a record of a known kind, or the end, is at `at`."""
         if at == len(self._data):
             return True
         raw = record_at(self._view, at)
         return raw is not None and raw.opcode in _KINDS
 
     def _next_sound(self, start: int) -> int:
-        """Return the offset of the next record that proves itself, or of the end."""
-        for match in _PROVABLE.finditer(self._data, start):
+        """Return the offset of the next verifiable record, or of the end."""
+        for match in _VERIFIABLE.finditer(self._data, start):
             raw = record_at(self._view, match.start())
-            if raw is not None and self._is_proved(raw):
+            if raw is not None and self._is_verified(raw):
                 return match.start()
         return len(self._data)
 
-    def _is_proved(self, raw: RawRecord) -> bool:
+    def _is_verified(self, raw: RawRecord) -> bool:
         try:
             with as_trial_file_error(self._path):
                 match raw.opcode:
@@ -204,17 +203,17 @@ class SoundRecords:
             return False
 
     def _is_chunk(self, body: memoryview) -> bool:
-        """Whether it is one whose checksum holds; what is tried counts as unpacked."""
+        """Return whether a chunk's checksum is correct, within the unpacking limit."""
         chunk = parse_chunk(body, RECORD_LIMIT)
         if not chunk.crc or chunk.size > self._room:
             return False
         self._room -= chunk.size
         unpacked(chunk, self._unpacker)
-        self._room += chunk.size  # it is unpacked again when it is read
+        self._room += chunk.size  # unpacked and counted again by _read_chunk
         return True
 
     def _read(self, raw: RawRecord, at: int) -> Generator[Salvaged]:
-        """Give the records of one top-level record; it raises before it gives any."""
+        """Yield the records of one top-level record, or raise before the first."""
         match raw.opcode:
             case Opcode.CHUNK:
                 yield from self._read_chunk(raw.body)
@@ -228,7 +227,7 @@ class SoundRecords:
                 pass
             case Opcode.MESSAGE_INDEX:
                 message_index(raw.body)
-            case opcode:  # perhaps a chunk once
+            case opcode:  # possibly a damaged chunk
                 raise DamageError(f"a broken record, kind {opcode}")
 
     def _read_chunk(self, body: memoryview) -> Generator[Salvaged]:
@@ -237,11 +236,11 @@ class SoundRecords:
         if self._room < 0:
             raise DamageError("chunks that unpack to too much")
         data = unpacked(chunk, self._unpacker)
-        known = self._schemas.copy(), self._channels.copy()
+        saved = self._schemas.copy(), self._channels.copy()
         try:
             records = [self._parse(raw) for raw in _messages(data)]
         except _UnknownChannelError:
-            self._schemas, self._channels = known
+            self._schemas, self._channels = saved
             definitions = self._definitions(data)
             for definition in definitions:
                 self._define(definition)
@@ -274,28 +273,28 @@ class SoundRecords:
         self._channels.add(record.id)
 
     def _definitions(self, data: memoryview) -> list[Schema | Channel]:
-        """Return the channels of a file whose definitions were lost.
+        """Return the definitions of a file in which they were lost.
 
-        They stand in the summary once more; where that is lost too, or was never
-        written, a file of this program has those that it always writes.
+        They are repeated in the summary; without one, those that this program always
+        writes are used.
 
         Args:
-            data: a sound chunk, by whose messages they are known.
+            data: a sound chunk; the sizes of its messages identify the channels.
         """
-        found = list(self._in_summary()) or list(_written(self._sizes(data)))
-        return found if any(isinstance(one, Channel) for one in found) else []
+        records = list(self._in_summary()) or list(_own_definitions(self._sizes(data)))
+        return records if any(isinstance(r, Channel) for r in records) else []
 
     def _in_summary(self) -> Iterator[Schema | Channel]:
-        """Give the definitions that stand behind the end of the data."""
-        for raw in self._behind_data(_DEFINITION):
+        """Yield the definitions in the summary."""
+        for raw in self._after_data(_DEFINITION):
             try:
                 with as_trial_file_error(self._path):
                     yield _definition(raw)
             except TrialFileError:
                 continue
 
-    def _behind_data(self, kind: re.Pattern[bytes]) -> Iterator[RawRecord]:
-        """Give the records of a kind behind the end of the data, damaged ones not."""
+    def _after_data(self, kind: re.Pattern[bytes]) -> Iterator[RawRecord]:
+        """Yield the undamaged records of a kind after the data section."""
         start = self._data.rfind(_DATA_END)
         if start < 0:
             return
@@ -305,7 +304,7 @@ class SoundRecords:
                 yield raw
 
     def _sizes(self, data: memoryview) -> dict[int, int]:
-        """Return how long the first message of each channel is."""
+        """Return the size of the first message of each channel [bytes]."""
         sizes: dict[int, int] = {}
         for raw in _messages(data):
             if raw.opcode == Opcode.MESSAGE:
@@ -326,7 +325,7 @@ class _UnknownChannelError(DamageError):
 
 
 def recorded_seconds(data: bytes) -> float:
-    """Return how long the sound part of a recording is, from its chunks' heads [s]."""
+    """Return the duration of the sound part of a recording by its chunk heads [s]."""
     at, first_ns, last_ns = len(MAGIC), None, 0
     whole = memoryview(data)
     while (raw := record_at(whole, at)) is not None:
@@ -343,14 +342,14 @@ def _definition(raw: RawRecord) -> Schema | Channel:
 
 
 def _messages(chunk: memoryview) -> Iterator[RawRecord]:
-    """Give the messages in a chunk, and what defines their channels."""
+    """Yield the messages, schemas and channels in a chunk."""
     for raw in records_of(chunk, what="a chunk"):
         if raw.opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE):
             yield raw
 
 
-def _written(sizes: Mapping[int, int]) -> Iterable[Schema | Channel]:
-    """Give the definitions that a file of this program begins with."""
+def _own_definitions(sizes: Mapping[int, int]) -> Iterable[Schema | Channel]:
+    """Yield the definitions at the beginning of a file of this program."""
     for number, (topic, name) in enumerate(topics_by_sizes(sizes).items(), 1):
         yield Schema(
             id=number, name=name, encoding="ros2msg", data=schema_text(name).encode()

@@ -1,4 +1,4 @@
-"""Read a finished file back and hold it against what the writer counted."""
+"""Verification of a finished file against the writer's counters."""
 
 import hashlib
 import os
@@ -21,13 +21,13 @@ REQUIRED_METADATA = ("trial", "clock", "provenance", "channels", "result")
 
 @dataclass(frozen=True, slots=True)
 class VerifiedFile:
-    """A file that was read back completely.
+    """Result of verifying a file.
 
     Attributes:
         sha256: hex digest of the file.
-        size: bytes.
+        size: size [bytes].
         cycles: records of `/cycle`, 0 for a truth file.
-        duration: from first to last cycle [s].
+        duration: time from first to last cycle [s].
         worst_gap: longest time between two cycles [s].
         is_complete: the recording was ended properly; False for a recovered file.
     """
@@ -43,15 +43,14 @@ class VerifiedFile:
 def verify_file(path: Path, counts: WriterCounts | None = None) -> VerifiedFile:
     """Check magics, CRCs, counts, cadence, clock and attachments of `path`.
 
-    A recovered file may lack attachments, and its cadence is not judged: it is all
-    that is left of a recording, however that went.
+    A recovered file may lack attachments, and its cadence is not checked.
 
     Args:
-        path: a finished trial file, under its `.partial` name or its own.
-        counts: what the writer counted, when it is at hand.
+        path: finished trial file, `.partial` or published.
+        counts: counters of the writer, if available.
 
     Raises:
-        TrialFileError: anything does not hold.
+        TrialFileError: a check fails.
     """
     reader = TrialReader(path)
     missing = [name for name in REQUIRED_METADATA if name not in reader.metadata]

@@ -1,4 +1,4 @@
-"""Standard messages with the content of a cycle, for viewers that know no Cycle."""
+"""Standard ROS messages with the content of a cycle, for generic viewers."""
 
 import struct
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ VIEW_TOPICS = {
     "/foot/twist": "geometry_msgs/msg/TwistStamped",
 }
 _STAMP: Final = struct.Struct("<iI")
-_STAMP_AT: Final = 4  # right behind the encapsulation
+_STAMP_AT: Final = 4  # directly after the encapsulation
 _CAN_FRAME: Final = np.dtype(
     [("can_id", "<u4"), ("length", "u1"), ("gap", "V3"), ("data", "V8")]
 )
@@ -26,11 +26,11 @@ _CAN_FRAME: Final = np.dtype(
 
 @dataclass(frozen=True, slots=True)
 class _View:
-    """A message of which only the numbers change.
+    """A message of constant layout.
 
     Attributes:
-        template: the message with zeros for stamp and numbers.
-        parts: where numbers stand in the message, and where in the bytes of a cycle.
+        template: message with zeros for stamp and numbers.
+        parts: (slice of the message, slice of the cycle's bytes) for each field.
     """
 
     template: bytes
@@ -40,13 +40,13 @@ class _View:
         """Return the message of one cycle."""
         data = bytearray(self.template)
         _STAMP.pack_into(data, _STAMP_AT, seconds, nanoseconds)
-        for here, there in self.parts:
-            data[here] = cycle[there]
+        for target, source in self.parts:
+            data[target] = cycle[source]
         return bytes(data)
 
 
 def encode_views(record: np.void, log_time: int) -> dict[str, bytes]:
-    """Return topic to CDR payload of one record of traction_msgs/Cycle.
+    """Return the CDR payloads of one traction_msgs/Cycle record, by topic.
 
     Args:
         record: one record in the layout of `acquisition.schema.CYCLE`.
@@ -66,7 +66,7 @@ def _joint_states() -> _View:
 def _view(
     writer: CdrWriter, fields: tuple[str, ...], *, are_counted: bool = False
 ) -> _View:
-    """Return the message that goes on with `fields` of a cycle after `writer`."""
+    """Return the view that appends `fields` of a cycle to `writer`."""
     empty = np.zeros((), CYCLE.dtype)
     assert CYCLE.dtype.fields is not None
     offsets = {field: entry[1] for field, entry in CYCLE.dtype.fields.items()}
@@ -76,8 +76,8 @@ def _view(
         numbers = empty[name]
         append(numbers)
         end, start = len(writer.finish()), offsets[name]
-        here = slice(end - numbers.nbytes, end)
-        parts.append((here, slice(start, start + numbers.nbytes)))
+        target = slice(end - numbers.nbytes, end)
+        parts.append((target, slice(start, start + numbers.nbytes)))
     return _View(writer.finish(), tuple(parts))
 
 

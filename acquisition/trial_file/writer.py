@@ -1,4 +1,4 @@
-"""TrialWriter: cycles, sensor samples and events into one MCAP file."""
+"""TrialWriter: writes cycles, sensor samples and events to an MCAP file."""
 
 import contextlib
 import hashlib
@@ -39,13 +39,13 @@ FLIGHT_TOPICS = {**TRIAL_TOPICS, CAN_TOPIC: "traction_msgs/msg/CanBatch"}
 
 
 def topics_by_sizes(sizes: Mapping[int, int]) -> Mapping[str, str]:
-    """Return the topics of a file, in the order in which its channels are numbered.
+    """Return the topics of a file in the order of its channel numbers.
 
     Args:
-        sizes: how long a message of a channel is [bytes], by its number, from 1 on.
+        sizes: message sizes [bytes] by channel number, from 1 on.
 
     Returns:
-        types by topics; empty where no file of today has such messages.
+        Types by topic; empty if the sizes fit no file of this program.
     """
     if set(sizes) == {1} and sizes[1] == TRUTH.size:
         return TRUTH_TOPICS
@@ -57,10 +57,10 @@ def topics_by_sizes(sizes: Mapping[int, int]) -> Mapping[str, str]:
 
 
 class TrialWriter:
-    """Writes `<name>.mcap.partial`; `publish` makes it `<name>.mcap`.
+    """Writes `<name>.mcap.partial`; `publish` renames it to `<name>.mcap`.
 
-    The partial file is created exclusively: an existing one is never touched. Used by
-    the recorder only, never by the control loop.
+    The partial file is created exclusively: an existing one is never changed. Used by
+    the recorder only, not by the control loop.
 
     Raises:
         TrialFileError: the file exists, or cannot be created or written.
@@ -93,7 +93,7 @@ class TrialWriter:
             self._start(topics)
 
     def write_cycles(self, records: Record) -> None:
-        """Append records of traction_msgs/Cycle in order; stamps are set here."""
+        """Append traction_msgs/Cycle records in order and set their stamps."""
         if not len(records):
             return
         records = records.copy()
@@ -127,7 +127,7 @@ class TrialWriter:
             self._add("/ft/raw", log_time, writer.finish())
 
     def write_event(self, host_ns: int, level: int, name: str, text: str) -> None:
-        """Append an event of monotonic time `host_ns`; levels as in Log."""
+        """Append an event at monotonic time `host_ns`; levels as in Log."""
         t_ns = host_ns + self._header.utc_offset_ns
         with self._guarded():
             self._add("/events", t_ns, encode_log(t_ns, level, name, text))
@@ -137,7 +137,7 @@ class TrialWriter:
         self._write_stamped(TRUTH_TOPIC, TRUTH, records)
 
     def _write_stamped(self, topic: str, layout: Layout, records: Record) -> None:
-        """Append records with a `host_ns`, whose UTC becomes stamp and log time."""
+        """Append records whose `host_ns` gives stamp and log time."""
         records = records.copy()
         log_times = records["host_ns"].astype(np.int64) + self._header.utc_offset_ns
         records["sec"], records["nanosec"] = np.divmod(log_times, NS_PER_S)
@@ -156,19 +156,19 @@ class TrialWriter:
             self._add(CAN_TOPIC, log_time, encode_can_batch(log_time, frames))
 
     def flush(self) -> None:
-        """Close the running chunk and force it to the disk."""
+        """End the current chunk and synchronise it to the disk."""
         with self._guarded():
             self._writer.flush()
             self._file.flush()
             os.fsync(self._file.fileno())
 
     def close_partial(self) -> None:
-        """Leave the `.partial` as it stands, e.g. after a write error."""
+        """Close the file as `.partial`, e.g. after a write error."""
         with contextlib.suppress(OSError):
             self._file.close()
 
     def finish(self, stop_reason: str) -> None:
-        """Write metadata `result`, the summary and everything to the disk.
+        """Write metadata `result` and the summary, and synchronise to the disk.
 
         The file keeps its `.partial` name until it is verified and published.
         """
@@ -183,7 +183,7 @@ class TrialWriter:
             "lost_in_ring": str(counts.lost_in_ring),
         }
         with self._guarded():
-            self._writer.flush()  # or `result` would stand before the last messages
+            self._writer.flush()  # keeps `result` after the last messages
             self._writer.add_metadata("result", result)
             self._writer.finish()
             self._file.flush()
@@ -212,7 +212,7 @@ class TrialWriter:
         self._describe(metadata)
         for name, content in header.attachments.items():
             self._writer.add_attachment(0, 0, name, "text/plain", content)
-        self._describe(metadata)  # a block that a disk loses takes one of both
+        self._describe(metadata)  # twice, so that a lost disk block spares one
         self._channels: dict[str, int] = {}
         for topic, type_name in topics.items():
             schema = self._writer.register_schema(
@@ -272,7 +272,7 @@ class TrialWriter:
 
 
 def publish(writer: TrialWriter) -> None:
-    """Give a verified `.partial` its final name, read-only; never replaces a file."""
+    """Rename a verified `.partial`, read-only; never replaces an existing file."""
     try:
         publish_file(writer.partial, writer.path)
     except OSError as error:

@@ -1,7 +1,7 @@
-"""A CAN bus on a Unix socket: one 16-byte `struct can_frame` of Linux per packet.
+"""CAN bus on a Unix socket, client end: one 16-byte Linux `can_frame` per packet.
 
-This is the end of a client; any program of python-can can open it as the interface
-`traction-fake` with the socket's path as the channel. The other end is fakes.bus.hub.
+Any program that uses python-can can open it as interface `traction-fake` with the
+socket's path as channel. The other end is fakes.bus.hub.
 """
 
 import select
@@ -23,15 +23,14 @@ _SEND_BUFFER = 1 << 20
 
 
 def pack_frame(can_id: int, data: bytes) -> bytes:
-    """Return the packet of a frame; `can_id` may carry the flags of SocketCAN."""
+    """Return the packet of a frame; `can_id` may include SocketCAN's flags."""
     return _FRAME.pack(can_id, len(data), data)
 
 
 def unpack_frame(packet: bytes) -> tuple[int, bytes] | None:
-    """Return (identifier, data) of a packet, None where it is no classic data frame.
+    """Return (identifier, data) of a packet, None unless it is a classic data frame.
 
-    Not taken are other sizes, more than eight bytes of data, and extended, remote and
-    error frames: a puck would not answer them either.
+    Extended, remote and error frames are ignored, as by a puck.
     """
     if len(packet) != FRAME_SIZE:
         return None
@@ -42,20 +41,20 @@ def unpack_frame(packet: bytes) -> tuple[int, bytes] | None:
 
 
 def open_socket() -> socket.socket:
-    """Return a socket of the kind that both ends use."""
+    """Return a socket of the type used by both ends."""
     made = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     made.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
     return made
 
 
 class SocketBus(can.BusABC):
-    """The bus as a client of python-can sees it.
+    """python-can client of the bus.
 
-    Frames have UTC [s] as their stamp, taken when they are read. What is sent does not
-    come back; the network and all other clients get it.
+    Frames are stamped with UTC [s] when read. Sent frames go to the network and all
+    other clients and are not echoed.
 
     Attributes:
-        ignored: packets that were no classic data frame.
+        ignored: packets other than classic data frames.
     """
 
     def __init__(
@@ -65,10 +64,10 @@ class SocketBus(can.BusABC):
         clock: Clock | None = None,
         **_settings: object,
     ) -> None:
-        """Connect to the socket at path `channel`; other settings mean nothing here.
+        """Connect to the socket at path `channel`; other settings are ignored.
 
         Raises:
-            can.CanInitializationError: no bus is served there.
+            can.CanInitializationError: no server at this path.
         """
         self.ignored = 0
         self.channel_info = f"traction-fake:{channel}"
@@ -87,10 +86,10 @@ class SocketBus(can.BusABC):
         super().__init__(channel=channel, can_filters=can_filters)
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
-        """Hand a frame to the bus; waits only for a full buffer, `timeout` [s] at most.
+        """Send a frame; if the buffer is full, wait `timeout` [s] at most.
 
         Raises:
-            can.CanOperationError: the buffer stays full, or the bus has ended.
+            can.CanOperationError: the buffer stays full, or the server has ended.
             ValueError: a CAN FD frame.
         """
         if msg.is_fd:
@@ -142,7 +141,7 @@ class SocketBus(can.BusABC):
         return message, False
 
     def _next_frame(self) -> tuple[int, bytes] | None:
-        """Return the first good frame that has arrived, without waiting."""
+        """Return the next valid frame received, None without blocking."""
         while True:
             try:
                 packet = self._socket.recv(

@@ -1,4 +1,4 @@
-"""The served end of a CAN bus on a Unix socket; clients see each other's frames."""
+"""CAN bus on a Unix socket, server end; clients receive each other's frames."""
 
 import errno
 import select
@@ -11,7 +11,7 @@ from fakes.bus.client import FRAME_SIZE, open_socket, pack_frame, unpack_frame
 from wam.bus.transports import open_transport
 
 CLIENTS = 32
-_PACKETS_AT_A_TIME = 64  # of one client, before the next one is heard
+_PACKETS_AT_A_TIME = 64  # packets read from one client in turn
 _HIGHEST_ID, _LONGEST_DATA = 0x7FF, 8  # of a classic data frame
 _LONGEST_PATH = 107  # bytes, the kernel's limit
 
@@ -19,18 +19,18 @@ Frame = tuple[int, bytes]
 
 
 class SocketHub:
-    """A listening socket and its clients; never waits.
+    """A listening socket and its clients; non-blocking.
 
     Attributes:
-        ignored: packets that were no classic data frame.
-        lost: frames that a client did not fetch in time.
+        ignored: packets other than classic data frames.
+        lost: frames dropped because a client's buffer was full.
     """
 
     def __init__(self, path: Path) -> None:
-        """Begin to listen at `path`.
+        """Listen at `path`.
 
         Raises:
-            SettingsError: the path is in use or cannot be one of a socket.
+            SettingsError: the path is in use or not usable for a socket.
         """
         self.ignored = 0
         self.lost = 0
@@ -43,12 +43,12 @@ class SocketHub:
 
     @property
     def name(self) -> str:
-        """The bus as a client of python-can names it."""
+        """Name of the bus for python-can."""
         return f"traction-fake:{self._path}"
 
     @property
     def clients(self) -> int:
-        """Number of clients that are connected."""
+        """Number of connected clients."""
         return len(self._clients)
 
     def fileno(self) -> int:
@@ -60,7 +60,7 @@ class SocketHub:
         return bool(self._poll.poll(0))
 
     def receive(self) -> list[Frame]:
-        """Return the clients' frames that have arrived; others get them at once."""
+        """Return received frames of clients, after forwarding them to the others."""
         frames: list[Frame] = []
         for descriptor, _ in self._poll.poll(0):
             if descriptor == self._dialog.fileno():
@@ -71,10 +71,10 @@ class SocketHub:
 
     def send(self, can_id: int, data: bytes) -> None:
         """Send a frame of the network to every client."""
-        self._spread(pack_frame(can_id, data), sender=-1)
+        self._broadcast(pack_frame(can_id, data), sender=-1)
 
     def close(self) -> None:
-        """Send every client home and remove the socket; a second call does nothing."""
+        """Disconnect all clients and remove the socket; a second call does nothing."""
         if self._poll.closed:
             return
         for descriptor in list(self._clients):
@@ -88,7 +88,7 @@ class SocketHub:
         try:
             client, _ = self._dialog.accept()
         except OSError:
-            return  # it has gone away again
+            return  # the client has disconnected again
         if len(self._clients) >= CLIENTS:
             client.close()
             return
@@ -112,10 +112,10 @@ class SocketHub:
                 self.ignored += 1
             else:
                 frames.append(frame)
-                self._spread(packet, sender=descriptor)
+                self._broadcast(packet, sender=descriptor)
         return frames
 
-    def _spread(self, packet: bytes, sender: int) -> None:
+    def _broadcast(self, packet: bytes, sender: int) -> None:
         for descriptor, client in list(self._clients.items()):
             if descriptor == sender:
                 continue
@@ -156,7 +156,7 @@ def _listen(path: Path) -> socket.socket:
 
 
 def _remove_stale(path: Path) -> None:
-    """Remove a socket that a server left behind; refuse whatever else is there."""
+    """Remove a socket left by a server; refuse any other file."""
     if not path.exists():
         return
     if not path.is_socket():
@@ -175,16 +175,16 @@ def _remove_stale(path: Path) -> None:
 
 
 class CanPort:
-    """Carries frames between a CAN bus and a network; never waits.
+    """Port to a real CAN bus for a simulated network; non-blocking.
 
     Attributes:
-        name: the bus as INTERFACE:CHANNEL.
-        ignored: received frames that were no classic data frame.
-        lost: frames that the bus did not take.
+        name: bus as INTERFACE:CHANNEL.
+        ignored: received frames other than classic data frames.
+        lost: frames refused by the bus.
     """
 
     def __init__(self, interface: str, channel: str, bitrate: int) -> None:
-        """Open the bus; raises LinkError if it cannot be."""
+        """Open the bus; raises LinkError if that fails."""
         self.name = f"{interface}:{channel}"
         self.ignored = 0
         self.lost = 0
@@ -204,7 +204,7 @@ class CanPort:
         return bool(self._inbox)
 
     def receive(self) -> list[Frame]:
-        """Return the frames that have arrived.
+        """Return the received frames.
 
         Raises:
             LinkError: the bus is down.
@@ -218,10 +218,10 @@ class CanPort:
         try:
             self._transport.send(can_id, data)
         except LinkError:
-            self.lost += 1  # as on a wire without an acknowledgement
+            self.lost += 1  # as on a bus without acknowledgement
 
     def close(self) -> None:
-        """Give the bus back; a second call does nothing."""
+        """Release the bus; a second call does nothing."""
         if self._is_open:
             self._is_open = False
             self._transport.close()

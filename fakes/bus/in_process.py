@@ -1,4 +1,4 @@
-"""A CAN bus in this process: a puck network behind python-can's own interface."""
+"""CAN bus in this process: a simulated puck network behind python-can's interface."""
 
 import errno
 from collections import deque
@@ -15,15 +15,15 @@ from wam.bus.link import Frame as TransportFrame
 from wam.bus.transports import PythonCanTransport
 
 _PATIENCE_NS = NS_PER_S
-_QUEUE = 11  # frames: txqueuelen 10, and one in the driver
+_QUEUE = 11  # frames: txqueuelen 10 plus one in the driver
 
 
 class FakeCanBus(can.BusABC):
-    """A bus with one host and a `PuckNetwork`; time comes from the clock alone.
+    """A bus with one host and a `PuckNetwork`; all time is from the given clock.
 
-    Frames have the clock's monotonic time as their stamp [s]. An interface that is down
-    (`network.faults.is_down`) refuses to send and to receive. What is sent through a
-    controller that has left the bus (`is_off`) vanishes without a word, as in Linux.
+    Frames are stamped with the clock's monotonic time [s]. An interface that is down
+    (`network.faults.is_down`) refuses to send and to receive. With a controller in
+    bus-off (`is_off`), sent frames are dropped silently, as in Linux.
     """
 
     def __init__(self, network: PuckNetwork, clock: Clock) -> None:
@@ -34,14 +34,15 @@ class FakeCanBus(can.BusABC):
         self._inbox: deque[OutFrame] = deque()
         self._stuck: deque[can.Message] = deque()
         self._wired = WiredNetwork(network)
-        self._t_ns = -1  # how far it has gone on
+        self._t_ns = -1  # time of the last advance
         super().__init__(channel="fake")
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
-        """Queue a frame for the wire at the clock's time; never waits.
+        """Queue a frame for the wire at the clock's time without blocking.
 
         Raises:
-            can.CanOperationError: the bus was shut down, or is off.
+            can.CanOperationError: the bus was shut down or is down, or its queue is
+                full.
         """
         if self._is_shutdown:
             raise can.CanOperationError("the bus was shut down")
@@ -57,7 +58,7 @@ class FakeCanBus(can.BusABC):
             self._stuck.append(msg)
             return
         now_ns = self._clock.now_ns()
-        self.advance(now_ns)  # what was sent before takes the wire first
+        self.advance(now_ns)  # earlier frames occupy the wire first
         if self._stuck:
             self._release(now_ns)
         if not (msg.is_extended_id or msg.is_remote_frame or msg.is_error_frame):
@@ -65,7 +66,7 @@ class FakeCanBus(can.BusABC):
 
     @property
     def is_undisturbed(self) -> bool:
-        """Whether every plain frame comes and goes as it is."""
+        """Whether no fault, filter or shutdown affects data frames."""
         faults = self._faults
         return not (
             faults.is_down
@@ -78,26 +79,26 @@ class FakeCanBus(can.BusABC):
         )
 
     def put(self, can_id: int, data: bytes) -> None:
-        """Send a data frame as `send` does; only while `is_undisturbed`."""
+        """Send a data frame like `send`; only while `is_undisturbed`."""
         now_ns, schedule = self._clock.now_ns(), self._schedule
         if now_ns != self._t_ns or schedule.outbox or schedule.next_ns <= now_ns:
             self.advance(now_ns)
         self._wired.send(now_ns, can_id, data)
 
     def arrived(self) -> deque[OutFrame]:
-        """Return what has arrived and waits to be taken, oldest first."""
+        """Return the inbox of received frames, oldest first."""
         if not self._inbox and (now_ns := self._clock.now_ns()) != self._t_ns:
             self.advance(now_ns)
         return self._inbox
 
     def _release(self, now_ns: int) -> None:
-        """Let the frames leave that waited while nobody acknowledged."""
+        """Send the frames that waited for an acknowledgement."""
         while self._stuck:
             old = self._stuck.popleft()
             self._wired.send(now_ns, old.arbitration_id, bytes(old.data))
 
     def fileno(self) -> int:
-        """There is no descriptor to wait on."""
+        """Raise: there is no descriptor."""
         raise NotImplementedError("a bus inside the process has no descriptor")
 
     def is_readable(self) -> bool:
@@ -107,21 +108,21 @@ class FakeCanBus(can.BusABC):
         return bool(self._inbox)
 
     def next_event_ns(self) -> int | None:
-        """Return when wire or network do something next, None if never."""
+        """Return the time of the next event of wire or network, or None."""
         return self._wired.next_event_ns()
 
     def advance(self, t_ns: int) -> None:
-        """Let wire and network go on to `t_ns`."""
+        """Advance wire and network to `t_ns`."""
         self._t_ns = t_ns
         self._inbox.extend(self._wired.advance(t_ns))
 
     def recv(self, timeout: float | None = None) -> can.Message | None:
-        """Return the next frame, None when `timeout` [s] of the clock has passed.
+        """Return the next frame, None after `timeout` [s] of the simulated clock.
 
-        python-can would measure the time-out on the machine's own clock.
+        Overridden, because python-can measures time-outs by the machine's clock.
 
         Raises:
-            can.CanOperationError: the bus is off.
+            can.CanOperationError: the interface is down.
         """
         faults = self._faults
         if faults.is_down:
@@ -130,8 +131,8 @@ class FakeCanBus(can.BusABC):
             classes, detail = faults.error_frames.pop(0)
             return can.Message(arbitration_id=classes, is_error_frame=True, data=detail)
         clock = self._clock
-        if self._filters is None:  # the way that nearly every question takes
-            # What is sent is on the wire for a while: at one instant nothing new comes.
+        if self._filters is None:  # the usual, fast path
+            # Frames take time on the wire: none arrives at the time of sending.
             if self.arrived():
                 return self._take()
             if timeout == 0:
@@ -139,8 +140,10 @@ class FakeCanBus(can.BusABC):
         patience_ns = 0 if timeout is None else int(timeout * NS_PER_S)
         deadline_ns = clock.now_ns() + patience_ns if timeout else 0
         while True:
-            left = (deadline_ns - clock.now_ns()) / NS_PER_S if timeout else timeout
-            message, is_filtered = self._recv_internal(left)
+            remaining = (
+                (deadline_ns - clock.now_ns()) / NS_PER_S if timeout else timeout
+            )
+            message, is_filtered = self._recv_internal(remaining)
             if message is None:
                 if timeout is not None:
                     return None
@@ -156,7 +159,7 @@ class FakeCanBus(can.BusABC):
 
     def _take(self) -> can.Message:
         t_ns, can_id, data = self._inbox.popleft()
-        # positionally: stamp, identifier, is it an extended one
+        # timestamp, identifier, is_extended_id; positional arguments are faster
         return can.Message(t_ns / NS_PER_S, can_id, False, data=data)
 
     def _await(self, timeout: float | None) -> bool:
@@ -164,21 +167,21 @@ class FakeCanBus(can.BusABC):
         return self._clock.wait(_Inbox(self), self._clock.now_ns() + patience_ns)
 
     def _refuse(self) -> NoReturn:
-        """Lose what waits, and say so as an interface does while it is down."""
+        """Drop waiting frames and raise the error of an interface that is down."""
         self._inbox.clear()
         self._wired.drop_waiting()
         raise can.CanOperationError("Network is down", errno.ENETDOWN)
 
 
 class InProcessTransport(PythonCanTransport):
-    """The transport of python-can for a `FakeCanBus`, without a message per frame.
+    """Transport for a `FakeCanBus` that bypasses python-can's messages, for speed.
 
-    Only where nothing is out of the ordinary: a bus that is disturbed, and frames that
-    have waited long, take python-can's way. What comes and goes is the same on both.
+    On a disturbed bus, and for frames that have waited long, it falls back to
+    python-can. Both paths give the same frames.
     """
 
     def __init__(self, bus: FakeCanBus, clock: Clock) -> None:
-        """Take a bus over; times are of `clock`."""
+        """Take ownership of a bus; frame times are by `clock`."""
         super().__init__(bus, clock)
         self._fake, self._now_ns = bus, clock.now_ns
 
@@ -190,7 +193,7 @@ class InProcessTransport(PythonCanTransport):
             super().send(can_id, data)
 
     def receive(self) -> list[TransportFrame]:
-        """Return what has arrived, oldest first; raises LinkError."""
+        """Return the queued frames, oldest first; raises LinkError."""
         fake = self._fake
         if not fake.is_undisturbed or self._error is not None:
             return super().receive()
@@ -205,7 +208,7 @@ class InProcessTransport(PythonCanTransport):
 
 
 class _Inbox:
-    """What a clock waits for while a reader waits for a frame."""
+    """Readable for the clock to wait on, without python-can's filters."""
 
     def __init__(self, bus: FakeCanBus) -> None:
         self._bus = bus

@@ -1,5 +1,5 @@
-"""Terrains: stones and plates that push back on the foot.
+"""Contact models of terrains: stones and plates.
 
-`terrain` is what a foot can stand and slip on: a plate, or a bed of `stones`; each is
-one trial's ground. Begin with `terrain`.
+`terrain` is the ground of one trial: a plate, or a bed of `stones`. Begin with
+`terrain`.
 """

@@ -1,7 +1,7 @@
-"""What a sole of finite size adds to a point: sideways hold, and moments.
+"""Lateral friction and moments of a sole of finite size.
 
-The centre of pressure wanders under the sole as the stones change; the sole resists
-being shifted sideways, turned and tilted like bristles that slip at a limit.
+The centre of pressure wanders under the sole along the path; bristles with a slip limit
+resist lateral motion, turning and tilting.
 """
 
 import numpy as np
@@ -17,9 +17,8 @@ _TURN_PER_N = _ARM / _K_TURN  # stretch of a torsional bristle at its limit [rad
 class Footing:
     """Lateral bristle, torsional bristles and the wandering centre of pressure.
 
-    A bristle is stretched by what the sole moves, up to a limit at which it slips. The
-    limit may be another at every step; the stored energy never grows by a change of it.
-
+    A bristle is stretched by the motion of the sole up to its slip limit. A change of
+    the limit never increases the stored energy.
     """
 
     def __init__(
@@ -28,10 +27,10 @@ class Footing:
         """Draw one trial's footing.
 
         Args:
-            stiffness: of the lateral bristle [N/m].
-            spread: of the centre of pressure about the sole's centre [m rms].
-            length: over which it wanders [m].
-            rng: of this trial's ground.
+            stiffness: stiffness of the lateral bristle [N/m].
+            spread: spread of the centre of pressure about the sole's centre [m rms].
+            length: correlation length of its path [m].
+            rng: generator of this trial's ground.
         """
         self._cop_x = (spread * smooth_profile(rng, length)).tolist()
         self._cop_y = (spread * smooth_profile(rng, length)).tolist()
@@ -39,22 +38,22 @@ class Footing:
         self.release()
 
     def release(self) -> None:
-        """Lose contact."""
+        """Reset after loss of contact."""
         self._aside = 0.0  # stretch of the lateral bristle [m]
-        self._turn_x = self._turn_y = self._turn_z = 0.0  # of the torsional ones [rad]
+        self._turn_x = self._turn_y = self._turn_z = 0.0  # torsional bristles [rad]
 
     def centre_of_pressure(self, x: float) -> tuple[float, float]:
-        """Return its offset from the sole's centre with the sole at `x` [m]."""
+        """Return the offset from the sole's centre with the sole at `x` [m]."""
         return value_at(self._cop_x, x), value_at(self._cop_y, x)
 
     def step(
         self, dt: float, motion: Motion, F_t: float, F_n: float, mu: float
     ) -> Contact:
-        """Return F_t and F_n with all that the sole's size adds to them.
+        """Advance the bristles; return the wrench from F_t, F_n and the bristles.
 
         Args:
             dt: time step [s].
-            motion: of the sole.
+            motion: motion of the sole.
             F_t: traction [N].
             F_n: normal force [N].
             mu: lateral friction limit per newton of F_n.
@@ -64,11 +63,11 @@ class Footing:
             return F_t, 0.0, 0.0, 0.0, 0.0, 0.0
         at, _, _, _, vy, _, wx, wy, wz = motion
         x, y = self.centre_of_pressure(at)
-        k, most = self._stiffness, _TURN_PER_N * F_n
+        k, limit = self._stiffness, _TURN_PER_N * F_n
         self._aside = _slipped(self._aside + vy * dt, mu * F_n / k)
-        self._turn_x = _slipped(self._turn_x + wx * dt, most)
-        self._turn_y = _slipped(self._turn_y + wy * dt, most)
-        self._turn_z = _slipped(self._turn_z + wz * dt, most)
+        self._turn_x = _slipped(self._turn_x + wx * dt, limit)
+        self._turn_y = _slipped(self._turn_y + wy * dt, limit)
+        self._turn_z = _slipped(self._turn_z + wz * dt, limit)
         F_y = -k * self._aside
         return (
             F_t,
@@ -81,5 +80,5 @@ class Footing:
 
 
 def _slipped(stretch: float, limit: float) -> float:
-    """Return the stretch of a bristle that slips at `limit`."""
+    """Return `stretch` clipped to ±`limit`."""
     return limit if stretch > limit else -limit if stretch < -limit else stretch

@@ -1,4 +1,4 @@
-"""Jams of stones: contacts that stretch, creep, break and collapse under a foot."""
+"""Jams of stones: contacts that stretch, creep, break and collapse under the foot."""
 
 import math
 from dataclasses import dataclass
@@ -9,15 +9,15 @@ from fakes.ground.stone_sizes import StoneParameters
 from fakes.randomness import DrawnAhead, NormalStream
 
 _PHI = math.radians(35.0)  # friction angle of the bed
-_THETA = (math.radians(30.0), math.radians(52.0))  # of the flank that is ridden up
+_THETA = (math.radians(30.0), math.radians(52.0))  # range of the flank angle
 _STEEPEST = 1.40  # rad
 _MU_R, _B_G, _C_T = 0.28, 4.0, 20.0  # rolling stones; N s/m; N s/m
 _V_C, _A_C = 0.020, 0.14  # creep [m/s], its sensitivity to load
 _LAM0, _LAM1 = 0.4, 2.0  # shuffles per second
 _S_LO, _S_HI = 0.7, 2.2  # capacity of a contact, in shares of the jam
 _Q0, _TAU = 0.75, 0.4  # strength of a fresh jam, time of ageing [s]
-_TOUCH = 0.05  # N, below which no stone engages
-_LITTLE = 1e-9  # N, keeps the load finite
+_TOUCH = 0.05  # N; least normal force for a stone to engage
+_LITTLE = 1e-9  # N; avoids a division by zero
 
 
 @dataclass(slots=True)
@@ -32,29 +32,29 @@ class Stone:
 
 
 class JamSequence:
-    """One locked configuration of stones after another.
+    """Sequence of locked configurations of stones.
 
     Attributes:
-        releases: how many have collapsed.
+        releases: number of collapses.
     """
 
-    _J: float  # strength of the jam of now [N]
-    _T: float  # its grip per newton of load
-    _age: float  # how long it has been loaded [s]
-    _elastic: float  # force of its stretched contacts [N]
+    _J: float  # strength of the present jam [N]
+    _T: float  # grip per newton of normal force
+    _age: float  # time under load [s]
+    _elastic: float  # force of the stretched contacts [N]
     _is_loaded: bool  # a contact was attached in the last step
-    _stones: list[Stone]  # its contacts
-    _weights: float  # the sum of their weights
+    _stones: list[Stone]  # contacts
+    _weights: float  # sum of their weights
 
     def __init__(
         self, parameters: StoneParameters, strength: float, rng: np.random.Generator
     ) -> None:
-        """Form the first jam, right before the foot.
+        """Form the first jam directly ahead of the foot.
 
         Args:
-            parameters: of the stones.
-            strength: mean capacity of a jam here and in this trial [N].
-            rng: of this trial's ground.
+            parameters: parameters of the stones.
+            strength: mean capacity of a jam in this trial [N].
+            rng: generator of this trial's ground.
         """
         self._p = parameters
         self._strength = strength
@@ -67,14 +67,14 @@ class JamSequence:
         self._form(0.0, 0.0)
 
     def step(self, dt: float, x: float, vx: float, F_n: float, sunk: float) -> float:
-        """Advance by `dt` [s] and return the force against x [N].
+        """Advance by `dt` [s] and return the force along -x [N].
 
         Args:
             dt: time step [s].
             x: position of the sole [m].
-            vx: its velocity [m/s].
+            vx: velocity of the sole [m/s].
             F_n: normal force [N].
-            sunk: share of the final slip sinkage, for the next jam.
+            sunk: slip sinkage as a share of its final value, for the next jam.
         """
         capacity = self._capacity(dt, F_n)
         load = self._elastic / capacity
@@ -114,18 +114,18 @@ class JamSequence:
         return total
 
     def lose_contact(self) -> None:
-        """Let go of the foot, which has left the ground."""
+        """Detach all contacts: the foot has left the ground."""
         self._elastic = 0.0
         self._is_loaded = False
         for stone in self._stones:
             stone.anchor = None
 
     def begin_at(self, x: float) -> None:
-        """Meet stones that have not borne the foot, at `x` [m]."""
+        """Start with fresh stones at `x` [m]."""
         self._form(x, 0.0)
 
     def _capacity(self, dt: float, F_n: float) -> float:
-        """Return the force that the jam can bear now [N]."""
+        """Return the present capacity of the jam [N]."""
         if self._is_loaded:
             self._age += dt
         aged = _Q0 + (1.0 - _Q0) * (1.0 - math.exp(-self._age / _TAU))
@@ -142,7 +142,7 @@ class JamSequence:
             self._shuffle(x)
 
     def _collapse(self, x: float, sunk: float) -> None:
-        """Let go at `x` [m] and form the next jam a free run ahead."""
+        """Collapse at `x` [m] and form the next jam a free run ahead."""
         self._chances.give_back()
         p = self._p
         run_out = p.run * p.d50 * float(self._generator.gamma(p.k_run, 1.0 / p.k_run))
@@ -150,7 +150,7 @@ class JamSequence:
         self._form(x + run_out, sunk)
 
     def _shuffle(self, x: float) -> None:
-        """Let one attached contact lose some of its stretch."""
+        """Relax one attached contact in part."""
         attached = [(s, s.anchor) for s in self._stones if s.anchor is not None]
         if attached:
             self._chances.give_back()
@@ -160,7 +160,7 @@ class JamSequence:
             )
 
     def _break(self, stone: Stone, x: float) -> None:
-        """Let `stone` go at `x` [m]; it meets its next seat after a gap."""
+        """Detach `stone` at `x` [m]; it engages again after a gap."""
         self._chances.give_back()
         p = self._p
         stone.anchor = None

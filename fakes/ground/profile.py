@@ -1,4 +1,4 @@
-"""Random profiles along the container, tabulated on a grid of a millimetre."""
+"""Random profiles along the container, tabulated on a 1 mm grid."""
 
 import numpy as np
 
@@ -14,7 +14,7 @@ def smooth_profile(rng: np.random.Generator, length: float) -> np.ndarray:
     Its autocorrelation at a distance x is exp(-x^2 / (2 length)^2).
 
     Args:
-        rng: where the noise comes from.
+        rng: generator of the noise.
         length: standard deviation of the Gaussian [m].
     """
     reach = max(int(4.0 * length / GRID), 1)
@@ -24,7 +24,7 @@ def smooth_profile(rng: np.random.Generator, length: float) -> np.ndarray:
 
 
 def value_at(table: list[float], x: float) -> float:
-    """Return a tabulated profile at `x` [m], linear between the points."""
+    """Return a tabulated profile at `x` [m], interpolated linearly."""
     position = (x + _MARGIN) / GRID
     if not 0.0 <= position <= _LAST:
         position = 0.0 if position < 0.0 else _LAST

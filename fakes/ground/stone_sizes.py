@@ -1,4 +1,4 @@
-"""The two sizes of stones, and what a slope does to a bed of them."""
+"""Parameters of stone beds by grain size, and the effect of a slope."""
 
 import math
 from dataclasses import dataclass, fields
@@ -14,17 +14,17 @@ class StoneParameters:
 
     Attributes:
         d50: grain size [m].
-        N: contacts that share the load.
+        N: number of contacts that share the load.
         J0: mean capacity of a jam [N].
         k_J: shape of its Gamma distribution.
         k_n: normal stiffness of the bed [N/m].
         run: mean free run to the next jam [d50].
         k_run: shape of its Gamma distribution.
-        disp: spread of the contacts' engagement [d50].
-        gap: mean gap to the next seat after a contact broke [d50].
-        s_inf: slip sinkage in the end [d50].
-        k_w: shape of the load sharing's Gamma distribution.
-        sigma_k: spread of the contacts' stiffness (log).
+        disp: spread of the contacts' engagement positions [d50].
+        gap: mean gap until a broken contact engages again [d50].
+        s_inf: final slip sinkage [d50].
+        k_w: shape of the Gamma distribution of load sharing.
+        sigma_k: standard deviation of the log contact stiffness.
         cop: spread of the centre of pressure [m rms].
         K_t: tangential stiffness of all contacts [N/m].
         zeta: normal damping ratio.
@@ -57,14 +57,14 @@ STONES = {
 }
 
 
-_FINEST, _COARSEST = 0.010, 0.060  # d50 that is simulated [m]
+_FINEST, _COARSEST = 0.010, 0.060  # range of simulated d50 [m]
 _FEWEST = 2  # contacts
 
 
 def stones_of_size(d50: float) -> StoneParameters:
-    """Return a bed of stones of any size between 10 and 60 mm.
+    """Return the parameters of stones of any size between 10 and 60 mm.
 
-    Every parameter is a straight line in ln d50 through those of the two sizes.
+    Every parameter is linear in ln d50 through the values of the two sizes.
 
     Args:
         d50: grain size [m].
@@ -85,7 +85,7 @@ def stones_of_size(d50: float) -> StoneParameters:
 
 
 def not_simulated(what: str) -> SettingsError:
-    """Return the refusal of a ground that is not simulated."""
+    """Return the error for a ground that is not simulated."""
     return SettingsError(
         f"{what} are not simulated, only plates and stones of "
         f"{1e3 * _FINEST:g} to {1e3 * _COARSEST:g} mm.",
@@ -95,9 +95,9 @@ def not_simulated(what: str) -> SettingsError:
 
 
 def slope_factor(incline: float) -> float:
-    """Return eta: how much a slope [rad] weakens the bed.
+    """Return the factor eta by which a slope [rad] weakens the bed.
 
-    Half the reduction of a free slope: the walls of the container support the bed.
+    Half the reduction of a free slope, because the container's walls support the bed.
     """
     loss = 0.5 * math.tan(incline) / math.tan(_REPOSE)
     return math.cos(incline) * (1.0 - loss)

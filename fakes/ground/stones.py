@@ -1,4 +1,4 @@
-"""A bed of stones: an uneven surface that sinks under the foot, and its jams."""
+"""Bed of stones: an uneven surface with slip sinkage, and its jams."""
 
 import math
 
@@ -11,35 +11,35 @@ from fakes.ground.profile import GRID, smooth_profile, value_at
 from fakes.ground.stone_sizes import StoneParameters, slope_factor
 
 _S_H, _L_H = 0.07, 0.40  # height of the surface and its correlation length [d50]
-_L_S = 0.06  # slip over which the bed sinks [m]
-_FIRM = 5.0  # normal force from which it sinks fully [N]
-_STEEPEST_SLOPE = 0.5  # slope that a foot can feel
+_L_S = 0.06  # slip length of the sinkage [m]
+_FIRM = 5.0  # normal force of full sinkage [N]
+_STEEPEST_SLOPE = 0.5  # limit of the slope under a foot
 _MU_LATERAL = 0.6
-# A foot that was in the air for this long and comes down this far away stands anew; a
-# bounce or a hop of the pushed foot (up to 0.7 s and 1.4 d50 in a trial) does not.
+# A foot lifted for this long and set down this far away meets fresh stones; a bounce or
+# hop during a push (up to 0.7 s and 1.4 d50 in a trial) does not.
 _LIFTED, _AWAY = 1.0, 3.0  # s, d50
 
 
 class StoneBed:
-    """A bed of stones as one foot meets it in one trial.
+    """Bed of stones under one foot in one trial.
 
-    A foot that is lifted and set down elsewhere stands on stones that nothing has
-    pushed or pressed yet: a jam of its own, and no slip sinkage.
+    A foot that is lifted and set down elsewhere meets fresh stones: a new jam and no
+    slip sinkage.
 
     Attributes:
         sink: slip sinkage [m].
-        away: a foot that comes down this far from where it stood stands anew [m].
+        away: distance from the last stand at which the stones are fresh [m].
     """
 
     def __init__(
         self, parameters: StoneParameters, incline: float, rng: np.random.Generator
     ) -> None:
-        """Lay the bed.
+        """Draw the bed of one trial.
 
         Args:
-            parameters: of the stones.
-            incline: of the container [rad].
-            rng: of this trial's ground; everything random is drawn from it.
+            parameters: parameters of the stones.
+            incline: incline of the container [rad].
+            rng: generator of this trial's ground.
         """
         p = parameters
         self._parameters = p
@@ -51,9 +51,9 @@ class StoneBed:
         self._profile = profile.tolist()
         self.sink = 0.0
         self._sink_limit = p.s_inf * p.d50
-        self._aloft = 0.0  # how long the foot has been in the air [s]
+        self._aloft = 0.0  # time of the foot in the air [s]
         self.away = _AWAY * p.d50
-        self._stood_at: float | None = None  # where the foot stood last [m]
+        self._stood_at: float | None = None  # last position in contact [m]
         self._footing = Footing(p.K_t, p.cop, 0.5 * p.d50, rng)
         self._jams = JamSequence(p, p.J0 * slope_factor(incline) * self._bed, rng)
 
@@ -64,7 +64,7 @@ class StoneBed:
 
     @property
     def releases(self) -> int:
-        """How many jams have let go."""
+        """Number of collapsed jams."""
         return self._jams.releases
 
     def surface(self, x: float) -> float:
@@ -72,11 +72,11 @@ class StoneBed:
         return value_at(self._profile, x)
 
     def _is_away(self, x: float) -> bool:
-        """Whether a lifted foot is far from where it stood: the bed is fresh there."""
+        """Return whether `x` is far from the last stand: the stones are fresh there."""
         return self._stood_at is not None and abs(x - self._stood_at) >= self.away
 
     def truth(self) -> dict[str, float]:
-        """Return the parameters in force [SI]."""
+        """Return the true parameters [SI]."""
         return {
             "bed_factor": self._bed,
             "J0": self._parameters.J0,
@@ -85,7 +85,7 @@ class StoneBed:
         }
 
     def step(self, dt: float, motion: Motion) -> Contact:
-        """Advance the bed by `dt` [s] and return what it does to the foot."""
+        """Advance the bed by `dt` [s] and return its wrench on the foot."""
         x, _, z, vx, _, vz, _, _, _ = motion
         is_fresh = self._aloft >= _LIFTED and self._is_away(x)
         sink = 0.0 if is_fresh else self.sink

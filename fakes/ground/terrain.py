@@ -1,4 +1,4 @@
-"""The ground of one trial: a plate or a bed of stones, and the planks around it."""
+"""Ground of one trial: a plate or a bed of stones, between the container's planks."""
 
 import math
 from collections.abc import Mapping
@@ -21,7 +21,7 @@ from fakes.ground.stones import StoneBed
 
 @dataclass(frozen=True, slots=True)
 class PlateParameters:
-    """LuGre friction of a flat plate: the surface and the foot's tread."""
+    """LuGre friction of a flat plate, for a pair of surface and tread."""
 
     mu_s: float
     mu_k: float
@@ -40,7 +40,7 @@ PLATES = {
 
 
 _K_LATERAL = 2200.0  # N/m
-_COP_SPREAD, _COP_LENGTH = 0.003, 0.010  # of the centre of pressure [m]
+_COP_SPREAD, _COP_LENGTH = 0.003, 0.010  # centre of pressure [m]
 
 
 class Plate:
@@ -48,10 +48,10 @@ class Plate:
 
     def __init__(self, parameters: PlateParameters, rng: np.random.Generator) -> None:
         self._parameters = parameters
-        self._bristle = 0.0  # its stretch [m]
+        self._bristle = 0.0  # deflection [m]
         self._pressed = 0.0  # normal force of the last step [N]
         self._c_n = 2.0 * parameters.zeta * math.sqrt(parameters.k_n * DAMPING_MASS)
-        # Multiples of the friction: of this trial, and along the plate.
+        # Factors of the friction: of this trial, and along the plate.
         self._level = math.exp(0.02 * float(rng.standard_normal()))
         self._texture = (1.0 + 0.03 * smooth_profile(rng, 0.03)).tolist()
         self._footing = Footing(_K_LATERAL, _COP_SPREAD, _COP_LENGTH, rng)
@@ -67,7 +67,7 @@ class Plate:
         return 0.0
 
     def truth(self) -> dict[str, float]:
-        """Return the parameters in force [SI]."""
+        """Return the true parameters [SI]."""
         return {
             "mu_s": self._parameters.mu_s * self._level,
             "mu_k": self._parameters.mu_k * self._level,
@@ -76,7 +76,7 @@ class Plate:
         }
 
     def step(self, dt: float, motion: Motion) -> Contact:
-        """Advance the bristle by `dt` and return the force."""
+        """Advance the bristle by `dt` [s] and return the wrench on the foot."""
         p = self._parameters
         x, _, z, v, _, vz, _, _, _ = motion
         if z >= 0.0:
@@ -88,11 +88,11 @@ class Plate:
         g = (p.mu_k + (p.mu_s - p.mu_k) * math.exp(-((v / p.v_S) ** 2))) * m
         before = self._bristle
         if F_n > self._pressed:
-            # Pressing harder stiffens the bristle; its force stays, or the stretch of a
-            # light touch would be paid back with the energy of a heavy one.
+            # A higher normal force stiffens the bristle. Keep its force, not its
+            # deflection: otherwise pressing would create energy.
             before *= self._pressed / F_n
         self._pressed = F_n
-        # backward Euler in z: the bristle is stiff at high speed
+        # backward Euler in z: the equation is stiff at high speed
         bristle = (before + dt * v) / (1.0 + dt * p.s0 * abs(v) / g)
         limit = p.mu_s * m / p.s0
         self._bristle = bristle = min(max(bristle, -limit), limit)
@@ -102,7 +102,7 @@ class Plate:
 
 
 class Terrain(Protocol):
-    """Ground that a foot can stand and slip on."""
+    """Interface of a ground."""
 
     @property
     def stiffness(self) -> float:
@@ -114,24 +114,23 @@ class Terrain(Protocol):
         ...
 
     def truth(self) -> dict[str, float]:
-        """Return the parameters in force [SI]."""
+        """Return the true parameters [SI]."""
         ...
 
     def step(self, dt: float, motion: Motion) -> Contact:
-        """Advance the contact by `dt` [s] and return what it does to the foot."""
+        """Advance the contact by `dt` [s] and return its wrench on the foot."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class GroundChoice:
-    """What the ground of a container is.
+    """Ground of a container.
 
     Attributes:
         stones: "small", "big", "none" (a plate), or e.g. "12 mm".
-        foot: its name; matters on plates.
-        sole: friction of the foot on plates; None = that of its name, or with tread.
-        effects: what parameters of the ground are multiplied by; those that it does
-            not have are left out.
+        foot: name of the foot, for plates.
+        sole: friction of the foot on plates; None = by its name, default "tread".
+        effects: factors of parameters by name; unknown ones are ignored.
     """
 
     stones: str
@@ -141,14 +140,14 @@ class GroundChoice:
 
     def plate(self) -> PlateParameters:
         """Return the friction of the foot on a plate."""
-        known = self.sole or PLATES.get(self.foot, PLATES["tread"])
-        return _multiplied(known, self.effects)
+        parameters = self.sole or PLATES.get(self.foot, PLATES["tread"])
+        return _multiplied(parameters, self.effects)
 
     def bed(self) -> StoneParameters:
         """Return the parameters of the stones.
 
         Raises:
-            SettingsError: these are not simulated.
+            SettingsError: stones of this kind are not simulated.
         """
         return _multiplied(_stones(self.stones), self.effects)
 
@@ -166,7 +165,7 @@ _P = TypeVar("_P", PlateParameters, StoneParameters)
 
 
 def _multiplied(parameters: _P, effects: Mapping[str, float]) -> _P:
-    """Return parameters with those of them that effects name multiplied."""
+    """Return the parameters multiplied by the effects of the same name."""
     own = {f.name for f in fields(parameters)} & set(effects)
     return replace(
         parameters, **{name: effects[name] * getattr(parameters, name) for name in own}
@@ -179,8 +178,8 @@ def make_terrain(
     """Return the ground of one trial.
 
     Args:
-        choice: what it is.
-        incline: along the push, positive downhill [rad].
+        choice: kind of ground.
+        incline: incline along the push, positive downhill [rad].
         rng: generator of this trial.
 
     Raises:
@@ -191,15 +190,15 @@ def make_terrain(
     return StoneBed(choice.bed(), incline, rng)
 
 
-FREE = 0.045  # from the centre line until the sole's edge meets a plank [m]
+FREE = 0.045  # lateral travel from the centre line to a plank [m]
 _RIM = 0.04  # height of the planks above the plane [m]
 _PLANK_K = 5000.0  # N/m
 _PLANK_B = 2.0 * 0.4 * math.sqrt(_PLANK_K * DAMPING_MASS)  # N s/m
-_PLANK_MU = 0.3  # of a foot that slips along them
+_PLANK_MU = 0.3  # friction along the planks
 
 
 class Container:
-    """A ground between two planks; both push, neither pulls."""
+    """A ground between two planks with unilateral contact."""
 
     def __init__(self, ground: Terrain) -> None:
         self.ground = ground
@@ -214,11 +213,11 @@ class Container:
         return self.ground.surface(x)
 
     def truth(self) -> dict[str, float]:
-        """Return the parameters in force [SI]."""
+        """Return the true parameters [SI]."""
         return self.ground.truth()
 
     def step(self, dt: float, motion: Motion) -> Contact:
-        """Advance the ground by `dt` [s]; return what it and the planks do."""
+        """Advance the ground by `dt` [s]; return the wrench of ground and planks."""
         contact = self.ground.step(dt, motion)
         if -FREE <= motion[1] <= FREE:
             return contact
@@ -227,7 +226,7 @@ class Container:
             return contact
         depth = abs(y) - FREE
         side = math.copysign(1.0, y)
-        shared = max(0.0, _PLANK_K * depth + _PLANK_B * side * vy)
-        friction = _PLANK_MU * shared * math.tanh(vx / 0.01)
+        plank_force = max(0.0, _PLANK_K * depth + _PLANK_B * side * vy)
+        friction = _PLANK_MU * plank_force * math.tanh(vx / 0.01)
         F_t, F_y, F_n, M_x, M_y, M_z = contact
-        return F_t + friction, F_y - side * shared, F_n, M_x, M_y, M_z
+        return F_t + friction, F_y - side * plank_force, F_n, M_x, M_y, M_z

@@ -1,5 +1,6 @@
-"""The simulated arm with its foot and the hand that pushes it.
+"""Dynamics of the simulated arm with its foot and the operator's hand.
 
-`plant` integrates the dynamics, `joints` is friction and stops, `gauges` what the
-sensor feels, `hand` and `push` what a person does. Begin with `plant`.
+`plant` and `body` integrate the dynamics, `joints` models drives and stops, `friction`
+the bristles, `gauges` the load on the sensor, `hand` and `push` the person. Begin with
+`plant`.
 """

@@ -1,14 +1,14 @@
 # pyright: reportMissingImports=false
-"""The dynamics of the arm, one substep after the other.
+"""Dynamics of the arm in substeps, semi-implicit Euler.
 
     (M + dt D) (qd' - qd) = dt (tau + J_s^T w_s + J_h^T w_h + T^T f - nle)
     q' = q + dt qd'
 
 nle at q and qd + dt qdd / 2, M with drive inertia, w_s the ground's wrench at the sole,
 w_h the hand's at the forearm, T the transmission, f the friction of the motors at qd.
-D is the diagonal of the damping of friction and stops, which is an addition to the
-armature, so one articulated-body pass solves it. What a differential adds beside the
-diagonal is smaller and taken explicitly: steps stay stable.
+D, the diagonal damping of friction and stops, is treated as an addition to the
+armature, so one articulated-body pass solves the equation. The off-diagonal damping of
+the differentials is smaller and taken explicitly, which stays stable.
 """
 
 from collections.abc import Sequence
@@ -25,18 +25,18 @@ from fakes.plant.model import ArmAndHand
 from fakes.plant.push import HandView, Vector3
 from wam.model.constants import Array
 
-GRIP = (40.0, 1.0)  # the hand keeps the forearm's turn: N m/rad, N m s/rad
+GRIP = (40.0, 1.0)  # orientation of the hand on the forearm: N m/rad, N m s/rad
 NO_GRIP = (0.0, 0.0)
 
 
 class HandLoad(NamedTuple):
-    """What the hand does in a cycle.
+    """Load of the hand in a cycle.
 
     Attributes:
-        force: on the hand point, with the weight that the person carries [N].
+        force: force on the hand point, including supported weight [N].
         grip: GRIP or NO_GRIP.
-        sole: force on the sole beside the ground's [N]; None = none.
-        links: of hands on the links; None = there are none.
+        sole: external force on the sole other than the ground's [N]; None = none.
+        links: torques of hands on the links; None = no such hands.
     """
 
     force: Vector3
@@ -54,9 +54,9 @@ class ArmBody:
     """Seven joints, foot on the ground, hand on the forearm; terrain frame.
 
     Attributes:
-        disturbance: joint torques from outside [N m], shape (7,).
-        drives: of the joints.
-        rotation: frame 7 to terrain as it was when the cycle began, shape (3, 3).
+        disturbance: external joint torques [N m], shape (7,).
+        drives: drives of the joints.
+        rotation: frame 7 to terrain at the start of the cycle, shape (3, 3).
     """
 
     def __init__(
@@ -67,11 +67,11 @@ class ArmBody:
         q: Array,
         substep_ns: int,
     ) -> None:
-        """Stand still at `q`, held; the hand keeps the turn of now.
+        """Start at rest at `q`, held; the hand keeps its present orientation.
 
         Args:
-            parts: the arm with the hand, its frames: sole and hand.
-            drives: of the joints.
+            parts: model of the arm with the frames of sole and hand.
+            drives: drives of the joints.
             j2mp: motor angle = j2mp @ joint angle, shape (7, 7).
             q: joint positions [rad], shape (7,).
             substep_ns: length of a substep [ns].
@@ -80,7 +80,7 @@ class ArmBody:
         self._data = self._model.createData()
         self.drives, self.disturbance = drives, drives.disturbance
         self._dt = substep_ns * 1e-9
-        # Forces act at the beginning of each substep, on average here in a cycle [s].
+        # Mean time of the substeps' forces after the start of a cycle [s].
         midway = 5e-10 * (PERIOD_NS - substep_ns)
         self._midway = np.array([1.0, midway, 0.0])
         self._is_held = True
@@ -91,26 +91,26 @@ class ArmBody:
         self._loads = JointLoads(j2mp)
         pin.forwardKinematics(self._model, self._data, q)
         hand = pin.updateFramePlacement(self._model, self._data, self._hand)
-        self._wanted = hand.rotation.copy()
+        self._target_rotation = hand.rotation.copy()
         self.linearise()
         self._begin_drives(0)
 
     @property
     def q(self) -> Array:
-        """Joint positions [rad], shape (7,); as they are now, also later."""
+        """Joint positions [rad], shape (7,); the array is not changed later."""
         return self._joints.rows[0]
 
     @property
     def qd(self) -> Array:
-        """Joint velocities [rad/s], shape (7,); as they are now, also later."""
+        """Joint velocities [rad/s], shape (7,); the array is not changed later."""
         return self._joints.rows[1]
 
     def move(self, q: Array) -> None:
-        """Be at `q` [rad] with the velocities of now."""
+        """Set the joint positions [rad], keeping the velocities."""
         self._joints.move(q)
 
     def hold(self, *, is_held: bool) -> None:
-        """Let a stand or a person bear the arm where it is, or let go of it."""
+        """Support the arm in place (stand or person), or release it."""
         self._is_held = is_held
         if is_held:
             self._joints.rest(self.q)
@@ -122,9 +122,9 @@ class ArmBody:
         self.drives.drive(units)
 
     def burden(self) -> Vector3:
-        """Return the force at the hand that bears the arm's weight [N].
+        """Return the force at the hand that supports the arm's weight [N].
 
-        A person lifts in the plane of joints 2 and 4; what turns the others is little.
+        In the plane of joints 2 and 4; gravity torques of the other joints are small.
         """
         weight = pin.computeGeneralizedGravity(self._model, self._data, self.q)
         lifted = self._loads.A[6:9:2, _LIFTED]  # along x and z
@@ -132,36 +132,36 @@ class ArmBody:
         return x, 0.0, z
 
     def bearing(self, hand: Vector3, sole: Vector3 | None) -> Array:
-        """Return the torques that bear what neither motors nor these forces do, (7,).
+        """Return the gravity torques not supported by motors and forces [N m], (7,).
 
         Args:
             hand: force on the hand point [N].
             sole: force on the sole [N]; None = none.
         """
         weight = pin.computeGeneralizedGravity(self._model, self._data, self.q)
-        borne = self.drives.driven + self._loads.A[6:9].T.dot(hand)
+        supported = self.drives.driven + self._loads.A[6:9].T.dot(hand)
         if sole is not None:
-            borne = borne + self._loads.A[:3].T.dot(sole)
-        return weight - borne
+            supported = supported + self._loads.A[:3].T.dot(sole)
+        return weight - supported
 
     def keep_turn(self) -> None:
-        """Let the hand keep the turn that the forearm has now."""
+        """Let the hand keep the present orientation of the forearm."""
         hand = pin.updateFramePlacement(self._model, self._data, self._hand)
-        self._wanted = hand.rotation.copy()
+        self._target_rotation = hand.rotation.copy()
 
     def counts(self) -> list[float]:
-        """Return what the encoders of the motors count, seven."""
+        """Return the counts of the motor encoders, seven."""
         return self.drives.counts(self.q).tolist()
 
     def motion(self) -> Sequence[float]:
-        """Return position, velocity and turning rate of the sole, nine numbers."""
+        """Return position, velocity and angular velocity of the sole, nine numbers."""
         return (*self._sole_at, *self._rates[:6])
 
     def linearise(self) -> HandView:
-        """Take positions and Jacobians anew, once per cycle; return what a hand feels.
+        """Update frames and Jacobians once per cycle; return the hand's observation.
 
-        Within the 2 ms sole and hand move along them; the joints themselves and their
-        dynamics are never linearised. Everything is in the terrain frame.
+        Within the 2 ms, sole and hand move by the Jacobians; the joints and their
+        dynamics are not linearised. All in the terrain frame.
         """
         model, data, A = self._model, self._data, self._loads.A
         pin.forwardKinematics(model, data, self.q)
@@ -171,7 +171,7 @@ class ArmBody:
         x, y, z = sole.translation.tolist()
         self._sole_at = (x, y, z)
         x, y, z = hand.translation.tolist()
-        (_, xy, xz), (yx, _, yz), (zx, zy, _) = self._wanted.dot(
+        (_, xy, xz), (yx, _, yz), (zx, zy, _) = self._target_rotation.dot(
             hand.rotation.T
         ).tolist()
         self._tilt = (0.5 * (zy - yz), 0.5 * (xz - zx), 0.5 * (yx - xy))
@@ -184,19 +184,19 @@ class ArmBody:
         return HandView(self._sole_at, (vx, vy, vz), (x, y, z), (hx, hy, hz))
 
     def begin_cycle(self, load: HandLoad, t_ns: int) -> None:
-        """Take anew what stays as it is for 2 ms from `t_ns` on."""
+        """Refresh the quantities held constant during one cycle from `t_ns`."""
         self._force, self._grip, self._pull, self.drives.grip = load
         self._begin_drives(t_ns)
 
     def go_on(self, steps: int, terrain: Terrain | None) -> None:
-        """Go on by `steps` substeps within a cycle."""
+        """Advance by `steps` substeps within a cycle."""
         for _ in range(steps):
             self._step(terrain)
 
     def end_cycle(self) -> tuple[Sequence[float], Sequence[float]]:
-        """Return the sum of the ground's wrenches in the cycle, six, and `motion`."""
-        ended, self._sum = self._sum, _NOTHING
-        return ended, self.motion()
+        """Return the sum of the ground's wrenches over the substeps, and `motion`."""
+        wrench_sum, self._sum = self._sum, _NOTHING
+        return wrench_sum, self.motion()
 
     def _begin_drives(self, t_ns: int) -> None:
         self.drives.begin_cycle(self._joints.rows, self._speeds, t_ns)
@@ -223,10 +223,10 @@ class ArmBody:
         """Advance by one substep under `wrench` on foot and hand, twelve numbers."""
         dt, state, drives = self._dt, self._joints.rows, self.drives
         armature = drives.armature
-        against = drives.torques(state, self._speeds)
+        motor_torques = drives.torques(state, self._speeds)
         if drives.armature is not armature:
             self._model.armature = drives.armature
-        tau = self._loads.torques(wrench, against, drives.driving)
+        tau = self._loads.torques(wrench, motor_torques, drives.driving)
         qdd = pin.aba(self._model, self._data, state[0], state[2], tau)
         motion = self._loads.A.dot(self._joints.step(qdd)[1]).tolist()
         self._rates, self._speeds = rates, speeds = motion[:12], motion[12:]

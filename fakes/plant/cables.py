@@ -1,13 +1,13 @@
-"""Drives whose motors turn the joints through cables that give way.
+"""Drives with elastic cables between motors and joints.
 
     J w' = J w + dt (u - f - s),   s = k e' + b (w' - v),   e' = e + dt (w' - v)
 
-J is the rotor's inertia, w its speed, u the torque sent, f its friction, e what the
-cable is twisted by, v the speed at which the joints turn the cable's other end; all by
-motor, in the motor's own angle. Solved for w' implicitly; the joints feel the s that
-the motor felt, so nothing is lost or won between them. Encoders sit at the motors.
+J is the rotor's inertia, w its speed, u the commanded torque, f its friction, e the
+twist of the cable, v the speed of the cable's joint end; all per motor, in motor
+angles. Solved implicitly for w'; the same s acts on motor and joints, so the coupling
+conserves energy. Encoders are at the motors.
 
-No WAM's cables have been published: their resonance is ASSUMED, see `CABLES`.
+No data of a WAM's cables are published: their resonance is ASSUMED, see `CABLES`.
 """
 
 from collections.abc import Sequence
@@ -20,15 +20,15 @@ from wam.model.constants import ArmConstants, Array
 from wam.model.friction import MotorFriction
 
 CABLES = FrictionParameter("cables", "Hz, motors held", np.inf, 8.0, 25.0, ASSUMED)
-_STIFFEST = 40.0  # Hz, that steps of 0.5 ms follow
-_DAMPING = 0.03  # of critical, of a joint on its cable; ASSUMED
+_STIFFEST = 40.0  # Hz; limit of stable steps of 0.5 ms
+_DAMPING = 0.03  # damping ratio of a joint on its cable; ASSUMED
 
 
 class CableDrives(JointDrives):
-    """The drives of an arm whose joints swing on their cables.
+    """Drives of an arm with elastic cables.
 
     Attributes:
-        twist: of the cables: motor angle beyond the joints' [rad], shape (7,).
+        twist: twist of the cables: motor angle minus that by the joints [rad], (7,).
     """
 
     def __init__(
@@ -41,20 +41,20 @@ class CableDrives(JointDrives):
         windings: Array,
         resonance: float,
     ) -> None:
-        """Take the drives of an arm that stands without torque.
+        """Start at rest without torque.
 
         Args:
-            constants: of the arm.
-            friction: of the motors.
-            inertia: that a motor moves when it turns [kg m^2], shape (7,).
-            swinging: what swings on the cable of each motor [kg m^2], shape (7,).
+            constants: constants of the arm.
+            friction: friction of the motors.
+            inertia: effective inertia at each motor [kg m^2], shape (7,).
+            swinging: inertia on the cable of each motor [kg m^2], shape (7,).
             dt: length of a step [s].
             windings: damping of each motor when shorted [N m s/rad], shape (7,).
-            resonance: of a joint on its cable while motor and other joints are held
-                [Hz].
+            resonance: resonance of a joint on its cable, with motor and other joints
+                held [Hz].
 
         Raises:
-            ValueError: no cable is like that, or the steps are too long for it.
+            ValueError: the resonance is out of range.
         """
         if not 1.0 <= resonance <= _STIFFEST:
             raise ValueError(f"resonance {resonance} Hz is outside 1..{_STIFFEST:g}")
@@ -66,17 +66,17 @@ class CableDrives(JointDrives):
         super().__init__(constants, friction, inertia, dt, windings)
 
     def counts(self, q: Array) -> Array:
-        """Return what the encoders at the motors count, shape (7,)."""
+        """Return the counts of the motor encoders, shape (7,)."""
         return super().counts(q) + self._turns * self.twist
 
     def rest(self) -> None:
-        """Unbend bristles and cables of an arm that something bears."""
+        """Relax bristles and cables of a supported arm."""
         super().rest()
         self.twist, self._speeds = np.zeros(7), np.zeros(7)
 
     def begin_cycle(self, rows: Array, speeds: Sequence[float], t_ns: int) -> None:
-        """Take anew what stays as it is for 2 ms; arguments as of JointDrives."""
-        del speeds  # of the joints: friction is at the motors
+        """Refresh the quantities held constant during one cycle; see JointDrives."""
+        del speeds  # by the joints; friction depends on the motors' own speeds
         motors = rows.copy()
         motors[0] = rows[0] + np.linalg.solve(self._j2mp, self.twist)
         self._bear(motors, self._speeds.tolist(), t_ns)
@@ -84,27 +84,32 @@ class CableDrives(JointDrives):
         self._resist(())
 
     def torques(self, rows: Array, speeds: Sequence[float]) -> list[float]:
-        """Step the motors; return the torques of the cables at them [N m], seven.
+        """Step the motors; return the cable torques at the motors [N m], seven.
 
-        Arguments as of JointDrives.
+        Arguments as for JointDrives.
         """
         if self._stopping.is_near or self.grip is not None:
             self._stop(rows)
             self._resist(())
         dt, bristles = self._dt, self._bristles
         bristles.take(self._speeds.tolist())
-        bent = np.array(bristles.torques([0.0] * 7))
+        bristle_torques = np.array(bristles.torques([0.0] * 7))
         stiffness, damping = self._stiffness, self._cable_damping
-        held = damping + dt * stiffness
+        coupling = damping + dt * stiffness
         damping = np.array(bristles.damping) + self._shorted
-        inertia = self._rotor + dt * (damping + held)
-        against = np.array(speeds)
-        push = np.array(self.sent()) + bent - stiffness * self.twist + held * against
+        inertia = self._rotor + dt * (damping + coupling)
+        end_speeds = np.array(speeds)
+        push = (
+            np.array(self.sent())
+            + bristle_torques
+            - stiffness * self.twist
+            + coupling * end_speeds
+        )
         self._speeds = motor = (self._rotor * self._speeds + dt * push) / inertia
-        return (stiffness * self.twist + held * (motor - against)).tolist()
+        return (stiffness * self.twist + coupling * (motor - end_speeds)).tolist()
 
     def follow(self, speeds: Sequence[float]) -> None:
-        """Go on by a step; the joints turn the cables at `speeds` [rad/s]."""
+        """Advance by a step with cable ends turning at `speeds` [rad/s]."""
         self._bristles.follow(self._speeds.tolist())
         self.twist = self.twist + self._dt * (self._speeds - np.array(speeds))
 

@@ -1,7 +1,7 @@
-"""Friction of the simulated arm: a table, an arm drawn from it, and its bristles.
+"""Friction of the simulated arm: parameter table, random draw, and bristle model.
 
-No WAM has published more than Coulomb and viscous friction of one arm. Every other
-figure is ASSUMED, with the range from which a simulated arm draws it.
+Only Coulomb and viscous friction of one WAM are published. All other values are
+ASSUMED, with the range from which those of a simulated arm are drawn.
 """
 
 import math
@@ -29,12 +29,12 @@ class FrictionParameter:
     """One row of the table.
 
     Attributes:
-        name: of the parameter.
-        unit: in which it is stated.
-        nominal: its value in an arm without a seed.
+        name: name of the parameter.
+        unit: unit.
+        nominal: value without a seed.
         low: smallest value drawn.
         high: largest value drawn.
-        source: where it is from; `ASSUMED` = not measured on any WAM.
+        source: source; `ASSUMED` = not measured on any WAM.
     """
 
     name: str
@@ -66,31 +66,31 @@ FRICTION_TABLE = (
         "presliding_wrist", "rad, motors 5-7", 2e-3, 1e-3, 2.5e-3, ASSUMED
     ),
 )
-# A move takes a motor that needs more than 1.5 of the figures for one that is stuck.
+# Above 1.5 times the nominal friction a move reports the motor as stuck.
 _LARGEST_BREAKAWAY = 1.4
-_DAMPED = 1.4  # of a bristle: twice its damping ratio
-_LIVELY = 0.1  # of the sliding deflection in a cycle: a bristle is taken anew sooner
+_DAMPED = 1.4  # twice the damping ratio of a bristle
+_LIVELY = 0.1  # of the sliding deflection per cycle: then updated in every step
 _PERIOD = PERIOD_NS * 1e-9  # s
-_LEAST = 1e-9  # N m at a motor: an arm without friction has almost none
+_LEAST = 1e-9  # N m at a motor: least Coulomb friction, avoids a division by zero
 
 
 def draw_friction(
     constants: ArmConstants, share: float, seed: int | None, load_at: Array
 ) -> MotorFriction:
-    """Return the friction of a simulated arm.
+    """Draw the friction of a simulated arm.
 
     Args:
-        constants: of the arm; its figures were identified on another one.
-        share: of these figures.
-        seed: of the parameters that are drawn; None = the nominal ones.
-        load_at: torques that the motors bear where the figures hold [N m], shape (7,).
+        constants: constants of the arm, with the friction identified on another arm.
+        share: factor of that friction.
+        seed: seed of the draw; None = nominal parameters.
+        load_at: reference loads of the motors [N m], shape (7,).
     """
     random = None if seed is None else friction_generator(seed)
     drawn = {row.name: row.values(random) for row in FRICTION_TABLE}
     nominal = share * motor_shares(constants, constants.coulomb, 1)
     viscous = share * motor_shares(constants, constants.viscous, 2)
     coulomb = nominal * drawn["coulomb"]
-    one_way = drawn["coulomb"] * (1.0 + np.abs(drawn["asymmetry"]))
+    largest_factor = drawn["coulomb"] * (1.0 + np.abs(drawn["asymmetry"]))
     turns = motor_turns(constants)
     presliding = np.append(drawn["presliding_arm"][:4], drawn["presliding_wrist"][4:])
     ripple, phase = drawn["ripple"], drawn["phase"]
@@ -99,7 +99,7 @@ def draw_friction(
         asymmetry=coulomb * drawn["asymmetry"],
         load=share * drawn["load"],
         load_at=load_at,
-        breakaway=np.minimum(drawn["breakaway"], _LARGEST_BREAKAWAY / one_way),
+        breakaway=np.minimum(drawn["breakaway"], _LARGEST_BREAKAWAY / largest_factor),
         stribeck=turns * drawn["stribeck"],
         viscous=viscous * drawn["viscous"],
         ripple_sin=ripple * np.cos(phase),
@@ -111,27 +111,27 @@ def draw_friction(
 class MotorBristles:
     """Friction of the seven motors: one elasto-plastic bristle each.
 
-    Taken implicitly in the speed: over a step of length dt the torque against the
-    motion is c z + D w, w the speed at its end, and z <- a (z + dt w). With s0 = g at
-    standstill / presliding, s1 the damping of the bristle and b that of the motor,
+    Implicit in the speed: over a step dt the torque against the motion is c z + D w,
+    with w the speed at its end, and z <- a (z + dt w). With s0 = g at standstill /
+    presliding, s1 the damping of the bristle and b that of the motor,
 
         a = 1 / (1 + dt alpha s0 |w| / g),  D = a (s0 dt + s1) + b
         c = a (s0 + s1 / dt) - s1 / dt
 
-    c, D and a are taken anew in every cycle, and in every step where a motor goes a
-    tenth of its presliding in a cycle. They are never negative, so the bristles take
-    energy out or store it, whenever they are taken.
+    c, D and a are updated in every cycle, and in every step if a motor moves a tenth of
+    its presliding in a cycle. They are never negative, so the bristles only store or
+    dissipate energy, whenever they are updated.
 
     Attributes:
         damping: D of the seven motors [N m s/rad].
     """
 
     def __init__(self, friction: MotorFriction, inertia: Array, dt: float) -> None:
-        """Take the friction of the motors; their bristles are not bent.
+        """Start with relaxed bristles.
 
         Args:
-            friction: of the motors.
-            inertia: that a motor moves when it turns [kg m^2], shape (7,).
+            friction: friction of the motors.
+            inertia: effective inertia at each motor [kg m^2], shape (7,).
             dt: length of a step [s].
         """
         self._dt = dt
@@ -154,49 +154,49 @@ class MotorBristles:
         self.rest()
 
     def rest(self) -> None:
-        """Let go of what bends the bristles, as in an arm that something bears."""
+        """Relax the bristles, as in a supported arm."""
         self._z = [0.0] * 7
         self._keep = [1.0] * 7
         self.take([0.0] * 7)
 
     def bear(self, angles: Sequence[float], tau: Sequence[float]) -> None:
-        """Take the dry friction where the motors are.
+        """Update the dry friction at the present angles and loads.
 
         Args:
-            angles: of the motors [rad].
-            tau: torques that they bear [N m].
+            angles: motor angles [rad].
+            tau: load torques of the motors [N m].
         """
-        ways: list[tuple[float, float]] = []
+        levels: list[tuple[float, float]] = []
         for angle, torque, row in zip(angles, tau, self._levels, strict=True):
             coulomb, load, asymmetry, ripple_sin, ripple_cos = row
             level = coulomb + load * abs(torque)
             ripple = 1.0 + ripple_sin * math.sin(angle) + ripple_cos * math.cos(angle)
-            ways.append(((level + asymmetry) * ripple, (level - asymmetry) * ripple))
-        self._ways = ways
+            levels.append(((level + asymmetry) * ripple, (level - asymmetry) * ripple))
+        self._sliding_torques = levels
 
     def follow(self, speeds: Sequence[float]) -> None:
-        """Bend the bristles by a step at `speeds` of the motors [rad/s]."""
+        """Advance the bristles by a step at motor speeds `speeds` [rad/s]."""
         dt = self._dt
         state = zip(self._keep, self._z, speeds, strict=True)
         self._z = [keep * (z + dt * w) for keep, z, w in state]
 
     def is_lively(self, speeds: Sequence[float]) -> bool:
-        """Return whether a motor bends its bristle far within a cycle."""
+        """Return whether a motor is fast enough for updates in every step."""
         state = zip(speeds, self._lively, strict=True)
         return any(abs(speed) > limit for speed, limit in state)
 
     def take(self, speeds: Sequence[float]) -> None:
-        """Take c, D and a anew at `speeds` of the motors [rad/s]."""
+        """Update c, D and a at motor speeds `speeds` [rad/s]."""
         dt = self._dt
         keeps, dampings = [1.0] * 7, self._bent_damping.copy()
         springs = self._bent_springs.copy()
-        state = zip(speeds, self._z, self._ways, self._columns, strict=True)
+        state = zip(speeds, self._z, self._sliding_torques, self._columns, strict=True)
         for i, (w, z, (forward, backward), row) in enumerate(state):
             if z * w <= 0.0:
                 continue
             more, slow, s0, bent_damping, bent_spring, s1_dt, b = row
             x = w * slow
-            # Bristle and speed have one sign: both are taken without it.
+            # Deflection and speed have the same sign here: use magnitudes.
             speed, bend, g = (w, z, forward) if w > 0.0 else (-w, -z, backward)
             g *= 1.0 + more / (1.0 + x * x)
             bent = bend * s0 / g
@@ -208,22 +208,22 @@ class MotorBristles:
         self._keep, self.damping, self._springs = keeps, dampings, springs
 
     def torques(self, speeds: Sequence[float]) -> list[float]:
-        """Return the torques on the motors [N m], taken at their `speeds` [rad/s]."""
+        """Return the friction torques on the motors [N m] at `speeds` [rad/s]."""
         state = zip(self._springs, self._z, self.damping, speeds, strict=True)
         return [-c * z - d * w for c, z, d, w in state]
 
 
 def lively_speeds(friction: MotorFriction) -> Array:
-    """Return from which speed a bristle is taken anew in every step [rad/s], (7,)."""
+    """Return the speed limits for updates once per cycle [rad/s], shape (7,)."""
     return _LIVELY / _PERIOD * friction.presliding
 
 
 def bristle_columns(
     friction: MotorFriction, inertia: Array, dt: float
 ) -> list[list[float]]:
-    """Return what `MotorBristles.take` needs of each motor.
+    """Return the coefficients of `MotorBristles.take`, seven per motor.
 
-    s - 1, 1 / w_s, s0, s0 dt + s1, s0 + s1 / dt, s1 / dt, b: seven numbers of each.
+    s - 1, 1 / w_s, s0, s0 dt + s1, s0 + s1 / dt, s1 / dt, b.
     """
     s0 = friction.coulomb * friction.breakaway / friction.presliding
     s1 = _DAMPED * np.sqrt(s0 * inertia)

@@ -1,4 +1,4 @@
-"""What the gauges in the wrist feel: ground, weight and inertia of the foot."""
+"""Load on the wrist sensor's gauges: ground, weight and inertia of the foot."""
 
 from collections.abc import Sequence
 
@@ -18,15 +18,15 @@ class WristGauges:
     f = F_c + m (g_w - a)
     n = p_s x F_c + M_c + c x m (g_w - a) - I alpha - w x I w      in the sensor frame
 
-    with F_c and M_c the ground's at the sole p_s, a and alpha the mean accelerations of
-    the foot over the cycle, m, c and I those of everything below the gauges.
+    with F_c and M_c the ground's wrench at the sole p_s, a and alpha the mean
+    accelerations of the foot over the cycle; m, c and I of everything below the gauges.
 
     Attributes:
-        cable: its force on the foot [N], terrain frame, shape (3,); None = none.
+        cable: force of the sensor's cable on the foot [N], terrain frame, or None.
     """
 
     def __init__(self, tool: Tool, up: Array, period: float) -> None:
-        """Take the tool, what is up in the terrain frame, (3,), and the cycle [s]."""
+        """Set tool, upward direction in the terrain frame (3,), and cycle time [s]."""
         payload = payload_of(tool)
         turn = payload.rotation
         origin = np.array([0.0, 0.0, tool.sensor_height])
@@ -35,7 +35,7 @@ class WristGauges:
         self._com = _vector(payload.com)
         self._com_from_sole = _vector(turn.T @ (tool.foot.com - tool.sole))
         self._inertia = turn.T @ tool.foot.inertia @ turn
-        self._turn = turn
+        self._mounting = turn
         self._period = period
         self._rotation = np.eye(3)
         self._ground: Sequence[float] = (0.0,) * 6
@@ -48,40 +48,40 @@ class WristGauges:
     def end_cycle(
         self, rotation: Array, ground: Sequence[float], rates: Sequence[float]
     ) -> None:
-        """Take what happened in a cycle.
+        """Set the motion and ground wrench of a cycle.
 
         Args:
             rotation: frame 7 to terrain, shape (3, 3).
             ground: mean force [N] and moment at the sole [N m], terrain frame.
-            rates: velocity of the sole [m/s] and turning rate [rad/s] at its end.
+            rates: linear [m/s] and angular velocity [rad/s] of the sole at its end.
         """
         self._rotation, self._ground = rotation, ground
         self._before, self._rates = self._rates, rates
         self._load = None
 
     def load(self) -> Wrench:
-        """Return what the sensor would read without errors, its own frame [N, N m]."""
+        """Return the reading of an ideal sensor in its own frame [N, N m]."""
         if self._load is None:
             self._load = self._compute()
         return self._load
 
     def _compute(self) -> Wrench:
-        """Work in plain numbers: for three of them numpy takes ten times as long."""
+        """Compute the load in Python floats: ten times as fast as numpy for vectors."""
         before, now, period = self._before, self._rates, self._period
         change = [(v - u) / period for u, v in zip(before, now, strict=True)]
-        # Force, moment, accelerations, turning rate and what is up, one a row.
+        # Rows: force, moment, linear and angular acceleration, angular velocity, up.
         rows = np.array([*self._ground, *change, *now[3:], *self._up]).reshape(6, 3)
-        felt = rows.dot(self._rotation.dot(self._turn))
+        felt = rows.dot(self._rotation.dot(self._mounting))
         force, moment, a, alpha, w, (gx, gy, gz) = felt.tolist()
-        # The inertia is symmetric: rows of its products are I alpha and I w.
+        # The inertia is symmetric, so row vectors times it are I alpha and I w.
         (ix, iy, iz), (jx, jy, jz) = felt[3:5].dot(self._inertia).tolist()
         spin = _cross(w, (jx, jy, jz))
         euler = _cross(alpha, self._com_from_sole)
         inward = _cross(w, _cross(w, self._com_from_sole))
         lever = _cross(self._sole, force)
-        if self.cable is not None:  # it pulls at the gauges, without a lever
-            pull = self.cable.dot(self._rotation.dot(self._turn))
-            force = [felt + more for felt, more in zip(force, pull, strict=True)]
+        if self.cable is not None:  # acts at the gauges, without a lever arm
+            pull = self.cable.dot(self._rotation.dot(self._mounting))
+            force = [f + extra for f, extra in zip(force, pull, strict=True)]
         m, s = self._mass, self._sign
         weight = (
             -m * (GRAVITY * gx + a[0] + euler[0] + inward[0]),

@@ -1,6 +1,6 @@
-"""The operator's hand: carries the foot, puts it down, pushes it across.
+"""The operator's hand: carries the foot, puts it down, pushes it across the container.
 
-Forces are in the terrain frame [N]; they act on the forearm at the hand point.
+Forces are in the terrain frame [N] and act on the forearm at the hand point.
 """
 
 import math
@@ -21,20 +21,20 @@ from fakes.plant.push import (
     Vector3,
 )
 
-LIFT = 0.06  # how high the foot is carried above the plane [m]
+LIFT = 0.06  # height of the carried foot above the plane [m]
 SPEED = 0.25  # mean speed of carrying [m/s]
-_CAREFUL = 0.12  # m/s, of a hand that touches corners
+_CAREFUL = 0.12  # m/s, while touching corners
 _CARRY_K, _CARRY_B = 800.0, 100.0  # N/m, N s/m
-_REST_B = 18.0  # of a hand that lies on the arm, along z [N s/m]
+_REST_B = 18.0  # damping of a resting hand along z [N s/m]
 
 
-_ASIDE = 0.035  # from the centre line to a corner that a sole can touch [m]
+_ASIDE = 0.035  # lateral distance of a touched corner from the centre line [m]
 
 
 def touched_place(number: int, travel: float) -> tuple[float, float]:
-    """Return where a person touches the container the `number`th time [m].
+    """Return the position (x, y) of touch `number` on the container [m].
 
-    1 to 4: its corners; above `ENDS`: in the middle of its ends, the near one first.
+    1 to 4: its corners; above `ENDS`: the middle of its ends, the near one first.
     """
     if number > ENDS:
         return (travel if number % 2 else 0.0), 0.0
@@ -45,7 +45,7 @@ def touched_place(number: int, travel: float) -> tuple[float, float]:
 
 
 class HandPhase(Enum):
-    """What the hand is doing."""
+    """Activity of the hand."""
 
     CARRY = auto()
     REST = auto()
@@ -55,7 +55,7 @@ class HandPhase(Enum):
 
 
 class Hand:
-    """Follows its orders with forces a person could exert."""
+    """The operator's hand, with forces that a person can exert."""
 
     def __init__(self, dt: float, *, is_there: bool = True) -> None:
         self._dt = dt
@@ -72,7 +72,7 @@ class Hand:
 
     @property
     def is_done(self) -> bool:
-        """Whether the last carrying has come to its end."""
+        """Whether the last motion has ended."""
         if (grip := self.grip) is not None:
             return grip.is_done
         return self.phase is not HandPhase.CARRY or not self._path
@@ -84,7 +84,7 @@ class Hand:
 
     @property
     def grip(self) -> JointGrip | None:
-        """What two hands on the links do; None = they are not there."""
+        """Two hands on the links; None = not there."""
         return self._grip if self.phase is HandPhase.POSE else None
 
     def carry(self, *points: Vector3) -> None:
@@ -115,17 +115,17 @@ class Hand:
         self._pending = (pace, rng)
 
     def rest(self) -> None:
-        """Stop where it is and lie on the arm."""
+        """Stop and rest on the arm."""
         self.carry()
         self._rests_then = True
 
     def hold_links(self, grip: JointGrip) -> None:
-        """Take the links with two hands, and move them as `grip` does."""
+        """Grasp the links with two hands that follow `grip`."""
         self.phase = HandPhase.POSE
         self._grip = grip
 
     def let_go(self) -> None:
-        """Take the hand away."""
+        """Release the arm."""
         self.phase = HandPhase.AWAY
 
     def step(self, view: HandView) -> Vector3:

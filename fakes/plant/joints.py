@@ -1,4 +1,4 @@
-"""What drives the joints and resists them: motors, their friction, the stops."""
+"""Drives of the joints: motors, their friction, joint stops."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -12,17 +12,17 @@ from wam.model.constants import ArmConstants, Array
 from wam.model.friction import MotorFriction
 
 STOP_K, STOP_B = 2000.0, 20.0  # N m/rad, N m s/rad
-NEAR = 0.05  # of a stop: no joint goes further in 2 ms [rad]
-BEARING_NS = 4 * PERIOD_NS  # between two looks at load and ripple of the friction
+NEAR = 0.05  # distance to a stop that no joint travels in 2 ms [rad]
+BEARING_NS = 4 * PERIOD_NS  # between updates of load and ripple of the friction
 
 
 class StopForces(NamedTuple):
-    """What the stops do at one position and speed; seven numbers of each.
+    """Forces of the stops at one position and speed; seven numbers each.
 
     Attributes:
-        torques: with which they push back and damp [N m].
-        damping: their damping [N m s/rad].
-        is_near: a joint may be at a stop within a cycle.
+        torques: spring and damper torques [N m].
+        damping: damping of touched stops [N m s/rad].
+        is_near: a joint may reach a stop within a cycle.
     """
 
     torques: list[float]
@@ -31,17 +31,17 @@ class StopForces(NamedTuple):
 
 
 class GripTorques(NamedTuple):
-    """What hands on the links do at the joints in a cycle; shapes (7,).
+    """Torques of hands on the links in a cycle; shapes (7,).
 
-    tau = torques + K (target - q) - (B + K dt) qd', implicitly in the speed at the end
-    of a step, so that a stiff grip stays stable.
+    tau = torques + K (target - q) - (B + K dt) qd', implicit in the speed at the end of
+    a step, so that a stiff grip is stable.
 
     Attributes:
-        torques: that bear and hurry the joints [N m].
+        torques: feed-forward torques: support and damping of the reference [N m].
         stiffness: K [N m/rad].
         damping: B [N m s/rad].
-        target: joint positions that are wanted [rad].
-        strongest: that the springs pull [N m].
+        target: reference joint positions [rad].
+        strongest: limit of the spring torques [N m].
     """
 
     torques: Array
@@ -51,12 +51,12 @@ class GripTorques(NamedTuple):
     strongest: Array
 
     def at(self, q: Array) -> Array:
-        """Return what does not depend on the speed, at `q` [rad], [N m], shape (7,)."""
+        """Return the part independent of the speed at `q` [rad] [N m], shape (7,)."""
         pull = self.stiffness * (self.target - q)
         return self.torques + np.clip(pull, -self.strongest, self.strongest)
 
     def against(self, dt: float) -> Array:
-        """Return the damping over a step of `dt` [s], [N m s/rad], shape (7,)."""
+        """Return the implicit damping of a step `dt` [s] [N m s/rad], shape (7,)."""
         return self.damping + dt * self.stiffness
 
 
@@ -64,14 +64,14 @@ class JointStops:
     """Stops of the seven joints: springs with dampers."""
 
     def __init__(self, constants: ArmConstants) -> None:
-        """Take where the stops of the arm are."""
+        """Set the stops of the arm."""
         lower, upper = constants.q_lower, constants.q_upper
         self._ends: list[list[float]] = np.stack((lower, upper), axis=-1).tolist()
         free = np.stack((lower + NEAR, upper - NEAR), axis=-1)
         self._free: list[list[float]] = free.tolist()
 
     def at(self, q: Sequence[float], qd: Sequence[float]) -> StopForces:
-        """Return what the stops do.
+        """Return the forces of the stops.
 
         Args:
             q: joint positions [rad].
@@ -93,16 +93,16 @@ _CLEAR = StopForces([0.0] * 7, [0.0] * 7, is_near=False)
 
 
 class JointDrives:
-    """What acts at the joints beside gravity, ground and hand.
+    """Torques at the joints other than gravity, ground and hand.
 
-    A motor whose windings are shorted has their damping beside that of its friction.
+    Shorted windings add to the damping of a motor's friction.
 
     Attributes:
-        disturbance: joint torques from outside [N m], shape (7,).
-        driving: torques that drive the joints whatever they do in a step [N m], seven.
-        stops: of the joints.
-        grip: of hands on the links; None = nobody has them.
-        armature: inertia of the drives and dt D [kg m^2], shape (7,).
+        disturbance: external joint torques [N m], shape (7,).
+        driving: explicit joint torques of a step [N m], seven.
+        stops: joint stops.
+        grip: torques of hands on the links, or None.
+        armature: drive inertia plus dt D [kg m^2], shape (7,).
     """
 
     def __init__(
@@ -113,12 +113,12 @@ class JointDrives:
         dt: float,
         windings: Array,
     ) -> None:
-        """Take the drives of an arm that stands without torque, windings shorted.
+        """Start at rest without torque, windings shorted.
 
         Args:
-            constants: of the arm.
-            friction: of the motors.
-            inertia: that a motor moves when it turns [kg m^2], shape (7,).
+            constants: constants of the arm.
+            friction: friction of the motors.
+            inertia: effective inertia at each motor [kg m^2], shape (7,).
             dt: length of a step [s].
             windings: damping of each motor when shorted [N m s/rad], shape (7,).
         """
@@ -128,7 +128,7 @@ class JointDrives:
         self._to_counts = self._turns[:, None] * constants.j2mp
         self._j2mp, self._ipnm = constants.j2mp, constants.ipnm
         self._from_units = constants.j2mp.T / np.array(constants.ipnm, dtype=float)
-        self._dampings = constants.j2mp.T**2  # of the joints by those of the motors
+        self._dampings = constants.j2mp.T**2  # maps motor to joint damping
         self._inertia = np.diag(drive_inertia_matrix(constants))
         self._bristles = MotorBristles(friction, inertia, dt)
         self._is_lively = False
@@ -137,12 +137,12 @@ class JointDrives:
         self.stops = JointStops(constants)
         self._stopping = _CLEAR
         self.grip: GripTorques | None = None
-        self._held_at = np.zeros(7)  # where the hands find the joints
+        self._held_at = np.zeros(7)  # joint positions for the hands' springs
         self.armature = self._inertia
         self.drive([0.0] * 7)
 
     def counts(self, q: Array) -> Array:
-        """Return what the encoders count at `q` of the joints [rad], shape (7,)."""
+        """Return the encoder counts at joint positions `q` [rad], shape (7,)."""
         return self._to_counts.dot(q)
 
     def drive(self, units: Sequence[float]) -> None:
@@ -155,7 +155,7 @@ class JointDrives:
         """Short the windings of motors 1 to 7, or open them, from now on."""
         self._shorted = np.where(shorted, self._windings, 0.0)
         self._is_damped = any(shorted)
-        self._is_other = True  # than what the armature was made for
+        self._is_outdated = True  # the armature is out of date
 
     def sent(self) -> list[float]:
         """Return the torques applied to motors 1 to 7 [N m]."""
@@ -163,19 +163,19 @@ class JointDrives:
 
     @property
     def driven(self) -> Array:
-        """Torques with which the motors drive the joints [N m], shape (7,)."""
+        """Joint torques of the motors [N m], shape (7,)."""
         return self._tau
 
     def rest(self) -> None:
-        """Unbend the bristles of an arm that something bears."""
+        """Relax the bristles of a supported arm."""
         self._bristles.rest()
 
     def begin_cycle(self, rows: Array, speeds: Sequence[float], t_ns: int) -> None:
-        """Take anew what stays as it is for 2 ms.
+        """Refresh the quantities held constant during one cycle.
 
         Args:
-            rows: positions [rad] and velocities [rad/s] of the joints, shape (3, 7).
-            speeds: of the motors [rad/s], seven.
+            rows: joint positions [rad] and velocities [rad/s], shape (3, 7).
+            speeds: motor speeds [rad/s], seven.
             t_ns: time [ns].
         """
         self._stop(rows)
@@ -184,23 +184,23 @@ class JointDrives:
         self._resist(speeds)
 
     def torques(self, rows: Array, speeds: Sequence[float]) -> list[float]:
-        """Return the torques of friction on the motors [N m] in a step, seven.
+        """Return the friction torques on the motors in a step [N m], seven.
 
-        Near a stop, and where a motor is fast, the resistance is taken anew before.
-        Arguments as of `begin_cycle`.
+        Near a stop, or with a fast motor, the damping is updated first. Arguments as
+        for `begin_cycle`.
         """
         if self._stopping.is_near or self.grip is not None:
             self._stop(rows)
             self._resist(speeds)
-        elif self._is_lively or self._is_other:
+        elif self._is_lively or self._is_outdated:
             self._resist(speeds)
-        against = self._bristles.torques(speeds)
+        friction = self._bristles.torques(speeds)
         if not self._is_damped:
-            return against
-        return (np.array(against) - self._shorted * speeds).tolist()
+            return friction
+        return (np.array(friction) - self._shorted * speeds).tolist()
 
     def follow(self, speeds: Sequence[float]) -> None:
-        """Go on by a step at `speeds` of the motors [rad/s]."""
+        """Advance the bristles by a step at motor speeds `speeds` [rad/s]."""
         self._bristles.follow(speeds)
 
     def _bear(self, rows: Array, speeds: Sequence[float], t_ns: int) -> None:
@@ -227,7 +227,7 @@ class JointDrives:
             armature += self.grip.against(self._dt)
         armature *= self._dt
         armature += self._inertia
-        self._is_other = False
+        self._is_outdated = False
         self.armature = armature
 
     def _add_up(self) -> None:
@@ -240,33 +240,33 @@ class JointDrives:
 
 
 class JointState:
-    """Where the joints are and how fast, shapes (7,); semi-implicit Euler.
+    """Joint positions and velocities, shapes (7,); semi-implicit Euler (leapfrog).
 
-    Velocities stand half a step behind positions. The speed-dependent part of the
-    dynamics takes them where the positions are, or a free swing loses energy.
+    Velocities lag positions by half a step. The velocity-dependent part of the dynamics
+    uses velocities advanced by half a step: otherwise a free swing loses energy.
 
     Attributes:
-        rows: q [rad], qd [rad/s] and qd half a step on, shape (3, 7). A step makes
-            new ones, so what was taken of the old ones stays as it was.
+        rows: q [rad], qd [rad/s] and qd half a step later, shape (3, 7). A step makes a
+            new array, so views of the old one stay valid.
     """
 
     def __init__(self, q: Array, dt: float) -> None:
-        """Rest at `q` [rad]; a step is `dt` [s] long."""
+        """Start at rest at `q` [rad] with steps of `dt` [s]."""
         # P (q, qd, qdd): q + dt (qd + dt qdd), qd + dt qdd, and dt / 2 later
         onward = [[1.0, dt, dt * dt], [0.0, 1.0, dt], [0.0, 1.0, 1.5 * dt]]
         self._P = np.array(onward)
         self.rest(q)
 
     def rest(self, q: Array) -> None:
-        """Stand still at `q` [rad]."""
+        """Set the joints to rest at `q` [rad]."""
         self.rows = np.stack((q, np.zeros(7), np.zeros(7)))
 
     def move(self, q: Array) -> None:
-        """Be at `q` [rad] with the velocities of now."""
+        """Set the joint positions [rad], keeping the velocities."""
         self.rows = np.stack((q, *self.rows[1:]))
 
     def step(self, qdd: Array) -> Array:
-        """Go on by a step under `qdd` [rad/s^2]; return the new rows."""
+        """Advance by a step with `qdd` [rad/s^2]; return the new rows."""
         rows = self.rows
         rows[2] = qdd
         self.rows = rows = self._P.dot(rows)
@@ -274,16 +274,15 @@ class JointState:
 
 
 class JointLoads:
-    """Turns wrenches on foot and hand and torques of motors into torques of the joints.
+    """Maps wrenches on foot and hand and motor torques to joint torques.
 
     Attributes:
-        A: rows that give the sole's velocity, the foot's turn, the hand's velocity and
-            turn, and the speeds of the motors from the joint velocities, shape
-            (19, 7); the first twelve are to be filled in place.
+        A: stacked Jacobians of sole (6 rows), hand (6) and motors (7), shape (19, 7);
+            the first twelve rows are filled in place.
     """
 
     def __init__(self, j2mp: Array) -> None:
-        """Take the transmission, motor angle = `j2mp` @ joint angle, shape (7, 7)."""
+        """Set the transmission, motor angle = `j2mp` @ joint angle, shape (7, 7)."""
         self._B = np.vstack((np.zeros((12, 7)), j2mp, np.eye(7)))
         self.A = self._B[:19]
 
@@ -296,8 +295,8 @@ class JointLoads:
         """Return A^T (`wrench`, `motors`) + `driving` [N m], shape (7,).
 
         Args:
-            wrench: on foot and hand, twelve numbers in the order of the rows of A.
+            wrench: wrenches on foot and hand, twelve numbers in the row order of A.
             motors: torques on the motors [N m], seven.
-            driving: torques that drive the joints [N m], seven.
+            driving: torques on the joints [N m], seven.
         """
         return np.array([*wrench, *motors, *driving]).dot(self._B)

@@ -1,5 +1,5 @@
 # pyright: basic, reportMissingImports=false
-"""The body that the simulated arm is: links, sensor, foot and a person's forearm."""
+"""Rigid-body model of the simulated arm: links, sensor, foot, person's forearm."""
 
 from dataclasses import dataclass
 from enum import Enum, auto
@@ -14,15 +14,15 @@ from wam.model.constants import ArmConstants, Array
 from wam.model.friction import MotorFriction
 from wam.model.tool import Tool
 
-FOREARM_MASS = 1.0  # of the person's arm, carried by the person [kg]
+FOREARM_MASS = 1.0  # of the person's arm, supported by the person [kg]
 _HAND_ABOVE_PLATE = 0.030  # on the axis of joint 7 [m]
 
 
 class Support(Enum):
-    """What bears an arm that no motor drives, apart from a hand that is on it.
+    """Support of an arm without motor torques, other than the operator's hand.
 
-    STAND: a stand, where the arm begins. PERSON: a person, wherever the arm is, as long
-    as no motor pulls. NONE: nothing; it sinks on its shorted windings.
+    STAND: a stand at the initial pose. PERSON: a person, at any pose, while no motor
+    has torque. NONE: none; the arm sinks on its shorted windings.
     """
 
     STAND = auto()
@@ -32,20 +32,20 @@ class Support(Enum):
 
 @dataclass(frozen=True, slots=True)
 class PlantOptions:
-    """How the simulated arm differs from an ideal one.
+    """Deviations of the simulated arm from an ideal one.
 
     Attributes:
-        friction: share of the joint friction identified on another arm (1 = all of
-            it). A real arm's is unknown; with more than 0.1 hardly a slip bounces.
+        friction: factor of the joint friction identified on another arm. That of a real
+            arm is unknown; above 0.1 slips hardly bounce back.
         substeps: steps per 2 ms cycle.
-        seed: draws the parameters of friction; None = the nominal ones.
-        motors: friction of the motors, given instead of drawn; None = drawn.
+        seed: seed of the friction parameters; None = nominal ones.
+        motors: friction of the motors; None = drawn.
         cables: resonance of the joints on their cables [Hz]; None = stiff cables.
-        has_hand: a person holds the arm by its forearm, from the beginning.
-        windings: share of the damping that shorted windings have by the motors' data;
-            it is drawn anew with `seed`.
-        support: what bears the arm while no motor drives it.
-        down: where its base is mounted, the direction of gravity in the base frame.
+        has_hand: a person holds the arm by its forearm from the start.
+        windings: factor of the shorted windings' damping by the motors' data sheet;
+            also drawn with `seed`.
+        support: support of the arm without motor torques.
+        down: direction of gravity in the base frame.
     """
 
     friction: float = 0.02
@@ -63,9 +63,9 @@ class ArmAndHand(NamedTuple):
     """A model of the arm with the hand on it.
 
     Attributes:
-        model: its world is the terrain frame.
-        sole: number of the sole's frame.
-        hand: number of the frame where a person holds the forearm.
+        model: model whose world frame is the terrain frame.
+        sole: index of the sole's frame.
+        hand: index of the frame at which a person holds the forearm.
     """
 
     model: "pin.Model"
@@ -80,24 +80,24 @@ def arm_and_hand(
     forearm: float = FOREARM_MASS,
     down: tuple[float, float, float] = (0.0, 0.0, -1.0),
 ) -> ArmAndHand:
-    """Return a model of the arm that stands before the terrain.
+    """Return a model of the arm in the terrain frame.
 
-    The hand is on link 6, where a person holds the forearm, and has the mass of one:
-    `forearm` [kg], 0 where there is no person. Gravity points `down` in the base frame.
+    The hand is on link 6, where a person holds the forearm, with a mass of `forearm`
+    [kg], 0 without a person. Gravity points `down` in the base frame.
     """
     model = build_pinocchio(constants, (tool.sensor, tool.foot))
-    _stand_in(model, frame, down)
+    _move_to_terrain_frame(model, frame, down)
     hand = _add_forearm(model, constants, forearm)
     sole = add_point(model, constants, "sole", tool.sole)
     return ArmAndHand(model, sole, hand)
 
 
 def motor_inertia(model: "pin.Model", constants: ArmConstants, q: Array) -> Array:
-    """Return what each motor moves when it turns alone [kg m^2], shape (7,).
+    """Return the effective inertia at each motor, other motors free [kg m^2], (7,).
 
     Args:
-        model: the arm; gets the inertia of its drives.
-        constants: of the arm.
+        model: the arm; its armature is set to the drive inertia.
+        constants: constants of the arm.
         q: joint positions [rad], shape (7,).
     """
     model.armature = np.diag(drive_inertia_matrix(constants))
@@ -107,14 +107,14 @@ def motor_inertia(model: "pin.Model", constants: ArmConstants, q: Array) -> Arra
 
 
 def cable_inertia(model: "pin.Model", constants: ArmConstants, q: Array) -> Array:
-    """Return what swings on the cable of each motor [kg m^2], shape (7,).
+    """Return the link inertia on the cable of each motor [kg m^2], shape (7,).
 
-    Of the heaviest joint that the motor turns, the others held still, its share by
-    motors that turn it. The two cables of a differential are alike.
+    For the heaviest joint of the motor, with the other joints held, divided among its
+    motors. The two cables of a differential get the same value.
 
     Args:
-        model: the arm; loses the inertia of its drives.
-        constants: of the arm.
+        model: the arm; its armature is set to 0.
+        constants: constants of the arm.
         q: joint positions [rad], shape (7,).
     """
     model.armature = np.zeros(7)
@@ -125,15 +125,15 @@ def cable_inertia(model: "pin.Model", constants: ArmConstants, q: Array) -> Arra
 
 
 def motor_weights(model: "pin.Model", constants: ArmConstants, q: Array) -> Array:
-    """Return what the weight puts on each motor, without sign [N m], shape (7,)."""
+    """Return the magnitude of the gravity torque on each motor [N m], shape (7,)."""
     weight = pin.computeGeneralizedGravity(model, model.createData(), q)
     return np.abs(np.linalg.solve(constants.j2mp.T, weight))
 
 
-def _stand_in(
+def _move_to_terrain_frame(
     model: "pin.Model", frame: TerrainFrame, down: tuple[float, float, float]
 ) -> None:
-    """Let the terrain frame be the world of the model: nothing is to be turned."""
+    """Make the terrain frame the world frame of the model."""
     axes = frame.axes()
     base = pin.SE3(axes, -axes.dot(frame.far_end))
     model.jointPlacements[1] = base * model.jointPlacements[1]
@@ -142,7 +142,7 @@ def _stand_in(
 
 
 def _add_forearm(model: "pin.Model", constants: ArmConstants, mass: float) -> int:
-    """Add the hand's frame on link 6 and the mass [kg] of a forearm in it."""
+    """Add the hand's frame on link 6 with the mass of a forearm [kg]."""
     alpha, height = constants.alpha[5], constants.d[6] - _HAND_ABOVE_PLATE
     c, s = np.cos(alpha), np.sin(alpha)
     tilt = np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])

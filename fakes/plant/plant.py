@@ -1,8 +1,8 @@
-"""The arm as a body: seven joints, foot on the ground, hand on the forearm.
+"""The simulated arm: seven joints, foot on the ground, hand on the forearm.
 
-`body` has the equations. Ground and dynamics go on in substeps. Once in a cycle of 2 ms
-are taken anew: the Jacobians, the damping of the friction unless a motor is fast, and
-the force of the hand, of 10 Hz at most.
+`body` has the equations. Ground and dynamics advance in substeps. Once per 2 ms cycle
+are refreshed: Jacobians, damping of the friction (unless a motor is fast), and the
+force of the hand, whose bandwidth is 10 Hz.
 """
 
 from collections.abc import Sequence
@@ -37,26 +37,26 @@ from wam.model.constants import GRAVITY, ArmConstants, Array
 from wam.model.tool import Tool
 
 _NO_TORQUE = (0.0,) * 7
-_JOINT_7, _TWIST_RATE = 6, 2.0  # N m/s, of a person
-_ON_STAND = 0.02  # rad, of each joint: the foot has not left the stand
-# A person notices that the arm grows heavy, and then bears it [s].
+_JOINT_7, _TWIST_RATE = 6, 2.0  # index; N m/s of a person
+_ON_STAND = 0.02  # rad of each joint within which the foot is on its stand
+# Time until a person notices a heavy arm, and until it is fully supported [s].
 _NOTICED, _BORNE = 0.2, 0.5
-_STRONGEST = 150.0  # of a person [N]
+_STRONGEST = 150.0  # strength of a person [N]
 
 
 class ArmPlant:
-    """Implements fakes.pucks.bank.MotorSide with the dynamics of the whole arm.
+    """Dynamics of the whole arm; implements fakes.pucks.bank.MotorSide.
 
     Attributes:
-        disturbance: joint torques from outside [N m], shape (7,).
-        terrain: the ground; None = the foot hangs above nothing.
-        hand: the operator's.
+        disturbance: external joint torques [N m], shape (7,).
+        terrain: ground; None = no ground.
+        hand: the operator's hand.
         finger: force of a person who touches the foot, terrain frame [N].
-        t_ns: how far the world has gone on [ns].
-        truth: what really happened; None = not written down.
-        friction: of the motors.
-        support: what bears the arm while no motor drives it.
-        wiring: what is wrong between pucks and motors; None = nothing is.
+        t_ns: time of the world [ns].
+        truth: ground truth; None = not recorded.
+        friction: friction of the motors.
+        support: support of the arm without motor torques.
+        wiring: wrong wiring between pucks and motors; None = correct.
     """
 
     def __init__(
@@ -75,7 +75,7 @@ class ArmPlant:
         weights = motor_weights(parts.model, constants, q)
         drawn = draw_friction(constants, options.friction, options.seed, weights)
         self.friction = drawn if options.motors is None else options.motors
-        self._axes, self._down = frame.axes(), _unit(options.down)
+        self._axes, self._down = frame.axes(), _unit_vector(options.down)
         up = -self._axes.dot(self._down)
         self._up: list[float] = (up * forearm * GRAVITY).tolist()
         self.support = options.support
@@ -86,11 +86,11 @@ class ArmPlant:
         self.terrain: Terrain | None = None
         self.hand = Hand(PERIOD_NS * 1e-9, is_there=options.has_hand)
         self.finger = (0.0, 0.0, 0.0)
-        self._hung = 0.0  # on a string from the sole [kg]
-        self._pushed: tuple[Array, int] = (np.zeros(3), 0)  # at the sole [N], until
-        self._twist, self._twisted_until_ns = 0.0, 0  # about joint 7 [N m]
-        self._twisted = 0.0  # of that, in this cycle
-        self._pull: Vector3 | None = None  # at the sole beside the ground's [N]
+        self._hung = 0.0  # mass on a string from the sole [kg]
+        self._pushed: tuple[Array, int] = (np.zeros(3), 0)  # force at the sole [N], end
+        self._twist, self._twisted_until_ns = 0.0, 0  # torque about joint 7 [N m], end
+        self._twisted = 0.0  # present torque, ramped [N m]
+        self._pull: Vector3 | None = None  # external force at the sole [N]
         self._ends = Ends(constants.q_lower, constants.q_upper)
         self._has_links = False
         self.t_ns = 0
@@ -122,32 +122,32 @@ class ArmPlant:
 
     @property
     def q(self) -> Array:
-        """Joint positions [rad], shape (7,); as they are now, also later."""
+        """Joint positions [rad], shape (7,); the array is not changed later."""
         return self._body.q
 
     @q.setter
     def q(self, q: Array) -> None:
         self._body.move(q)
-        self._stand = q.copy()  # it is put there, its stand too
+        self._stand = q.copy()  # the stand moves along
 
     def lay_cable(self, force: Sequence[float]) -> None:
-        """Let the wrist sensor's cable pull at the foot, `force` [N] in base frame."""
+        """Set the force of the wrist sensor's cable on the foot [N], base frame."""
         self._wrist.cable = self._axes.dot(np.array(force, dtype=np.float64))
 
     @property
     def ends(self) -> Ends:
-        """Where the joints really end."""
+        """True joint stops."""
         return self._ends
 
     @property
     def qd(self) -> Array:
-        """Joint velocities [rad/s], shape (7,); as they are now, also later."""
+        """Joint velocities [rad/s], shape (7,); the array is not changed later."""
         return self._body.qd
 
     # --- what the pucks see -------------------------------------------------------
 
     def advance(self, t_ns: int) -> None:
-        """Let the world go on to `t_ns`, in whole substeps."""
+        """Advance the world to `t_ns` in whole substeps."""
         step_ns = self._substep_ns
         while (room_ns := t_ns - self.t_ns) >= step_ns:
             into_ns = self.t_ns % PERIOD_NS
@@ -174,34 +174,34 @@ class ArmPlant:
         is_pulled = any(units)
         if is_pulled is not self._is_pulled:
             self._is_pulled = is_pulled
-            self._lay_down()
+            self._update_support()
 
     @property
     def is_idle(self) -> bool:
-        """Whether all windings are shorted: the arm is damped, and sinks."""
+        """Whether all windings are shorted: the arm is damped and sinks."""
         return self._is_idle
 
     @property
     def is_held(self) -> bool:
-        """Whether a stand or a person bears an arm without torque: it stands still."""
+        """Whether a stand or a person supports the arm: it is at rest."""
         return self._is_held
 
     def short_windings(self, shorted: Sequence[bool]) -> None:
-        """Short the windings of motors 1 to 7, which damps them, or open them."""
+        """Short (which damps) or open the windings of motors 1 to 7."""
         if all(shorted) and not self._is_idle:
             self._heavy_since_ns = self.t_ns
         self._is_idle = all(shorted)
         self._body.drives.short(shorted)
         if self._is_idle:
             self._body.drive(_NO_TORQUE)
-        self._lay_down()
+        self._update_support()
 
     # --- what the sensor feels ----------------------------------------------------
 
     def sensor_load(self, t_ns: int) -> Wrench:
         """Return the load on the wrist sensor in its own frame [N, N m].
 
-        Its mean over the cycle that ended last; the steps after that can wait.
+        The mean over the last complete cycle.
         """
         self.advance(t_ns - t_ns % PERIOD_NS)
         return self._wrist.load()
@@ -220,51 +220,51 @@ class ArmPlant:
         return float(np.linalg.norm(self._body.motion()[3:6]))
 
     def pose(self, q: Sequence[float], seconds: float) -> None:
-        """Let two hands bring the joints to `q` [rad] in `seconds`, and hold them."""
+        """Bring the joints to `q` [rad] in `seconds` with two hands and hold them."""
         self._grip_links(JointGrip(PoseWay(q, seconds, self._ends)))
 
     def turn_to_stop(self, joint: int, side: Side) -> None:
-        """Let two hands turn joint 1-7 until its stop bears; the others stay."""
+        """Turn joint 1-7 against its stop with two hands; hold the others in place."""
         self._grip_links(JointGrip(StopWay(joint, side, self._ends)))
 
     @property
     def is_hand_done(self) -> bool:
-        """Whether the hand has come to the end of its last order."""
+        """Whether the hand has finished its last action."""
         return self.hand.is_done
 
     def let_go(self) -> None:
-        """Let the hands let go of the arm."""
+        """Release the arm."""
         self.hand.let_go()
 
     def hang(self, mass: float) -> None:
-        """Hang `mass` [kg] on a string from the centre of the sole; 0 = nothing."""
+        """Hang `mass` [kg] on a string from the centre of the sole; 0 removes it."""
         self._hung = mass
 
     def push_with(self, force: Sequence[float], seconds: float) -> None:
-        """Let a person push the sole with `force` [N], base frame, for `seconds`."""
+        """Push the sole with `force` [N], base frame, for `seconds`."""
         until_ns = self.t_ns + round(1e9 * seconds)
         self._pushed = self._axes.dot(np.array(force, dtype=np.float64)), until_ns
 
     def twist(self, torque: float, seconds: float) -> None:
-        """Let a person twist the foot about joint 7, `torque` [N m], for `seconds`."""
+        """Twist the foot about joint 7 with `torque` [N m] for `seconds`."""
         self._twist = torque
         self._twisted_until_ns = self.t_ns + round(1e9 * seconds)
 
     def start_truth(self) -> None:
-        """Begin to write down what really happens."""
+        """Begin to record the ground truth."""
         self.truth = Truth()
 
     def take_truth(self) -> Truth:
-        """Return what happened since `start_truth`; nothing more is written down."""
+        """Stop recording and return the ground truth since `start_truth`."""
         taken, self.truth = self.truth or Truth(), None
         return taken
 
     def _grip_links(self, grip: JointGrip) -> None:
         self.hand.hold_links(grip)
-        self._lay_down()
+        self._update_support()
 
-    def _lay_down(self) -> None:
-        """Find out whether something bears the arm."""
+    def _update_support(self) -> None:
+        """Update whether the arm is supported."""
         if self.hand.grip is not None:
             is_held = False
         elif self.support is Support.PERSON:
@@ -280,9 +280,9 @@ class ArmPlant:
             self._body.hold(is_held=is_held)
 
     def _begin_cycle(self) -> None:
-        """Take anew what stays as it is for 2 ms."""
+        """Refresh the quantities held constant during one cycle."""
         if self._is_idle and not self._is_held:
-            self._lay_down()
+            self._update_support()
         body, links = self._body, self.hand.grip
         self._push = self.hand.step(body.linearise())
         if self._has_links and links is None:
@@ -290,10 +290,10 @@ class ArmPlant:
         self._has_links = links is not None
         force, self._pull = self._lift(), self._pull_at_sole()
         twisted = 0.0
-        if self.t_ns < self._twisted_until_ns:  # begun gently, let go at once
+        if self.t_ns < self._twisted_until_ns:  # ramped up, ended at once
             step = _TWIST_RATE * PERIOD_NS * 1e-9
-            most = self._twist - self._twisted
-            twisted = self._twisted + min(max(most, -step), step)
+            remaining = self._twist - self._twisted
+            twisted = self._twisted + min(max(remaining, -step), step)
         if twisted != self._twisted:
             self.disturbance[_JOINT_7] += twisted - self._twisted
             self._twisted = twisted
@@ -304,7 +304,7 @@ class ArmPlant:
         body.begin_cycle(HandLoad(force, grip, self._pull, torques), self.t_ns)
 
     def _pull_at_sole(self) -> Vector3 | None:
-        """Return the force of what hangs there or pushes, terrain frame [N]."""
+        """Return the force of hung mass and push at the sole, terrain frame [N]."""
         pushed, until_ns = self._pushed
         is_pushed = self.t_ns < until_ns
         if not (self._hung or is_pushed):
@@ -314,9 +314,9 @@ class ArmPlant:
         return x, y, z
 
     def _lift(self) -> tuple[float, float, float]:
-        """Return the force of the hand with what the person carries [N].
+        """Return the force of the hand including supported weight [N].
 
-        That is the own forearm, and soon after it went idle the arm.
+        The weight of the forearm and, soon after the arm went idle, of the arm.
         """
         (x, y, z), (ux, uy, uz) = self._push, self._up
         is_borne = self._is_held or self.hand.grip is not None
@@ -334,7 +334,7 @@ class ArmPlant:
         (x, y, z, tx, ty, tz), motion = self._body.end_cycle()
         n = self._substeps
         self._ground = x, y, z, tx, ty, tz = x / n, y / n, z / n, tx / n, ty / n, tz / n
-        # The hand that holds the arm gives way to nothing that small.
+        # Finger, pull and twist act on the sensor; they are too small to move the arm.
         fx, fy, fz = self.finger
         if self._pull is not None:
             px, py, pz = self._pull
@@ -349,6 +349,6 @@ class ArmPlant:
             self.truth.add(self.t_ns, row)
 
 
-def _unit(vector: Sequence[float]) -> Array:
-    """Return `vector` with length one, shape (3,)."""
+def _unit_vector(vector: Sequence[float]) -> Array:
+    """Return the unit vector along `vector`, shape (3,)."""
     return np.array(vector) / np.linalg.norm(vector)

@@ -1,7 +1,8 @@
-"""One push across the container, as a person does it.
+"""Model of a person's push across the container.
 
-A spring to a target that moves at a wandering speed, pressing down at a wandering
-angle, with tremor; it gives way after a slip and presses harder when stuck.
+A spring to a target that moves at a fluctuating speed, with a fluctuating downward
+angle and tremor; the target moves back after a slip, and the force limit grows when the
+foot is stuck.
 """
 
 import math
@@ -12,24 +13,24 @@ import numpy as np
 
 from fakes.randomness import NormalStream, OrnsteinUhlenbeck, Tremor
 
-_SWERVE, _SWERVE_OVER = 0.075, 0.06  # how far aside, over which way [m]
-_LIFT, _LIFT_OVER = 0.025, 0.04  # how high, over which way [m]
+_SWERVE, _SWERVE_OVER = 0.075, 0.06  # lateral deviation, over a travel of [m]
+_LIFT, _LIFT_OVER = 0.025, 0.04  # height, over a travel of [m]
 
 
 @dataclass(frozen=True, slots=True)
 class Mishaps:
-    """Where along the container they happen.
+    """Positions of mishaps along the container.
 
     Attributes:
-        swerve_at: where the hand begins to swerve [m]; infinite = never.
-        lift_at: where it begins to lift the foot [m]; infinite = never.
+        swerve_at: start of a lateral deviation [m]; infinite = never.
+        lift_at: start of lifting the foot [m]; infinite = never.
     """
 
     swerve_at: float = math.inf
     lift_at: float = math.inf
 
     def at(self, x: float) -> tuple[float, float]:
-        """Return (how far aside, how high) the hand wants the foot at `x` [m]."""
+        """Return (lateral offset, height) of the hand's target at `x` [m]."""
         aside = _SWERVE * _bump((x - self.swerve_at) / _SWERVE_OVER)
         return aside, _LIFT * _bump((x - self.lift_at) / _LIFT_OVER)
 
@@ -38,7 +39,7 @@ NO_MISHAPS = Mishaps()
 
 
 def _bump(share: float) -> float:
-    """Return a smooth hill of height 1 over 0 to 1."""
+    """Return a smooth bump of height 1 over 0 to 1."""
     if not 0.0 < share < 1.0:
         return 0.0
     return math.sin(math.pi * share) ** 2
@@ -46,23 +47,23 @@ def _bump(share: float) -> float:
 
 Vector3 = tuple[float, float, float]
 
-LATERAL_K, LATERAL_B = 400.0, 20.0  # to the centre line: N/m, N s/m
+LATERAL_K, LATERAL_B = 400.0, 20.0  # towards the centre line: N/m, N s/m
 PUSH_K, PUSH_B = 300.0, 18.0  # along x: N/m, N s/m
-_LIFT_K, _LIFT_B = 800.0, 100.0  # of a hand that lifts: N/m, N s/m
+_LIFT_K, _LIFT_B = 800.0, 100.0  # while lifting: N/m, N s/m
 _Z_K, _Z_B, _Z_TIME = 50.0, 18.0, 0.8  # vertical: N/m, N s/m, s
-_WEAKEST = -3.0  # along x [N]
-_RAMP = 0.4  # from rest to full speed [s]
+_WEAKEST = -3.0  # least force along x [N]
+_RAMP = 0.4  # time from rest to full speed [s]
 _FLATTEST, _STEEPEST = math.radians(-5.0), math.radians(40.0)
-_SLIP_SPEED = 0.12  # m/s, where the hand notices
+_SLIP_SPEED = 0.12  # m/s; a faster slip is noticed
 _REACTION, _REACTION_SPREAD, _FASTEST_REACTION = 0.18, 0.03, 0.1  # s
-_DEAF = 0.25  # s after a reaction without another
-_PROGRESS, _STUCK = 0.006, 1.5  # m in s, less is stuck
+_DEAF = 0.25  # s without another reaction
+_PROGRESS, _STUCK = 0.006, 1.5  # m in s; less is stuck
 _HARDER, _HARDEST = 3.0, 40.0  # N/s, N
-_ON_THE_WAY = (0.0, 0.0)  # neither aside nor lifted
+_NO_OFFSET = (0.0, 0.0)  # neither lateral offset nor lift
 
 
 class HandView(NamedTuple):
-    """What the hand feels, terrain frame: sole and hand point [m], speeds [m/s]."""
+    """Observation of the hand, terrain frame: sole and hand point [m], speeds [m/s]."""
 
     sole: Vector3
     sole_v: Vector3
@@ -72,16 +73,15 @@ class HandView(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Pace:
-    """How this operator pushes.
+    """Pushing style of an operator.
 
     Attributes:
-        speed: median over trials [m/s].
-        stiffness: of hand and arm, median over trials [N/m].
-        strongest: push before the hand holds back [N].
-        press_deg: angle at which the push leans on the ground, mean over trials
-            [degrees].
+        speed: median speed over trials [m/s].
+        stiffness: median stiffness of hand and arm over trials [N/m].
+        strongest: force at which the hand holds back [N].
+        press_deg: mean downward angle of the push over trials [degrees].
         press_spread_deg: its standard deviation over trials [degrees].
-        mishaps: what goes wrong on the way.
+        mishaps: mishaps during the push.
     """
 
     speed: float = 0.040
@@ -101,17 +101,17 @@ PACES = {
 
 
 class Push:
-    """One push from rest, until the hand gets another order."""
+    """One push from rest until the hand's next action."""
 
     def __init__(
         self, pace: Pace, rng: np.random.Generator, view: HandView, dt: float
     ) -> None:
-        """Draw one trial's hand.
+        """Draw the hand of one trial.
 
         Args:
-            pace: of the person.
-            rng: of this trial's hand.
-            view: where foot and hand are now.
+            pace: pushing style of the person.
+            rng: generator of this trial's hand.
+            view: present observation.
             dt: time step [s].
         """
         n = NormalStream(rng)
@@ -143,10 +143,10 @@ class Push:
         x, y, _ = view.hand
         vx, vy, _ = view.hand_v
         self._watch(view.sole[0], view.sole_v[0])
-        begun = (self._age - self._wait) / _RAMP
-        begun = 0.0 if begun < 0.0 else begun if begun < 1.0 else 1.0
+        ramp = (self._age - self._wait) / _RAMP
+        ramp = 0.0 if ramp < 0.0 else ramp if ramp < 1.0 else 1.0
         pace = 1.0 + self._wander.step()
-        v_e = begun * self._speed * pace if pace > 0.0 else 0.0
+        v_e = ramp * self._speed * pace if pace > 0.0 else 0.0
         moved = x - self._x0
         spring = self._K * (self._xe - moved)
         room = (self._strongest - spring) / (0.3 * self._strongest)
@@ -160,17 +160,17 @@ class Push:
         force = force if force > _WEAKEST else _WEAKEST
         unsteady = force * self._effort.step()
         force += unsteady + (0.05 + 0.012 * abs(force)) * self._tremor.step()
-        aside, lift = _ON_THE_WAY
+        aside, lift = _NO_OFFSET
         if self._pace.mishaps is not NO_MISHAPS:
             aside, lift = self._pace.mishaps.at(view.sole[0])
         lateral = LATERAL_K * (aside - y) - LATERAL_B * vy
-        return force, lateral, self._upward(force, view, begun, lift)
+        return force, lateral, self._upward(force, view, ramp, lift)
 
-    def _upward(self, push: float, view: HandView, begun: float, lift: float) -> float:
+    def _upward(self, push: float, view: HandView, ramp: float, lift: float) -> float:
         dt, z, vz = self._dt, view.hand[2], view.hand_v[2]
         tilt = self._beta + self._tilt.step()
         tilt = _FLATTEST if tilt < _FLATTEST else min(tilt, _STEEPEST)
-        wander = self._press.step() * begun
+        wander = self._press.step() * ramp
         self._z_ref += dt * (z - self._z_ref) / _Z_TIME
         if lift > 0.0:
             if self._z_rest is None:
@@ -182,7 +182,7 @@ class Push:
         return -(pressed + wander + _Z_B * vz + _Z_K * (z - self._z_ref))
 
     def _watch(self, x: float, vx: float) -> None:
-        """Press harder when stuck; notice a slip of the sole."""
+        """Raise the force limit when stuck; detect a slip of the sole."""
         dt = self._dt
         if x - self._progress_x > _PROGRESS:
             self._progress_x, self._progress_age = x, 0.0
@@ -196,10 +196,10 @@ class Push:
             reaction = _REACTION + _REACTION_SPREAD * self._n.next()
             self._react_in = max(_FASTEST_REACTION, reaction)
 
-    def _react(self, left: float, x: float) -> None:
-        """When nothing is `left` [s] of the reaction time, let the target go back."""
-        self._react_in = left
-        if left <= 0.0:
+    def _react(self, remaining: float, x: float) -> None:
+        """Count the reaction time down; at its end move the target back."""
+        self._react_in = remaining
+        if remaining <= 0.0:
             share = float(self._rng.uniform(0.1, 0.5))
             self._xe = x + share * max(self._react_force, 0.0) / self._K
             self._react_in = None

@@ -1,8 +1,7 @@
-"""Between pucks and motors: cables, coils and encoders that are not as built.
+"""Wiring faults between pucks and motors: cables, coils and encoders.
 
-A motor whose plug is turned, whose coil is open or which has another puck's cable does
-something else with a torque than its puck believes; an encoder's cable on another puck
-tells of another motor.
+A reversed plug, an open coil or swapped motor cables change the torque of a motor;
+swapped encoder cables report the position of another motor.
 """
 
 from collections.abc import Sequence
@@ -19,16 +18,16 @@ def _as_built() -> Array:
 
 @dataclass(frozen=True, slots=True)
 class Wiring:
-    """What passes between the seven pucks and the seven motors.
+    """Wiring of the seven pucks and motors.
 
     Attributes:
-        torque: what each motor makes of each torque that is sent, shape (7, 7).
-        counts: what each encoder tells of each motor's way, shape (7, 7).
-        home: counts of the motors where the arm was zeroed, shape (7,).
-        torn: motor whose cable to the joints is torn, 1-7: its rotor alone turns, and
-            under the law's spring stays where it is. 0 = none.
-        torn_at: where that rotor stands [counts].
-        shift: counts that are told too much, shape (7,).
+        torque: motor torques per commanded torque, shape (7, 7).
+        counts: encoder counts per motor travel, shape (7, 7).
+        home: motor counts at the zero pose, shape (7,).
+        torn: motor whose cable to the joints is torn, 1-7; its rotor stays in place
+            under the law's spring. 0 = none.
+        torn_at: position of that rotor [counts].
+        shift: offset of the reported counts, shape (7,).
     """
 
     torque: Array = field(default_factory=_as_built)
@@ -39,15 +38,15 @@ class Wiring:
     shift: Array = field(default_factory=lambda: np.zeros(7))
 
     def made_of(self, units: Sequence[int]) -> list[int]:
-        """Return the torques [puck units] that the motors make, shape (7,)."""
-        made = self.torque.dot(np.array(units, dtype=float))
+        """Return the motor torques for commanded `units` [puck units], seven."""
+        torques = self.torque.dot(np.array(units, dtype=float))
         if self.torn:
-            made[self.torn - 1] = 0.0
-        return [round(unit) for unit in made.tolist()]
+            torques[self.torn - 1] = 0.0
+        return [round(unit) for unit in torques.tolist()]
 
     def told_of(self, counts: Array) -> Array:
-        """Return what the encoders tell where the motors have turned by `counts`."""
-        told = self.home + self.counts.dot(counts - self.home) + self.shift
+        """Return the reported counts for true motor positions `counts`, shape (7,)."""
+        reported = self.home + self.counts.dot(counts - self.home) + self.shift
         if self.torn:
-            told[self.torn - 1] = self.torn_at
-        return told
+            reported[self.torn - 1] = self.torn_at
+        return reported

@@ -23,26 +23,26 @@ class MotorSide(Protocol):
     """The motors and the arm behind the pucks."""
 
     def advance(self, t_ns: int) -> None:
-        """Let the world go on to `t_ns`."""
+        """Advance the simulated world to `t_ns`."""
         ...
 
     def counts(self) -> Sequence[int]:
-        """Return the encoder counts of the seven motors now."""
+        """Return the present encoder counts of the seven motors."""
         ...
 
     def set_torques(self, units: Sequence[int]) -> None:
-        """Apply these torques [puck units] to motors 1 to 7 from now on."""
+        """Set the torques [puck units] of motors 1 to 7."""
         ...
 
     def short_windings(self, shorted: Sequence[bool]) -> None:
-        """Short the windings of motors 1 to 7, which damps them, or open them."""
+        """Short (damped) or open the windings of motors 1 to 7."""
         ...
 
 
 class PuckBank:
-    """Motor pucks 1 to 7: they are set, asked, driven, and lose their power.
+    """Motor pucks 1 to 7: properties, torques, positions and power.
 
-    Motors are advanced to the instants at which pucks touch them and no further.
+    Motors are advanced only to the instants at which a puck reads or drives them.
     `on_positions` is called with the positions [counts] by node that are reported at
     one instant.
     """
@@ -63,13 +63,13 @@ class PuckBank:
             MotorPuck(PuckPower(node, options, schedule), options)
             for node in MOTOR_NODES
         ]
-        self._deaf: set[int] = set()  # to the module
+        self._deaf_nodes: set[int] = set()  # to the module
         self._members: dict[int, list[MotorPuck]] = {}
         self._reporting: dict[tuple[int, int], list[MotorPuck]] = {}
-        self._wake_up()
+        self._power_up()
 
     def follow(self, mode: SafetyMode, before: SafetyMode) -> None:
-        """Go where the safety module sends the pucks in its new `mode`."""
+        """Follow a change of the safety module from mode `before` to `mode`."""
         self._mode = mode
         if (power := power_after(mode, before)) is not None:
             for puck in self._pucks:
@@ -78,41 +78,41 @@ class PuckBank:
         self._set_puck_modes()
 
     def silence(self, node: int, *, is_mute: bool) -> None:
-        """Cut the transmit wire of a puck, or mend it."""
+        """Cut or reconnect the transmit wire of a puck."""
         self._pucks[node - 1].life.cut(is_mute=is_mute)
 
     def set_bus_voltage(self, voltage: float) -> None:
-        """Let the pucks measure `voltage` [V]."""
+        """Set the bus voltage [V] that the pucks measure."""
         for puck in self._pucks:
             puck.define("VBUS", round(voltage))
 
     def set_property(self, node: int, name: str, value: int) -> None:
-        """Let a puck measure `value` for a property such as TEMP."""
+        """Set a measured property of a puck, such as TEMP."""
         self._pucks[node - 1].define(name, value)
 
     def reboot(self, node: int) -> None:
-        """Let a puck fall into its monitor."""
+        """Drop a puck into its monitor."""
         self._pucks[node - 1].restart(Power.MONITOR)
         self._forget_groups()
         self._apply()
 
     def deafen(self, node: int, *, is_deaf: bool) -> None:
-        """Let a puck miss every change of mode that the module tells, or hear again."""
-        (self._deaf.add if is_deaf else self._deaf.discard)(node)
+        """Make a puck ignore, or follow again, the safety module's mode broadcasts."""
+        (self._deaf_nodes.add if is_deaf else self._deaf_nodes.discard)(node)
 
     def driven(self) -> list[int]:
-        """Return the pucks that follow torques."""
+        """Return the nodes in torque mode."""
         return [puck.node for puck in self._pucks if puck.is_driven]
 
     def lose_mode(self, node: int) -> None:
-        """Let a puck leave torque mode by itself."""
+        """Make a puck leave torque mode by itself."""
         puck = self._pucks[node - 1]
         puck.define("MODE", PuckMode.IDLE)
         puck.torque = 0
         self._apply()
 
     def restart_at_once(self, node: int) -> None:
-        """Let a puck restart and run again in no time."""
+        """Restart a puck without any downtime; mode and position are lost."""
         puck = self._pucks[node - 1]
         puck.restart(Power.AWAKE)
         self._lose_positions([puck])
@@ -120,41 +120,41 @@ class PuckBank:
         self._apply()
 
     def receive(self, node: int, request: Property) -> None:
-        """Take a GET or SET sent to one puck."""
+        """Handle a GET or SET sent to one puck."""
         puck = self._pucks[node - 1]
         if puck.life.is_listening:
-            self._ask_or_tell([puck], request)
+            self._get_or_set([puck], request)
 
     def receive_group(self, group: int, request: Property) -> None:
-        """Take a GET or SET sent to a group."""
+        """Handle a GET or SET sent to a group."""
         key = (group, request.number)
         if request.value is None and key in self._reporting:
             self._plan_report(self._reporting[key])
         else:
-            self._ask_or_tell(self._group(group), request)
+            self._get_or_set(self._group(group), request)
 
     def receive_torques(self, group: int, header: int, units: Sequence[int]) -> None:
-        """Take a torque frame: its first byte and four torques [puck units]."""
+        """Handle a torque frame: its first byte and four torques [puck units]."""
         for puck in self._group(group):
             if puck.t_header == header and puck.is_driven:
                 puck.take_torque(units[puck.slot])
         self._motors.advance(self._schedule.now_ns)
         self._motors.set_torques([puck.torque for puck in self._pucks])
 
-    def _wake_up(self) -> None:
+    def _power_up(self) -> None:
         for puck in self._pucks:
             puck.restart(power_at_start(self._options))
         if not self._options.has_positions:
             self._lose_positions(self._pucks)
         self._set_puck_modes()
 
-    def _ask_or_tell(self, pucks: list[MotorPuck], request: Property) -> None:
+    def _get_or_set(self, pucks: list[MotorPuck], request: Property) -> None:
         number = request.number
         if request.value is not None:
             for puck in pucks:
-                self._tell(puck, number, request.value)
+                self._set_property(puck, number, request.value)
             return
-        if feedback := _asked_for_positions(pucks, number):
+        if feedback := _reporting_pucks(pucks, number):
             self._plan_report(feedback)
             return
         for puck in pucks:
@@ -168,18 +168,18 @@ class PuckBank:
         return puck.value_of(name, self._encoder_counts()[puck.node - 1])
 
     def _report(self, pucks: list[MotorPuck]) -> None:
-        """Latch the positions of `pucks` and hand them to the wire."""
+        """Latch the positions of `pucks` and send them."""
         counts = self._encoder_counts()
-        speaking = [puck for puck in pucks if puck.life.is_speaking]
-        if not speaking:
+        senders = [puck for puck in pucks if puck.life.is_speaking]
+        if not senders:
             return
-        positions = [counts[puck.node - 1] + puck.offset for puck in speaking]
-        for puck, data in zip(speaking, encode_positions(positions), strict=True):
+        positions = [counts[puck.node - 1] + puck.offset for puck in senders]
+        for puck, data in zip(senders, encode_positions(positions), strict=True):
             self._schedule.emit(puck.position_id, data)
-        nodes = [puck.node for puck in speaking]
+        nodes = [puck.node for puck in senders]
         self._on_positions(dict(zip(nodes, wrap_positions(positions), strict=True)))
 
-    def _tell(self, puck: MotorPuck, number: int, value: int) -> None:
+    def _set_property(self, puck: MotorPuck, number: int, value: int) -> None:
         name = puck.name_of(number)
         if name == "STAT":
             self._restart(puck, value)
@@ -198,7 +198,7 @@ class PuckBank:
                 self._apply()
 
     def _restart(self, puck: MotorPuck, stat: int) -> None:
-        """Obey SET STAT: wake a sleeping puck, reset a running one."""
+        """Carry out SET STAT: wake a sleeping puck, reset a running one."""
         change = puck.life.transition(stat)
         if change is None:
             return
@@ -216,7 +216,7 @@ class PuckBank:
 
     def _set_puck_modes(self) -> None:
         for puck in self._pucks:
-            if puck.node in self._deaf and self._mode is not SafetyMode.E_STOP:
+            if puck.node in self._deaf_nodes and self._mode is not SafetyMode.E_STOP:
                 continue
             if puck.is_awake:
                 puck.define("MODE", puck_mode_in(self._mode))
@@ -224,7 +224,7 @@ class PuckBank:
         self._apply()
 
     def _apply(self) -> None:
-        """Hand the torques and windings as they are now to the motors.
+        """Pass the present torques and windings to the motors.
 
         The motor of a puck that restarts under an active module turns freely.
         """
@@ -253,16 +253,16 @@ class PuckBank:
             members = [p for p in self._pucks if p.hears(group)]
             self._members[group] = members
             for number in {p.p_number for p in members}:
-                if feedback := _asked_for_positions(members, number):
+                if feedback := _reporting_pucks(members, number):
                     self._reporting[group, number] = feedback
         return members
 
     def _forget_groups(self) -> None:
-        """Find out anew who belongs to which group and who runs."""
+        """Drop the cached group members; they depend on properties and power."""
         self._members.clear()
         self._reporting.clear()
 
 
-def _asked_for_positions(pucks: list[MotorPuck], number: int) -> list[MotorPuck]:
-    """Return those that run and to which property `number` is their position."""
+def _reporting_pucks(pucks: list[MotorPuck], number: int) -> list[MotorPuck]:
+    """Return the running pucks whose property `number` is the position P."""
     return [p for p in pucks if p.p_number == number and p.life.power is Power.AWAKE]

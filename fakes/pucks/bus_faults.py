@@ -1,7 +1,7 @@
-"""What can go wrong with frames between a simulated network and its host.
+"""Faults of the frames between a simulated network and its host.
 
-Nothing happens here of its own accord: a fault is switched on, works on the network's
-time, and goes on until its count is used up or it is mended.
+No fault occurs by itself: each is switched on, works on the network's time, and lasts
+until its count is used up or it is cleared.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,8 +22,8 @@ from wam.bus.frames import (
     group_id,
 )
 
-# FROM 31 TO 9 wins every arbitration against pucks, FROM 11 TO group 11 (what the
-# finger of a hand says) loses all of them; nobody here has or hears either.
+# FROM 31 TO 9 wins every arbitration against pucks, FROM 11 TO group 11 (a reply of a
+# hand's finger) loses all of them; no device here uses or receives either.
 FOREIGN_IDS = (
     compose_id(31, 9, is_group=False),
     compose_id(11, 11, is_group=True),
@@ -41,10 +41,10 @@ class _Rule:
     """An effect on the frames of one identifier.
 
     Attributes:
-        effect: what is left of a frame, and how much later.
-        left: how often it still strikes, None = until mended.
-        every: it strikes every so many frames.
-        share: it strikes with this probability.
+        effect: gives the frames that replace a frame, and their delays.
+        left: remaining strikes, None = until cleared.
+        every: strikes every `every`-th frame only.
+        share: probability of a strike.
         passed: frames so far.
     """
 
@@ -56,19 +56,19 @@ class _Rule:
 
 
 class BusFaults:
-    """Loses, delays, doubles and spoils the frames of a network's devices.
+    """Loses, delays, duplicates and corrupts the frames of a network's devices.
 
-    Devices among themselves are not touched: the faults sit before the host, and
-    `lose_from_host` behind it. Frames of one identifier keep their order, as they do in
-    the queue of a CAN controller. `count` is how many frames a fault strikes, None =
-    all until `clear_faults`.
+    Traffic between devices is not affected: the faults act on what the host receives,
+    `lose_from_host` on what it sends. Frames of one identifier keep their order, as
+    they do in the queue of a CAN controller. `count` is how many frames a fault
+    strikes, None = all until `clear_faults`.
 
     Attributes:
         is_down: the host's interface is down: it refuses to send and to receive.
-        is_off: the host's controller has left the bus, as Linux shows it: what is sent
-            vanishes, nothing arrives, and one error frame told it.
-        is_unheard: nobody acknowledges what the host sends: it waits in its queue.
-        error_frames: (classes, detail) that the host's controller has still to tell.
+        is_off: the host's controller is bus-off, as Linux shows it: sent frames are
+            lost, nothing arrives, and one error frame has reported it.
+        is_unheard: no device acknowledges the host's frames: they wait in its queue.
+        error_frames: (classes, detail) that the host's controller has yet to report.
     """
 
     def __init__(self, schedule: EventQueue, seed: int = 0) -> None:
@@ -80,99 +80,99 @@ class BusFaults:
         self._rng = np.random.default_rng(seed)
         self._rules: dict[int, list[_Rule]] = {}
         self._released_ns: dict[int, int] = {}
-        self._flood = 0  # number of the present one; events of earlier ones are void
-        self._unheard: list[Callable[[int, Payload], bool]] = []
+        self._flood = 0  # number of the present flood; events of earlier ones are void
+        self._host_losses: list[Callable[[int, Payload], bool]] = []
 
     def lose_from_host(self, is_lost: Callable[[int, Payload], bool]) -> None:
-        """Let no device hear the host's frames for which `is_lost(identifier, data)`.
+        """Lose the host's frames for which `is_lost(identifier, data)` is true.
 
         It lasts until `clear_faults`.
         """
-        self._unheard.append(is_lost)
+        self._host_losses.append(is_lost)
 
     def is_heard(self, can_id: int, data: Payload) -> bool:
-        """Return whether devices hear a frame of the host."""
-        return not any(is_lost(can_id, data) for is_lost in self._unheard)
+        """Return whether devices receive a frame of the host."""
+        return not any(is_lost(can_id, data) for is_lost in self._host_losses)
 
     def drop(self, can_id: int, count: int | None = 1, share: float = 1.0) -> None:
-        """Lose frames, each with probability `share`."""
+        """Drop frames, each with probability `share`."""
         self._add(can_id, lambda _: [], count, share=share)
 
     def delay(
         self, can_id: int, delay_ns: int, count: int | None = 1, every: int = 1
     ) -> None:
-        """Let every so-many-th frame reach the wire `delay_ns` later."""
+        """Delay every `every`-th frame by `delay_ns`."""
         self._add(can_id, lambda data: [(delay_ns, data)], count, every=every)
 
     def duplicate(self, can_id: int, count: int | None = 1) -> None:
-        """Let frames come twice."""
+        """Send frames twice."""
         self._add(can_id, lambda data: [(0, data), (0, data)], count)
 
     def corrupt(self, can_id: int, byte: int, count: int | None = 1) -> None:
-        """Invert one byte, as a failing memory does that no checksum covers."""
+        """Invert one byte, like a memory error that no checksum covers."""
 
-        def spoil(data: bytes) -> list[tuple[int, bytes]]:
-            spoilt = bytearray(data)
-            if byte < len(spoilt):
-                spoilt[byte] ^= 0xFF
-            return [(0, bytes(spoilt))]
+        def invert(data: bytes) -> list[tuple[int, bytes]]:
+            corrupted = bytearray(data)
+            if byte < len(corrupted):
+                corrupted[byte] ^= 0xFF
+            return [(0, bytes(corrupted))]
 
-        self._add(can_id, spoil, count)
+        self._add(can_id, invert, count)
 
     def answer_twice(
         self, can_id: int, other: Callable[[bytes], bytes], after_ns: int
     ) -> None:
-        """Let every frame be followed by `other` of it, `after_ns` later."""
+        """Follow every frame with a second one, `other(data)`, `after_ns` later."""
         self._add(can_id, lambda data: [(0, data), (after_ns, other(data))], None)
 
     def falsify(self, can_id: int, lie: Callable[[int], int]) -> None:
-        """Let `lie` change every position [counts] that a puck tells."""
+        """Replace every position [counts] that a puck reports by `lie` of it."""
 
-        def tell(data: bytes) -> list[tuple[int, bytes]]:
+        def replace_position(data: bytes) -> list[tuple[int, bytes]]:
             return [(0, encode_position(lie(decode_position(data))))]
 
-        self._add(can_id, tell, None)
+        self._add(can_id, replace_position, None)
 
     def flood(self, load: float, ids: Sequence[int] = FOREIGN_IDS) -> None:
-        """Let others use `load` of the bus, 0 to 1, with `ids` in turn.
+        """Load the bus with foreign frames: a share `load`, 0 to 1, with `ids` in turn.
 
-        They compete frame by frame; pauses vary by half, so no cycle is like another.
+        They compete frame by frame; pauses vary by ±50 %, so cycles differ.
         """
         self._flood += 1
-        self._say_foreign(self._flood, FRAME_NS[len(_FOREIGN_DATA)] / load, ids)
+        self._send_foreign(self._flood, FRAME_NS[len(_FOREIGN_DATA)] / load, ids)
 
     def go_off(self) -> None:
-        """Let the host's controller leave the bus, as after too many errors."""
+        """Put the host's controller in bus-off, as after too many errors."""
         self.is_off = True
         self.error_frames.append((_BUS_OFF, bytes(8)))
-        self._step_in()
+        self._intercept_frames()
 
     def go_unheard(self) -> None:
-        """Leave the host alone on the bus, as behind a torn cable.
+        """Leave the host's frames unacknowledged, as with a broken cable.
 
-        Its controller becomes passive and repeats its frame for ever; it never leaves.
+        Its controller turns error-passive and repeats its frame; it never goes bus-off.
         """
         self.is_unheard = True
         self.error_frames.append((_PASSIVE, _TX_PASSIVE))
-        self._step_in()
+        self._intercept_frames()
 
     def go_down(self) -> None:
-        """Set the host's interface down, as `ip link set can0 down` does."""
+        """Bring the host's interface down, as `ip link set can0 down` does."""
         self.is_down = True
-        self._step_in()
+        self._intercept_frames()
 
     def report_error(self, classes: int, detail: bytes = bytes(8)) -> None:
-        """Let the host's controller tell an error frame with `classes`."""
+        """Make the host's controller report an error frame with `classes`."""
         self.error_frames.append((classes, detail))
 
     def clear_faults(self) -> None:
-        """End everything; frames that are late already still come."""
+        """Clear all faults; frames already delayed still arrive."""
         if self.is_off:
             self.error_frames.append((_RESTARTED, bytes(8)))
         self.is_off = self.is_down = self.is_unheard = False
         self._flood += 1
         self._rules.clear()
-        self._unheard.clear()
+        self._host_losses.clear()
 
     def _add(
         self,
@@ -185,22 +185,22 @@ class BusFaults:
     ) -> None:
         rule = _Rule(effect, count, every, share)
         self._rules.setdefault(can_id, []).append(rule)
-        self._step_in()
+        self._intercept_frames()
 
-    def _step_in(self) -> None:
-        """Come between devices and wire, once and for good.
+    def _intercept_frames(self) -> None:
+        """Route the devices' frames through the faults from now on.
 
-        Until something goes wrong for the first time frames take the short way. The
-        long one stays: a mended delay still keeps frames of an identifier in order.
+        Until the first fault, frames go straight to the wire. The detour stays: after a
+        delay has been cleared, frames of one identifier must still keep their order.
         """
-        self._schedule.intercept(self._pass_on)
+        self._schedule.intercept(self._forward)
 
-    def _pass_on(self, can_id: int, data: bytes) -> None:
-        for delay_ns, left in self._struck(can_id, data):
-            self._release(can_id, delay_ns, left)
+    def _forward(self, can_id: int, data: bytes) -> None:
+        for delay_ns, received in self._apply_rules(can_id, data):
+            self._release(can_id, delay_ns, received)
 
-    def _struck(self, can_id: int, data: bytes) -> list[tuple[int, bytes]]:
-        """Return what the first rule that strikes leaves of a frame."""
+    def _apply_rules(self, can_id: int, data: bytes) -> list[tuple[int, bytes]]:
+        """Return the frames that replace a frame, by the first rule that strikes."""
         for rule in self._rules.get(can_id, ()):
             rule.passed += 1
             is_due = rule.left != 0 and rule.passed % rule.every == 0
@@ -223,14 +223,14 @@ class BusFaults:
         if not (self.is_off or self.is_down or self.is_unheard):
             self._schedule.put(can_id, data)
 
-    def _say_foreign(self, flood: int, gap_ns: float, ids: Sequence[int]) -> None:
+    def _send_foreign(self, flood: int, gap_ns: float, ids: Sequence[int]) -> None:
         if flood != self._flood:
             return
         self._put(ids[0], _FOREIGN_DATA)
         pause_ns = round(gap_ns * self._rng.uniform(0.5, 1.5))
         following = (*ids[1:], ids[0])
         self._schedule.after(
-            pause_ns, lambda: self._say_foreign(flood, gap_ns, following)
+            pause_ns, lambda: self._send_foreign(flood, gap_ns, following)
         )
 
 

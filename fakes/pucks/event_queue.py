@@ -1,4 +1,4 @@
-"""The time of a simulated network: what happens later, and the frames sent."""
+"""The clock of a simulated network, its planned events and the frames sent."""
 
 from collections.abc import Callable
 from heapq import heappop, heappush
@@ -16,15 +16,15 @@ FRAME_NS = tuple(1000 * bits for bits in (50, 58, 67, 76, 84, 93, 101, 110, 118)
 
 
 class EventQueue:
-    """One time for all devices of a network, their plans and their frames.
+    """One clock for all devices of a network, their planned events and frames.
 
-    The wire asks for the next event with every frame, so it is kept, not looked up.
+    The wire reads the time of the next event with every frame, so it is cached.
 
     Attributes:
-        now_ns: the network's time; it never runs back.
-        next_ns: when the next plan or the alarm is due, `NEVER` if there is none.
+        now_ns: the network's time; never decreases.
+        next_ns: when the next event or the alarm is due, `NEVER` if there is none.
         emit: sends a frame of a device now (identifier, data); see `intercept`.
-        outbox: frames that want onto the wire, until they are taken.
+        outbox: frames ready for the wire, until `take`.
     """
 
     def __init__(self, t_ns: int) -> None:
@@ -33,37 +33,37 @@ class EventQueue:
         self.emit: Callable[[int, bytes], None] = self.put
         self._on_alarm: Callable[[], None] = lambda: None
         self._alarm_ns = NEVER
-        self._plans: list[tuple[int, int, Callable[[], None]]] = []
-        self._plan_count = 0
+        self._events: list[tuple[int, int, Callable[[], None]]] = []
+        self._event_count = 0
         self.outbox: list[OutFrame] = []
 
     def after(self, delay_ns: int, action: Callable[[], None]) -> None:
-        """Plan `action` for `delay_ns` from now."""
-        self._plan_count += 1  # keeps plans for one instant in their order
+        """Schedule `action` in `delay_ns` from now."""
+        self._event_count += 1  # keeps events of one instant in their order
         at_ns = self.now_ns + delay_ns
-        heappush(self._plans, (at_ns, self._plan_count, action))
+        heappush(self._events, (at_ns, self._event_count, action))
         self.next_ns = min(self.next_ns, at_ns)
 
     def intercept(self, emit: Callable[[int, bytes], None]) -> None:
-        """Give every frame of a device to `emit` from now on, instead of `put`."""
+        """Pass every frame of a device to `emit` from now on, instead of `put`."""
         self.emit = emit
 
     def define_alarm(self, action: Callable[[], None]) -> None:
-        """Call `action` when the alarm goes off."""
+        """Set the action of the alarm."""
         self._on_alarm = action
 
     def set_alarm(self, at_ns: int) -> None:
-        """Let the alarm go off at `at_ns` only, `NEVER` = not at all."""
+        """Set the time of the alarm, replacing the last one; `NEVER` = off."""
         self._alarm_ns = at_ns
         self._find_next()
 
     def advance(self, t_ns: int) -> None:
-        """Carry out all that is due until `t_ns`, in order of time; let it be then."""
+        """Run all events due until `t_ns` in order of time; `now_ns` is then `t_ns`."""
         while (next_ns := self.next_ns) <= t_ns:
             self.now_ns = max(self.now_ns, next_ns)
-            # At one instant plans come first: what they do may put the alarm off.
-            if self._plans and self._plans[0][0] <= self.now_ns:
-                action = heappop(self._plans)[2]
+            # At one instant events come first: they may postpone the alarm.
+            if self._events and self._events[0][0] <= self.now_ns:
+                action = heappop(self._events)[2]
                 self._find_next()
                 action()
             else:
@@ -71,7 +71,7 @@ class EventQueue:
         self.now_ns = t_ns if t_ns > self.now_ns else self.now_ns
 
     def put(self, can_id: int, data: bytes) -> None:
-        """Hand a frame to the wire now."""
+        """Pass a frame to the wire now."""
         self.outbox.append((self.now_ns, can_id, data))
 
     def reply(self, node: int, number: int, name: str, value: int) -> None:
@@ -87,5 +87,5 @@ class EventQueue:
         return frames
 
     def _find_next(self) -> None:
-        plans, alarm_ns = self._plans, self._alarm_ns
-        self.next_ns = plans[0][0] if plans and plans[0][0] < alarm_ns else alarm_ns
+        events, alarm_ns = self._events, self._alarm_ns
+        self.next_ns = events[0][0] if events and events[0][0] < alarm_ns else alarm_ns

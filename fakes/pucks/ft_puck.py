@@ -1,9 +1,9 @@
 """The simulated wrist sensor on the arm's bus, node 8: gauges behind a puck.
 
-What it weighs comes from a `Load`. Its own choices, where Barrett's firmware is not
-known: each gauge feels one axis, a reading beyond the frame's ±128 N is clipped rather
-than wrapped (Fz is good for ±135 N), a gain matrix and offsets are taken and have no
-effect, and the accelerometer feels a sensor at rest.
+The measured wrench comes from a `Load`. Choices where Barrett's firmware is not known:
+each gauge measures one axis, a reading beyond the frame's ±128 N is clipped rather than
+wrapped (the range of Fz is ±135 N), a gain matrix and offsets are accepted without
+effect, and the accelerometer reads a sensor at rest.
 """
 
 from collections.abc import Callable, Sequence
@@ -28,8 +28,8 @@ from wam.bus.properties import Device, PuckRole, PuckStatus, names
 # Data sheet: steps and ranges of fx fy fz tx ty tz [N, N m]
 STEPS = (0.05, 0.05, 0.08, 0.0015, 0.0015, 0.0015)
 RANGES = (80.0, 80.0, 135.0, 2.75, 2.75, 2.75)
-# Two bits of noise, four steps from peak to peak, taken as two standard deviations each
-# way; the steps themselves are the puck's.
+# Two bits of noise, four steps peak to peak, are taken as ±2 standard deviations; the
+# resolution is applied by the puck.
 SENSOR_FORCE_ERRORS = replace(FORCE_ERRORS, white=STEPS[0], resolution=0.0)
 SENSOR_TORQUE_ERRORS = replace(TORQUE_ERRORS, white=STEPS[3], resolution=0.0)
 
@@ -46,27 +46,27 @@ _READ_ONLY = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """What the gauges feel.
+    """The wrench on the gauges.
 
     Attributes:
-        source: the true load at an instant [ns]: fx fy fz tx ty tz [N, N m].
-        errors: added to it; None = felt as it is.
+        source: the true load at a time [ns]: fx fy fz tx ty tz [N, N m].
+        errors: the sensor errors added to it; None = none.
     """
 
     source: Callable[[int], Sequence[float]] = lambda _: (0.0,) * 6
     errors: SensorErrors | None = None
 
     def at(self, t_ns: int) -> Sequence[float]:
-        """Return the load as the gauges feel it at `t_ns`."""
-        felt = self.source(t_ns)
-        return felt if self.errors is None else self.errors.apply(t_ns, felt)
+        """Return the load at `t_ns` with the sensor errors."""
+        wrench = self.source(t_ns)
+        return wrench if self.errors is None else self.errors.apply(t_ns, wrench)
 
 
 class ForceTorquePuck:
-    """State of node 8, which answers its own id; the arm's groups are not its own.
+    """State of node 8, which answers its own id only, not the arm's groups.
 
     Attributes:
-        life: its processor.
+        life: power state of its processor.
     """
 
     def __init__(
@@ -97,37 +97,37 @@ class ForceTorquePuck:
         }
 
     def follow(self, mode: SafetyMode, before: SafetyMode) -> None:
-        """Lose or get power with a change of the safety module's mode."""
+        """Follow the power bus when the safety module changes its mode."""
         if (power := power_after(mode, before)) is not None:
             self._restart(power)
 
     def reboot(self) -> None:
-        """Fall into the monitor; the tare is lost."""
+        """Drop into the monitor; the tare is lost."""
         self._restart(Power.MONITOR)
 
     def set_bus_voltage(self, voltage: float) -> None:
-        """Measure `voltage` [V]."""
+        """Set the measured bus voltage [V]."""
         self._properties["VBUS"] = round(voltage)
 
     def receive(self, request: Property) -> None:
-        """Take a GET or SET sent to node 8."""
+        """Handle a GET or SET sent to node 8."""
         is_awake = self.life.power is Power.AWAKE
         table = names(Device.SENSOR if is_awake else Device.MONITOR)
         name = table.get(request.number)
         if name is None or not self.life.is_listening:
             return
         if request.value is not None:
-            self._tell(name, request.value)
+            self._set_property(name, request.value)
         elif is_awake and name == "FT":
-            self.life.later(self._options.latch_ns, self._say_wrench)
+            self.life.later(self._options.latch_ns, self._send_wrench)
         elif is_awake and name == "A":
-            self.life.later(self._options.latch_ns, self._say_acceleration)
+            self.life.later(self._options.latch_ns, self._send_acceleration)
         else:
             self.life.answer(request.number, name, self._value_of)
 
-    def _tell(self, name: str, value: int) -> None:
+    def _set_property(self, name: str, value: int) -> None:
         if name == "STAT":
-            self._obey_stat(value)
+            self._set_stat(value)
         elif self.life.power is not Power.AWAKE:
             return
         elif name == "FT" and value == 0:
@@ -135,7 +135,7 @@ class ForceTorquePuck:
         elif name in self._properties and name not in _READ_ONLY:
             self._properties[name] = value
 
-    def _obey_stat(self, stat: int) -> None:
+    def _set_stat(self, stat: int) -> None:
         change = self.life.transition(stat)
         if change is not None:
             delay_ns, power = change
@@ -160,41 +160,45 @@ class ForceTorquePuck:
         return self._properties.get(name)
 
     def _gauge(self, index: int) -> int:
-        share = self._felt()[index] / RANGES[index]
+        share = self._gauge_wrench()[index] / RANGES[index]
         return min(round(_GAUGE_ZERO * (1.0 + share)), _GAUGE_TOP)
 
     def _component(self, index: int) -> int:
-        """Return fx to az as the frames carry it [counts]."""
+        """Return component `index` of fx to az in the frames' encoding [counts]."""
         force, torque, _ = self._wrench()
         data = force + torque + encode_acceleration(_REST)
         return int.from_bytes(data[2 * index : 2 * index + 2], "little", signed=True)
 
-    def _felt(self) -> tuple[float, ...]:
-        """Return what the gauges show now, in their steps, no further than they go."""
+    def _gauge_wrench(self) -> tuple[float, ...]:
+        """Return the present gauge readings, quantised and clipped to their ranges."""
         load = self._load.at(self._schedule.now_ns)
         return tuple(
-            min(max(round(felt / step) * step, -top), top)
-            for felt, step, top in zip(load, STEPS, RANGES, strict=True)
+            min(max(round(value / step) * step, -top), top)
+            for value, step, top in zip(load, STEPS, RANGES, strict=True)
         )
 
     def _wrench(self) -> tuple[bytes, bytes, int]:
-        """Return force and torque less the tare as frames, and what is to report."""
-        felt = self._felt()
-        ends = zip(felt, RANGES, strict=True)
-        bad = sum(1 << i for i, (value, top) in enumerate(ends) if abs(value) >= top)
-        self._latched |= bad
-        fx, fy, fz, tx, ty, tz = (f - z for f, z in zip(felt, self._zero, strict=True))
+        """Return the tared force and torque as frame data, and the status byte."""
+        wrench = self._gauge_wrench()
+        pairs = zip(wrench, RANGES, strict=True)
+        saturated = sum(
+            1 << i for i, (value, top) in enumerate(pairs) if abs(value) >= top
+        )
+        self._latched |= saturated
+        fx, fy, fz, tx, ty, tz = (
+            value - zero for value, zero in zip(wrench, self._zero, strict=True)
+        )
         status = (_RETARE | self._latched if self._latched else 0) | (
-            _BAD if bad else 0
+            _BAD if saturated else 0
         )
         return encode_force((fx, fy, fz)), encode_torque((tx, ty, tz)), status
 
-    def _say_wrench(self) -> None:
+    def _send_wrench(self) -> None:
         force, torque, status = self._wrench()
         self._emit(Group.FORCE, force)
         self._emit(Group.TORQUE, torque + bytes((status,)) if status else torque)
 
-    def _say_acceleration(self) -> None:
+    def _send_acceleration(self) -> None:
         self._emit(Group.ACCELERATION, encode_acceleration(_REST))
 
     def _emit(self, group: Group, data: bytes) -> None:
@@ -202,5 +206,5 @@ class ForceTorquePuck:
             self._schedule.emit(group_id(group, SENSOR_NODE), data)
 
     def _tare(self) -> None:
-        self._zero = self._felt()
+        self._zero = self._gauge_wrench()
         self._latched = 0

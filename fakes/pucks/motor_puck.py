@@ -23,17 +23,17 @@ class MotorPuck:
     """State of one motor puck.
 
     Attributes:
-        life: its processor.
+        life: power state of its processor.
         node: its number, 1 to 7.
         position_id: identifier of its position replies.
         vers: its firmware.
-        offset: its position less the encoder's [counts].
-        torque: that it makes [puck units].
+        offset: its reported position minus the encoder's [counts].
+        torque: its present torque [puck units].
         p_number: number of the property P in its firmware.
-        t_header: first byte of a torque frame that it takes.
-        slot: which of the four torques of a frame is its own, 0 to 3.
-        limit: the most that it makes, MT [puck units].
-        is_driven: it follows torques.
+        t_header: first byte of the torque frames that it accepts.
+        slot: index of its torque in a torque frame, 0 to 3.
+        limit: largest torque, property MT [puck units].
+        is_driven: it is in torque mode.
     """
 
     def __init__(self, life: PuckPower, options: NetworkOptions) -> None:
@@ -71,15 +71,15 @@ class MotorPuck:
             "JIDX": node,
         }
         self._monitor_vers = options.monitor_vers
-        self._follow_properties()
+        self._cache_properties()
 
     def define(self, name: str, value: int) -> None:
-        """Let a property have `value` from now on."""
+        """Set a property."""
         self._properties[name] = value
-        self._follow_properties()
+        self._cache_properties()
 
-    def _follow_properties(self) -> None:
-        """Take over what every torque frame asks for."""
+    def _cache_properties(self) -> None:
+        """Cache the properties that every torque frame needs."""
         self.is_driven = self._properties["MODE"] == PuckMode.TORQUE
         self.slot = (self._properties["PIDX"] - 1) & 3
         self.limit = self._properties["MT"]
@@ -95,7 +95,7 @@ class MotorPuck:
         return self.life.is_listening and group in groups
 
     def name_of(self, number: int) -> str | None:
-        """Return what `number` means to the puck as it is now."""
+        """Return the name of property `number` in the running program, if any."""
         if self.life.power is Power.MONITOR:
             return names(Device.MONITOR).get(number)
         return names(Device.MOTOR, self._table).get(number)
@@ -112,7 +112,7 @@ class MotorPuck:
         return computed.get(name, self._properties.get(name))
 
     def take_torque(self, units: int) -> None:
-        """Follow a torque [puck units], clipped to MT, if it is in torque mode."""
+        """Set the torque [puck units], clipped to MT, if in torque mode."""
         if self.is_driven:
             limit = self.limit
             self.torque = (
@@ -120,11 +120,11 @@ class MotorPuck:
             )
 
     def restart(self, power: Power) -> None:
-        """Lose what a puck loses with its program."""
+        """Restart the program: torque and mode are lost."""
         self.life.enter(power)
         self.torque = 0
         self.define("MODE", PuckMode.IDLE)
 
     def lose_position(self, counts: int) -> None:
-        """Count from within one turn again, as the magnetic encoder sees it."""
+        """Report the position within one turn again, as the magnetic encoder has it."""
         self.offset = counts % (self._properties["CTS"] or 1) - counts

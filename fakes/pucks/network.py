@@ -1,4 +1,4 @@
-"""A WAM's puck network without wires: frames in, frames out, time as an argument.
+"""The puck network of a WAM: frames in, frames out, time as an argument.
 
 Seven motor pucks, the safety module and, where there is one, the force/torque sensor,
 as far as hosts have described them.
@@ -30,12 +30,12 @@ from wam.driver.pendant import PendantWord
 
 
 class PuckNetwork:
-    """The network as a host sees it: `receive` frames, `advance`, take what is `due`.
+    """The network as a host sees it: `receive` and `advance` in, `due` frames out.
 
     Attributes:
-        schedule: the network's time, its plans, and what wants onto the wire.
-        options: the arm as it was found.
-        faults: what goes wrong with frames on their way to the host.
+        schedule: the network's clock, its planned events, and frames for the wire.
+        options: the initial state of the arm.
+        faults: faults of frames between network and host.
         other_master: another program that may join.
     """
 
@@ -46,7 +46,7 @@ class PuckNetwork:
         t_ns: int = 0,
         load: Load | None = None,
     ) -> None:
-        """Join devices and motors; `load` is on the sensor, if there is one."""
+        """Connect devices and motors; `load` acts on the sensor, if there is one."""
         self.options = options or NetworkOptions()
         self.schedule = schedule = EventQueue(t_ns)
         self.faults = BusFaults(schedule)
@@ -66,54 +66,54 @@ class PuckNetwork:
 
     @property
     def pendant_word(self) -> PendantWord:
-        """What the pendant shows."""
+        """The state that the pendant shows."""
         return self._safety.pendant_word
 
     def advance(self, t_ns: int) -> None:
-        """Let everything happen that happens until `t_ns`, in order of time."""
+        """Run all events until `t_ns`, in order of time."""
         self.schedule.advance(t_ns)
 
     def next_event_ns(self) -> int | None:
-        """Return when the network does something of its own accord next."""
+        """Return the time of the next planned event [ns], None if there is none."""
         next_ns = self.schedule.next_ns
         return None if next_ns == NEVER else next_ns
 
     def due(self, t_ns: int) -> list[OutFrame]:
-        """Advance to `t_ns` and return the frames that want onto the wire by then."""
+        """Advance to `t_ns` and return the frames ready for the wire by then."""
         self.schedule.advance(t_ns)
         return self.schedule.take()
 
     def receive(self, t_ns: int, can_id: int, data: Payload) -> None:
-        """Take a host's frame whose last bit arrived at `t_ns`.
+        """Handle a host's frame whose last bit arrived at `t_ns`.
 
-        Devices look at whom it is for, not at whom it names as its sender.
+        Devices check its destination, not its sender.
         """
         schedule = self.schedule
         if schedule.next_ns <= t_ns:
             schedule.advance(t_ns)
-        elif schedule.now_ns < t_ns:  # nothing is planned till then
+        elif schedule.now_ns < t_ns:  # nothing is planned until then
             schedule.now_ns = t_ns
         if not self.faults.is_heard(can_id, data):
             return
-        to = can_id & 0x1F
+        destination = can_id & 0x1F
         try:
             if can_id & GROUP_BIT:
-                self._receive_group(to, data)
-            elif to == SAFETY_NODE:
+                self._receive_group(destination, data)
+            elif destination == SAFETY_NODE:
                 self._safety.receive(decode_request(data))
-            elif to in MOTOR_NODES:
-                self._bank.receive(to, decode_request(data))
-            elif to == SENSOR_NODE and self._sensor is not None:
+            elif destination in MOTOR_NODES:
+                self._bank.receive(destination, decode_request(data))
+            elif destination == SENSOR_NODE and self._sensor is not None:
                 self._sensor.receive(decode_request(data))
         except FrameError:
-            return  # devices do not answer what they do not understand
+            return  # devices do not answer malformed requests
 
     def pendant(self, action: PendantAction) -> None:
         """Press a button of the pendant, at the time of the last `advance`."""
         self._safety.press(action)
 
     def silence(self, node: int, *, is_mute: bool = True) -> None:
-        """Cut the transmit wire of a node, or mend it; it still hears."""
+        """Cut or reconnect the transmit wire of a node; it still receives."""
         if node == SAFETY_NODE:
             self._safety.is_mute = is_mute
         elif node == SENSOR_NODE:
@@ -123,34 +123,34 @@ class PuckNetwork:
             self._bank.silence(node, is_mute=is_mute)
 
     def disobey(self, *, is_disobedient: bool = True) -> None:
-        """Let the safety module ignore hosts that lower its mode, or obey again."""
+        """Make the safety module ignore, or obey again, hosts that lower its mode."""
         self._safety.is_disobedient = is_disobedient
 
     def break_button(self, action: PendantAction) -> None:
-        """Let a button of the pendant do nothing from now on."""
+        """Disable a button of the pendant."""
         self._safety.dead_button = action
 
     def misset(self, limit: str, factor: float) -> None:
-        """Let the safety module set a limit `factor` times as large as it is told."""
+        """Make the safety module store `factor` times the value it is set to."""
         self._safety.limit_factors[limit] = factor
 
     def say_idle(self, *, says_idle: bool = True) -> None:
-        """Let the safety module answer IDLE whatever its mode, or the truth again."""
+        """Make the safety module report IDLE in every mode, or its true mode again."""
         self._safety.says_idle = says_idle
 
     def set_heartbeat(self, heartbeat_ns: int) -> None:
-        """Let the safety module wait otherwise than expected for positions [ns]."""
+        """Set the heartbeat timeout of the safety module [ns]."""
         self._safety.set_heartbeat(heartbeat_ns)
 
     def set_bus_voltage(self, voltage: float) -> None:
-        """Let the arm's power bus have `voltage` [V], at the last `advance`."""
+        """Set the voltage of the arm's power bus [V], at the last `advance`."""
         self._bank.set_bus_voltage(voltage)
         if self._sensor is not None:
             self._sensor.set_bus_voltage(voltage)
         self._safety.set_bus_voltage(voltage)
 
     def set_property(self, node: int, name: str, value: int) -> None:
-        """Let a motor puck find `value` for one of its own measurements."""
+        """Set a measured property of a motor puck."""
         self._bank.set_property(node, name, value)
 
     def forget_positions(self) -> None:
@@ -158,34 +158,34 @@ class PuckNetwork:
         self._safety.forget_positions()
 
     def trip(self, monitor: Strainable) -> None:
-        """Let a monitor of the safety module find fault with what it sees."""
+        """Make a monitor of the safety module report a fault."""
         self._safety.trip(monitor)
 
     def reset_monitors(self) -> None:
-        """Let the safety module judge as before; a fault stays until Shift-idle."""
+        """Restore the safety module's monitors; a fault stays until Shift-idle."""
         self._safety.reset_monitors()
 
     def reboot(self, node: int) -> None:
-        """Let a puck fall into its monitor: no torque, position and tare lost."""
+        """Drop a puck into its monitor: no torque, position and tare lost."""
         if node != SENSOR_NODE:
             self._bank.reboot(node)
         elif self._sensor is not None:
             self._sensor.reboot()
 
     def deafen(self, node: int, *, is_deaf: bool = True) -> None:
-        """Let a motor puck miss every change of mode that the module tells."""
+        """Make a motor puck ignore the safety module's mode broadcasts."""
         self._bank.deafen(node, is_deaf=is_deaf)
 
     def driven(self) -> list[int]:
-        """Return the motor pucks that follow torques."""
+        """Return the motor pucks in torque mode."""
         return self._bank.driven()
 
     def lose_mode(self, node: int) -> None:
-        """Let a motor puck leave torque mode by itself."""
+        """Make a motor puck leave torque mode by itself."""
         self._bank.lose_mode(node)
 
     def restart_at_once(self, node: int) -> None:
-        """Let a motor puck restart within a cycle: mode and position are lost."""
+        """Restart a motor puck within a cycle: mode and position are lost."""
         self._bank.restart_at_once(node)
 
     def _receive_group(self, group: int, data: Payload) -> None:

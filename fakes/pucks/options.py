@@ -1,4 +1,4 @@
-"""The simulated arm as a host finds it."""
+"""Initial state and constants of the simulated arm."""
 
 from dataclasses import dataclass
 
@@ -7,22 +7,22 @@ from acquisition.devices import SafetyMode
 
 @dataclass(frozen=True, slots=True)
 class NetworkOptions:
-    """The arm as it is found.
+    """Initial state and constants of the arm.
 
-    What is not documented outside Barrett, such as the boot time, is a plain choice.
+    Values that are not documented outside Barrett, such as the boot time, are assumed.
 
     Attributes:
         safety_mode: mode at the start; in E_STOP the pucks have no power.
-        are_asleep: pucks wait in the monitor, as after power-up.
+        are_asleep: the pucks wait in the monitor, as after power-up.
         has_sensor: there is a force/torque sensor on the bus, node 8.
         is_zeroed: a host has defined the positions (never when asleep or E_STOP).
         vers: firmware of each motor puck; its table is the nearest documented one.
-        monitor_vers: what VERS says while a puck sleeps.
+        monitor_vers: VERS while a puck sleeps.
         safety_vers: firmware of the safety module.
         cts, ipnm, poles, mt: constants of each motor puck.
-        boot_ns: silence of a puck that was woken.
-        reset_ns: silence of a puck that was reset.
-        latch_ns: from the end of a request to the latched position.
+        boot_ns: time from waking a puck until it runs.
+        reset_ns: time from resetting a puck until its monitor answers.
+        latch_ns: time from the end of a request to the latched position.
         heartbeat_ns: longest time without position traffic while ACTIVE.
     """
 

@@ -1,7 +1,7 @@
-"""The simulated safety module: mode, pendant, and what it watches.
+"""The simulated safety module: mode, pendant and monitors.
 
-Neither the heartbeat's limit nor the content of the broadcast is known outside Barrett:
-the one is an option, the other the mode that the pucks go to.
+Neither the heartbeat timeout nor the content of the broadcast is known outside Barrett:
+the timeout is an option, the content is assumed to be the mode that the pucks enter.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -47,27 +47,27 @@ _POWER_UP_LIMITS = {
 }
 _FAULT_LIMITS = {"velocity": "VL2", "torque": "TL2"}
 NOMINAL_VOLTAGE = 48.0  # of the power bus [V]
-_PATIENCE_NS = 500_000_000  # above VL2 for longer than this takes the power away
+_MAX_OVERSPEED_NS = 500_000_000  # above VL2 for longer than this removes the power
 _ZERO_CHARACTER, _E_CHARACTER = 0x3F, 0x79  # seven-segment patterns
 
 
 def puck_mode_in(mode: SafetyMode) -> PuckMode:
-    """Return the mode that the module sends the pucks to in its own `mode`."""
+    """Return the mode that the pucks enter when the module enters `mode`."""
     return PuckMode.TORQUE if mode is SafetyMode.ACTIVE else PuckMode.IDLE
 
 
 class FakeSafetyModule:
-    """State of the safety module, which answers hosts and watches their traffic.
+    """State of the safety module, which answers hosts and monitors their traffic.
 
-    `on_change(before)` is called when the mode has changed.
+    `on_change(before)` is called after a change of mode.
 
     Attributes:
         mode: the true mode.
         is_mute: its transmit wire is cut.
         is_disobedient: it ignores a host that lowers its mode.
-        says_idle: it answers IDLE whatever its mode.
-        dead_button: of the pendant that does nothing; None = none.
-        limit_factors: by name, how much larger a limit is set than a host says.
+        says_idle: it reports IDLE whatever its mode.
+        dead_button: a pendant button without effect; None = none.
+        limit_factors: by name, the ratio of the stored limit to the value a host sets.
     """
 
     def __init__(
@@ -95,9 +95,9 @@ class FakeSafetyModule:
         self._too_fast_since_ns: int | None = None
         self._bus_voltage = NOMINAL_VOLTAGE
         self._is_deaf = False
-        self._spared: dict[str, int] = {}  # limits as they were before `strain`
+        self._saved_limits: dict[str, int] = {}  # limits before `trip`
         # Largest torques commanded last [puck units].
-        self._largest: dict[int, int] = dict.fromkeys(TORQUE_GROUPS, 0)
+        self._largest_torques: dict[int, int] = dict.fromkeys(TORQUE_GROUPS, 0)
         self._properties = {
             "VERS": options.safety_vers,
             "ROLE": int(PuckRole.SAFETY),
@@ -114,12 +114,12 @@ class FakeSafetyModule:
             "ZERO": int(options.has_positions),
             **_POWER_UP_LIMITS,
         }
-        schedule.define_alarm(self._miss_beat)
-        self._feel_beat()
+        schedule.define_alarm(self._expire_heartbeat)
+        self._restart_heartbeat()
 
     @property
     def pendant_word(self) -> PendantWord:
-        """What the pendant shows."""
+        """The state that the pendant shows."""
         is_stopped = self.mode is SafetyMode.E_STOP
         return PendantWord(
             **self._levels,
@@ -139,77 +139,77 @@ class FakeSafetyModule:
         elif action == "idle":
             self._levels = dict.fromkeys(self._levels, SafetyLevel.SAFE)
             self._enter(SafetyMode.IDLE)
-            self._judge_torque()
-            self._judge_voltage()
+            self._check_torque()
+            self._check_voltage()
         elif self.mode is SafetyMode.IDLE and not self.pendant_word.faults:
             self._enter(SafetyMode.ACTIVE)
 
     def forget_positions(self) -> None:
-        """Know no longer where the joints are, as after power-up."""
+        """Forget where the joints are, as after power-up."""
         self._properties["ZERO"] = 0
         self._speeds.reset()
 
     def receive(self, request: Property) -> None:
-        """Take a GET or SET sent to the module."""
+        """Handle a GET or SET sent to the module."""
         number = request.number
         name = self._names.get(number)
         if request.value is not None:
-            self._tell(name, request.value)
+            self._set_property(name, request.value)
         elif name is not None:
             self._schedule.after(
                 self._options.latch_ns, lambda: self._answer(number, name)
             )
 
     def set_bus_voltage(self, voltage: float) -> None:
-        """Let the power bus have `voltage` [V] from now on."""
+        """Set the voltage of the power bus [V]."""
         self._bus_voltage = voltage
-        self._judge_voltage()
+        self._check_voltage()
 
     def set_heartbeat(self, heartbeat_ns: int) -> None:
-        """Wait so long for positions from now on [ns]."""
+        """Set the heartbeat timeout [ns]."""
         self._heartbeat_ns = heartbeat_ns
-        self._feel_beat()
+        self._restart_heartbeat()
 
     def trip(self, monitor: Strainable) -> None:
-        """Let a monitor find fault with what it sees, until `relax`.
+        """Make a monitor report a fault, until `reset_monitors`.
 
-        The limits of speed and torque become the smallest that is not off; for the
-        heartbeat the module goes deaf to positions.
+        The limits of speed and torque become the smallest value that is not off; for
+        the heartbeat the module ignores positions.
         """
         limit = _FAULT_LIMITS.get(monitor)
         if limit is None:
             self._is_deaf = True
         else:
-            self._spared.setdefault(limit, self._properties[limit])
+            self._saved_limits.setdefault(limit, self._properties[limit])
             self._properties[limit] = 1
 
     def reset_monitors(self) -> None:
-        """Judge as before; a fault stays until Shift-idle."""
+        """Restore the monitors; a fault stays until Shift-idle."""
         self._is_deaf = False
-        self._properties.update(self._spared)
-        self._spared.clear()
+        self._properties.update(self._saved_limits)
+        self._saved_limits.clear()
 
     def hear_positions(self, positions: Mapping[int, int]) -> None:
-        """Take positions [counts] by node: heartbeat of the arm, and its speed."""
+        """Update heartbeat and speed with positions [counts] by node."""
         if self._is_deaf:
             return
-        self._feel_beat()
+        self._restart_heartbeat()
         self._speeds.on_positions(self._schedule.now_ns, positions)
-        self._judge_speed()
+        self._check_speed()
 
     def hear_torques(self, group: int, units: Sequence[int]) -> None:
-        """Judge a torque command as it stands on the bus, before a puck clips it."""
-        self._largest[group] = max(map(abs, units))
-        self._judge_torque()
+        """Check a torque command as sent on the bus, before a puck clips it."""
+        self._largest_torques[group] = max(map(abs, units))
+        self._check_torque()
 
-    def _feel_beat(self) -> None:
-        """Wait for the next position until the heartbeat is over, while ACTIVE."""
+    def _restart_heartbeat(self) -> None:
+        """Restart the heartbeat timeout, while ACTIVE."""
         is_active = self.mode is SafetyMode.ACTIVE
         due_ns = self._schedule.now_ns + self._heartbeat_ns
         self._schedule.set_alarm(due_ns if is_active else NEVER)
 
-    def _miss_beat(self) -> None:
-        """Fault the arm: positions were not asked for in time."""
+    def _expire_heartbeat(self) -> None:
+        """Fault the arm: no positions within the heartbeat timeout."""
         self._fault("heartbeat")
 
     def _answer(self, number: int, name: str) -> None:
@@ -219,9 +219,9 @@ class FakeSafetyModule:
         if value is not None and not self.is_mute:
             self._schedule.reply(SAFETY_NODE, number, name, value)
 
-    def _tell(self, name: str | None, value: int) -> None:
+    def _set_property(self, name: str | None, value: int) -> None:
         if name == "MODE":
-            # A host can lower the mode only.
+            # A host can only lower the mode.
             if 0 <= value < self.mode and not self.is_disobedient:
                 self._enter(SafetyMode(value))
         elif name in ("DEF", "LOAD"):
@@ -230,9 +230,9 @@ class FakeSafetyModule:
                 self._properties[limit] = _POWER_UP_LIMITS[limit]
         elif name in self._properties and name not in _READ_ONLY:
             self._properties[name] = round(value * self.limit_factors.get(name, 1.0))
-            self._judge_voltage()
+            self._check_voltage()
 
-    def _judge_speed(self) -> None:
+    def _check_speed(self) -> None:
         """Compare the speed with VL1 and VL2; a limit of 0 or less is off."""
         limits = self._properties
         is_zeroed = limits["ZERO"] == 1
@@ -251,36 +251,36 @@ class FakeSafetyModule:
         now_ns = self._schedule.now_ns
         if self._too_fast_since_ns is None:
             self._too_fast_since_ns = now_ns
-        if now_ns - self._too_fast_since_ns >= _PATIENCE_NS:
+        if now_ns - self._too_fast_since_ns >= _MAX_OVERSPEED_NS:
             self._enter(SafetyMode.E_STOP)
 
-    def _judge_voltage(self) -> None:
+    def _check_voltage(self) -> None:
         limits, voltage = self._properties, self._bus_voltage
         if self.mode is SafetyMode.E_STOP:
-            return  # the bus has no power, and nothing to judge
+            return  # the bus has no power
         if not limits["VOLTL2"] <= voltage <= limits["VOLTH2"]:
             self._levels["voltage"] = SafetyLevel.FAULT
-            self._enter(SafetyMode.E_STOP)  # a choice: the effect is not known
+            self._enter(SafetyMode.E_STOP)  # assumed: the true reaction is not known
         else:
-            is_odd = not limits["VOLTL1"] <= voltage <= limits["VOLTH1"]
-            self._warn("voltage", is_warning=is_odd)
+            is_outside = not limits["VOLTL1"] <= voltage <= limits["VOLTH1"]
+            self._warn("voltage", is_warning=is_outside)
 
     def _warn(self, monitor: str, *, is_warning: bool) -> None:
-        """Light or put out a warning; a fault stays until Shift-idle."""
+        """Set or clear a warning; a fault stays until Shift-idle."""
         if self._levels[monitor] is not SafetyLevel.FAULT:
             self._levels[monitor] = (
                 SafetyLevel.WARNING if is_warning else SafetyLevel.SAFE
             )
 
-    def _judge_torque(self) -> None:
-        largest = max(self._largest.values())
+    def _check_torque(self) -> None:
+        largest = max(self._largest_torques.values())
         if self.mode is SafetyMode.ACTIVE and largest > self._properties["TL2"]:
             self._fault("torque")
         else:
             self._warn("torque", is_warning=largest > self._properties["TL1"])
 
     def _fault(self, monitor: str) -> None:
-        """Note a fault until Shift-idle and stop the arm."""
+        """Latch a fault until Shift-idle and stop the arm."""
         self._levels[monitor] = SafetyLevel.FAULT
         if self.mode is SafetyMode.ACTIVE:
             self._enter(SafetyMode.IDLE)
@@ -293,7 +293,7 @@ class FakeSafetyModule:
             self._properties["ZERO"] = 0
             self._speeds.reset()
             self._too_fast_since_ns = None
-        self._feel_beat()
+        self._restart_heartbeat()
         frame = encode_reply(_MODE, puck_mode_in(mode), is_wide=False)
         self._schedule.emit(_BROADCAST_ID, frame)
         self._on_change(before)

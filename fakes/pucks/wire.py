@@ -6,18 +6,18 @@ from fakes.pucks.event_queue import FRAME_NS, NEVER, OutFrame
 from fakes.pucks.network import PuckNetwork
 from wam.bus.frames import Payload
 
-# A frame that wants onto the wire: identifier, order of arrival, data, is of a host.
+# A frame waiting for the wire: identifier, order of arrival, data, is from a host.
 # The lowest identifier goes first.
 _Waiting = tuple[int, int, bytes, bool]
 
 
 class WiredNetwork:
-    """A `PuckNetwork` and the wire it hangs on; time is an argument.
+    """A `PuckNetwork` and its wire; time is an argument.
 
-    One frame is on the wire at a time; of those that wait, the lowest identifier wins.
+    One frame is on the wire at a time; of the waiting ones the lowest identifier wins.
     A frame counts as sent when its last bit is. Where hosts are other programs
-    (`is_far`), the way to them and back takes about as long as a frame on the wire, so
-    that a host's frame takes no time here, and a device's leaves with its first bit.
+    (`is_far`), the transport between them takes about as long as a frame on the wire,
+    so a host's frame takes no time here and a device's is passed on at its first bit.
     """
 
     def __init__(self, network: PuckNetwork, *, is_far: bool = False) -> None:
@@ -27,7 +27,7 @@ class WiredNetwork:
         self._waiting: list[_Waiting] = []
         self._on_wire: _Waiting | None = None
         self._free_ns = 0
-        self._next_ns = NEVER  # the frame on the wire ends, or the next one starts
+        self._next_ns = NEVER  # end of the frame on the wire, or start of the next one
         self._order = 0
         self._sent: list[OutFrame] = []
 
@@ -36,25 +36,25 @@ class WiredNetwork:
         self._order = order = self._order + 1
         frame = (can_id, order, bytes(data), True)
         if self._waiting or self._on_wire is not None or self._free_ns > t_ns:
-            self._begin_at(t_ns)
+            self._claim_wire(t_ns)
             heappush(self._waiting, frame)
-        else:  # nobody else wants the wire at this instant
+        else:  # the wire is free
             self._on_wire = frame
             self._next_ns = t_ns if self._is_far else t_ns + FRAME_NS[len(data)]
 
     def drop_waiting(self) -> None:
-        """Lose the frames that wait for the wire."""
+        """Discard the frames that wait for the wire."""
         self._waiting.clear()
         if self._on_wire is None:
             self._next_ns = NEVER
 
     def next_event_ns(self) -> int | None:
-        """Return when wire or network do something next, None if never."""
+        """Return the time of the next event of wire or network [ns], None if never."""
         next_ns = min(self._next_ns, self._schedule.next_ns)
         return None if next_ns == NEVER else next_ns
 
     def advance(self, t_ns: int) -> list[OutFrame]:
-        """Let wire and network go on to `t_ns`; return the devices' frames till then.
+        """Advance wire and network to `t_ns`; return the devices' frames sent so far.
 
         Each comes with the time [ns] at which it was sent.
         """
@@ -63,39 +63,39 @@ class WiredNetwork:
             schedule.now_ns = max(schedule.now_ns, t_ns)
             return []
         while True:
-            if schedule.outbox:  # something was said outside of all plans
-                self._take_due(schedule.now_ns)
+            if schedule.outbox:  # a device sent outside of all planned events
+                self._queue_due(schedule.now_ns)
             # At one instant the network is first: its frame may win the arbitration.
-            own_ns, wire_ns = schedule.next_ns, self._next_ns
-            if own_ns <= t_ns and own_ns <= wire_ns:
-                self._take_due(own_ns)
+            network_ns, wire_ns = schedule.next_ns, self._next_ns
+            if network_ns <= t_ns and network_ns <= wire_ns:
+                self._queue_due(network_ns)
             elif wire_ns <= t_ns:
-                self._carry(min(t_ns, own_ns - 1))
+                self._transmit(min(t_ns, network_ns - 1))
             else:
                 break
-        schedule.now_ns = max(schedule.now_ns, t_ns)  # nothing is planned till then
+        schedule.now_ns = max(schedule.now_ns, t_ns)  # nothing is planned until then
         sent, self._sent = self._sent, []
         return sent
 
-    def _take_due(self, t_ns: int) -> None:
-        """Let the network go on to `t_ns`; what it says wants onto the wire."""
+    def _queue_due(self, t_ns: int) -> None:
+        """Advance the network to `t_ns` and queue its frames for the wire."""
         due = self.network.due(t_ns)
         if not due:
             return
-        self._begin_at(due[0][0])
+        self._claim_wire(due[0][0])
         waiting, order = self._waiting, self._order
         for _, can_id, data in due:
             order += 1
             heappush(waiting, (can_id, order, data, False))
         self._order = order
 
-    def _begin_at(self, ready_ns: int) -> None:
-        """Let a frame that is ready at `ready_ns` have a wire for which none waits."""
+    def _claim_wire(self, ready_ns: int) -> None:
+        """Plan the start of a frame ready at `ready_ns` if the wire has no other."""
         if not self._waiting and self._on_wire is None:
             self._next_ns = max(self._free_ns, ready_ns)
 
-    def _carry(self, until_ns: int) -> None:
-        """Carry frames until `until_ns`, or until the network has got one of a host."""
+    def _transmit(self, until_ns: int) -> None:
+        """Transmit frames until `until_ns`, or until one from a host arrived."""
         waiting, is_far, sent = self._waiting, self._is_far, self._sent
         t_ns, frame = self._next_ns, self._on_wire
         while t_ns <= until_ns:
@@ -105,7 +105,7 @@ class WiredNetwork:
                     t_ns = self._start(t_ns, frame)
                 else:
                     t_ns += FRAME_NS[len(frame[2])]
-                if t_ns > until_ns:  # its end is of a later call
+                if t_ns > until_ns:  # it ends in a later call
                     break
             can_id, _, data, is_of_host = frame
             frame = None
@@ -116,13 +116,13 @@ class WiredNetwork:
                 return
             if not is_far:
                 sent.append((t_ns, can_id, data))
-            # Whoever waits by now has been ready for a while.
+            # Frames waiting now were ready before, so the next one starts at once.
             if not waiting:
                 t_ns = NEVER
         self._on_wire, self._next_ns = frame, t_ns
 
     def _start(self, t_ns: int, frame: _Waiting) -> int:
-        """Begin a frame of far hosts at `t_ns`; return when it ends."""
+        """Start a frame of far hosts at `t_ns`; return when it ends."""
         can_id, _, data, is_of_host = frame
         if is_of_host:
             return t_ns

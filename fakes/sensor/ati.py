@@ -1,4 +1,4 @@
-"""A simulated ATI sensor on the network: what it says and what it obeys."""
+"""A simulated ATI sensor on the network: its records and requests."""
 
 from dataclasses import dataclass
 
@@ -18,16 +18,16 @@ _ERROR, _SATURATED = 1 << 31, 1 << 17
 
 @dataclass(frozen=True, slots=True)
 class AtiOptions:
-    """Which device it is and what is wrong with it from the start.
+    """Identity and initial faults of the device.
 
     Attributes:
         counts: per N and per N m.
-        rate: records a second [Hz].
-        is_running: it streams already, to whoever asked before.
+        rate: records per second [Hz].
+        is_running: it streams already, to the host that asked before.
         baudrate: of the network [bit/s].
-        clock_error_ppm: how much its clock runs fast [parts per million].
-        counter_start: measurements since it was switched on.
-        is_deaf: it takes no requests.
+        clock_error_ppm: rate error of its clock, positive = fast [parts per million].
+        counter_start: measurements since power-on.
+        is_deaf: it ignores requests.
     """
 
     counts: tuple[float, float] = COUNTS
@@ -48,15 +48,15 @@ def ati_stream(
     options: AtiOptions = _NORMAL,
     start_ns: int = 0,
 ) -> SensorStream:
-    """Return an ATI sensor that shows `source`."""
+    """Return an ATI sensor with the load `source`."""
     return SensorStream(AtiFirmware(options, start_ns), source, errors, start_ns)
 
 
 class AtiFirmware:
-    """Implements `fakes.sensor.stream.Firmware`; silent until it is asked."""
+    """Implements `fakes.sensor.stream.Firmware`; silent until a request."""
 
     frame_size = ati.FRAME_SIZE
-    is_checked = True  # a datagram that is damaged does not arrive
+    is_checked = True  # a damaged datagram does not arrive
 
     def __init__(self, options: AtiOptions, start_ns: int) -> None:
         self.baudrate = options.baudrate
@@ -66,56 +66,56 @@ class AtiFirmware:
         self._options = options
         self._first: int | None = None
         if options.is_running:
-            self._run_from(start_ns)
+            self._start_stream(start_ns)
 
     def power_up(self, t_ns: int) -> list[Saying]:
-        """Be silent."""
+        """Restart; the device sends nothing until a request."""
         self.on_since_ns = t_ns
         self.schedule = None
         self._first = None
         return []
 
     def receive(self, t_ns: int, data: bytes) -> list[Saying]:
-        """Obey a request; there is no answer but the stream."""
+        """Carry out a request; there is no answer except the stream."""
         request = None if self._options.is_deaf else ati.decode_request(data)
         if request is not None and request[0] == ati.STOP:
             self.schedule = None
         elif request is not None and request[0] == ati.STREAM:
-            self._run_from(t_ns + _DELAY_NS)
+            self._start_stream(t_ns + _DELAY_NS)
         return []
 
-    def frame(self, shown: Measurement, status: int) -> bytes:
+    def frame(self, measurement: Measurement, status: int) -> bytes:
         """Return the 36 bytes of a record."""
         if self._first is None:
-            self._first = shown.number - 1  # numbers begin at 1 with every start
+            self._first = measurement.number - 1  # numbers start at 1 with every stream
         force, torque = self._options.counts
         counts = [
             _count(value * scale)
             for value, scale in zip(
-                shown.wrench, (force,) * 3 + (torque,) * 3, strict=True
+                measurement.wrench, (force,) * 3 + (torque,) * 3, strict=True
             )
         ]
-        if shown.saturated:
+        if measurement.saturated:
             status |= _ERROR | _SATURATED
         fx, fy, fz, tx, ty, tz = counts
-        measurement = self._options.counter_start + shown.number
+        counter = self._options.counter_start + measurement.number
         return ati.encode_record(
             RdtRecord(
-                (shown.number - self._first) % ati.MODULUS,
-                measurement % ati.MODULUS,
+                (measurement.number - self._first) % ati.MODULUS,
+                counter % ati.MODULUS,
                 status,
                 (fx, fy, fz, tx, ty, tz),
             )
         )
 
-    def _run_from(self, t_ns: int) -> None:
+    def _start_stream(self, t_ns: int) -> None:
         self._first = None
         period_ns = 1e9 / self._options.rate / self.clock_rate
         self.schedule = SampleSchedule(t_ns, period_ns)
 
 
 def _count(value: float) -> int:
-    """Return a 32-bit count; what is no number reads full scale."""
+    """Return a 32-bit count; NaN reads full scale."""
     if not abs(value) < _FULL:
         return _FULL if not value < 0 else -_FULL
     return round(value)

@@ -1,4 +1,4 @@
-"""A simulated Bota sensor of generation 1: what it says and what it obeys."""
+"""A simulated Bota sensor of generation 1: its frames, texts and commands."""
 
 import re
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from fakes.sensor.stream import SensorStream, Source
 from ft_sensor.vendors import bota
 from ft_sensor.vendors.bota import Acknowledgement, BootText, BotaFrame
 
-_BOOT_NS = 400_000_000  # silence until the port's opening has settled
+_BOOT_NS = 400_000_000  # silence after power-on or the opening of the port
 _LINE_PAUSE_NS = 100_000_000
 _SETTLE_NS = 200_000_000  # from the boot text to the first sample
 _REPLY_NS = 2_000_000
@@ -21,7 +21,7 @@ _COMMAND_BEGIN = re.compile(rb"c(,(\d(,(\d(,(\d(,)?)?)?)?)?)?)?|f(,[\d,]{0,10})?
 
 
 class BotaMode(Enum):
-    """What the device is doing."""
+    """Operating mode of the device."""
 
     RUN = auto()
     CONFIGURATION = auto()
@@ -29,20 +29,20 @@ class BotaMode(Enum):
 
 @dataclass(frozen=True, slots=True)
 class BotaOptions:
-    """Which device it is and what is wrong with it from the start.
+    """Identity and initial faults of the device.
 
     Attributes:
-        boot_text: what it says after power-on; the fake's own words.
-        is_running: it has been streaming since before the beginning; otherwise it is
-            switched on at the beginning and boots.
-        resets_on_open: opening the port boots it.
+        boot_text: its text after power-on; not a real device's.
+        is_running: it streams from the start; otherwise it is switched on then and
+            boots.
+        resets_on_open: opening the port reboots it.
         baudrate: speed of its line [bit/s].
-        clock_error_ppm: how much its clock runs fast [parts per million].
-        clock_start_us: what its clock shows at power-on [us].
+        clock_error_ppm: rate error of its clock, positive = fast [parts per million].
+        clock_start_us: its clock at power-on [us].
         sinc: fixed sinc length; 0 = 512 until commanded.
         refused: letters of the commands it answers with code 1.
-        is_deaf: it takes no commands.
-        raw_starts: so many starts leave the calibration matrix inactive.
+        is_deaf: it ignores commands.
+        raw_starts: number of starts that leave the calibration matrix inactive.
     """
 
     boot_text: BootText = _BOOT_TEXT
@@ -66,7 +66,7 @@ def bota_stream(
     options: BotaOptions = _NORMAL,
     start_ns: int = 0,
 ) -> SensorStream:
-    """Return a Bota sensor that shows `source`."""
+    """Return a Bota sensor with the load `source`."""
     firmware = BotaFirmware(options, start_ns)
     stream = SensorStream(firmware, source, errors, start_ns, options.clock_start_us)
     stream.resets_on_open = options.resets_on_open
@@ -77,7 +77,7 @@ class BotaFirmware:
     """Implements `fakes.sensor.stream.Firmware`.
 
     Attributes:
-        is_raw: its calibration matrix is inactive, which its frames say.
+        is_raw: its calibration matrix is inactive, as its frames report.
     """
 
     frame_size = bota.FRAME_SIZE
@@ -91,54 +91,58 @@ class BotaFirmware:
         self.on_since_ns = start_ns
         self._options = options
         self._raw_starts = options.raw_starts
-        self._forget()
+        self._reset_state()
         self._ready_ns = start_ns
         if options.is_running:
-            self._run_from(start_ns)
+            self._start_stream(start_ns)
 
     def power_up(self, t_ns: int) -> list[Saying]:
-        """Boot; return the boot text, line by line."""
-        self._forget()
+        """Boot; return the lines of the boot text with their times."""
+        self._reset_state()
         self.on_since_ns = t_ns
-        sayings: list[Saying] = []
-        speak_ns = t_ns + _BOOT_NS
+        outputs: list[Saying] = []
+        line_ns = t_ns + _BOOT_NS
         for line in bota.encode_boot_text(self._options.boot_text).splitlines(True):
-            sayings.append((speak_ns, line))
-            speak_ns += _LINE_PAUSE_NS
-        self._ready_ns = speak_ns + _SETTLE_NS
-        self._run_from(self._ready_ns)
-        return sayings
+            outputs.append((line_ns, line))
+            line_ns += _LINE_PAUSE_NS
+        self._ready_ns = line_ns + _SETTLE_NS
+        self._start_stream(self._ready_ns)
+        return outputs
 
     def receive(self, t_ns: int, data: bytes) -> list[Saying]:
-        """Obey the commands in `data`; return the acknowledgements."""
+        """Carry out the commands in `data`; return the acknowledgements."""
         if self._options.is_deaf or t_ns < self._ready_ns:
             return []
-        sayings: list[Saying] = []
+        outputs: list[Saying] = []
         self._input = (self._input + data)[-bota.MAX_COMMAND_SIZE :]
         while self._input:
             command = _COMMAND.match(self._input)
             if command is not None:
                 self._input = self._input[command.end() :]
-                sayings += self._obey(t_ns, command)
+                outputs += self._handle(t_ns, command)
             elif _COMMAND_BEGIN.fullmatch(self._input):
                 break
             else:
                 self._input = self._input[1:]
-        return sayings
+        return outputs
 
-    def frame(self, shown: Measurement, status: int) -> bytes:
+    def frame(self, measurement: Measurement, status: int) -> bytes:
         """Return the 37 bytes of a sample."""
-        status |= shown.is_skipping | self.is_raw << 3 | (shown.saturated > 0) << 1
+        status |= (
+            measurement.is_skipping
+            | self.is_raw << 3
+            | (measurement.saturated > 0) << 1
+        )
         return bota.encode_frame(
             BotaFrame(
                 status,
-                shown.wrench,
-                shown.device_us % bota.CLOCK_MODULUS,
-                shown.temperature,
+                measurement.wrench,
+                measurement.device_us % bota.CLOCK_MODULUS,
+                measurement.temperature,
             )
         )
 
-    def _forget(self) -> None:
+    def _reset_state(self) -> None:
         self._input = b""
         self._sinc = self._options.sinc or _SHIPPED_SINC
         self._start_measuring()
@@ -147,7 +151,7 @@ class BotaFirmware:
         self.is_raw = self._raw_starts > 0
         self._raw_starts -= self.is_raw
 
-    def _run_from(self, t_ns: int) -> None:
+    def _start_stream(self, t_ns: int) -> None:
         self._mode = BotaMode.RUN
         period_ns = bota.frame_period_ns(self._sinc) / self.clock_rate
         self.schedule = SampleSchedule(t_ns, period_ns)
@@ -156,7 +160,7 @@ class BotaFirmware:
         self._mode = BotaMode.CONFIGURATION
         self.schedule = None
 
-    def _obey(self, t_ns: int, command: re.Match[bytes]) -> list[Saying]:
+    def _handle(self, t_ns: int, command: re.Match[bytes]) -> list[Saying]:
         letter = chr(command[0][0])
         if letter == "#":
             return self.power_up(t_ns)
@@ -167,10 +171,10 @@ class BotaFirmware:
             is_refused = True
         answer = bota.encode_acknowledgement(Acknowledgement(letter, int(is_refused)))
         if not is_refused:
-            self._carry_out(t_ns, letter, command)
+            self._execute(t_ns, letter, command)
         return [(t_ns + _REPLY_NS, answer)]
 
-    def _carry_out(self, t_ns: int, letter: str, command: re.Match[bytes]) -> None:
+    def _execute(self, t_ns: int, letter: str, command: re.Match[bytes]) -> None:
         if letter == "C":
             self._stop()
         elif letter == "I":
@@ -180,4 +184,4 @@ class BotaFirmware:
         elif letter == "f" and not self._options.sinc:
             self._sinc = int(command[1])
         elif letter == "R":
-            self._run_from(t_ns + 2 * _REPLY_NS)
+            self._start_stream(t_ns + 2 * _REPLY_NS)

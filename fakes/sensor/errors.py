@@ -1,4 +1,4 @@
-"""What the gauges of a wrist sensor add to the true load."""
+"""Measurement errors of a wrist sensor's gauges."""
 
 import math
 from collections.abc import Sequence
@@ -13,18 +13,18 @@ from ft_sensor.reading import Wrench
 
 @dataclass(frozen=True, slots=True)
 class ErrorScale:
-    """How far the readings of one kind of axis are off, in the axis' own unit.
+    """Error magnitudes of the force or the torque axes, in the axis' unit.
 
     Attributes:
         walk: standard deviation of the zero over minutes.
         drift: standard deviation of the zero over seconds.
         white: standard deviation of the noise of each sample.
         resolution: step of the output.
-        creep: share of the load that the reading takes on late.
-        hysteresis: share of a change of load that the reading lags behind.
-        span: load that the shares of `hysteresis` and `cross_talk` refer to.
-        cross_talk: standard deviation of the share of another axis' load that shows
-            in this one, both in spans.
+        creep: share of the load that appears with a delay.
+        hysteresis: share of a change of load by which the reading lags.
+        span: full scale for `hysteresis` and `cross_talk`.
+        cross_talk: standard deviation of the share of another axis' load that appears
+            in this one, both relative to their spans.
         drift_time: correlation time of the drift [s].
         walk_time: correlation time of the walk [s].
     """
@@ -41,7 +41,7 @@ class ErrorScale:
     walk_time: float = 120.0
 
 
-# A tare of a second and this drift are 0.3 N apart, as a good sensor is accurate to.
+# With this drift, tares of one second differ by 0.3 N: the accuracy of a good sensor.
 FORCE_ERRORS = ErrorScale(
     walk=0.10,
     drift=0.22,
@@ -62,27 +62,27 @@ TORQUE_ERRORS = ErrorScale(
     span=4.0,
     cross_talk=0.003,
 )
-PER_DEGREE = (0.05, 0.05, 0.15, 0.002, 0.002, 0.002)  # [N, N m]; what warmth adds
+PER_DEGREE = (0.05, 0.05, 0.15, 0.002, 0.002, 0.002)  # zero drift [N, N m]
 
 NO_SHIFT: Wrench = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
-_SLOW_NS = 10_000_000  # between two updates of what changes over seconds
+_SLOW_NS = 10_000_000  # update period of the slow errors
 _CREEP_TIME = 20.0  # s
-_LAGGING = 0.05  # of the span: a larger change of load pulls the reading along
-_WARMTH, _WARMTH_TIME = 0.3, 300.0  # of the room and the arm [degrees Celsius], s
+_MAX_LAG = 0.05  # of the span: the hysteresis saturates beyond this change of load
+_WARMTH, _WARMTH_TIME = 0.3, 300.0  # ambient temperature: sd [degrees Celsius], s
 
 
 class SensorErrors:
-    """What the sensor adds to the truth, as one process from power-on to power-off.
+    """Errors of a sensor, as one continuous process from power-on to power-off.
 
-    Seconds and minutes of drift, warmth, creep, hysteresis, cross-talk, noise and
-    steps. Nothing begins anew with a trial or stops for a tare: a tare takes away what
-    is there at its moment. Low-frequency error dominates on purpose: white noise alone
-    averages away.
+    Drift over seconds and minutes, temperature, creep, hysteresis, cross-talk, noise
+    and quantisation. Neither a trial nor a tare restarts the process: a tare subtracts
+    the error of its moment. Low-frequency error dominates on purpose: white noise alone
+    averages out.
 
     Attributes:
-        warmth: how far the sensor is from its usual temperature [degrees Celsius].
-        shift: what a fault has added to the zero [N, N m].
+        warmth: sensor temperature minus its usual one [degrees Celsius].
+        shift: shift of the zero by a fault [N, N m].
     """
 
     def __init__(
@@ -91,7 +91,7 @@ class SensorErrors:
         force: ErrorScale = FORCE_ERRORS,
         torque: ErrorScale = TORQUE_ERRORS,
     ) -> None:
-        """Draw the sensor and the state that it is switched on in from `rng`."""
+        """Draw the sensor and its state at power-on from `rng`."""
         self._scales = scales = (force,) * 3 + (torque,) * 3
         self._load_errors = LoadErrors(scales, rng)
         self.draw_from(rng)
@@ -105,35 +105,35 @@ class SensorErrors:
         self._slow = [0.0] * 6
         self._slow_ns: int | None = None
         self._t_ns: int | None = None
-        self._pace_drifts(0)
+        self._set_drift_step(0)
 
     def draw_from(self, rng: np.random.Generator) -> None:
-        """Draw everything random from `rng` from now on; the process goes on."""
+        """Draw from `rng` from now on; the process continues."""
         self._normals = NormalStream(rng)
 
     def apply(self, t_ns: int, wrench: Sequence[float]) -> Wrench:
-        """Return what is shown at `t_ns` under `wrench` [N, N m], shape (6,)."""
+        """Return the reading at `t_ns` under `wrench` [N, N m], shape (6,)."""
         before_ns, self._t_ns = self._t_ns, t_ns
         step_ns = t_ns - before_ns if before_ns is not None and t_ns > before_ns else 0
-        if step_ns != self._step_ns:  # samples come at an almost even pace
-            self._pace_drifts(step_ns)
+        if step_ns != self._step_ns:  # sample periods rarely change
+            self._set_drift_step(step_ns)
         if self._slow_ns is None or t_ns - self._slow_ns >= _SLOW_NS:
             self._update_slow(t_ns, wrench)
         next_normal = self._normals.next
-        shown: list[float] = []
+        reading: list[float] = []
         drifts: list[float] = []
         rows = zip(wrench, self._slow, self._drifts, self._steps, strict=True)
         for load, slow, drift, (keep, kick, white, step) in rows:
-            moved = keep * drift + kick * next_normal()
-            value = load + slow + moved + white * next_normal()
-            drifts.append(moved)
-            shown.append(round(value / step) * step if step else value)
+            next_drift = keep * drift + kick * next_normal()
+            value = load + slow + next_drift + white * next_normal()
+            drifts.append(next_drift)
+            reading.append(round(value / step) * step if step else value)
         self._drifts = drifts
-        fx, fy, fz, tx, ty, tz = shown
+        fx, fy, fz, tx, ty, tz = reading
         return fx, fy, fz, tx, ty, tz
 
-    def _pace_drifts(self, step_ns: int) -> None:
-        """Let the drifts step by `step_ns` from now on."""
+    def _set_drift_step(self, step_ns: int) -> None:
+        """Precompute the drift steps for a sample period of `step_ns`."""
         self._step_ns, dt = step_ns, step_ns * 1e-9
         self._steps = [
             (*exact_step(s.drift, s.drift_time, dt), s.white, s.resolution)
@@ -141,7 +141,7 @@ class SensorErrors:
         ]
 
     def _update_slow(self, t_ns: int, wrench: Sequence[float]) -> None:
-        """Let walk, warmth and the effects of the load go on to `t_ns`."""
+        """Advance walk, temperature and the load errors to `t_ns`."""
         passed_ns = 0 if self._slow_ns is None else t_ns - self._slow_ns
         self._slow_ns, dt, normal = t_ns, passed_ns * 1e-9, self._normals.next
         keep, kick = exact_step(self._warmth_sd, _WARMTH_TIME, dt)
@@ -160,7 +160,7 @@ class SensorErrors:
 
 
 class LoadErrors:
-    """What the load itself makes the reading miss: creep, hysteresis, cross-talk."""
+    """Load-dependent errors: creep, hysteresis, cross-talk."""
 
     def __init__(self, scales: Sequence[ErrorScale], rng: np.random.Generator) -> None:
         """Draw the cross-talk of one sensor from `rng`."""
@@ -168,53 +168,59 @@ class LoadErrors:
         talk = np.array([[scale.cross_talk] for scale in scales])
         talk = talk * rng.standard_normal((6, 6)) * span[:, None] / span
         np.fill_diagonal(talk, 0.0)
-        # Share of the loads by column that shows in the axes by row.
+        # Share of the load of each column that appears in the axis of each row.
         self._cross_talk: list[list[float]] = talk.tolist()
-        lagging: list[float] = (_LAGGING * span).tolist()
-        # Creep, hysteresis and largest stretch [N, N m] of each axis.
+        max_lags: list[float] = (_MAX_LAG * span).tolist()
+        # Creep, hysteresis and largest lag [N, N m] of each axis.
         self._rows = [
-            (scale.creep, scale.hysteresis, most)
-            for scale, most in zip(scales, lagging, strict=True)
+            (scale.creep, scale.hysteresis, max_lag)
+            for scale, max_lag in zip(scales, max_lags, strict=True)
         ]
-        self._stretch: Sequence[float] = (0.0,) * 6
+        self._lags: Sequence[float] = (0.0,) * 6
         self._before: Sequence[float] | None = None
 
     def update(self, dt: float, wrench: Sequence[float]) -> list[float]:
         """Return the errors [N, N m], six, `dt` [s] after the last update."""
-        if self._before is None:  # it has hung on the arm for long
-            self._before = self._taken_on = wrench
-        share = _crept(dt)
-        stretches, taken_on, errors = list[float](), list[float](), list[float]()
-        # Plain numbers: for six of them numpy takes three times as long.
+        if self._before is None:  # the load has been applied for long
+            self._before = self._crept_load = wrench
+        share = _creep_share(dt)
+        lags, crept_loads, errors = list[float](), list[float](), list[float]()
+        # Plain floats: numpy takes three times as long for six values.
         rows = zip(
             wrench,
             self._before,
-            self._stretch,
-            self._taken_on,
+            self._lags,
+            self._crept_load,
             self._rows,
             [_dot(row, wrench) for row in self._cross_talk],
             strict=True,
         )
-        for load, before, stretch, taken, (creep, hysteresis, most), talk in rows:
-            moved = stretch + load - before
-            lag = most if moved > most else -most if moved < -most else moved
-            slow = taken + share * (load - taken)
-            stretches.append(lag)
-            taken_on.append(slow)
-            errors.append(creep * (slow - load) - hysteresis * lag + talk)
+        for load, before, last_lag, crept, (creep, hysteresis, max_lag), talk in rows:
+            raw_lag = last_lag + load - before
+            lag = (
+                max_lag
+                if raw_lag > max_lag
+                else -max_lag
+                if raw_lag < -max_lag
+                else raw_lag
+            )
+            crept_load = crept + share * (load - crept)
+            lags.append(lag)
+            crept_loads.append(crept_load)
+            errors.append(creep * (crept_load - load) - hysteresis * lag + talk)
         self._before = wrench
-        self._stretch, self._taken_on = stretches, taken_on
+        self._lags, self._crept_load = lags, crept_loads
         return errors
 
 
 def _dot(row: Sequence[float], wrench: Sequence[float]) -> float:
-    """Return the scalar product; `sum` rounds as the version of Python does."""
+    """Return the dot product; the rounding of `sum` depends on the Python version."""
     a, b, c, d, e, f = row
     fx, fy, fz, tx, ty, tz = wrench
     return a * fx + b * fy + c * fz + d * tx + e * ty + f * tz
 
 
 @lru_cache(maxsize=64)
-def _crept(dt: float) -> float:
-    """Return the share of its way that the creep goes in `dt` [s]."""
+def _creep_share(dt: float) -> float:
+    """Return the share of the remaining creep that occurs in `dt` [s]."""
     return 1.0 - math.exp(-dt / _CREEP_TIME)

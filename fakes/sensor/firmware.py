@@ -1,4 +1,4 @@
-"""What is particular to a make of wrist sensor: its words, its frames, its pace."""
+"""The vendor-specific part of a wrist sensor: commands, frames, sample times."""
 
 import math
 from dataclasses import dataclass
@@ -7,12 +7,12 @@ from typing import Protocol
 from ft_sensor.reading import Wrench
 
 Saying = tuple[int, bytes]  # time of sending [ns], bytes
-FULL_COUNT = 32767  # of a sensor that sends 16-bit counts
+FULL_COUNT = 32767  # of a sensor with 16-bit counts
 
 
 @dataclass(frozen=True, slots=True)
 class SampleSchedule:
-    """When a running device takes its samples, by its own clock: first and period."""
+    """Sample times of a running device by its own clock: first and period."""
 
     first_ns: int
     period_ns: float
@@ -20,14 +20,14 @@ class SampleSchedule:
 
 @dataclass(slots=True)
 class Measurement:
-    """What the gauges and the device's clock show at one sample.
+    """Readings of the gauges and the device's clock at one sample.
 
     Attributes:
         wrench: fx fy fz tx ty tz [N, N m], clipped at the ranges.
         saturated: bit i set = axis i was clipped.
         device_us: the device's clock [us], not wrapped.
-        number: frames sent since power-on, as a counter shows them.
-        is_skipping: the sample before could not be sent.
+        number: counter of frames since power-on.
+        is_skipping: the previous sample could not be sent.
         temperature: [degrees Celsius].
     """
 
@@ -40,16 +40,16 @@ class Measurement:
 
 
 class Firmware(Protocol):
-    """What is particular to a make: its words and its frames.
+    """Commands and frames of one vendor.
 
     Attributes:
         baudrate: speed of its line [bit/s].
-        schedule: when it samples; None = it does not stream. A new object is a new
-            beginning.
-        on_since_ns: when its power was switched on, or it reset itself.
-        clock_rate: how fast its clock runs, 1 = right.
-        frame_size: [bytes].
-        is_checked: a frame that was damaged on its way does not arrive.
+        schedule: its sample times; None = it does not stream. A new object restarts
+            the stream.
+        on_since_ns: time of power-on or of its last reset.
+        clock_rate: rate of its clock, 1 = exact.
+        frame_size: size of a frame [bytes].
+        is_checked: a frame damaged in transit does not arrive.
     """
 
     is_checked: bool
@@ -60,20 +60,20 @@ class Firmware(Protocol):
     frame_size: int
 
     def power_up(self, t_ns: int) -> list[Saying]:
-        """Begin anew; return what it says by itself."""
+        """Restart; return the unsolicited output."""
         ...
 
     def receive(self, t_ns: int, data: bytes) -> list[Saying]:
-        """Take bytes from the client; return the answers."""
+        """Handle bytes from the client; return the answers."""
         ...
 
-    def frame(self, shown: Measurement, status: int) -> bytes:
-        """Return the bytes of a frame with `status` bits set beside its own."""
+    def frame(self, measurement: Measurement, status: int) -> bytes:
+        """Return the bytes of a frame with `status` bits set besides its own."""
         ...
 
 
 def count_of(value: float) -> int:
-    """Return `value` as a 16-bit count; what is no number reads full scale."""
+    """Return `value` as a 16-bit count; NaN and infinity read full scale."""
     if not math.isfinite(value):
         return FULL_COUNT
     return max(-FULL_COUNT, min(FULL_COUNT, round(value)))

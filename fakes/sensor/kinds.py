@@ -1,4 +1,4 @@
-"""Which simulated wrist sensor, by the names that rig.toml uses."""
+"""Choice of the simulated wrist sensor, by the names in rig.toml."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,23 +19,23 @@ from fakes.sensor.robotous import RobotousOptions, robotous_stream
 from fakes.sensor.stream import SensorStream, Source
 from ft_sensor.reading import Wrench
 
-DRIFT_PPM = 20.0  # of the device's clock; two crystals are never alike
+DRIFT_PPM = 20.0  # rate error of the device's clock; crystals differ
 
 
 @dataclass(frozen=True, slots=True)
 class SensorChoice:
-    """A wrist sensor that fits a rig.toml.
+    """A wrist sensor as described by rig.toml.
 
     Attributes:
         kind: "bota", "robotous", "optoforce", "ati" on the network, or "barrett" on the
             arm's bus.
-        sinc: filter length that a bota is found running with.
-        baudrate: speed of the line [bit/s]; None = the usual one of the kind.
-        sensitivity: of an optoforce [counts/N, counts/N m]; None = of the fake's own.
-        serial_number: of an optoforce; None = the fake's own.
+        sinc: filter length with which a bota is already running.
+        baudrate: speed of the line [bit/s]; None = the default of the kind.
+        sensitivity: of an optoforce [counts/N, counts/N m]; None = the fake's default.
+        serial_number: of an optoforce; None = the fake's default.
         rate: of an ati [Hz].
-        counts_per_force: of an ati [counts/N]; None = the fake's own.
-        counts_per_torque: of an ati [counts/N m]; None = the fake's own.
+        counts_per_force: of an ati [counts/N]; None = the fake's default.
+        counts_per_torque: of an ati [counts/N m]; None = the fake's default.
     """
 
     kind: str = "bota"
@@ -56,9 +56,9 @@ class SensorChoice:
 def make_stream(
     choice: SensorChoice, source: Source, errors: SensorErrors | None, t_ns: int
 ) -> SensorStream:
-    """Return a sensor that has been running for a while at `t_ns`.
+    """Return a sensor that is already running at `t_ns`.
 
-    One on the bus gets the stream of a bota without a reader.
+    For a sensor on the bus this is the stream of a bota without a reader.
     """
     maker = _bota if choice.is_on_bus else _MAKERS[choice.kind]
     return maker(choice, source, errors, t_ns)
@@ -130,14 +130,14 @@ SERIAL_KINDS = tuple(_MAKERS)
 def plug(
     choice: SensorChoice, stream: SensorStream, t_ns: int, link: Path | None
 ) -> SerialPty | UdpDevice:
-    """Return a sensor's end of the wire that it has: a serial line or the network.
+    """Return the device's end of the sensor's line: a serial port or the network.
 
     Args:
-        choice: which sensor.
-        stream: what it says.
-        t_ns: when it is plugged in.
-        link: name of the line that stays; on the network its last part may be
-            ADDRESS:PORT, else any port is taken.
+        choice: the sensor.
+        stream: its output.
+        t_ns: time of plugging in.
+        link: persistent path of the line; on the network its last part may be
+            ADDRESS:PORT, otherwise any free port is used.
 
     Raises:
         OSError: the name or the port is taken.

@@ -1,4 +1,4 @@
-"""A wrist sensor that shows another load than it bears: turned, scaled, late."""
+"""A wrist sensor whose reading differs from its load: rotated, scaled, delayed."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -9,32 +9,32 @@ from wam.model.constants import Array
 
 
 class MountedSensor:
-    """The load that a sensor shows, as a function of time: see `SensorStream`."""
+    """The reading of a sensor as a function of time: see `SensorStream`."""
 
     def __init__(self, source: Source, shown: Array, late_ns: int = 0) -> None:
-        """Take what it bears, and how it shows that.
+        """Define the true load and the map from load to reading.
 
         Args:
-            source: the true load in the axes that it is taken to have [N, N m].
-            shown: what it shows of the true load, shape (6, 6).
-            late_ns: how much older the load that it shows is [ns].
+            source: the true load in the assumed axes of the sensor [N, N m].
+            shown: matrix from the true load to the reading, shape (6, 6).
+            late_ns: delay of the reading [ns].
         """
         self._source = source
-        self._shown = shown
+        self._matrix = shown
         self._late_ns = late_ns
         self._past: deque[tuple[int, Sequence[float]]] = deque()
 
     def __call__(self, t_ns: int) -> Wrench:
-        """Return the load that is shown at `t_ns` [N, N m]."""
-        borne = self._source(t_ns)
+        """Return the reading at `t_ns` [N, N m]."""
+        load = self._source(t_ns)
         if self._late_ns:
-            borne = self._older(t_ns, borne)
-        fx, fy, fz, tx, ty, tz = self._shown.dot(borne).tolist()
+            load = self._delayed(t_ns, load)
+        fx, fy, fz, tx, ty, tz = self._matrix.dot(load).tolist()
         return fx, fy, fz, tx, ty, tz
 
-    def _older(self, t_ns: int, borne: Sequence[float]) -> Sequence[float]:
+    def _delayed(self, t_ns: int, load: Sequence[float]) -> Sequence[float]:
         past = self._past
-        past.append((t_ns, borne))
+        past.append((t_ns, load))
         while len(past) > 1 and past[1][0] <= t_ns - self._late_ns:
             past.popleft()
         return past[0][1]

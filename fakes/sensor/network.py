@@ -1,4 +1,4 @@
-"""A network between a simulated sensor and its reader, and what it does to packets."""
+"""A lossy network between a simulated sensor and its reader."""
 
 import contextlib
 import socket
@@ -8,13 +8,13 @@ import numpy as np
 
 from fakes.sensor.port import ByteStream
 
-_READ_AT_MOST = 2048
+_MAX_DATAGRAM = 2048
 _LOOPBACK = "127.0.0.1"
 Packets = list[tuple[int, bytes]]
 
 
 class LossyNetwork:
-    """A stream whose packets get lost, come twice, or overtake each other.
+    """A stream whose packets are lost, duplicated or reordered.
 
     Implements `fakes.sensor.port.ByteStream` around another one.
     """
@@ -27,23 +27,23 @@ class LossyNetwork:
         doubled: float = 0.0,
         overtaken: float = 0.0,
     ) -> None:
-        """Take shares of the packets; the network draws from `rng`."""
+        """Set the shares of affected packets; `rng` selects them."""
         self.counts = {"lost": 0, "doubled": 0, "overtaken": 0}
         self._stream = stream
         self._rng = rng
         self._shares = lost, doubled, overtaken
-        self._held: bytes | None = None
+        self._held_back: bytes | None = None
 
     def port_opened(self, t_ns: int) -> None:
-        """Tell the device that somebody listens."""
+        """Notify the device that its port was opened."""
         self._stream.port_opened(t_ns)
 
     def receive(self, t_ns: int, data: bytes) -> None:
-        """Carry a request to the device."""
+        """Pass a request to the device."""
         self._stream.receive(t_ns, data)
 
     def due(self, t_ns: int) -> Packets:
-        """Return what has arrived by `t_ns`."""
+        """Return the packets that have arrived by `t_ns`."""
         out: Packets = []
         lost, doubled, overtaken = self._shares
         for at_ns, data in self._stream.due(t_ns):
@@ -51,28 +51,28 @@ class LossyNetwork:
             if draw < lost:
                 self.counts["lost"] += 1
                 continue
-            if draw < lost + overtaken and self._held is None:
+            if draw < lost + overtaken and self._held_back is None:
                 self.counts["overtaken"] += 1
-                self._held = data
+                self._held_back = data
                 continue
             out.append((at_ns, data))
             if draw > 1.0 - doubled:
                 self.counts["doubled"] += 1
                 out.append((at_ns, data))
-            if self._held is not None:
-                out.append((at_ns, self._held))
-                self._held = None
+            if self._held_back is not None:
+                out.append((at_ns, self._held_back))
+                self._held_back = None
         return out
 
     def next_event_ns(self) -> int | None:
-        """Return when the next packet may arrive; None = never."""
+        """Return the time of the next possible packet [ns]; None = never."""
         return self._stream.next_event_ns()
 
 
 class UdpDevice:
-    """The device's end of a network, on loopback: another process asks its address.
+    """The device's end of a network, on loopback, for another process.
 
-    It stands in the place of `fakes.sensor.pty.SerialPty`.
+    It replaces `fakes.sensor.pty.SerialPty`.
 
     Attributes:
         path: its address, as a driver opens it.
@@ -80,7 +80,7 @@ class UdpDevice:
     """
 
     def __init__(self, stream: ByteStream, t_ns: int, port: int = 0) -> None:
-        """Plug the device in at `t_ns`; `port` 0 = any that is free.
+        """Plug the device in at `t_ns`; `port` 0 = any free port.
 
         Raises:
             OSError: the port is taken.
@@ -95,37 +95,37 @@ class UdpDevice:
 
     @property
     def is_plugged_in(self) -> bool:
-        """Whether there is something at the end of the address."""
+        """Whether a device answers at the address."""
         return self._socket is not None
 
     def plug_in(self, t_ns: int) -> None:
-        """Put the cable in, unless it is."""
+        """Plug the cable in, if it is not."""
         if self._socket is not None:
             return
-        opened = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        opened.setblocking(False)
-        opened.bind((_LOOPBACK, self._port))
-        self._port = int(opened.getsockname()[1])
-        self._socket = opened
-        self._stream.due(t_ns)  # what was sent meanwhile is gone
+        udp_socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        udp_socket.setblocking(False)
+        udp_socket.bind((_LOOPBACK, self._port))
+        self._port = int(udp_socket.getsockname()[1])
+        self._socket = udp_socket
+        self._stream.due(t_ns)  # packets sent meanwhile are lost
         self._stream.port_opened(t_ns)
 
     def unplug(self) -> None:
-        """Pull the cable: nothing arrives any more."""
+        """Unplug the cable: nothing arrives any more."""
         self.close()
 
     def fileno(self) -> int:
-        """Return the descriptor that is readable when the driver asks something."""
+        """Return the descriptor that is readable when a request has arrived."""
         return -1 if self._socket is None else self._socket.fileno()
 
     def advance(self, t_ns: int) -> None:
-        """Carry datagrams both ways up to `t_ns`."""
-        self._take_requests(t_ns)
+        """Transfer datagrams both ways up to `t_ns`."""
+        self._receive_requests(t_ns)
         packets = self._stream.due(t_ns)
         self.send([data for _, data in packets])
 
     def send(self, packets: Sequence[bytes]) -> None:
-        """Send datagrams to whoever asked last; to nobody before."""
+        """Send datagrams to the sender of the last request, if any."""
         if self._socket is None or self._reader is None:
             return
         for data in packets:
@@ -135,7 +135,7 @@ class UdpDevice:
                 self.overrun += len(data)
 
     def next_event_ns(self) -> int | None:
-        """Return when the next datagram leaves the device; None = never."""
+        """Return when the next datagram leaves the device [ns]; None = never."""
         return self._stream.next_event_ns()
 
     def close(self) -> None:
@@ -144,12 +144,12 @@ class UdpDevice:
             self._socket.close()
             self._socket = None
 
-    def _take_requests(self, t_ns: int) -> None:
+    def _receive_requests(self, t_ns: int) -> None:
         if self._socket is None:
             return
         with contextlib.suppress(OSError):
             while True:
-                data, sender = self._socket.recvfrom(_READ_AT_MOST)
+                data, sender = self._socket.recvfrom(_MAX_DATAGRAM)
                 if sender[0] == _LOOPBACK:
                     self._reader = sender
                     self._stream.receive(t_ns, data)

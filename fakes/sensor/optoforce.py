@@ -1,4 +1,4 @@
-"""A simulated OptoForce / OnRobot HEX sensor: what it says and what it obeys."""
+"""A simulated OptoForce / OnRobot HEX sensor: its frames and commands."""
 
 from dataclasses import dataclass
 
@@ -12,23 +12,23 @@ from ft_sensor.vendors.optoforce import OptoForceFrame
 SERIAL_NUMBER = "HEX00042"
 SENSITIVITY: Wrench = (18.28, 18.41, 2.12, 278.72, 259.55, 448.47)
 _REPLY_NS = 1_000_000
-_INPUT = 64
+_MAX_INPUT = 64
 _SIZES = {0xAA: 9, 0xAB: 6}
 
 
 @dataclass(frozen=True, slots=True)
 class OptoForceOptions:
-    """Which device it is and what is wrong with it from the start.
+    """Identity and initial faults of the device.
 
     Attributes:
         serial_number: eight characters at most.
         sensitivity: counts per N and per N m.
-        is_running: it streams 1000 Hz already; otherwise 100 Hz, as it is shipped.
+        is_running: it streams at 1000 Hz already; otherwise at 100 Hz, as shipped.
         baudrate: speed of its line [bit/s].
-        clock_error_ppm: how much its clock runs fast [parts per million].
-        counter_start: what its counter shows first.
-        refusal: code it answers every configuration with; 0 = it obeys.
-        is_deaf: it takes no commands.
+        clock_error_ppm: rate error of its clock, positive = fast [parts per million].
+        counter_start: first value of its counter.
+        refusal: error code of its answer to every configuration; 0 = it accepts.
+        is_deaf: it ignores commands.
     """
 
     serial_number: str = SERIAL_NUMBER
@@ -50,7 +50,7 @@ def optoforce_stream(
     options: OptoForceOptions = _NORMAL,
     start_ns: int = 0,
 ) -> SensorStream:
-    """Return an OptoForce sensor that shows `source`."""
+    """Return an OptoForce sensor with the load `source`."""
     return SensorStream(OptoForceFirmware(options, start_ns), source, errors, start_ns)
 
 
@@ -67,64 +67,64 @@ class OptoForceFirmware:
         self.on_since_ns = start_ns
         self._options = options
         self._input = b""
-        self._run_from(start_ns, 1 if options.is_running else 10)
+        self._start_stream(start_ns, 1 if options.is_running else 10)
 
     def power_up(self, t_ns: int) -> list[Saying]:
-        """Stream 100 Hz."""
+        """Restart with a stream of 100 Hz."""
         self._input = b""
         self.on_since_ns = t_ns
-        self._run_from(t_ns, 10)
+        self._start_stream(t_ns, 10)
         return []
 
     def receive(self, t_ns: int, data: bytes) -> list[Saying]:
-        """Obey the commands in `data`; return the answers."""
+        """Carry out the commands in `data`; return the answers."""
         if self._options.is_deaf:
             return []
-        sayings: list[Saying] = []
-        self._input = (self._input + data)[-_INPUT:]
+        outputs: list[Saying] = []
+        self._input = (self._input + data)[-_MAX_INPUT:]
         while self._input:
             size = _SIZES.get(self._input[0], 1)
             if len(self._input) < size:
                 break
-            answer = self._obey(t_ns, self._input[:size])
+            answer = self._answer(t_ns, self._input[:size])
             self._input = self._input[size if answer else 1 :]
-            sayings += [(t_ns + _REPLY_NS, answer)] if answer else []
-        return sayings
+            outputs += [(t_ns + _REPLY_NS, answer)] if answer else []
+        return outputs
 
-    def frame(self, shown: Measurement, status: int) -> bytes:
+    def frame(self, measurement: Measurement, status: int) -> bytes:
         """Return the 22 bytes of a sample."""
-        pairs = zip(shown.wrench, self._options.sensitivity, strict=True)
+        pairs = zip(measurement.wrench, self._options.sensitivity, strict=True)
         counts = [count_of(value * gain) for value, gain in pairs]
-        overload = shown.saturated
+        overload = measurement.saturated
         for axis, count in enumerate(counts):
             if abs(count) >= optoforce.FULL_COUNTS:
                 overload |= 1 << axis
         for axis in range(6):
             status |= (overload >> axis & 1) << (9 - axis)
         fx, fy, fz, tx, ty, tz = counts
-        counter = self._options.counter_start + shown.number
+        counter = self._options.counter_start + measurement.number
         return optoforce.encode_frame(
             OptoForceFrame(
                 counter % optoforce.COUNTER_MODULUS, status, (fx, fy, fz, tx, ty, tz)
             )
         )
 
-    def _run_from(self, t_ns: int, period_ms: int) -> None:
+    def _start_stream(self, t_ns: int, period_ms: int) -> None:
         self.schedule = SampleSchedule(t_ns, period_ms * 1e6 / self.clock_rate)
 
-    def _obey(self, t_ns: int, data: bytes) -> bytes | None:
+    def _answer(self, t_ns: int, data: bytes) -> bytes | None:
         if data == optoforce.ASK_SERIAL:
             return optoforce.encode_serial_number(self._options.serial_number)
-        wished = optoforce.decode_configuration(data)
-        if wished is None:
+        configuration = optoforce.decode_configuration(data)
+        if configuration is None:
             return None
         if self._options.refusal:
             return optoforce.encode_configuration_answer(self._options.refusal)
-        speed = wished[0]
-        if speed == optoforce.STOPPED:
+        period_ms = configuration[0]
+        if period_ms == optoforce.STOPPED:
             self.schedule = None
-        elif speed in optoforce.SPEED_CODES.values():
-            self._run_from(t_ns + 2 * _REPLY_NS, speed)
+        elif period_ms in optoforce.SPEED_CODES.values():
+            self._start_stream(t_ns + 2 * _REPLY_NS, period_ms)
         else:
             return optoforce.encode_configuration_answer(1)
         return optoforce.encode_configuration_answer(0)

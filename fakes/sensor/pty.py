@@ -1,4 +1,4 @@
-"""A simulated serial device on a pseudo-terminal: another process opens its path."""
+"""A simulated serial device on a pseudo-terminal, for another process."""
 
 import contextlib
 import os
@@ -7,21 +7,21 @@ from pathlib import Path
 
 from fakes.sensor.port import ByteStream
 
-_READ_AT_MOST = 4096
+_MAX_READ = 4096
 
 
 class SerialPty:
     """The device's end of a pseudo-terminal.
 
     Attributes:
-        path: of the end that a driver opens: `link`, or e.g. /dev/pts/3.
+        path: path for the driver: `link`, or e.g. /dev/pts/3.
         overrun: bytes lost without a reader.
     """
 
     def __init__(self, stream: ByteStream, t_ns: int, link: Path | None = None) -> None:
-        """Plug the device in at `t_ns`; it may be talking already.
+        """Plug the device in at `t_ns`; it may be sending already.
 
-        `link`: a name that stays when the device is pulled and plugged in again.
+        `link`: a path that persists when the device is unplugged and plugged in again.
 
         Raises:
             OSError: the name is taken.
@@ -35,11 +35,11 @@ class SerialPty:
 
     @property
     def is_plugged_in(self) -> bool:
-        """Whether there is something at the end of the path."""
+        """Whether a device answers at the path."""
         return self._device >= 0
 
     def plug_in(self, t_ns: int) -> None:
-        """Put the cable in, unless it is."""
+        """Plug the cable in, if it is not."""
         if self.is_plugged_in:
             return
         self._device, self._line = os.openpty()
@@ -47,23 +47,23 @@ class SerialPty:
         os.set_blocking(self._device, False)
         if self._link is not None:
             self._link.symlink_to(os.ttyname(self._line))
-        self._stream.due(t_ns)  # bytes without a reader are gone
+        self._stream.due(t_ns)  # bytes without a reader are lost
         self._stream.port_opened(t_ns)
 
     def unplug(self) -> None:
-        """Pull the cable: an open port disappears."""
+        """Unplug the cable: an open port disappears."""
         if self._link is not None and self.is_plugged_in:
             self._link.unlink(missing_ok=True)
         self.close()
 
     def fileno(self) -> int:
-        """Return the descriptor that is readable when the driver says something."""
+        """Return the descriptor that is readable when the driver has sent bytes."""
         return self._device
 
     def advance(self, t_ns: int) -> None:
-        """Carry bytes both ways up to `t_ns`."""
+        """Transfer bytes both ways up to `t_ns`."""
         with contextlib.suppress(BlockingIOError, OSError):
-            self._stream.receive(t_ns, os.read(self._device, _READ_AT_MOST))
+            self._stream.receive(t_ns, os.read(self._device, _MAX_READ))
         for _, data in self._stream.due(t_ns):
             try:
                 sent = os.write(self._device, data)
@@ -72,7 +72,7 @@ class SerialPty:
             self.overrun += len(data) - sent
 
     def next_event_ns(self) -> int | None:
-        """Return when the next bytes leave the device; None = never."""
+        """Return when the next bytes leave the device [ns]; None = never."""
         return self._stream.next_event_ns()
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""A simulated Robotous RFT sensor: what it says and what it obeys."""
+"""A simulated Robotous RFT sensor: its frames and commands."""
 
 from dataclasses import dataclass
 
@@ -17,16 +17,16 @@ _TEXTS = {robotous.SERIAL: "RF60-0042", robotous.FIRMWARE: "V1.0.0"}
 
 @dataclass(frozen=True, slots=True)
 class RobotousOptions:
-    """Which device it is and what is wrong with it from the start.
+    """Identity and initial faults of the device.
 
     Attributes:
-        model: what it calls itself.
-        is_running: it has been streaming since before the beginning.
+        model: its reported model.
+        is_running: it streams from the start.
         baudrate: speed of its line [bit/s].
-        clock_error_ppm: how much its clock runs fast [parts per million].
+        clock_error_ppm: rate error of its clock, positive = fast [parts per million].
         refused: commands it answers with error 2.
-        is_deaf: it takes no commands.
-        forgets: it says yes to rate and filter and keeps what it had.
+        is_deaf: it ignores commands.
+        forgets: it acknowledges new rates and filters without applying them.
     """
 
     model: str = "RFT60-HA01"
@@ -47,14 +47,14 @@ def robotous_stream(
     options: RobotousOptions = _NORMAL,
     start_ns: int = 0,
 ) -> SensorStream:
-    """Return a Robotous sensor that shows `source`."""
+    """Return a Robotous sensor with the load `source`."""
     return SensorStream(RobotousFirmware(options, start_ns), source, errors, start_ns)
 
 
 class RobotousFirmware:
     """Implements `fakes.sensor.stream.Firmware`.
 
-    Powers up idle; filter, rate and speed outlive the power.
+    Powers up idle; filter, rate and line speed are non-volatile.
     """
 
     frame_size = robotous.FRAME_SIZE
@@ -66,29 +66,29 @@ class RobotousFirmware:
         self.schedule: SampleSchedule | None = None
         self.on_since_ns = start_ns
         self._options = options
-        known = MODELS.get(options.model)
-        self._ranges: Wrench = (known or MODELS["RFT60-HA01"]).ranges
-        self._torque_counts = (known or MODELS["RFT60-HA01"]).torque_counts
+        model = MODELS.get(options.model)
+        self._ranges: Wrench = (model or MODELS["RFT60-HA01"]).ranges
+        self._torque_counts = (model or MODELS["RFT60-HA01"]).torque_counts
         self._rate_code = robotous.RATE_CODES[200]
         self._filter = (0, 0)
         self._overloads = [0] * 6
         self._input = b""
         if options.is_running:
             self._rate_code = robotous.RATE_CODES[1000]
-            self._run_from(start_ns)
+            self._start_stream(start_ns)
 
     def power_up(self, t_ns: int) -> list[Saying]:
-        """Begin idle and silent."""
+        """Restart idle, without a stream."""
         self.on_since_ns = t_ns
         self._input = b""
         self.schedule = None
         return []
 
     def receive(self, t_ns: int, data: bytes) -> list[Saying]:
-        """Obey the commands in `data`; return the answers."""
+        """Carry out the commands in `data`; return the answers."""
         if self._options.is_deaf:
             return []
-        sayings: list[Saying] = []
+        outputs: list[Saying] = []
         self._input = (self._input + data)[-8 * robotous.COMMAND_SIZE :]
         while len(self._input) >= robotous.COMMAND_SIZE:
             command = robotous.decode_command(self._input[: robotous.COMMAND_SIZE])
@@ -96,21 +96,21 @@ class RobotousFirmware:
                 self._input = self._input[1:]
                 continue
             self._input = self._input[robotous.COMMAND_SIZE :]
-            answer = self._obey(t_ns, *command)
-            sayings += [(t_ns + _REPLY_NS, answer)] if answer else []
-        return sayings
+            answer = self._handle(t_ns, *command)
+            outputs += [(t_ns + _REPLY_NS, answer)] if answer else []
+        return outputs
 
-    def frame(self, shown: Measurement, status: int) -> bytes:
+    def frame(self, measurement: Measurement, status: int) -> bytes:
         """Return the 19 bytes of a sample."""
         fx, fy, fz, tx, ty, tz = (
             count_of(value * gain)
-            for value, gain in zip(shown.wrench, self._gains(), strict=True)
+            for value, gain in zip(measurement.wrench, self._gains(), strict=True)
         )
         overload = status
         for axis, (value, rated) in enumerate(
-            zip(shown.wrench, self._ranges, strict=True)
+            zip(measurement.wrench, self._ranges, strict=True)
         ):
-            if abs(value) > _OVERLOAD * rated or shown.saturated >> axis & 1:
+            if abs(value) > _OVERLOAD * rated or measurement.saturated >> axis & 1:
                 overload |= 1 << (5 - axis)
                 self._overloads[axis] = min(self._overloads[axis] + 1, 255)
         return robotous.encode_frame(
@@ -120,20 +120,20 @@ class RobotousFirmware:
     def _gains(self) -> tuple[float, ...]:
         return (robotous.FORCE_COUNTS,) * 3 + (self._torque_counts,) * 3
 
-    def _run_from(self, t_ns: int) -> None:
+    def _start_stream(self, t_ns: int) -> None:
         period_ns = 1e9 / _RATES[self._rate_code] / self.clock_rate
         self.schedule = SampleSchedule(t_ns, period_ns)
 
-    def _obey(self, t_ns: int, command: int, parameters: bytes) -> bytes | None:
+    def _handle(self, t_ns: int, command: int, parameters: bytes) -> bytes | None:
         if command == robotous.STOP:
             self.schedule = None
             return None
         if self.schedule is not None or command == robotous.BIAS:
-            return None  # while it streams, it takes stop and bias only
+            return None  # while streaming, it accepts stop and bias only
         if command in self._options.refused:
             return robotous.encode_answer(command, 0, 2)
         if command == robotous.STREAM:
-            self._run_from(t_ns + 2 * _REPLY_NS)
+            self._start_stream(t_ns + 2 * _REPLY_NS)
             return None
         return self._answer(command, parameters)
 
@@ -143,20 +143,20 @@ class RobotousFirmware:
             return robotous.encode_answer(command, *texts[command].encode("ascii"))
         if command in (robotous.SET_BAUDRATE, robotous.SET_FILTER, robotous.SET_RATE):
             if not self._options.forgets:
-                self._keep(command, parameters)
+                self._apply_setting(command, parameters)
             return robotous.encode_answer(command, 1, 0)
-        shown = {
+        values = {
             robotous.GET_FILTER: self._filter,
             robotous.GET_RATE: (self._rate_code,),
             robotous.OVERLOADS: tuple(self._overloads),
         }
         return (
-            robotous.encode_answer(command, *shown[command])
-            if command in shown
+            robotous.encode_answer(command, *values[command])
+            if command in values
             else None
         )
 
-    def _keep(self, command: int, parameters: bytes) -> None:
+    def _apply_setting(self, command: int, parameters: bytes) -> None:
         if command == robotous.SET_RATE and parameters[0] in _RATES:
             self._rate_code = parameters[0]
         elif command == robotous.SET_FILTER:

@@ -1,7 +1,7 @@
-"""The bytes a wrist sensor sends, as a function of simulated time and of nothing else.
+"""The bytes that a wrist sensor sends, as a function of simulated time only.
 
-`SensorStream` is the device behind the wire: gauges, clock, line and what can go wrong
-with them. What is particular to a make is its `Firmware`. Told the time, never waits.
+`SensorStream` is the device: gauges, clock, line and their faults; its `Firmware` is
+the vendor-specific part. Time is an argument; nothing here waits.
 """
 
 from collections import deque
@@ -15,26 +15,26 @@ from ft_sensor.serial_line.framing import wire_time_ns
 
 Source = Callable[[int], Sequence[float]]
 
-ROOM = 25.0  # where it stands [degrees Celsius]
+ROOM = 25.0  # ambient temperature [degrees Celsius]
 _NO_RANGES: Wrench = (1e9, 1e9, 1e9, 1e9, 1e9, 1e9)
 
 
 class SensorStream:
     """A wrist sensor seen from its end of the wire.
 
-    `source(t_ns)` is the true load at an instant: fx fy fz tx ty tz in the sensor frame
+    `source(t_ns)` is the true load at a time: fx fy fz tx ty tz in the sensor frame
     [N, N m]. It is called once per sample, in order of time, when `due` reaches the
-    instant of the sample.
+    time of the sample.
 
     Attributes:
-        errors: added to the load; None = shown as it is. A constant load without
-            errors repeats bit for bit, which drivers rightly take for a frozen sensor.
-        ranges: where the gauges end [N, N m].
-        status: status bits set in every frame, beside those the device sets itself.
+        errors: errors added to the load; None = none. A constant load without errors
+            repeats bit for bit, which drivers rightly report as a frozen sensor.
+        ranges: measuring ranges of the gauges [N, N m].
+        status: status bits set in every frame, besides the device's own.
         is_clock_frozen: the device's clock and counter stand still.
-        faults: what goes wrong with its numbers and its frames.
-        resets_on_open: opening the port boots it.
-        warming: how fast it warms up, which moves its zero [degrees Celsius per s].
+        faults: faults of its values and frames.
+        resets_on_open: opening the port reboots it.
+        warming: rate of warming, which moves its zero [degrees Celsius per s].
     """
 
     def __init__(
@@ -45,7 +45,7 @@ class SensorStream:
         start_ns: int = 0,
         clock_start_us: int = 0,
     ) -> None:
-        """Switch the device on at `start_ns`, or find it running."""
+        """Switch the device on at `start_ns`, unless its firmware already runs."""
         self.errors = errors
         self.ranges = _NO_RANGES
         self.status = 0
@@ -68,36 +68,36 @@ class SensorStream:
         self._follow_schedule()
 
     def reset(self, t_ns: int) -> None:
-        """Switch the power off and on at `t_ns`; settings are lost."""
-        sayings = self.firmware.power_up(t_ns)
-        self._begin_anew()
-        self._say(sayings)
+        """Power-cycle the device at `t_ns`; settings are lost."""
+        outputs = self.firmware.power_up(t_ns)
+        self._restart_line()
+        self._send_outputs(outputs)
 
     def port_opened(self, t_ns: int) -> None:
-        """Tell the device that its port was opened."""
+        """Notify the device that its port was opened."""
         if self.resets_on_open:
             self.reset(t_ns)
 
     def receive(self, t_ns: int, data: bytes) -> None:
-        """Take bytes written by the client at `t_ns`."""
+        """Handle bytes written by the client at `t_ns`."""
         self._sample_until(t_ns)
-        sayings = self.firmware.receive(t_ns, data)
+        outputs = self.firmware.receive(t_ns, data)
         if self.firmware.on_since_ns != self.on_since_ns:
-            self._begin_anew()
-        self._say(sayings)
+            self._restart_line()
+        self._send_outputs(outputs)
 
     def due(self, t_ns: int) -> list[Saying]:
-        """Return (time, bytes) of all that has left the wire by `t_ns`, in order."""
+        """Return (time [ns], bytes) of all output sent by `t_ns`, in order."""
         if self._schedule is not None and self._sample_ns <= t_ns:
             self._sample_until(t_ns)
         pending = self._pending
-        gone: list[Saying] = []
+        sent: list[Saying] = []
         while pending and pending[0][0] <= t_ns:
-            gone.append(pending.popleft())
-        return gone
+            sent.append(pending.popleft())
+        return sent
 
     def next_event_ns(self) -> int | None:
-        """Return when the next bytes will have left the wire; None = never."""
+        """Return when the next output will be sent [ns]; None = never."""
         if self._pending:
             return self._pending[0][0]
         if self._schedule is None or self._is_silent:
@@ -105,7 +105,7 @@ class SensorStream:
         return self._sample_ns + self._frame_wire_ns
 
     def go_silent(self) -> None:
-        """Say nothing from now on, until `speak`: a cut cable."""
+        """Send nothing until `speak`, as with a cut cable."""
         self._is_silent = True
         self._pending.clear()
 
@@ -114,7 +114,7 @@ class SensorStream:
         self._is_silent = False
 
     def pause(self, until_ns: int) -> None:
-        """Lose the samples before `until_ns`; the device's clock goes on."""
+        """Lose the samples before `until_ns`; the device's clock continues."""
         self._paused_until_ns = until_ns
 
     def damage_next(self, fault: ByteFault, index: int) -> None:
@@ -122,16 +122,16 @@ class SensorStream:
         self._fault = (fault, index)
 
     def jump_clock(self, step_us: int) -> None:
-        """Let the device's clock, and a counter of milliseconds, go `step_us` ahead."""
+        """Advance the device's clock, and a counter of milliseconds, by `step_us`."""
         self._clock_start_us += step_us
         self._number += step_us // 1000
 
     def saturate(self) -> None:
-        """Report every axis as beyond its range, until `recover`."""
+        """Report every axis as saturated, until `recover`."""
         self._is_saturated = True
 
     def recover(self) -> None:
-        """End every fault but what is lost for good: a pulled cable, a reboot."""
+        """Clear every fault except lasting ones: an unplugged cable, a reboot."""
         self.speak()
         self.status = 0
         self.is_clock_frozen = self._is_saturated = False
@@ -139,20 +139,20 @@ class SensorStream:
         self.ranges = _NO_RANGES
         self.warming = 0.0
 
-    def _begin_anew(self) -> None:
-        """Let clock, counter and line begin with the power."""
+    def _restart_line(self) -> None:
+        """Restart clock, counter and line at power-on."""
         self.on_since_ns = self._wire_free_ns = self.firmware.on_since_ns
         self._pending.clear()
         self._is_skipping = False
         self._number = 0
 
-    def _say(self, sayings: list[Saying]) -> None:
-        for say_ns, data in sayings:
-            self._send(say_ns, data)
+    def _send_outputs(self, outputs: list[Saying]) -> None:
+        for send_ns, data in outputs:
+            self._send(send_ns, data)
         self._follow_schedule()
 
     def _follow_schedule(self) -> None:
-        """Begin the samples of a new schedule of the firmware."""
+        """Restart the samples if the firmware has a new schedule."""
         schedule = self.firmware.schedule
         if schedule is self._schedule:
             return
@@ -180,20 +180,22 @@ class SensorStream:
         if not self.is_clock_frozen:
             self._number += 1
         if self._is_silent or t_ns < self._paused_until_ns:
-            return  # sent all the same, into a cable that is cut
+            return  # sent into a cut cable
         if self._wire_free_ns > t_ns + period_ns:
             self._is_skipping = True  # the line is too slow for the rate
             return
-        whole = data = self.firmware.frame(self._measured(t_ns, wrench), self.status)
+        undamaged = data = self.firmware.frame(
+            self._measurement(t_ns, wrench), self.status
+        )
         self._is_skipping = False
         if self._fault is not None:
             data = damage(data, *self._fault)
             self._fault = None
         data = self.faults.carry(data)
-        if data == whole or not self.firmware.is_checked:
+        if data == undamaged or not self.firmware.is_checked:
             self._send(t_ns, data)
 
-    def _measured(self, t_ns: int, wrench: Sequence[float]) -> Measurement:
+    def _measurement(self, t_ns: int, wrench: Sequence[float]) -> Measurement:
         warmth = 0.0 if self.errors is None else self.errors.warmth
         if self.warming:
             heated = self.warming * (t_ns - self.on_since_ns) * 1e-9
@@ -202,12 +204,12 @@ class SensorStream:
             wrench = [value + heated * gain for value, gain in pairs]
         saturated = ALL_AXES if self._is_saturated else 0
         if self.ranges is not _NO_RANGES:
-            wrench, beyond = _clipped(wrench, self.ranges)
-            saturated |= beyond
+            wrench, clipped_axes = _clipped(wrench, self.ranges)
+            saturated |= clipped_axes
         fx, fy, fz, tx, ty, tz = wrench
         if not self.is_clock_frozen:
-            passed_ns = round((t_ns - self.on_since_ns) * self.firmware.clock_rate)
-            self._device_us = self._clock_start_us + passed_ns // 1000
+            elapsed_ns = round((t_ns - self.on_since_ns) * self.firmware.clock_rate)
+            self._device_us = self._clock_start_us + elapsed_ns // 1000
         return Measurement(
             self.faults.show((fx, fy, fz, tx, ty, tz)),
             saturated,
@@ -218,7 +220,7 @@ class SensorStream:
         )
 
     def _send(self, t_ns: int, data: bytes) -> None:
-        """Put `data` on the wire as soon as it is free, not before `t_ns`."""
+        """Send `data` as soon as the line is free, not before `t_ns`."""
         if self._is_silent:
             return
         wire_ns = wire_time_ns(len(data), self.firmware.baudrate)
@@ -228,11 +230,11 @@ class SensorStream:
 
 
 def _clipped(wrench: Sequence[float], ranges: Wrench) -> tuple[list[float], int]:
-    """Return `wrench` cut at `ranges`, and the axes that were, one bit each."""
-    shown: list[float] = []
+    """Return `wrench` clipped to `ranges`, and a bit mask of the clipped axes."""
+    clipped: list[float] = []
     saturated = 0
-    for axis, (value, most) in enumerate(zip(wrench, ranges, strict=True)):
-        if abs(value) >= most:
+    for axis, (value, limit) in enumerate(zip(wrench, ranges, strict=True)):
+        if abs(value) >= limit:
             saturated |= 1 << axis
-        shown.append(min(max(value, -most), most))
-    return shown, saturated
+        clipped.append(min(max(value, -limit), limit))
+    return clipped, saturated

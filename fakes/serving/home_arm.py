@@ -1,4 +1,4 @@
-"""An arm at its home position, carried by a person or left to itself, to be served."""
+"""A served arm at its home position, carried by a person or unsupported."""
 
 from dataclasses import dataclass, replace
 
@@ -39,20 +39,20 @@ _PLATE = Tool(_NO_BODY, _NO_BODY, np.zeros(3), sensor_height=0.0)
 
 @dataclass(frozen=True, slots=True)
 class HomePose:
-    """An arm at its home position, and how it is found.
+    """Initial state of an arm at its home position.
 
     Attributes:
-        tool: sensor and foot on its plate; None = the bare plate, no sensor at all.
-        frame: where the container stands.
-        line: of a serial sensor; None = the sensor is on the bus.
+        tool: sensor and foot on its plate; None = the bare plate without a sensor.
+        frame: location of the container.
+        line: line of a serial sensor; None = the sensor is on the bus.
         is_idle_first: powered, idle, pucks asleep; otherwise in E-STOP.
-        has_hand: a person carries the arm, with hardly any friction then; otherwise it
-            has all the friction that was identified on another one.
-        firmware: of the motor pucks, and of the safety module.
-        is_at_rest: joint 6 is on its upper stop, where its weight lies.
-        friction: of the joints, as a share; None = what fits `has_hand`.
-        seed: of friction and windings; None = the nominal ones.
-        departure: how it differs from what is believed; None = not at all.
+        has_hand: a person carries the arm, with almost no friction; otherwise it has
+            the full friction identified on another arm.
+        firmware: versions of the motor pucks and of the safety module.
+        is_at_rest: joint 6 is on its upper stop, held there by gravity.
+        friction: scale of the joint friction; None = by `has_hand`.
+        seed: seed of friction and windings; None = nominal values.
+        departure: deviation of the true arm from its settings; None = none.
     """
 
     tool: Tool | None
@@ -68,7 +68,7 @@ class HomePose:
 
 
 def build_home_server(port: Port, pose: HomePose, clock: Clock) -> PuckServer:
-    """Return a server of an arm that stands at its home position, not zeroed.
+    """Return a server of an arm at its home position, not zeroed.
 
     With a tool it has a force/torque sensor on its bus or on a serial line.
 
@@ -83,12 +83,12 @@ def build_home_server(port: Port, pose: HomePose, clock: Clock) -> PuckServer:
         options = replace(options, friction=pose.friction)
     options = true_options(options, departure)
     tool = true_tool(pose.tool or _PLATE, departure)
-    q = _where_it_is(constants, departure, is_at_rest=pose.is_at_rest)
+    q = _zeroing_pose(constants, departure, is_at_rest=pose.is_at_rest)
     plant = ArmPlant(constants, tool, pose.frame, q, options)
     plant.t_ns = now_ns // PERIOD_NS * PERIOD_NS
     rng = trial_generator(_SEED, "home", 0)
     errors = SensorErrors(rng, SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS)
-    found = NetworkOptions(
+    network_options = NetworkOptions(
         safety_mode=SafetyMode.IDLE if pose.is_idle_first else SafetyMode.E_STOP,
         are_asleep=True,
         has_sensor=pose.line is None and pose.tool is not None,
@@ -99,9 +99,9 @@ def build_home_server(port: Port, pose: HomePose, clock: Clock) -> PuckServer:
     )
     source = shown_load(plant.sensor_load, departure)
     network = PuckNetwork(
-        plant, true_network(found, departure), now_ns, Load(source, errors)
+        plant, true_network(network_options, departure), now_ns, Load(source, errors)
     )
-    # Its zeros are those of the pose that it is zeroed in.
+    # The zero errors are in the pose in which it is zeroed, so not in the wiring.
     depart(plant, network, replace(departure, zeros=np.zeros(7)), believed)
     sensor = None
     if pose.line is not None:
@@ -109,12 +109,12 @@ def build_home_server(port: Port, pose: HomePose, clock: Clock) -> PuckServer:
     return PuckServer(network, plant, port, clock, sensor, plant)
 
 
-def _where_it_is(
+def _zeroing_pose(
     constants: ArmConstants, departure: Departure, *, is_at_rest: bool
 ) -> Array:
-    """Return where a person puts the arm to zero it [rad], shape (7,).
+    """Return the pose in which a person zeroes the arm [rad], shape (7,).
 
-    At home but for the errors of its zeros, and no further than its stops let it.
+    The home position less the errors of the zeros, within the stops.
     """
     q = constants.home - departure.zeros
     if is_at_rest:

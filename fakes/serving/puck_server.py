@@ -1,4 +1,4 @@
-"""Serves a puck network to other programs, on the wall clock, in one thread."""
+"""Server of a puck network for other programs, on the wall clock, in one thread."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -17,11 +17,11 @@ Tap = Callable[[int, bytes], None]
 
 
 class Port(Protocol):
-    """Where hosts are: a Readable that frames come from and go to.
+    """The bus as seen from the network: a Readable that carries the hosts' frames.
 
     Attributes:
-        ignored: what came and was no classic data frame.
-        lost: frames that were not taken in time.
+        ignored: number of packets that were not classic data frames.
+        lost: number of frames that a host did not read in time.
     """
 
     ignored: int
@@ -33,15 +33,15 @@ class Port(Protocol):
         ...
 
     def fileno(self) -> int:
-        """Return the descriptor to wait on, -1 if there is none."""
+        """Return the descriptor to wait on, -1 = none."""
         ...
 
     def is_readable(self) -> bool:
-        """Return whether something has arrived."""
+        """Return whether frames have arrived."""
         ...
 
     def receive(self) -> list[Frame]:
-        """Return the frames of hosts that have arrived; never waits."""
+        """Return the frames received from hosts; never waits."""
         ...
 
     def send(self, can_id: int, data: bytes) -> None:
@@ -54,15 +54,15 @@ class Port(Protocol):
 
 
 class PuckServer:
-    """A network and the bus it is served on.
+    """A network and the bus on which it is served.
 
-    Whatever carries the frames here, the devices' leave one after the other, as on a
-    wire of 1 Mbit/s.
+    On any kind of bus, the devices' frames leave one after the other, as on a wire of
+    1 Mbit/s.
 
     Attributes:
         network: the pucks.
-        sensor: a serial wrist sensor that is served beside them; None = none.
-        hands: at the arm; None = it has no body that they could take.
+        sensor: a serial wrist sensor served alongside; None = none.
+        hands: hands that can move the arm; None = none.
     """
 
     def __init__(
@@ -91,21 +91,21 @@ class PuckServer:
 
     @property
     def state(self) -> str:
-        """The mode of the safety module in words."""
+        """The mode of the safety module as text."""
         return self.network.safety_mode.name.lower().replace("_", "-")
 
     @property
     def losses(self) -> str:
-        """What was not carried, in words; empty if all was."""
+        """Report of ignored packets and lost frames; empty if there are none."""
         port = self._port
-        words = [self.sensor.losses] if self.sensor and self.sensor.losses else []
+        reports = [self.sensor.losses] if self.sensor and self.sensor.losses else []
         if port.ignored or port.lost:
-            words.append(
-                f"{port.ignored} packets were no classic data frames and were "
+            reports.append(
+                f"{port.ignored} packets were not classic data frames and were "
                 f"ignored; {port.lost} frames were lost because the client did not "
                 "read them in time."
             )
-        return " ".join(words)
+        return " ".join(reports)
 
     def press(self, action: PendantAction) -> None:
         """Press a button of the pendant now."""
@@ -113,13 +113,13 @@ class PuckServer:
         self.network.pendant(action)
 
     def step(self, tap: Tap | None = None) -> None:
-        """Wait for a frame or for the network, 2 ms at most, and let both go on.
+        """Wait at most 2 ms for a frame or an event, then advance network and bus.
 
         Args:
             tap: called for every frame on the bus.
 
         Raises:
-            LinkError: the bus broke.
+            LinkError: the bus failed.
         """
         self._clock.wait(self._port, self._deadline_ns())
         now_ns = self._clock.go_on()
@@ -131,25 +131,25 @@ class PuckServer:
             self._port.send(can_id, data)
             if tap is not None:
                 tap(can_id, data)
-        # Nobody may have looked at the arm for long; catching up would delay answers.
+        # Advance the arm even if no host reads it: catching up would delay answers.
         self._motors.advance(now_ns)
         if self.sensor is not None:
             self.sensor.step()
 
     def close(self) -> None:
-        """Leave the bus, pull the sensor's cable."""
+        """Leave the bus and unplug the sensor."""
         self._port.close()
         if self.sensor is not None:
             self.sensor.close()
 
     def _deadline_ns(self) -> int:
         now_ns, event_ns = self._clock.now_ns(), self._wired.next_event_ns()
-        left = TICK_NS if event_ns is None else event_ns - now_ns
-        return now_ns + max(0, min(left, TICK_NS))
+        wait_ns = TICK_NS if event_ns is None else event_ns - now_ns
+        return now_ns + max(0, min(wait_ns, TICK_NS))
 
 
 def open_can_port(interface: str, channel: str, bitrate: int) -> Port:
-    """Return the place where a network is to be served.
+    """Return the port on which a network is served.
 
     Raises:
         SettingsError: the socket's path is in use or cannot be one.

@@ -1,4 +1,4 @@
-"""The simulated rig as a process of its own: bus on a socket, sensor on a terminal."""
+"""The simulated rig as a process: bus on a socket, sensor on a pseudo-terminal."""
 
 import select
 import signal
@@ -26,8 +26,8 @@ from fakes.world_clock import TICK_NS, WorldClock
 from wam.model.constants import load_constants
 
 PRIORITY = 70
-TRUTH_ROWS = 50  # in one answer; the bus waits meanwhile
-LINGER_NS = 5_000_000_000  # an arm whose console has died is idled within this
+TRUTH_ROWS = 50  # in one answer; the bus waits while it is sent
+LINGER_NS = 5_000_000_000  # for the driver to idle the arm if the console dies
 
 
 class PtyCable:
@@ -38,16 +38,16 @@ class PtyCable:
         self._clock = clock
 
     def unplug(self) -> None:
-        """Pull the cable."""
+        """Unplug the cable."""
         self._pty.unplug()
 
     def plug_in(self) -> None:
-        """Put it in again."""
+        """Plug the cable in again."""
         self._pty.plug_in(self._clock.now_ns())
 
 
 class RigServer:
-    """Serves one simulated rig to the processes of a session, and its handle."""
+    """Server of one simulated rig and its control handle for a session's processes."""
 
     def __init__(
         self,
@@ -72,12 +72,12 @@ class RigServer:
         )
 
     def devices(self) -> ServedDevices:
-        """Return where bus and sensor are served."""
+        """Return the addresses of bus and sensor."""
         channel = str(self._can_path)
         return ServedDevices("traction-fake", channel, 1_000_000, self._pty.path)
 
     def serve(self) -> None:
-        """Go on until the console hangs up and the arm's driver has left the bus."""
+        """Serve until the console hangs up and the arm's driver has left the bus."""
         try:
             try:
                 while True:
@@ -91,18 +91,18 @@ class RigServer:
             self._hub.close()
             self._pty.close()
 
-    def _step(self, asked: int | None) -> bool:
-        """Wait for what comes next; return whether descriptor `asked` is readable."""
+    def _step(self, request_fd: int | None) -> bool:
+        """Wait for input or an event; return whether `request_fd` is readable."""
         watched = [self._hub.fileno()]
         watched += [self._pty.fileno()] if self._pty.is_plugged_in else []
-        if asked is not None:
-            watched.append(asked)
-        ready = select.select(watched, [], [], self._patience())[0]
+        if request_fd is not None:
+            watched.append(request_fd)
+        ready = select.select(watched, [], [], self._wait_time())[0]
         now_ns = self._clock.go_on()
         self._carry_frames(now_ns)
         self._pty.advance(now_ns)
         self._rig.plant.advance(now_ns)
-        return asked in ready
+        return request_fd in ready
 
     def _carry_frames(self, now_ns: int) -> None:
         for can_id, data in self._hub.receive():
@@ -111,15 +111,15 @@ class RigServer:
             self._hub.send(can_id, data)
 
     def _truth_part(self) -> Record:
-        """Return the oldest rows that were not taken yet; none ends the truth."""
+        """Return the oldest rows not yet returned; an empty record is the end."""
         plant, frame = self._rig.plant, self._rig.scene.frame
         part = plant.truth.take(TRUTH_ROWS) if plant.truth is not None else Truth()
         if not part.t_ns:
             plant.take_truth()
         return truth_records(part, frame)
 
-    def _patience(self) -> float:
-        """Return how long nothing will happen by itself [s]."""
+    def _wait_time(self) -> float:
+        """Return the time until the next planned event [s]."""
         events = [self._wired.next_event_ns(), self._pty.next_event_ns()]
         times = [t for t in events if t is not None]
         now_ns = self._clock.go_on()
@@ -130,7 +130,7 @@ class RigServer:
 def main(station: ChildContext) -> None:
     """Serve a simulated rig until the console hangs up."""
     name_process("traction-fake")
-    # When the console dies, the driver still has to idle the arm.
+    # After the console has died, the driver still has to idle the arm.
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     request(RealtimeRequest(PRIORITY, station.settings.get("core")))
     with temporary_folder("traction", Path(tempfile.gettempdir())) as folder:

@@ -1,4 +1,4 @@
-"""Serves a simulated wrist sensor to other programs, on the wall clock."""
+"""Server of a simulated wrist sensor for other programs, on the wall clock."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,14 +20,14 @@ _SEED = 2  # of the sensor's errors
 
 @dataclass(frozen=True, slots=True)
 class SensorLine:
-    """Where a sensor is served, and which."""
+    """A sensor and the path on which it is served."""
 
     path: Path
     choice: SensorChoice
 
 
 class SensorServer:
-    """A sensor at the end of a path that other programs open as a serial port."""
+    """A sensor on a path that other programs open as a serial port."""
 
     def __init__(self, line: SensorLine, source: Source, clock: Clock) -> None:
         """Plug the sensor in; `source` is its load.
@@ -50,38 +50,38 @@ class SensorServer:
 
     @property
     def name(self) -> str:
-        """The sensor and where it is."""
+        """The sensor and its path."""
         return f"{self._kind} sensor on {self._pty.path}"
 
     @property
     def losses(self) -> str:
-        """Bytes that were not taken in time, in words; empty if all were."""
+        """Report of bytes not read in time; empty if there are none."""
         lost = self._pty.overrun
         return f"{lost} bytes of the sensor were not read in time." if lost else ""
 
     def fileno(self) -> int:
-        """Return the descriptor that is readable when a host says something."""
+        """Return the descriptor that is readable when a host has sent bytes."""
         return self._pty.fileno()
 
     def is_readable(self) -> bool:
-        """Return False: what a host says is looked at in every step."""
+        """Return False: input of hosts is polled in every step."""
         return False
 
     def wait(self) -> None:
-        """Wait 2 ms at most, until a host says something."""
+        """Wait at most 2 ms for input of a host."""
         self._clock.wait(self, self._clock.now_ns() + TICK_NS)
 
     def step(self) -> None:
-        """Carry bytes both ways up to now."""
+        """Transfer bytes both ways up to now."""
         self._pty.advance(self._clock.go_on())
 
     def close(self) -> None:
-        """Pull the cable; the path is gone."""
+        """Unplug the cable; the path is removed."""
         self._pty.unplug()
 
 
 def hanging_load(tool: Tool) -> Source:
-    """Return the load [N, N m] of a foot that hangs below a sensor at rest."""
+    """Return the constant load [N, N m] of a foot hanging below a sensor at rest."""
     foot = tool.foot
     arm = np.array(foot.com) - np.array([0.0, 0.0, tool.sensor_height])
     force = np.array([0.0, 0.0, tool.sensor_sign * foot.mass * GRAVITY])

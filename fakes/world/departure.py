@@ -1,4 +1,4 @@
-"""How a simulated rig differs from what its settings and drawings say of it."""
+"""Deviations of a simulated rig from its settings and drawings."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -28,12 +28,12 @@ def _as_wired() -> Array:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where the container truly is, against its row of the matrix.
+    """Error of the container's location in its row of the matrix.
 
     Attributes:
-        incline: further inclined [rad].
-        far_end: further away [m].
-        travel: longer [m].
+        incline: additional inclination [rad].
+        far_end: shift of the far end [m].
+        travel: additional length [m].
     """
 
     incline: float = 0.0
@@ -43,14 +43,14 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class BusTrouble:
-    """What is wrong with the bus and who is on it.
+    """Faults of the bus and foreign devices on it.
 
     Attributes:
-        late_ns: by which the position replies of a node come too late: (node, ns), ...
-        lost: share of the position replies that is lost.
-        doubled: node that is there twice; 0 = none.
+        late_ns: delays of the position replies by node: (node, ns), ...
+        lost: share of lost position replies.
+        doubled: node that exists twice; 0 = none.
         other_master: node of another program that drives the arm; 0 = none.
-        silent: nodes that say nothing.
+        silent: nodes that send nothing.
     """
 
     late_ns: tuple[tuple[int, int], ...] = ()
@@ -62,13 +62,13 @@ class BusTrouble:
 
 @dataclass(frozen=True, slots=True)
 class ModuleTrouble:
-    """What is wrong with the safety module and its pendant.
+    """Faults of the safety module and its pendant.
 
     Attributes:
-        limits: factor by which it sets another limit than it was told: (name, factor).
-        dead_button: of the pendant that does nothing; None = none.
+        limits: ratio of a stored limit to the value set: (name, factor), ...
+        dead_button: a pendant button without effect; None = none.
         is_disobedient: it ignores a host that lowers its mode.
-        heartbeat: how long it waits for positions, as a multiple.
+        heartbeat: factor on the heartbeat timeout.
     """
 
     limits: tuple[tuple[str, float], ...] = ()
@@ -79,30 +79,30 @@ class ModuleTrouble:
 
 @dataclass(frozen=True, slots=True)
 class Departure:
-    """What is true of a rig, against what is believed; nothing by default.
+    """Deviation of the true rig from its settings and drawings; none by default.
 
     Attributes:
-        zeros: angles that positions show too much [rad], shape (7,).
-        stops: how much further up the lower and the upper stops are [rad], (2, 7).
-        ratios: true gear ratios of the joints, as shares, shape (7,).
-        mount: turns of the base about x, then y, then z [rad], shape (3,).
-        links: more mass in the links [kg], shape (7,).
-        foot_mass: true mass of the foot, as a share.
-        foot_centre: how far its centre is off [m], frame 7, shape (3,).
-        sole: how far the sole is off [m], frame 7, shape (3,).
-        shown: what the sensor shows of the load on it, shape (6, 6).
-        force_late: age of what it shows [s].
+        zeros: offsets of the joint zeros, reported minus true angle [rad], shape (7,).
+        stops: shifts of the lower and the upper stops [rad], shape (2, 7).
+        ratios: factors on the gear ratios of the joints, shape (7,).
+        mount: rotations of the base about x, then y, then z [rad], shape (3,).
+        links: additional mass of the links [kg], shape (7,).
+        foot_mass: factor on the mass of the foot.
+        foot_centre: shift of its centre of mass [m], frame 7, shape (3,).
+        sole: shift of the sole [m], frame 7, shape (3,).
+        shown: matrix from the load on the sensor to its reading, shape (6, 6).
+        force_late: delay of the sensor's reading [s].
         cable: force of its cable on the foot [N], base frame, shape (3,).
-        torque: what each motor makes of each torque that is sent, shape (7, 7).
-        counts: what each encoder tells of each motor's way from home, shape (7, 7).
+        torque: matrix from commanded to true motor torques, shape (7, 7).
+        counts: matrix from true to reported motor travel from home, shape (7, 7).
         torn: motor whose cable to the joints is torn, 1-7; 0 = none.
-        friction: of the joints, as a share.
-        properties: that pucks have otherwise: (node, name, value), ...
-        versions: firmware that pucks have otherwise: (node, VERS), ...
-        module: trouble of the safety module.
-        bus: trouble of the bus.
-        place: of the container.
-        foot_typed: mass of the foot that is typed into rig.toml [kg]; None = as it is.
+        friction: factor on the friction of the joints.
+        properties: changed properties of pucks: (node, name, value), ...
+        versions: changed firmware of pucks: (node, VERS), ...
+        module: faults of the safety module.
+        bus: faults of the bus.
+        place: error of the container's location.
+        foot_typed: mass of the foot as typed in rig.toml [kg]; None = correct.
     """
 
     zeros: Array = field(default_factory=_no_angles)
@@ -128,7 +128,7 @@ class Departure:
     foot_typed: float | None = None
 
     def on(self, sound: "Departure") -> "Departure":
-        """Return what is true of a rig that departs like `sound` and like this too."""
+        """Return the combination of the deviation `sound` and this one."""
         return replace(
             self,
             zeros=sound.zeros + self.zeros,
@@ -146,7 +146,7 @@ class Departure:
 
 
 def rotation(angles: Sequence[float]) -> Array:
-    """Return the matrix of turns about x, then y, then z by `angles` [rad], (3, 3)."""
+    """Return the rotation about x, then y, then z by `angles` [rad], shape (3, 3)."""
     a, b, c = np.cos(angles).tolist()
     i, j, k = np.sin(angles).tolist()
     about_x = np.array([[1.0, 0.0, 0.0], [0.0, a, -i], [0.0, i, a]])
@@ -156,21 +156,21 @@ def rotation(angles: Sequence[float]) -> Array:
 
 
 def turned_axes(angles: Sequence[float]) -> Array:
-    """Return what a sensor shows whose axes are turned by `angles` [rad], (6, 6)."""
-    shown, turn = np.zeros((6, 6)), rotation(angles).T
-    shown[:3, :3] = shown[3:, 3:] = turn
-    return shown
+    """Return the reading matrix of a sensor rotated by `angles` [rad], shape (6, 6)."""
+    matrix, to_sensor = np.zeros((6, 6)), rotation(angles).T
+    matrix[:3, :3] = matrix[3:, 3:] = to_sensor
+    return matrix
 
 
 def draw_sound(seed: int) -> Departure:
-    """Return how the sound rig of `seed` differs from its drawings.
+    """Return the deviation of the sound rig of `seed` from its drawings.
 
-    What it draws from is its own: nothing else that is random in a rig changes.
+    It has its own generator: no other random quantity of the rig changes.
     """
-    random = sound_rig_generator(seed)
+    generator = sound_rig_generator(seed)
 
     def drawn(scale: float, *shape: int) -> Array:
-        return scale * random.standard_normal(shape)
+        return scale * generator.standard_normal(shape)
 
     zeros, stops = drawn(ZEROS, 7), drawn(STOPS, 2, 7)
     tilt, axes = drawn(TILT, 2), drawn(AXES, 3)

@@ -1,4 +1,4 @@
-"""Faults of the simulated arm and its bus by the names a rehearsal calls them."""
+"""Faults of the simulated arm and its bus, by the names used in a rehearsal."""
 
 from collections.abc import Callable, Iterable
 from functools import partial
@@ -23,28 +23,28 @@ from wam.bus.frames import (
     position_reply_id,
 )
 
-PUCK = 3  # of those that fail alone: its joint carries little, the arm stays up
-FOREIGN_LOAD = 0.6  # of the bus, half of it before the arm's frames and half after
-_OTHER_NODE = 20  # of a master that does not call itself host
-_LOW_VOLTAGE = 20.0  # below what the safety module tolerates [V]
-_OTHER_IPNM = 2500  # of the motor that PUCK says to have
+PUCK = 3  # the puck that fails alone: its joint supports little, the arm stays up
+FOREIGN_LOAD = 0.6  # of the bus, half above and half below the arm's priority
+_OTHER_NODE = 20  # of a master that does not use the host's node
+_LOW_VOLTAGE = 20.0  # below the limit of the safety module [V]
+_OTHER_IPNM = 2500  # wrong motor constant reported by PUCK
 _HOT = 72  # above OTEMP [degrees Celsius]
 _USUAL = {"TEMP": 35, "ERROR": 0}
-# A reply that waits for six others comes last; one that waits for almost a cycle comes
-# between the next question and its answer.
-_BEHIND_THE_OTHERS_NS = 7 * FRAME_NS[3]
-_BEHIND_THE_NEXT_QUESTION_NS = 1_950_000
+# A reply delayed by six others comes last; one delayed by almost a cycle comes between
+# the next request and its reply.
+_AFTER_THE_OTHERS_NS = 7 * FRAME_NS[3]
+_AFTER_NEXT_REQUEST_NS = 1_950_000
 _LATE_EVERY = 50  # cycles
-# Late by one cycle, and by two: the replies are taken for those of the present one.
+# Late by one cycle and by two: they are taken for the replies of the present cycle.
 _PAST_NS, _LONG_PAST_NS = 2_000_000, 3_950_000
 _LOSING_MODE = (2, 4, 7)  # pucks
 LAST_PUCK = 7  # nothing is on the wire after its reply
-_TWIN_NS, _TWIN_COUNTS = 50_000, 100  # of a second puck behind the first one
+_TWIN_NS, _TWIN_COUNTS = 50_000, 100  # delay and offset of a second puck's replies
 _LOST_SHARE = 0.01  # of the replies of each puck
 
 
 def network_faults(network: PuckNetwork) -> dict[str, Callable[[], None]]:
-    """Return what each name does to the network; `clear_network_faults` undoes it."""
+    """Return the network faults by name; `clear_network_faults` undoes them."""
     faults = network.faults
     return {
         **_reply_faults(faults),
@@ -79,17 +79,17 @@ def network_faults(network: PuckNetwork) -> dict[str, Callable[[], None]]:
         ),
         "safety-silent": lambda: network.silence(SAFETY_NODE),
         "safety-disobedient": network.disobey,
-        "safety-false-idle": lambda: _say_idle(network),
+        "safety-false-idle": lambda: _report_false_idle(network),
         "estop": lambda: network.pendant("estop"),
         "pendant-idle": lambda: network.pendant("idle"),
     }
 
 
 def clear_network_faults(network: PuckNetwork) -> None:
-    """End every fault that can be ended without the arm.
+    """Clear every fault that needs no action at the arm.
 
-    What the safety module latched waits for Shift-idle; a puck that rebooted sleeps
-    until a start-up wakes it and has to be zeroed, as on a real arm.
+    Faults latched by the safety module wait for Shift-idle; a rebooted puck sleeps
+    until a start-up wakes it and must be zeroed, as on a real arm.
     """
     network.faults.clear_faults()
     network.other_master.leave()
@@ -108,47 +108,47 @@ def clear_network_faults(network: PuckNetwork) -> None:
 
 
 def _reply_faults(faults: BusFaults) -> dict[str, Callable[[], None]]:
-    """Return what may happen to the positions on their way to the host."""
+    """Return the faults of the position replies by name."""
     reply = position_reply_id(PUCK)
     return {
         "reply-lost": lambda: faults.drop(reply),
         "reply-lost-3": lambda: faults.drop(reply, 3),
         "reply-lost-10": lambda: faults.drop(reply, 10),
-        "reply-lost-some": lambda: _lose_some(faults),
+        "reply-lost-some": lambda: _lose_a_share(faults),
         "reply-late": lambda: _answer_too_late(faults),
         "replies-late": lambda: _answer_always_late(faults, MOTOR_NODES, _PAST_NS),
         "puck-late": lambda: _answer_always_late(faults, [LAST_PUCK], _LONG_PAST_NS),
         "reply-doubled": lambda: faults.duplicate(reply, 3),
-        "puck-doubled": lambda: faults.answer_twice(reply, _off_by_a_bit, _TWIN_NS),
+        "puck-doubled": lambda: faults.answer_twice(reply, _second_position, _TWIN_NS),
         "reply-swapped": lambda: _swap_replies(faults),
         "reply-spoilt": lambda: faults.corrupt(reply, 0, 3),
     }
 
 
 def _answer_always_late(faults: BusFaults, nodes: Iterable[int], late_ns: int) -> None:
-    """Let every reply of `nodes` be late by about whole cycles, for ever."""
+    """Delay every reply of `nodes` permanently by `late_ns`, about whole cycles."""
     for node in nodes:
         faults.delay(position_reply_id(node), late_ns, None)
 
 
-def _off_by_a_bit(reply: bytes) -> bytes:
-    """Return the position of a second puck, some millimetres of the sole away."""
+def _second_position(reply: bytes) -> bytes:
+    """Return a second puck's position, some millimetres of the sole away."""
     return encode_position(decode_position(reply) + _TWIN_COUNTS)
 
 
-def _lose_some(faults: BusFaults) -> None:
+def _lose_a_share(faults: BusFaults) -> None:
     for node in MOTOR_NODES:
         faults.drop(position_reply_id(node), None, _LOST_SHARE)
 
 
-def _say_idle(network: PuckNetwork) -> None:
-    """Let the module say IDLE, and obey nobody."""
+def _report_false_idle(network: PuckNetwork) -> None:
+    """Make the module report IDLE and ignore commands."""
     network.disobey()
     network.say_idle()
 
 
 def _lose_torques(faults: BusFaults, group: Group) -> None:
-    """Let the torques of one group of motors reach nobody."""
+    """Lose the torque frames of one group of motors."""
     faults.lose_from_host(lambda can_id, _: can_id == group_id(group))
 
 
@@ -158,32 +158,30 @@ def _silence_all(network: PuckNetwork) -> None:
 
 
 def _swap_replies(faults: BusFaults) -> None:
-    """Let puck 3 answer after puck 7, and puck 6 now and then a question too late."""
-    faults.delay(position_reply_id(3), _BEHIND_THE_OTHERS_NS, count=None)
+    """Delay puck 3 after puck 7, and puck 6 now and then past the next request."""
+    faults.delay(position_reply_id(3), _AFTER_THE_OTHERS_NS, count=None)
     _answer_too_late(faults)
 
 
 def _answer_too_late(faults: BusFaults) -> None:
-    faults.delay(
-        position_reply_id(6), _BEHIND_THE_NEXT_QUESTION_NS, None, every=_LATE_EVERY
-    )
+    faults.delay(position_reply_id(6), _AFTER_NEXT_REQUEST_NS, None, every=_LATE_EVERY)
 
 
 _JOINT_6, _JOINT_7 = 5, 6
-# A blow that the driver still believes [rad/s]; the safety module does not count the
+# A blow within the driver's plausible range [rad/s]; the safety module ignores the
 # wrist, so the guard acts.
 _BLOW = 10.0
-# The lock of 20 N m/rad lets go of 50 mrad at 1 N m; the joint may have 1.3 N m. A
-# sudden twist would swing beyond that, so it grows.
+# The joint lock of 20 N m/rad deflects by 50 mrad, where it counts as slipped, at
+# 1 N m; the joint torque limit is 1.3 N m. A sudden twist would overshoot, so it ramps.
 _TWIST, _TWIST_STEP = 1.2, 0.02  # N m
-_LOAD = (0.0, 0.0, 120.0)  # on the foot, more than a trial may have [N]
-_FINGER = (0.0, 0.0, 3.2)  # below the sole while it hangs free, terrain frame [N]
+_LOAD = (0.0, 0.0, 120.0)  # on the foot, above the limit of a trial [N]
+_FINGER = (0.0, 0.0, 3.2)  # at the hanging sole, terrain frame [N]
 
 Later = Callable[[int, Callable[[], None]], None]  # (delay [ns], action)
 
 
 class BodyFaults:
-    """Pushes and twists the arm until `clear_faults`; `later` schedules it."""
+    """Pushes and twists the arm until `clear_faults`; `later` schedules an action."""
 
     def __init__(self, plant: ArmPlant, later: Later) -> None:
         self._plant = plant
@@ -191,7 +189,7 @@ class BodyFaults:
         self._is_twisting = False
 
     def by_name(self) -> dict[str, Callable[[], None]]:
-        """Return what each name does to the arm."""
+        """Return the faults of the arm by name."""
         return {
             "overspeed": self._hit,
             "joint7-slip": self._begin_twist,
@@ -201,13 +199,13 @@ class BodyFaults:
         }
 
     def clear_faults(self) -> None:
-        """End every twist and touch of the foot."""
+        """Remove every torque and force on the foot."""
         self._plant.finger = (0.0, 0.0, 0.0)
         self._is_twisting = False
         self._plant.disturbance[_JOINT_7] = 0.0
 
     def _hit(self) -> None:
-        if not self._plant.is_idle:  # a blow to damped joints does nothing
+        if not self._plant.is_idle:  # a blow to damped joints has no effect
             self._plant.qd[_JOINT_6] = _BLOW
 
     def _touch(self) -> None:
@@ -229,31 +227,31 @@ class BodyFaults:
 
 
 class Cable(Protocol):
-    """What joins a serial sensor and its reader."""
+    """The cable between a serial sensor and its reader."""
 
     def unplug(self) -> None:
-        """Pull it out."""
+        """Unplug the cable."""
         ...
 
     def plug_in(self) -> None:
-        """Put it in again."""
+        """Plug the cable in again."""
         ...
 
 
-_F_Z = 2  # of a wrench
+_F_Z = 2  # index in a wrench
 CLOCK_JUMP_US = 10_000_000
-_JUMP = (1.5, 0.0, -1.5, 0.0, 0.0, 0.0)  # of the zero: no tare hides so much [N, N m]
+_JUMP = (1.5, 0.0, -1.5, 0.0, 0.0, 0.0)  # of the zero: too large for a tare [N, N m]
 
 
 def stream_faults(
     stream: SensorStream, unplug: Callable[[], None], now_ns: Callable[[], int]
 ) -> dict[str, Callable[[], None]]:
-    """Return what each name does to a sensor on a serial port.
+    """Return the faults of a sensor on a serial port by name.
 
     Args:
         stream: the sensor.
-        unplug: pulls the cable.
-        now_ns: tells the time of the simulation [ns].
+        unplug: unplugs the cable.
+        now_ns: returns the time of the simulation [ns].
     """
     faults = stream.faults
     return {
@@ -272,7 +270,7 @@ def stream_faults(
 
 
 def clear_stream_faults(stream: SensorStream) -> None:
-    """End every fault of a sensor on a serial port but a pulled cable."""
+    """Clear every fault of a sensor on a serial port except an unplugged cable."""
     stream.recover()
     if stream.errors is not None:
         stream.errors.shift = NO_SHIFT
@@ -284,7 +282,7 @@ def _shift_zero(stream: SensorStream) -> None:
 
 
 def bus_sensor_faults(network: PuckNetwork) -> dict[str, Callable[[], None]]:
-    """Return what each name does to a sensor on the arm's bus."""
+    """Return the faults of a sensor on the arm's bus by name."""
     return {
         "ft-silent": lambda: network.silence(SENSOR_NODE),
         "ft-stale": lambda: network.silence(SENSOR_NODE),

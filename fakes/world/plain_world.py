@@ -1,4 +1,4 @@
-"""A simulated rig from plain values, as they go to a process of its own."""
+"""A simulated rig from plain values, as passed to its own process."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -19,7 +19,7 @@ from wam.model.tool import tool_of
 
 
 def _scene_of(fields: Mapping[str, Any]) -> SimulatedScene:
-    """Return the scene that was put into plain values."""
+    """Return the scene from its plain values."""
     frame = fields["frame"]
     return SimulatedScene(
         terrain=fields["terrain"],
@@ -43,12 +43,12 @@ def _scene_of(fields: Mapping[str, Any]) -> SimulatedScene:
 
 
 def departure_of(truth: Mapping[str, Any] | None, seed: int) -> Departure | None:
-    """Return how a rig differs from what is believed of it; None = not at all.
+    """Return the deviation of a rig from its settings; None = none.
 
     Args:
-        truth: "spread": it is one of many sound rigs; "mount": turns of its base about
-            x, y, z [degrees]; "wrong": its name in the catalogue, "" = none.
-        seed: of the sound rig.
+        truth: "spread": draw a sound rig; "mount": rotations of its base about x, y, z
+            [degrees]; "wrong": name in the catalogue of wrong rigs, "" = none.
+        seed: seed of the sound rig.
     """
     if truth is None:
         return None
@@ -62,12 +62,12 @@ def departure_of(truth: Mapping[str, Any] | None, seed: int) -> Departure | None
 def simulated_rig(
     fields: Mapping[str, Any], constants: ArmConstants, clock: Clock
 ) -> LocalSimulation:
-    """Return the simulation that was put into plain values.
+    """Return the simulation from its plain values.
 
     Args:
-        fields: scene, tool, share of friction, pace, cables.
-        constants: of the arm by its drawings.
-        clock: of the world.
+        fields: scene, tool, factor on the friction, pace, cables.
+        constants: constants of the arm from its drawings.
+        clock: clock of the simulated world.
     """
     scene = _scene_of(fields["scene"])
     options = PlantOptions(

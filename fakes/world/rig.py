@@ -50,23 +50,23 @@ from wam.model.constants import ArmConstants, Array
 from wam.model.start_pose import lowered_to
 from wam.model.tool import Tool
 
-_START_HEIGHT = 0.05  # the foot waits this far above the far end [m]
-LAG_NS = 600_000  # more than a cycle may be late
+_START_HEIGHT = 0.05  # of the waiting foot above the far end [m]
+LAG_NS = 600_000  # above the allowed lateness of a cycle
 _ANY_SENSOR = SensorChoice()
 
 
 @dataclass(frozen=True, slots=True)
 class SimulatedScene:
-    """What stands on the laboratory floor.
+    """The simulated set-up: terrain, ground, container, arm and sensor.
 
     Attributes:
         terrain: its name, e.g. "S10".
-        ground: what the container holds, and the foot that meets it.
-        frame: where the container is.
+        ground: contents of the container, and the foot.
+        frame: location of the container.
         start_q: joint positions with the foot at the far end [rad], shape (7,).
-        seed: of everything random.
-        sensor: which wrist sensor the arm has.
-        departure: how the rig differs from what is believed; None = not at all.
+        seed: seed of all random quantities.
+        sensor: the wrist sensor of the arm.
+        departure: deviation of the true rig from its settings; None = none.
     """
 
     terrain: str
@@ -88,7 +88,7 @@ def solve_start(model: ArmModel, frame: TerrainFrame, q: Array, height: float) -
 
 
 class FakeRig:
-    """Simulated devices joined by one plant; a World for the stepped clock.
+    """Simulated devices on one plant; a World for the stepped clock.
 
     The wrist sensor is on a serial port, or on the bus where `network` has one.
     """
@@ -117,17 +117,21 @@ class FakeRig:
         self.scene = scene
         self.plant = ArmPlant(constants, tool, scene.frame, q, options)
         self.plant.t_ns = clock.now_ns() // PERIOD_NS * PERIOD_NS
-        chosen = replace(network, mt=constants.mt)
+        network_options = replace(network, mt=constants.mt)
         if scene.sensor.is_on_bus:
-            chosen = replace(chosen, has_sensor=True)
+            network_options = replace(network_options, has_sensor=True)
         self.random = self._rake(0)
-        kind = (SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS) if chosen.has_sensor else ()
+        kind = (
+            (SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS)
+            if network_options.has_sensor
+            else ()
+        )
         self.errors = SensorErrors(self.random.sensor, *kind)
         source = self.plant.sensor_load
         if departure is not None:
             source = shown_load(source, departure)
         load = Load(source, self.errors)
-        self.network = PuckNetwork(self.plant, chosen, clock.now_ns(), load)
+        self.network = PuckNetwork(self.plant, network_options, clock.now_ns(), load)
         if departure is not None:
             depart(self.plant, self.network, departure, believed)
         self._body = BodyFaults(self.plant, self.network.schedule.after)
@@ -137,38 +141,38 @@ class FakeRig:
         self._cable: Cable | None = None
 
     def open_port(self) -> FakeSerialPort:
-        """Return the sensor's serial port, opened now."""
+        """Open and return the sensor's serial port."""
         self._cable = self._port = FakeSerialPort(self.stream, self._clock)
         return self._port
 
     def lay_cable(self, cable: Cable) -> None:
-        """Use `cable` for the serial sensor, as a port that others have opened."""
+        """Set the cable of the serial sensor, whose port another process opens."""
         self._cable = cable
 
     def advance(self, t_ns: int) -> None:
-        """Let every device go on to `t_ns`."""
+        """Advance every device to `t_ns`."""
         self.bus.advance(t_ns)
         if self._port is not None:
             self._port.advance(t_ns)
         self.plant.advance(t_ns)
 
     def next_event_ns(self) -> int | None:
-        """Return when a frame or byte arrives next."""
+        """Return when the next frame or byte arrives [ns]; None = never."""
         times = [self.bus.next_event_ns()]
         if self._port is not None:
             times.append(self._port.next_event_ns())
         return min((t for t in times if t is not None), default=None)
 
     def faults(self) -> dict[str, Callable[[], None]]:
-        """Return what each name of a fault does to the devices."""
+        """Return the faults of the devices by name."""
         sensor = bus_sensor_faults(self.network)
         if not self.network.options.has_sensor:
             now_ns = self._clock.now_ns
             sensor = stream_faults(self.stream, self._unplug, now_ns)
-        chosen = {**sensor, **network_faults(self.network), **self._body.by_name()}
+        actions = {**sensor, **network_faults(self.network), **self._body.by_name()}
         if isinstance(self._clock, SteppedClock):
-            chosen["loop-late"] = lambda: self._let_lag(LAG_NS)
-        return chosen
+            actions["loop-late"] = lambda: self._set_lag(LAG_NS)
+        return actions
 
     def clear_faults(self) -> None:
         """End every fault that can be ended without the arm."""
@@ -177,24 +181,24 @@ class FakeRig:
             self._cable.plug_in()
         self._body.clear_faults()
         clear_network_faults(self.network)
-        self._let_lag(0)
+        self._set_lag(0)
 
-    def _let_lag(self, lag_ns: int) -> None:
-        """Let all sleepers on stepped time wake `lag_ns` too late."""
+    def _set_lag(self, lag_ns: int) -> None:
+        """Make all sleepers on stepped time wake `lag_ns` too late."""
         if isinstance(self._clock, SteppedClock):
             self._clock.lag_ns = lag_ns
 
     def _unplug(self) -> None:
-        """Pull the sensor's cable; a port that is not open yet will bring nothing."""
+        """Unplug the sensor's cable; a port not open yet will receive nothing."""
         if self._cable is not None:
             self._cable.unplug()
         else:
             self.stream.go_silent()
 
     def rake(self, trial: int) -> None:
-        """Rake the bed for `trial`: ground and hand start anew.
+        """Rake the bed for `trial`: ground and hand are drawn again.
 
-        The sensor's errors go on; what they draw from here on is the trial's own.
+        The sensor's errors continue, with the random numbers of the trial.
         """
         self.random = self._rake(trial)
         self.errors.draw_from(self.random.sensor)
@@ -203,14 +207,14 @@ class FakeRig:
         scene = self.scene
         random = trial_generators(scene.seed, scene.terrain, trial)
         incline = scene.frame.incline
-        drawn = make_terrain(scene.ground, incline, random.ground)
-        self.ground: Terrain = Container(drawn)
+        terrain = make_terrain(scene.ground, incline, random.ground)
+        self.ground: Terrain = Container(terrain)
         self.plant.terrain = self.ground
         return random
 
 
 class LocalSimulation:
-    """What only the simulation can be asked: hand, pendant, bed, faults, truth.
+    """Control handle of the simulation: hand, pendant, bed, faults, truth.
 
     Attributes:
         rig: the simulated rig.
@@ -223,25 +227,25 @@ class LocalSimulation:
 
     @property
     def fault_names(self) -> tuple[str, ...]:
-        """Names that `inject` knows."""
+        """Names of the faults for `inject`."""
         return tuple(self._faults)
 
     def prepare(self, trial: int) -> None:
-        """Rake the bed for `trial` and begin to write the truth."""
+        """Rake the bed for `trial`."""
         self.rig.rake(trial)
 
     @property
     def is_hand_done(self) -> bool:
-        """Whether the hand has come to the end of its last order."""
+        """Whether the hand has completed its last order."""
         return self.rig.plant.hand.is_done
 
     def pose(self, q: Sequence[float], seconds: float) -> None:
-        """Let two hands bring the joints truly to `q` [rad] in `seconds`."""
-        self.rig.plant.terrain = None  # the container is moved aside
+        """Move the joints to the true positions `q` [rad] in `seconds` by two hands."""
+        self.rig.plant.terrain = None  # the container is moved away
         self.rig.plant.pose(q, seconds)
 
     def turn_to_stop(self, joint: int, side: Side) -> None:
-        """Let two hands turn joint 1-7 until its stop bears, and hold it there."""
+        """Turn joint 1-7 by two hands onto its stop, and hold it there."""
         self.rig.plant.terrain = None
         self.rig.plant.turn_to_stop(joint, side)
 
@@ -258,43 +262,43 @@ class LocalSimulation:
         self.rig.plant.twist(torque, seconds)
 
     def lift(self) -> None:
-        """Let the hand carry the foot above the far end and hold it still."""
-        self._roll_in()
+        """Make the hand carry the foot above the far end and hold it still."""
+        self._place_container()
         self.rig.plant.hand.lift_to_start()
 
     def rest(self) -> None:
-        """Let the hand stop pushing and lie on the arm."""
+        """Make the hand stop pushing and rest on the arm."""
         self.rig.plant.hand.rest()
 
     def take(self) -> None:
-        """Let the hand take the arm where it is and hold it there."""
+        """Make the hand grip the arm and hold it in its present pose."""
         self.rig.plant.hand.carry()
 
     def let_go(self) -> None:
-        """Let the hand let go of the arm."""
+        """Make the hand release the arm."""
         self.rig.plant.hand.let_go()
 
     def put_down(self) -> None:
-        """Let the hand put the foot down at the far end."""
-        self._roll_in()
+        """Make the hand put the foot down at the far end."""
+        self._place_container()
         self.rig.plant.hand.put_down(self.rig.ground.surface(0.0))
 
     def touch(self, number: int) -> None:
-        """Let the hand touch the ground with the sole and stay there.
+        """Make the hand touch the ground with the sole and stay there.
 
         1 to 4: far left, far right, near left, near right, seen from the arm; more:
         points between them.
         """
-        self._roll_in()
+        self._place_container()
         x, y = touched_place(number, self.rig.scene.frame.travel)
         self.rig.plant.hand.touch(x, y, self.rig.ground.surface(x))
 
-    def _roll_in(self) -> None:
-        """Put the container where it belongs."""
+    def _place_container(self) -> None:
+        """Move the container to its location."""
         self.rig.plant.terrain = self.rig.ground
 
     def push(self) -> None:
-        """Let the hand push the foot across."""
+        """Make the hand push the foot across; recording of the truth starts."""
         self.rig.plant.hand.push(self._pace, self.rig.random.hand)
         self.rig.plant.start_truth()
 
@@ -303,7 +307,7 @@ class LocalSimulation:
         self.rig.network.pendant(button)
 
     def inject(self, fault: str) -> None:
-        """Let a device fail; `fault` is one of `fault_names`."""
+        """Inject `fault`, one of `fault_names`."""
         self._faults[fault]()
 
     def clear_faults(self) -> None:
@@ -315,9 +319,9 @@ class LocalSimulation:
         return truth_records(self.rig.plant.take_truth(), self.rig.scene.frame)
 
     def parameters(self) -> dict[str, str]:
-        """Return the true parameters of the ground, and what moves the arm, as text.
+        """Return the true parameters of the ground, and the dynamics library, as text.
 
-        The dynamics' name is kept for readers of files: once there were others.
+        The library's name is kept for readers of older files, which may name others.
         """
         ground = {name: f"{v:.9g}" for name, v in self.rig.ground.truth().items()}
         effects = self.rig.scene.ground.effects
@@ -325,5 +329,5 @@ class LocalSimulation:
         return {**ground, **multiples, "dynamics": "pinocchio"}
 
     def friction(self) -> dict[str, list[float]]:
-        """Return the true friction of the motors, by the names of its model."""
+        """Return the true friction of the motors, by parameter of its model."""
         return self.rig.plant.friction.metadata()

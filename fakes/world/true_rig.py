@@ -1,4 +1,4 @@
-"""Applies what is true of a rig, but not believed, to arm, sensor, pucks and ground."""
+"""Application of a rig's deviations to arm, sensor, pucks and ground."""
 
 from dataclasses import replace
 
@@ -18,13 +18,13 @@ from wam.model.constants import ArmConstants, Array, Body
 from wam.model.tool import Tool
 
 _DOWN = np.array([0.0, 0.0, -1.0])
-_TWIN_NS = 150_000  # after which the second of two nodes answers
+_TWIN_NS = 150_000  # delay of the second of two nodes with one number
 
 
 def constants_around_home(constants: ArmConstants) -> ArmConstants:
-    """Return the arm with its stops no further in than home, which lies beyond two.
+    """Return the arm with its stops moved out to home, which lies beyond two of them.
 
-    A simulated spring would throw the arm off them.
+    Otherwise the springs of the simulated stops would throw the arm off.
     """
     return replace(
         constants,
@@ -34,7 +34,7 @@ def constants_around_home(constants: ArmConstants) -> ArmConstants:
 
 
 def true_constants(believed: ArmConstants, departure: Departure) -> ArmConstants:
-    """Return the arm as it is: stops, gear ratios, masses of its links."""
+    """Return the true arm: stops, gear ratios, masses of its links."""
     arm = constants_around_home(believed)
     pairs = zip(arm.links, departure.links.tolist(), strict=True)
     return replace(
@@ -42,12 +42,12 @@ def true_constants(believed: ArmConstants, departure: Departure) -> ArmConstants
         q_lower=arm.q_lower + departure.stops[0],
         q_upper=arm.q_upper + departure.stops[1],
         j2mp=arm.j2mp * departure.ratios,
-        links=tuple(replace(link, mass=link.mass + more) for link, more in pairs),
+        links=tuple(replace(link, mass=link.mass + extra) for link, extra in pairs),
     )
 
 
 def true_tool(believed: Tool, departure: Departure) -> Tool:
-    """Return the foot as it is."""
+    """Return the true foot."""
     foot, share = believed.foot, departure.foot_mass
     centre = foot.com + departure.foot_centre
     body = Body(share * foot.mass, centre, share * foot.inertia)
@@ -55,7 +55,7 @@ def true_tool(believed: Tool, departure: Departure) -> Tool:
 
 
 def true_options(believed: PlantOptions, departure: Departure) -> PlantOptions:
-    """Return friction and gravity as they are."""
+    """Return the true friction and direction of gravity."""
     down: list[float] = (rotation(departure.mount.tolist()).T @ _DOWN).tolist()
     x, y, z = down
     friction = departure.friction * believed.friction
@@ -63,7 +63,7 @@ def true_options(believed: PlantOptions, departure: Departure) -> PlantOptions:
 
 
 def true_network(believed: NetworkOptions, departure: Departure) -> NetworkOptions:
-    """Return the network as it is found: firmware of its pucks."""
+    """Return the true network: firmware of its pucks."""
     vers = list(believed.vers)
     for node, version in departure.versions:
         vers[node - 1] = version
@@ -71,7 +71,7 @@ def true_network(believed: NetworkOptions, departure: Departure) -> NetworkOptio
 
 
 def true_frame(believed: TerrainFrame, departure: Departure) -> TerrainFrame:
-    """Return where the container stands, in the frame of the base as it is turned."""
+    """Return the true location of the container in the rotated base frame."""
     place, yaw = departure.place, float(departure.mount[2])
     shifted = np.array(believed.far_end) + place.far_end
     x, y, z = (rotation((0.0, 0.0, yaw)).T @ shifted).tolist()
@@ -84,14 +84,14 @@ def true_frame(believed: TerrainFrame, departure: Departure) -> TerrainFrame:
 
 
 def true_start(q: Array, departure: Departure) -> Array:
-    """Return the pose of an arm that a person brings to its container, shape (7,)."""
-    turned = q.copy()
-    turned[0] -= departure.mount[2]
-    return turned
+    """Return the true start pose at the container [rad], shape (7,)."""
+    rotated = q.copy()
+    rotated[0] -= departure.mount[2]
+    return rotated
 
 
 def shown_load(source: Source, departure: Departure) -> Source:
-    """Return what the wrist sensor shows of the load on it."""
+    """Return the reading of the wrist sensor under the load `source`."""
     late_ns = round(1e9 * departure.force_late)
     if not late_ns and (departure.shown == np.eye(6)).all():
         return source
@@ -104,7 +104,7 @@ def depart(
     departure: Departure,
     believed: ArmConstants,
 ) -> None:
-    """Let cables, pucks, module and bus of a standing rig be as they are."""
+    """Apply the deviations of cables, pucks, safety module and bus to a rig at rest."""
     plant.wiring = wiring_of(plant, departure, believed)
     if departure.cable.any():
         plant.lay_cable(departure.cable.tolist())
@@ -117,15 +117,15 @@ def depart(
 def wiring_of(
     plant: ArmPlant, departure: Departure, believed: ArmConstants
 ) -> Wiring | None:
-    """Return what passes between pucks and motors; None = what is believed."""
+    """Return the wiring between pucks and motors; None = as assumed."""
     per_radian = np.array(believed.cts) / (2.0 * np.pi)
     true_home = per_radian * (believed.j2mp * departure.ratios @ believed.home)
     home = per_radian * (believed.j2mp @ believed.home)
     shift = per_radian * (believed.j2mp @ departure.zeros) + home - true_home
-    is_built = (departure.torque == np.eye(7)).all()
-    is_told = (departure.counts == np.eye(7)).all() and not shift.any()
+    has_true_torques = (departure.torque == np.eye(7)).all()
+    has_true_counts = (departure.counts == np.eye(7)).all() and not shift.any()
     torn = departure.torn
-    if is_built and is_told and not torn:
+    if has_true_torques and has_true_counts and not torn:
         return None
     wiring = Wiring(departure.torque, departure.counts, true_home, shift=shift)
     if not torn:
@@ -155,15 +155,15 @@ def _break_bus(network: PuckNetwork, bus: BusTrouble) -> None:
             faults.drop(position_reply_id(node), None, bus.lost)
     if bus.doubled:
         for reply in (position_reply_id(bus.doubled), property_reply_id(bus.doubled)):
-            faults.answer_twice(reply, _of_twin, _TWIN_NS)
+            faults.answer_twice(reply, _twin_reply, _TWIN_NS)
     if bus.other_master:
         network.other_master.join(bus.other_master)
     for node in bus.silent:
         network.silence(node)
 
 
-def _of_twin(data: Payload) -> bytes:
-    """Return what another device says in place of `data`: its lowest bits differ."""
+def _twin_reply(data: Payload) -> bytes:
+    """Return another device's reply in place of `data`, with one bit changed."""
     last = len(data) - 1 if len(data) == _POSITION else 2
     return bytes(b ^ 1 if i == last else b for i, b in enumerate(bytes(data)))
 

@@ -1,8 +1,8 @@
-"""The catalogue of wrong rigs: what may be wrong with a rig that is taken for sound.
+"""The catalogue of wrong rigs: undetected faults of a rig that is assumed to be sound.
 
-Each is a line of data, one of every kind: what is wrong, and why that happens. They are
-applied at the truth: arm, cables, sensor, pucks, bus, container; only what is mistyped
-is applied to the settings. Which step of commissioning finds which is a table of tests.
+Each is a line of data, one of every kind: the fault and its cause. They are applied to
+the true rig: arm, cables, sensor, pucks, bus, container; only typing errors are applied
+to the settings. A table in the tests names the commissioning step that finds each.
 """
 
 from dataclasses import dataclass
@@ -22,21 +22,21 @@ from fakes.world.departure import (
 from wam.bus.frames import MOTOR_NODES
 from wam.model.constants import Array
 
-_A_CYCLE_NS = 2_000_000  # of replies that are late for ever
+_A_CYCLE_NS = 2_000_000  # constant delay of replies
 _OTHER = 20  # node of another program
 _KGF = 0.10197  # per N
-_OTHER_GEARS = 9.48 / 9.7  # of the wrist of another generation
+_OTHER_GEARS = 9.48 / 9.7  # gear ratio of another generation's wrist
 
 
 @dataclass(frozen=True, slots=True)
 class WrongRig:
-    """A rig that is not what it is taken for.
+    """A rig that differs from its settings.
 
     Attributes:
-        name: it is called by.
-        wrong: what is wrong, in words.
-        cause: how that may come about.
-        departure: how it differs from what is believed.
+        name: its name.
+        wrong: text of the fault.
+        cause: text of a possible cause.
+        departure: deviation from the settings and drawings.
     """
 
     name: str
@@ -46,7 +46,7 @@ class WrongRig:
 
 
 def _scaled(**motors: float) -> Array:
-    """Return the matrix of motors that make a share of it, e.g. `m2=0.5`, (7, 7)."""
+    """Return the identity with the rows of motors scaled, e.g. `m2=0.5`, (7, 7)."""
     matrix = np.eye(7)
     for name, share in motors.items():
         matrix[int(name[1:]) - 1] *= share
@@ -54,7 +54,7 @@ def _scaled(**motors: float) -> Array:
 
 
 def _swapped(a: int, b: int) -> Array:
-    """Return the matrix of two cables that are swapped, 1-7, shape (7, 7)."""
+    """Return the matrix of two swapped cables, 1-7, shape (7, 7)."""
     matrix = np.eye(7)
     matrix[[a - 1, b - 1]] = matrix[[b - 1, a - 1]]
     return matrix
@@ -62,27 +62,27 @@ def _swapped(a: int, b: int) -> Array:
 
 def _foreign_matrix() -> Array:
     """Return a calibration of one sensor times the inverse of another one's, (6, 6)."""
-    units = np.array([1.0, 1.0, 1.0, 0.05, 0.05, 0.05])  # of loads alike: N, N m
+    units = np.array([1.0, 1.0, 1.0, 0.05, 0.05, 0.05])  # comparable loads: N, N m
     mixed = 0.12 * np.random.default_rng(51).standard_normal((6, 6))
     return np.eye(6) + mixed * units[:, None] / units
 
 
-def _said(*properties: tuple[int, str, int]) -> Departure:
+def _with_properties(*properties: tuple[int, str, int]) -> Departure:
     return Departure(properties=properties)
 
 
-def _senses(shown: Array) -> Departure:
+def _with_sensor(shown: Array) -> Departure:
     return Departure(shown=shown)
 
 
 # fmt: off
 _RIGS = (
-    WrongRig("pidx-3-is-2", "puck 3 takes the torque of puck 2 (PIDX 2)", "spare puck", _said((3, "PIDX", 2))),
-    WrongRig("cts-tenfold", "all pucks state ten times their counts per turn", "property of an old arm", _said(*((node, "CTS", 40960) for node in MOTOR_NODES))),
+    WrongRig("pidx-3-is-2", "puck 3 takes the torque of puck 2 (PIDX 2)", "spare puck", _with_properties((3, "PIDX", 2))),
+    WrongRig("cts-tenfold", "all pucks state ten times their counts per turn", "property of an old arm", _with_properties(*((node, "CTS", 40960) for node in MOTOR_NODES))),
     WrongRig("mixed-firmware", "puck 3 has firmware 60, in which properties have other numbers", "repair", Departure(versions=((3, 60),))),
-    WrongRig("one-puck-replaced", "puck 3 has another serial number", "repair", _said((3, "SN", 2003))),
+    WrongRig("one-puck-replaced", "puck 3 has another serial number", "repair", _with_properties((3, "SN", 2003))),
     WrongRig("puck-4-silent", "puck 4 says nothing", "transmit wire", Departure(bus=BusTrouble(silent=(4,)))),
-    WrongRig("puck-6-hot", "puck 6 is 58 degrees warm, idle", "motor that was stalled", _said((6, "TEMP", 58), (6, "THERM", 57))),
+    WrongRig("puck-6-hot", "puck 6 is 58 degrees warm, idle", "motor that was stalled", _with_properties((6, "TEMP", 58), (6, "THERM", 57))),
     WrongRig("motor-3-reversed", "motor 3 turns the other way", "plug turned", Departure(torque=_scaled(m3=-1.0))),
     WrongRig("motors-5-6-swapped", "cables of motors 5 and 6 are swapped", "loom", Departure(torque=_swapped(5, 6))),
     WrongRig("motor-2-dead", "motor 2 makes no torque, its puck answers", "open phase", Departure(torque=_scaled(m2=0.0))),
@@ -101,11 +101,11 @@ _RIGS = (
     WrongRig("foot-heavier", "the foot has one and a half times the mass that is typed", "another foot", Departure(foot_mass=1.5)),
     WrongRig("centre-off-50mm", "the centre of the foot is 50 mm aside", "drawing", Departure(foot_centre=np.array([0.0, 0.05, 0.0]))),
     WrongRig("sole-20mm-lower", "the sole is 20 mm lower", "another sole", Departure(sole=np.array([0.0, 0.0, 0.02]))),
-    WrongRig("sensor-turned-20deg", "the sensor is turned by 20 degrees about joint 7", "slot", _senses(turned_axes(np.radians([0.0, 0.0, 20.0]).tolist()))),
-    WrongRig("sensor-sign", "the sensor shows the reaction", "convention", _senses(-np.eye(6))),
-    WrongRig("sensor-kgf", "forces are in kilograms", "the vendor's tool", _senses(np.diag([_KGF] * 3 + [1.0] * 3))),
-    WrongRig("sensor-scale-95", "the sensor shows 5 % too little", "another sheet", _senses(0.95 * np.eye(6))),
-    WrongRig("sensor-foreign-matrix", "the matrix is that of another sensor", "files mixed up", _senses(_foreign_matrix())),
+    WrongRig("sensor-turned-20deg", "the sensor is turned by 20 degrees about joint 7", "slot", _with_sensor(turned_axes(np.radians([0.0, 0.0, 20.0]).tolist()))),
+    WrongRig("sensor-sign", "the sensor shows the reaction", "convention", _with_sensor(-np.eye(6))),
+    WrongRig("sensor-kgf", "forces are in kilograms", "the vendor's tool", _with_sensor(np.diag([_KGF] * 3 + [1.0] * 3))),
+    WrongRig("sensor-scale-95", "the sensor shows 5 % too little", "another sheet", _with_sensor(0.95 * np.eye(6))),
+    WrongRig("sensor-foreign-matrix", "the matrix is that of another sensor", "files mixed up", _with_sensor(_foreign_matrix())),
     WrongRig("sensor-cable-pulls", "the sensor's cable pulls at the foot with 1 N", "strain relief", Departure(cable=np.array([0.6, 0.8, 0.0]))),
     WrongRig("sensor-20ms-late", "forces are 20 ms old", "buffer", Departure(force_late=0.020)),
     WrongRig("replies-a-cycle-late", "every position comes a cycle late", "adapter", Departure(bus=BusTrouble(late_ns=tuple((node, _A_CYCLE_NS) for node in MOTOR_NODES)))),
@@ -130,17 +130,17 @@ def catalogue() -> dict[str, WrongRig]:
 
 
 def wrong_rig(name: str) -> WrongRig:
-    """Return the rig of that name.
+    """Return the wrong rig of that name.
 
     Raises:
-        SettingsError: the catalogue has none.
+        SettingsError: there is none of that name.
     """
     rigs = catalogue()
     if name in rigs:
         return rigs[name]
-    near = get_close_matches(name.lower(), rigs, n=1, cutoff=0.6)
-    asked = f"Did you mean {near[0]}? " if near else ""
+    matches = get_close_matches(name.lower(), rigs, n=1, cutoff=0.6)
+    suggestion = f"Did you mean {matches[0]}? " if matches else ""
     raise SettingsError(
         f"There is no wrong rig {name[:60]!r}.",
-        hint=f"{asked}--wrong help lists them. Nothing was started.",
+        hint=f"{suggestion}--wrong help lists them. Nothing was started.",
     )

@@ -1,5 +1,5 @@
-"""Sensor, foot and container measured: least-squares fits and their files.
+"""Calibration of sensor, foot and container: least-squares fits and their files.
 
-`fit` finds mass, centre, bias and mounting from wrenches in known poses, `files` and
-`sensor_file` read and write what was found.
+`fit` identifies mass, centre of mass, bias and mounting from wrenches in known poses,
+`files` and `sensor_file` read and write the results.
 """

@@ -1,4 +1,4 @@
-"""Calibration and terrain as TOML: what a recording needs to be read years later."""
+"""Payload calibration and terrain as TOML, attached to every recording."""
 
 from collections.abc import Mapping
 from typing import Any, TypeVar
@@ -60,7 +60,7 @@ def payload_from_toml(text: str) -> tuple[Payload, Array]:
     """Return (payload, sole [m] (3,)) from `ft_calibration.toml`.
 
     Raises:
-        SettingsError: the text is not of that form.
+        SettingsError: the text is not a valid file.
     """
     file = _parse(_PayloadFile, text, "ft_calibration.toml")
     payload = Payload(
@@ -74,7 +74,7 @@ def payload_from_toml(text: str) -> tuple[Payload, Array]:
 
 
 def terrain_to_toml(name: str, frame: TerrainFrame, fields: Mapping[str, str]) -> str:
-    """Return `terrain.toml`: where the container stood and what was in it."""
+    """Return `terrain.toml`: pose of the container and facts about its bed."""
     file = _TerrainFile.model_construct(
         name=name,
         incline=float(frame.incline),
@@ -90,7 +90,7 @@ def terrain_from_toml(text: str) -> tuple[str, TerrainFrame]:
     """Return (name, frame) from `terrain.toml`.
 
     Raises:
-        SettingsError: the text is not of that form.
+        SettingsError: the text is not a valid file.
     """
     file = _parse(_TerrainFile, text, "terrain.toml")
     frame = TerrainFrame(file.incline, file.heading, file.far_end, file.travel)
@@ -98,10 +98,10 @@ def terrain_from_toml(text: str) -> tuple[str, TerrainFrame]:
 
 
 def terrain_metadata(text: str) -> dict[str, str]:
-    """Return what else `terrain.toml` says, empty where it says nothing.
+    """Return the table `facts` of `terrain.toml`, empty if there is none.
 
     Raises:
-        SettingsError: the text is not of that form.
+        SettingsError: the text is not a valid file.
     """
     facts = _parse(_TerrainFile, text, "terrain.toml").facts
     return {key: str(value) for key, value in facts.items()}

@@ -1,11 +1,12 @@
-"""What the sensor carries and how it is mounted, from readings in many orientations.
+"""Payload and mounting of the sensor from readings in many orientations.
 
-At rest and without contact the sensor shows
+At rest and without contact the sensor reads
 
     f = s m R_WS^T g_w + b,   n = s c x (m R_WS^T g_w) + b_n
 
-with R_WS = R_W7 Rz(psi). For a mounting angle psi and a sign s the forces are linear in
-m and b, the torques in m c and b_n; psi is searched, both signs are tried.
+with R_WS = R_W7 Rz(psi). For a given mounting angle psi and sign s the forces are
+linear in m and b, the torques in m c and b_n; psi is searched, both signs are tried.
+Also the frame of a container from touched points.
 """
 
 from dataclasses import dataclass
@@ -20,8 +21,8 @@ from wam.model.constants import GRAVITY, Array
 
 FEWEST = 6  # orientations
 LARGEST_RESIDUAL = 0.3  # N rms; a sound sensor drifts by 0.2 between two poses
-LEAST_SPREAD = 0.15  # of the weight's direction: the smallest singular value, relative
-_LIGHTEST = 0.02  # kg, a weight that is surely seen
+LEAST_SPREAD = 0.15  # relative smallest singular value of the gravity directions
+_LIGHTEST = 0.02  # kg; smallest mass that is significant
 _COARSE = np.radians(np.arange(-180.0, 180.0, 5.0))
 _FINE_STEPS = 40  # halvings of the bracket around the best coarse angle
 
@@ -30,16 +31,16 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class SensorFit:
-    """What a series of orientations says.
+    """Payload, bias and mounting fitted to a series of orientations.
 
     Attributes:
-        mass: of everything below the gauges [kg].
-        com: its centre in the sensor frame [m], shape (3,).
+        mass: mass of everything below the gauges [kg].
+        com: centre of mass in the sensor frame [m], shape (3,).
         bias: reading without load [N, N m], shape (6,).
-        angle: of the sensor frame about z7 [rad], -pi..pi.
-        sign: +1 if the sensor reads the load on it, -1 if the reaction.
-        residual: rms of force that is not explained [N].
-        torque_residual: rms of torque that is not explained [N m].
+        angle: angle of the sensor frame about z7 [rad], -pi..pi.
+        sign: +1 if the sensor reads the load, -1 if it reads the reaction.
+        residual: rms force residual [N].
+        torque_residual: rms torque residual [N m].
     """
 
     mass: float
@@ -56,27 +57,27 @@ def fit_sensor(
     readings: Floats,
     mounting: tuple[float, float] | None = None,
 ) -> SensorFit:
-    """Fit payload, bias and mounting to readings at rest without contact.
+    """Fit payload, bias and mounting to readings at torque_residual without contact.
 
     Args:
         rotations: orientations of frame 7 in the base frame, shape (n, 3, 3), n >= 6.
-        readings: mean raw readings there [N, N m], shape (n, 6).
-        mounting: angle [rad] and sign where they are known; None = fitted too.
+        readings: mean raw readings [N, N m], shape (n, 6).
+        mounting: known angle [rad] and sign; None = fitted, too.
 
     Raises:
-        SettingsError: too few orientations, or too much alike.
+        SettingsError: too few or too similar orientations, or a wrong sign.
     """
     down = _directions(rotations)
     forces, torques = readings[:, :3], readings[:, 3:]
     fits: list[tuple[float, float, float, Array, float]] = []
     for sign in (1.0, -1.0) if mounting is None else (mounting[1],):
-        seen = sign * GRAVITY * down
-        angle = _search_angle(seen, forces) if mounting is None else mounting[0]
-        fits.append((*_fit_forces(seen, forces, angle), sign))
+        acceleration = sign * GRAVITY * down
+        angle = _search_angle(acceleration, forces) if mounting is None else mounting[0]
+        fits.append((*_fit_forces(acceleration, forces, angle), sign))
     residual, angle, mass, bias, sign = min(fits, key=_cost)
     if mounting is not None and mass < -_LIGHTEST:
         raise SettingsError(
-            f"The foot's weight turns the other way in the sensor: its sign is not "
+            f"The foot's weight has the opposite sign in the sensor: its sign is not "
             f"{sign:+.0f}.",
             hint=f"Write sign = {-sign:.0f} into [ft_sensor] of rig.toml, or run "
             "traction calibrate sensor.",
@@ -87,8 +88,8 @@ def fit_sensor(
             hint="Is this sensor the one that carries the foot, and does its sign in "
             "rig.toml fit?",
         )
-    weight = mass * sign * GRAVITY * _turned(down, angle)
-    moment, bias_torque, rest = _fit_torques(weight / mass, torques)
+    weight = mass * sign * GRAVITY * _in_sensor_frame(down, angle)
+    moment, bias_torque, torque_residual = _fit_torques(weight / mass, torques)
     return SensorFit(
         mass=mass,
         com=moment / mass,
@@ -96,7 +97,7 @@ def fit_sensor(
         angle=angle,
         sign=sign,
         residual=residual,
-        torque_residual=rest,
+        torque_residual=torque_residual,
     )
 
 
@@ -106,7 +107,7 @@ def _cost(fit: tuple[float, float, float, Array, float]) -> float:
 
 
 def turn_words(angle: float, other: float) -> str:
-    """Return that a sensor is turned from `angle` to `other` [rad], "" = it is not."""
+    """Return a text if a sensor is turned from `angle` to `other` [rad], else ""."""
     turned = float(np.degrees((other - angle + np.pi) % (2.0 * np.pi) - np.pi))
     if abs(turned) <= np.degrees(LARGEST_TURN):
         return ""
@@ -116,15 +117,15 @@ def turn_words(angle: float, other: float) -> str:
 def check_residual(
     fit: SensorFit, *, is_forced: bool, free: SensorFit | None = None
 ) -> None:
-    """Refuse a fit that explains too little.
+    """Refuse a fit with large force residuals.
 
     Args:
-        fit: of the readings.
+        fit: fit of the readings.
         is_forced: a person accepts it.
-        free: of the same readings with the mounting fitted too; None = it was.
+        free: fit of the same readings with free mounting; None = `fit` has it free.
 
     Raises:
-        SettingsError: more than 0.3 N are left and it is not forced.
+        SettingsError: the residual exceeds 0.3 N and is not forced.
     """
     if fit.residual > LARGEST_RESIDUAL and not is_forced:
         turned = ""
@@ -146,10 +147,10 @@ def check_residual(
 
 
 def _directions(rotations: Floats) -> Floats:
-    """Return the direction of gravity in frame 7, shape (n, 3), if they differ enough.
+    """Return the directions of gravity in frame 7, shape (n, 3).
 
     Raises:
-        SettingsError: too few orientations, or too much alike.
+        SettingsError: too few or too similar orientations.
     """
     if len(rotations) < FEWEST:
         raise SettingsError(
@@ -160,15 +161,15 @@ def _directions(rotations: Floats) -> Floats:
     spread = np.linalg.svd(down - down.mean(axis=0), compute_uv=False)
     if spread[-1] < LEAST_SPREAD * np.sqrt(len(down) / 3):
         raise SettingsError(
-            "The orientations are too much alike: the foot has to point up, down and "
-            "to all sides.",
+            "The orientations are too similar: the foot has to point up, down and to "
+            "all sides.",
             hint="Use more different poses.",
         )
     return down
 
 
-def _turned(down: Floats, angle: float) -> Floats:
-    """Return directions of frame 7 in the sensor frame, turned by `angle` [rad]."""
+def _in_sensor_frame(down: Floats, angle: float) -> Floats:
+    """Rotate directions from frame 7 to a sensor frame at `angle` about z7 [rad]."""
     c, s = np.cos(angle), np.sin(angle)
     return down @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
@@ -177,13 +178,13 @@ def _fit_forces(
     accelerations: Floats, forces: Floats, angle: float
 ) -> tuple[float, float, float, Array]:
     """Return (rms residual [N], angle, mass [kg], bias [N]) for one mounting angle."""
-    seen = _turned(accelerations, angle)
-    centred = seen - seen.mean(axis=0)
-    wanted = forces - forces.mean(axis=0)
-    mass = float((centred * wanted).sum() / (centred * centred).sum())
-    bias = forces.mean(axis=0) - mass * seen.mean(axis=0)
-    rest = forces - mass * seen - bias
-    return float(np.sqrt((rest**2).mean())), angle, mass, bias
+    in_sensor = _in_sensor_frame(accelerations, angle)
+    centred = in_sensor - in_sensor.mean(axis=0)
+    centred_forces = forces - forces.mean(axis=0)
+    mass = float((centred * centred_forces).sum() / (centred * centred).sum())
+    bias = forces.mean(axis=0) - mass * in_sensor.mean(axis=0)
+    residuals = forces - mass * in_sensor - bias
+    return float(np.sqrt((residuals**2).mean())), angle, mass, bias
 
 
 def _search_angle(accelerations: Floats, forces: Floats) -> float:
@@ -209,26 +210,25 @@ def _fit_torques(accelerations: Floats, torques: Floats) -> tuple[Array, Array, 
     solution: Array = np.asarray(
         np.linalg.lstsq(matrix, torques.ravel())[0], dtype=np.float64
     )
-    rest = torques.ravel() - matrix @ solution
-    return solution[:3], solution[3:], float(np.sqrt((rest**2).mean()))
+    residuals = torques.ravel() - matrix @ solution
+    return solution[:3], solution[3:], float(np.sqrt((residuals**2).mean()))
 
 
 CORNERS = ("far left", "far right", "near left", "near right")
-LARGEST_TILT = np.radians(1.0)  # between touched and expected incline
-LEAST_EDGE = 0.05  # m between two touched corners of an edge
+LARGEST_TILT = np.radians(1.0)  # difference of measured and expected incline
+LEAST_EDGE = 0.05  # m between the two corners of an edge
 LEAST_LENGTH = 0.1  # m between the edges
 
 
 @dataclass(frozen=True, slots=True)
 class ContainerFit:
-    """A container as touched.
+    """Frame of a container from touched points.
 
     Attributes:
         frame: incline, heading, far end and length; `travel` is the whole distance
             from far to near edge.
         residual: rms distance of the points from the plane [m].
-        roll: tilt of the plane about the way of the foot [rad]; 0 where it was
-            levelled.
+        roll: tilt of the plane about the foot's path [rad]; 0 if levelled.
     """
 
     frame: TerrainFrame
@@ -237,14 +237,14 @@ class ContainerFit:
 
 
 def fit_terrain(points: NDArray[np.float64]) -> ContainerFit:
-    """Return the container's frame from touched points.
+    """Fit the container's frame to touched points.
 
-    The plane is that of least squares through all points; the way of the foot leads
-    from the middle of the far edge to that of the near edge.
+    The plane is fitted by least squares; the foot's path leads from the middle of the
+    far edge to the middle of the near edge.
 
     Args:
-        points: of the sole [m], base frame, shape (n, 3), n >= 4; the first four are
-            `CORNERS` in their order.
+        points: positions of the sole [m], base frame, shape (n, 3), n >= 4; the first
+            four are `CORNERS` in their order.
 
     Raises:
         SettingsError: too few points, corners too close together, or a vertical plane.
@@ -284,10 +284,10 @@ def fit_terrain(points: NDArray[np.float64]) -> ContainerFit:
 def check_terrain(
     fit: ContainerFit, expected: TerrainFrame, *, is_forced: bool
 ) -> None:
-    """Hold a touched container against its row of the matrix.
+    """Compare a measured container with its row of the matrix.
 
     Raises:
-        SettingsError: the incline is more than 1 degree off and it is not forced.
+        SettingsError: the incline is more than 1 degree off and not forced.
     """
     if is_inclined_otherwise(fit, expected) and not is_forced:
         raise SettingsError(
@@ -298,7 +298,7 @@ def check_terrain(
 
 
 def is_inclined_otherwise(fit: ContainerFit, expected: TerrainFrame) -> bool:
-    """Return whether a touched container is not inclined as its row says."""
+    """Return whether the measured incline differs from the terrain's row."""
     return abs(fit.frame.incline - expected.incline) > LARGEST_TILT
 
 

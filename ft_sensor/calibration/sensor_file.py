@@ -1,4 +1,4 @@
-"""A calibration of the wrist sensor as TOML: payload, mounting, bias, what was read."""
+"""Wrist sensor calibration as TOML: payload, mounting, bias, readings."""
 
 from dataclasses import dataclass
 from typing import Annotated, Self
@@ -20,16 +20,16 @@ _Nine = Annotated[tuple[Number, ...], Field(min_length=9, max_length=9)]
 
 @dataclass(frozen=True, slots=True)
 class SensorCalibration:
-    """What one foot weighs on one sensor, and how the sensor is mounted.
+    """Payload of one foot on one sensor, and the sensor's mounting.
 
     Attributes:
         fit: payload, mounting and bias.
-        foot: name of the foot that was on.
-        drift: how much the force in the first orientation had changed at the end [N].
-        measured_utc: when.
-        is_simulated: the sensor was a simulated one.
+        foot: name of the mounted foot.
+        drift: change of the force in the first orientation until the end [N].
+        measured_utc: time of the measurement.
+        is_simulated: the sensor was simulated.
         rotations: orientations of frame 7 in the base frame, shape (n, 3, 3).
-        readings: mean raw readings there [N, N m], shape (n, 6).
+        readings: mean raw readings [N, N m], shape (n, 6).
         is_forced: a person accepted it although `check_residual` refuses it.
     """
 
@@ -43,10 +43,10 @@ class SensorCalibration:
     is_forced: bool = False
 
     def com_in_frame_7(self, height: float) -> Array:
-        """Return the payload's centre in frame 7 [m], shape (3,).
+        """Return the payload's centre of mass in frame 7 [m], shape (3,).
 
         Args:
-            height: origin of the sensor frame above the tool plate [m].
+            height: height of the sensor frame above the tool plate [m].
         """
         x, y, z = self.fit.com.tolist()
         c, s = np.cos(self.fit.angle), np.sin(self.fit.angle)
@@ -60,7 +60,7 @@ class _SensorFile(TomlFile):
     measured_utc: str
     is_simulated: bool = Field(strict=True)
     is_forced: bool = Field(default=False, strict=True)
-    mass: Number = Field(ge=0, le=5)  # kg; what a wrist sensor carries
+    mass: Number = Field(ge=0, le=5)  # kg
     com: tuple[Number, Number, Number]
     angle: Number = Field(ge=-2 * np.pi, le=2 * np.pi)
     sign: Number = Field(ge=-1, le=1)

@@ -1,5 +1,5 @@
-"""A sensor on the network: datagrams of one address, whole or not at all.
+"""A sensor on the network: UDP datagrams of one address.
 
-`datagrams` is the port, in the place of a serial one: what comes from its sensor in the
-right size is handed over, in the order of arrival. Begin there.
+`datagrams` replaces the serial port: it delivers datagrams of the right size from the
+sensor's address in order of arrival. Begin there.
 """

@@ -1,10 +1,9 @@
-"""UDP as a port: datagrams of one sensor, drained and never waited on.
+"""Non-blocking UDP port for the datagrams of one sensor.
 
-The socket is connected: the kernel binds it to the one local address that leads to the
-sensor and hands over nothing that comes from elsewhere. Datagrams of another size are
-counted and dropped, so what is read is always a whole number of frames. The network
-drops damaged ones itself, by their checksum; lost, doubled and overtaken ones are the
-business of whoever reads their numbers.
+The socket is connected, so the kernel drops datagrams of other senders. Datagrams of
+another size are counted and dropped: the data always consist of whole frames. The
+network stack drops damaged ones by their checksum; lost, duplicate and reordered ones
+are left to the protocol with its sequence numbers.
 """
 
 import ipaddress
@@ -13,19 +12,19 @@ from dataclasses import dataclass
 
 from acquisition.errors import LinkError, SettingsError
 
-_LARGEST = 2048  # bytes that are taken of one datagram
-_HELD = 8192  # bytes that wait to be read
-_MOST_AT_ONCE = 512  # datagrams in one look; the rest waits in the kernel
+_DATAGRAM_BYTES = 2048  # bytes read of one datagram
+_BUFFER_BYTES = 8192  # bytes buffered here
+_DATAGRAMS_PER_CALL = 512  # datagrams per call; the rest stays in the kernel
 _HINT = "Is the sensor powered, its cable in, and this the address of its web page?"
 
 
 @dataclass(frozen=True, slots=True)
 class SensorAddress:
-    """Where a sensor is: a number, never a name that would have to be looked up.
+    """Address of a sensor: numeric, without name resolution.
 
     Attributes:
         host: IPv4 address.
-        port: of UDP.
+        port: UDP port.
     """
 
     host: str
@@ -33,15 +32,15 @@ class SensorAddress:
 
     @property
     def text(self) -> str:
-        """As it is written in rig.toml."""
+        """The address as in rig.toml."""
         return f"{self.host}:{self.port}"
 
 
 def parse_address(text: str, usual_port: int) -> SensorAddress:
-    """Return the address that `HOST` or `HOST:PORT` says.
+    """Parse an address `HOST` or `HOST:PORT`.
 
     Raises:
-        SettingsError: it is none, or one that no single sensor has.
+        SettingsError: not a valid unicast address.
     """
     host, mark, port = text.partition(":")
     try:
@@ -51,12 +50,12 @@ def parse_address(text: str, usual_port: int) -> SensorAddress:
         address, number = None, 0
     if address is None or not 0 < number < 65_536:
         raise SettingsError(
-            f"{text[:60]!r} is no address of a sensor.",
+            f"{text[:60]!r} is not an address of a sensor.",
             hint="Give its IPv4 address, e.g. 192.168.1.1.",
         )
     if address.is_multicast or address.is_unspecified or host == "255.255.255.255":
         raise SettingsError(
-            f"{host} is the address of many, not of one sensor.",
+            f"{host} is not the address of a single sensor.",
             hint="Give its own, e.g. 192.168.1.1.",
         )
     return SensorAddress(host, number)
@@ -66,15 +65,15 @@ class DatagramPort:
     """Implements `ft_sensor.serial_line.link.SerialPort` over UDP.
 
     Attributes:
-        strange: datagrams of another size than the sensor's.
-        overrun: datagrams without a reader.
+        strange: datagrams dropped because of their size.
+        overrun: datagrams dropped because the buffer was full.
     """
 
     def __init__(self, address: SensorAddress, size: int) -> None:
         """Connect to `address`; its datagrams have `size` bytes.
 
         Raises:
-            LinkError: no interface leads there.
+            LinkError: no route to the address.
         """
         self.strange = 0
         self.overrun = 0
@@ -88,13 +87,13 @@ class DatagramPort:
         except OSError as error:
             self._socket.close()
             raise LinkError(
-                f"No way leads to the F/T sensor at {address.text}: {error}.",
+                f"No route to the F/T sensor at {address.text}: {error}.",
                 hint=_HINT,
             ) from error
 
     @property
     def in_waiting(self) -> int:
-        """Number of bytes that can be read at once; whole datagrams."""
+        """Number of bytes available; whole datagrams."""
         self._receive()
         return len(self._buffer)
 
@@ -108,7 +107,7 @@ class DatagramPort:
         """Send one datagram.
 
         Raises:
-            LinkError: the network takes nothing.
+            LinkError: the network refuses it.
         """
         try:
             return self._socket.send(data)
@@ -116,7 +115,7 @@ class DatagramPort:
             raise self._broken(error) from error
 
     def reset_input_buffer(self) -> None:
-        """Throw away what has arrived."""
+        """Discard received data."""
         self._receive()
         self._buffer.clear()
 
@@ -125,21 +124,21 @@ class DatagramPort:
         return self._socket.fileno()
 
     def close(self) -> None:
-        """Give the socket back."""
+        """Close the socket."""
         self._socket.close()
 
     def _receive(self) -> None:
-        """Take what the kernel holds."""
-        for _ in range(_MOST_AT_ONCE):
+        """Read the kernel's queue into the buffer."""
+        for _ in range(_DATAGRAMS_PER_CALL):
             try:
-                data = self._socket.recv(_LARGEST)
+                data = self._socket.recv(_DATAGRAM_BYTES)
             except BlockingIOError:
                 return
             except OSError as error:
                 raise self._broken(error) from error
             if len(data) != self._size:
                 self.strange += 1
-            elif len(self._buffer) + len(data) > _HELD:
+            elif len(self._buffer) + len(data) > _BUFFER_BYTES:
                 self.overrun += 1
             else:
                 self._buffer += data

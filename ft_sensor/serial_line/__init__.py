@@ -1,6 +1,6 @@
-"""A sensor on a serial port: bytes to dated samples.
+"""A sensor on a serial port: from bytes to timestamped samples.
 
-`link` imports pyserial, `framing` finds frames in damaged bytes, `timestamps`
-dates samples by the sensor's own counter, `sensor` is a `WrenchSensor` of any make and
-`reconnect` opens it again after it was unplugged. Begin with `sensor`.
+`link` imports pyserial, `framing` finds frames in damaged data, `timestamps` dates
+samples by the sensor's counter, `sensor` implements `WrenchSensor` for any make and
+`reconnect` reopens it after it was unplugged. Begin with `sensor`.
 """

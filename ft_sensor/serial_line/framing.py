@@ -1,4 +1,4 @@
-"""Frames of a fixed size in a byte stream that may be damaged anywhere."""
+"""Scanner for frames of fixed size in a possibly damaged byte stream."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,14 +11,14 @@ BITS_PER_BYTE = 10  # 8N1: a start bit, eight data bits, a stop bit
 
 @dataclass(slots=True)
 class ScanCounters:
-    """What a scanner has met so far.
+    """Counters of a scanner.
 
     Attributes:
         frames: good frames.
         bad_checks: headers whose frame failed its checks; one damaged frame counts
-            once for every header in it.
-        discarded: bytes that belong to no good frame.
-        resyncs: times the stream was lost.
+            once for every header pattern in it.
+        discarded: bytes outside good frames.
+        resyncs: losses of synchronisation.
     """
 
     frames: int = 0
@@ -30,17 +30,14 @@ class ScanCounters:
 class FrameScanner(Generic[F]):
     """Finds frames by header, size and check.
 
-    After a failed check the search goes on one byte later, so that one damaged byte
-    costs one frame. Between calls it holds less than one frame.
+    After a failed check the search continues one byte later, so that one damaged byte
+    costs one frame. Less than one frame is buffered between calls.
     """
 
     def __init__(
         self, header: bytes, size: int, decode: Callable[[bytes, int], F | None]
     ) -> None:
-        """Look for `header`; `decode` reads `size` bytes from an index of the data.
-
-        It returns None where they are no frame.
-        """
+        """Search for `header`; `decode(data, index)` decodes `size` bytes, or None."""
         self.counters = ScanCounters()
         self._header = header
         self._size = size
@@ -50,7 +47,7 @@ class FrameScanner(Generic[F]):
 
     @property
     def held(self) -> int:
-        """Bytes held until the rest of their frame comes."""
+        """Number of buffered bytes of an incomplete frame."""
         return len(self._held)
 
     def feed(self, data: bytes) -> list[F]:
@@ -58,7 +55,7 @@ class FrameScanner(Generic[F]):
         frames: list[F] = []
         start = 0
         if self._held:
-            # A frame that begins in the held bytes ends before this many more.
+            # A frame that begins in the held bytes ends within size - 1 more bytes.
             held = len(self._held)
             boundary = self._held + data[: self._size - 1]
             reached = self._scan(boundary, 0, held, frames)
@@ -70,7 +67,7 @@ class FrameScanner(Generic[F]):
         return frames
 
     def _scan(self, data: bytes, start: int, stop: int, frames: list[F]) -> int:
-        """Collect the frames that begin in [start, stop); return where to go on."""
+        """Append the frames that begin in [start, stop); return the next index."""
         counters, size, decode = self.counters, self._size, self._decode
         while start < stop:
             begin = self._find_header(data, start, stop)
@@ -93,12 +90,12 @@ class FrameScanner(Generic[F]):
         return start
 
     def _find_header(self, data: bytes, start: int, stop: int) -> int:
-        """Return where a frame may begin, `stop` if nowhere before it."""
+        """Return the index of the next header, possibly incomplete, or `stop`."""
         header = self._header
         at = data.find(header, start, stop + len(header) - 1)
         if at >= 0:
             return at
-        # The last bytes may be the first of a header that goes on in the next data.
+        # The last bytes may be the beginning of a header.
         at = max(start, len(data) - len(header) + 1)
         while at < stop and not header.startswith(data[at:]):
             at += 1
@@ -112,5 +109,5 @@ class FrameScanner(Generic[F]):
 
 
 def wire_time_ns(size: int, baudrate: int) -> int:
-    """Return how long `size` bytes occupy the wire [ns]."""
+    """Return the transmission time of `size` bytes [ns]."""
     return size * BITS_PER_BYTE * 1_000_000_000 // baudrate

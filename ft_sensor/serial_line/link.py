@@ -1,4 +1,4 @@
-"""Serial ports that are drained, never waited on; the only importer of pyserial."""
+"""Non-blocking serial ports; the only importer of pyserial."""
 
 import os
 import termios
@@ -16,12 +16,12 @@ from ft_sensor.serial_line.framing import wire_time_ns
 
 @dataclass(frozen=True, slots=True)
 class PortSettings:
-    """A serial line and how its stream is checked.
+    """Settings of a serial line.
 
     Attributes:
         port: path of the serial device.
         baudrate: speed of the line [bit/s].
-        rate_check: how long the rate is measured after the start [s].
+        rate_check: duration of the rate measurement after the start [s].
     """
 
     port: str
@@ -32,13 +32,13 @@ class PortSettings:
         """Refuse a line that cannot carry the stream.
 
         Args:
-            baudrates: speeds the sensor knows [bit/s].
-            size: of a frame [bytes].
-            period_ns: between two of them [ns].
+            baudrates: speeds supported by the sensor [bit/s].
+            size: frame size [bytes].
+            period_ns: frame period [ns].
 
         Raises:
-            SettingsError: unknown speed, a line too slow for the frames, or a check
-                that is too short or too long.
+            SettingsError: unsupported speed, a line too slow for the frames, or a rate
+                check that is too short or too long.
         """
         if self.baudrate not in baudrates:
             raise SettingsError(
@@ -59,16 +59,16 @@ class PortSettings:
             )
 
 
-_READ_LIMIT = 4096  # what the kernel keeps for a terminal
-_PORT_ERRORS = (OSError, termios.error)  # termios.error is no OSError
+_READ_LIMIT = 4096  # size of the kernel's tty buffer
+_PORT_ERRORS = (OSError, termios.error)  # termios.error is not an OSError
 
 
 class SerialPort(Protocol):
-    """The part of pyserial's port that is used here."""
+    """The part of pyserial's interface that is used here."""
 
     @property
     def in_waiting(self) -> int:
-        """Number of bytes that can be read at once."""
+        """Number of bytes available."""
         ...
 
     def read(self, size: int = 1, /) -> bytes:
@@ -80,7 +80,7 @@ class SerialPort(Protocol):
         ...
 
     def reset_input_buffer(self) -> None:
-        """Throw away what has arrived."""
+        """Discard received data."""
         ...
 
     def fileno(self) -> int:
@@ -88,23 +88,23 @@ class SerialPort(Protocol):
         ...
 
     def close(self) -> None:
-        """Give the device back."""
+        """Close the device."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class OpenedPort:
-    """An open port, and what about it is not as wished (empty = nothing)."""
+    """An open port and a warning about its settings, "" if there is none."""
 
     port: SerialPort
     warning: str
 
 
 def open_port(path: str, baudrate: int) -> OpenedPort:
-    """Open the serial device at `path`, 8N1, for this program alone.
+    """Open the serial device at `path`, 8N1, exclusively.
 
     Raises:
-        LinkError: the device is missing, taken, or refuses.
+        LinkError: the device is missing, in use, or refuses the settings.
     """
     try:
         port = serial.Serial(
@@ -128,10 +128,10 @@ def _low_latency_warning(port: serial.Serial, path: str) -> str:
 
 
 def latency_timer_warning(path: str, sysfs: Path = Path("/sys/class/tty")) -> str:
-    """Return what is wrong with the latency timer of `path`; empty if nothing.
+    """Return a warning if the latency timer of `path` is too long, else "".
 
-    An FTDI adapter may accept the low-latency flag and go on collecting bytes for
-    16 ms, so the timer is read back.
+    An FTDI adapter may accept the low-latency flag and still buffer for 16 ms, so the
+    timer is read back.
     """
     timer = sysfs / Path(path).resolve().name / "device" / "latency_timer"
     try:
@@ -144,17 +144,14 @@ def latency_timer_warning(path: str, sysfs: Path = Path("/sys/class/tty")) -> st
 
 
 class SerialLink:
-    """A serial port as the drivers use it: drained, written to, closed.
-
-    Implements `acquisition.clock.Readable`.
-    """
+    """Serial port of the drivers; implements `acquisition.clock.Readable`."""
 
     def __init__(self, port: SerialPort) -> None:
         self._port = port
         self._is_open = True
 
     def read_available(self) -> bytes:
-        """Return what has arrived, at most 4096 bytes; does not wait.
+        """Return received data, at most 4096 bytes, without blocking.
 
         Raises:
             LinkError: the port is closed or gone.
@@ -170,7 +167,7 @@ class SerialLink:
         """Send `data`.
 
         Raises:
-            LinkError: the port is closed or gone, or takes nothing for 0.5 s.
+            LinkError: the port is closed or gone, or blocked for 0.5 s.
         """
         self._require_open()
         try:
@@ -179,7 +176,7 @@ class SerialLink:
             raise _broken(error) from error
 
     def discard_input(self) -> None:
-        """Throw away what has arrived.
+        """Discard received data.
 
         Raises:
             LinkError: the port is closed or gone.
@@ -210,7 +207,7 @@ class SerialLink:
             raise _broken(error) from error
 
     def close(self) -> None:
-        """Give the port back; never raises, also when called again."""
+        """Close the port; never raises, also on a second call."""
         if not self._is_open:
             return
         self._is_open = False
@@ -232,7 +229,7 @@ def _broken(error: Exception) -> LinkError:
 
 
 def adapter_serial(port: str) -> str | None:
-    """Return the serial number of the adapter behind a port; None = none is known."""
+    """Return the serial number of a port's USB adapter, or None."""
     real = os.path.realpath(port)
-    found = (p.serial_number for p in list_ports.comports() if p.device == real)
-    return next((serial for serial in found if serial), None)
+    serials = (p.serial_number for p in list_ports.comports() if p.device == real)
+    return next((serial for serial in serials if serial), None)

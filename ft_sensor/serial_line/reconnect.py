@@ -1,4 +1,4 @@
-"""Keeps a serial wrist sensor open: what was lost is looked for and opened again."""
+"""Automatic reconnection of a serial wrist sensor."""
 
 from collections.abc import Callable
 
@@ -7,26 +7,26 @@ from acquisition.devices import WrenchSample
 from acquisition.errors import DeviceFaultError, TractionError
 from ft_sensor.serial_line.sensor import SerialSensor
 
-LOST_NS = 250_000_000  # without one sample that can be trusted
-FIRST_PAUSE_NS = NS_PER_S // 2  # before it is looked for; doubled every time
+LOST_NS = 250_000_000  # time without a valid sample until the sensor counts as lost
+FIRST_PAUSE_NS = NS_PER_S // 2  # pause before the first retry, then doubled
 LONGEST_PAUSE_NS = 4 * NS_PER_S
 _UNKNOWN = "unknown"
 
 
 class ReconnectingSensor:
-    """A sensor that survives its cable, its power supply and a restart of its own.
+    """A sensor that is reopened after a loss of cable or power, or its own restart.
 
-    The loop stops a trial long before a sensor counts as lost here; the next trial
-    begins with a tare, as a sensor without power forgets its zero. Only the same sensor
-    is taken back: another serial number is refused.
+    The loop stops a trial long before a sensor counts as lost here. The next trial
+    begins with a tare, because a sensor loses its zero without power. A sensor with
+    another serial number is refused.
 
     Attributes:
-        reopened: how often it was opened again.
-        last_error: why it is not read at present; empty while it is.
+        reopened: number of reconnections.
+        last_error: reason for the loss; "" while connected.
     """
 
     def __init__(self, connect: Callable[[], SerialSensor], clock: Clock) -> None:
-        """Take what opens the port; `connect` returns a sensor not opened yet."""
+        """Prepare; `connect` opens the port and returns a sensor not yet opened."""
         self.reopened = 0
         self.last_error = ""
         self._connect = connect
@@ -43,7 +43,7 @@ class ReconnectingSensor:
         return self._sensor
 
     def open(self) -> dict[str, str]:
-        """Open the sensor for the first time; return what it says about itself.
+        """Open the sensor for the first time; return its description.
 
         Raises:
             TractionError: as `SerialSensor.open` and the port.
@@ -53,7 +53,7 @@ class ReconnectingSensor:
         return self._facts
 
     def poll(self, now_ns: int) -> list[WrenchSample]:
-        """Return what has arrived; looks for a lost sensor, which takes seconds."""
+        """Return new samples; may try to reconnect, which takes seconds."""
         if self._sensor is None:
             self._reconnect(now_ns)
             return []
@@ -69,7 +69,7 @@ class ReconnectingSensor:
         return samples
 
     def close(self) -> None:
-        """Stop the stream and give the port back; never raises."""
+        """Stop the stream and close the port; never raises."""
         if self._sensor is not None:
             self._sensor.close()
             self._sensor = None
@@ -112,7 +112,7 @@ class ReconnectingSensor:
     def _refuse_another(self, sensor: SerialSensor) -> None:
         before = self._facts.get("serial_number", _UNKNOWN)
         now = sensor.describe().get("serial_number", _UNKNOWN)
-        # A sensor found streaming may not tell.
+        # Some sensors do not report it while streaming.
         if before == now or before.startswith(_UNKNOWN) or now.startswith(_UNKNOWN):
             return
         sensor.close()
@@ -123,7 +123,7 @@ class ReconnectingSensor:
 
 
 def stream_metadata(reconnecting: ReconnectingSensor) -> dict[str, str]:
-    """Return what became of the stream since it was opened last, as text."""
+    """Return the stream's counters since it was last opened, as text."""
     fields = {
         "reopened": str(reconnecting.reopened),
         "trouble": reconnecting.last_error,

@@ -1,4 +1,4 @@
-"""A serial wrist sensor as the loop sees it: opened, polled, closed."""
+"""Driver of a serial wrist sensor of any make."""
 
 import contextlib
 from dataclasses import asdict, dataclass
@@ -13,18 +13,18 @@ from ft_sensor.serial_line.link import PortSettings, SerialLink
 from ft_sensor.serial_line.startup import SerialDialog
 from ft_sensor.serial_line.timestamps import SampleTimestamper
 
-BURST_NS = 5_000_000  # of a stream read at once: an adapter collects bytes
-BURSTY = 0.1  # share of the reads
+BURST_NS = 5_000_000  # a read of more than this much of the stream is a burst
+BURSTY = 0.1  # share of bursts that shows a buffering adapter
 
 
 class SerialDevice(Protocol):
-    """One make of serial sensor: its frames, its opening ritual, its words.
+    """One make of serial sensor: frames, start-up sequence, status texts.
 
     Attributes:
-        line: where it is connected.
-        timing: how its frames follow each other.
-        ranges: fx fy fz tx ty tz it measures up to [N, N m].
-        stop: bytes that end its stream.
+        line: serial line.
+        timing: timing of the stream.
+        ranges: measuring ranges fx fy fz tx ty tz [N, N m].
+        stop: command that stops the stream.
     """
 
     line: PortSettings
@@ -37,28 +37,28 @@ class SerialDevice(Protocol):
         ...
 
     def start(self, dialog: SerialDialog) -> dict[str, str]:
-        """Set it up and start its stream; return who it is and how it is set."""
+        """Configure the sensor, start its stream, and return its description."""
         ...
 
     def status_words(self, status: int) -> tuple[str, ...]:
-        """Return what the set bits of `status` say."""
+        """Return the meanings of the set bits of `status`."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class SensorCounters:
-    """What happened to the stream since it was opened.
+    """Counters of the stream since it was opened.
 
     Attributes:
         frames: good frames.
         bad_checks: headers whose frame failed its checks.
-        discarded: bytes that belong to no good frame.
-        resyncs: times the stream was lost.
-        lost: samples missing by the device's clock or count.
-        jumps: times the device's clock did not show time that had passed.
-        frozen: frames whose numbers or clock stood still.
-        bursts: reads that brought more than 5 ms of the stream at once.
-        reads: reads that brought something.
+        discarded: bytes outside good frames.
+        resyncs: losses of synchronisation.
+        lost: samples missing by the device's clock or counter.
+        jumps: jumps of the device's clock.
+        frozen: frames with a frozen wrench or clock.
+        bursts: reads of more than 5 ms of the stream.
+        reads: reads that were not empty.
     """
 
     frames: int
@@ -73,19 +73,19 @@ class SensorCounters:
 
     @property
     def is_bursty(self) -> bool:
-        """Whether the adapter collects bytes before it delivers them."""
+        """Whether the adapter buffers data before delivery."""
         return self.bursts > BURSTY * self.reads
 
     def metadata(self) -> dict[str, str]:
-        """Return the counts as text for the recording."""
+        """Return the counters as text for the recording."""
         return {name: str(value) for name, value in asdict(self).items()}
 
 
 class SerialSensor:
     """A wrist sensor on a serial line.
 
-    Implements `acquisition.devices.WrenchSensor`. Poll it as soon as bytes are there:
-    the kernel keeps 0.1 s of the stream, and what is read late looks like a burst.
+    Implements `acquisition.devices.WrenchSensor`. Poll it as soon as data arrive: the
+    kernel buffers 0.1 s of the stream, and late reads look like bursts.
     """
 
     def __init__(self, link: SerialLink, clock: Clock, device: SerialDevice) -> None:
@@ -97,13 +97,13 @@ class SerialSensor:
         self._begin(device.scanner())
 
     def open(self) -> None:
-        """Set the sensor up, start its stream and measure its rate.
+        """Configure the sensor, start its stream and measure its rate.
 
         Raises:
-            LinkError: the port failed, or bytes came that are not this sensor's.
+            LinkError: the port failed, or the data are not this sensor's.
             LinkTimeoutError: the sensor is silent or does not answer.
-            DeviceFaultError: it refused a setting, its numbers cannot be
-                trusted, or its rate is below 495 Hz.
+            DeviceFaultError: it refused a setting, its readings are implausible, or its
+                rate is below 495 Hz.
         """
         device, scanner = self.device, self.device.scanner()
         dialog = SerialDialog(self._link, self._clock, scanner)
@@ -113,7 +113,7 @@ class SerialSensor:
         self._begin(scanner)
 
     def poll(self, now_ns: int) -> list[WrenchSample]:
-        """Return what has arrived since the last call, oldest first; does not wait.
+        """Return the samples since the last call, oldest first, without blocking.
 
         Raises:
             LinkError: the port is closed or gone.
@@ -126,7 +126,7 @@ class SerialSensor:
         readings = self._scanner.feed(data)
         for reading in readings:
             if not is_measurable(reading.wrench, self.device.ranges):
-                reading.is_trusted = False  # whatever its checksum says
+                reading.is_trusted = False
         if readings:
             self._reads += 1
             self._bursts += len(readings) > self._most_at_once
@@ -142,7 +142,7 @@ class SerialSensor:
 
     @property
     def counters(self) -> SensorCounters:
-        """What happened to the stream since it was opened."""
+        """Counters of the stream since it was opened."""
         scanned, dated = self._scanner.counters, self._timestamper
         return SensorCounters(
             frames=scanned.frames,
@@ -157,24 +157,24 @@ class SerialSensor:
         )
 
     def describe(self) -> dict[str, str]:
-        """Return what the sensor is and how it is set up, as text."""
+        """Return identity and settings of the sensor, as text."""
         device = self.device
         return {
             **self._facts,
             "port": device.line.port,
             "baudrate": str(device.line.baudrate),
-            "ranges": " ".join(f"{most:g}" for most in device.ranges),
+            "ranges": " ".join(f"{limit:g}" for limit in device.ranges),
             "nominal_rate": f"{NS_PER_S / device.timing.period_ns:.1f} Hz",
             "measured_rate": f"{self._rate:.1f} Hz",
         }
 
     def stream_metadata(self) -> dict[str, str]:
-        """Return what became of the stream since it was opened, as text."""
+        """Return the counters of the stream, as text."""
         return self.counters.metadata()
 
     def close(self) -> None:
-        """Stop the stream and give the port back; never raises."""
-        # A port that is gone or closed has no stream to stop.
+        """Stop the stream and close the port; never raises."""
+        # Errors are expected if the port is gone or closed.
         with contextlib.suppress(TractionError):
             self._link.write(self.device.stop)
         self._link.close()

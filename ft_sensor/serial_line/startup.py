@@ -1,4 +1,4 @@
-"""What the start-up of all serial sensors shares: commands, answers, frame rate."""
+"""Start-up dialog of serial sensors: commands, replies, frame rate."""
 
 from collections.abc import Callable
 from typing import TypeVar
@@ -9,20 +9,20 @@ from ft_sensor.reading import Reading, StreamTiming
 from ft_sensor.serial_line.framing import FrameScanner
 from ft_sensor.serial_line.link import SerialLink
 
-MIN_RATE = 0.99 * RATE_HZ  # [Hz]; less by what two clocks may disagree
+MIN_RATE = 0.99 * RATE_HZ  # [Hz]; 1 % tolerance for the difference of two clocks
 FIRST_READINGS = 10
 _FIRST_NS = NS_PER_S
-_BUFFER_SIZE = 2048  # answers are looked for in this much of what came last
+_BUFFER_SIZE = 2048  # last bytes, searched for replies
 
 T = TypeVar("T")
 
 
 class SerialDialog:
-    """Commands to a sensor, and their answers in what may be a running stream.
+    """Commands to a sensor, with replies possibly embedded in a running stream.
 
     Attributes:
-        buffer: the last bytes that came since `discard`, or since the last write.
-        received_bytes: how many came in all.
+        buffer: last bytes received since `discard` or the last write.
+        received_bytes: total number of bytes received.
     """
 
     def __init__(
@@ -40,7 +40,7 @@ class SerialDialog:
         return self._scanner.counters.frames
 
     def write(self, data: bytes) -> None:
-        """Send `data`; answers are looked for in what comes from now on.
+        """Send `data` and clear the buffer for its reply.
 
         Raises:
             LinkError: the port failed.
@@ -49,11 +49,11 @@ class SerialDialog:
         self._link.write(data)
 
     def pause(self, duration_ns: int) -> None:
-        """Let time pass; what comes meanwhile stays in the port."""
+        """Wait without reading the port."""
         self._clock.sleep_until(self._clock.now_ns() + duration_ns)
 
     def discard(self) -> None:
-        """Discard all input so far."""
+        """Discard all received data."""
         self._link.discard_input()
         self.buffer = b""
 
@@ -63,13 +63,13 @@ class SerialDialog:
         duration_ns: int,
         readings: list[Reading] | None = None,
     ) -> T | None:
-        """Listen until `condition` returns something; None after `duration_ns`.
+        """Receive until `condition` returns a value; None after `duration_ns`.
 
-        `readings` collects the frames that come meanwhile.
+        Frames received in the meantime are appended to `readings`.
         """
         deadline_ns = self._clock.now_ns() + duration_ns
         while (result := condition()) is None:
-            # A device that never pauses keeps the link readable past the deadline.
+            # With a continuous stream the link stays readable past the deadline.
             if self._clock.now_ns() >= deadline_ns:
                 return None
             if self._clock.wait(self._link, deadline_ns):
@@ -77,10 +77,10 @@ class SerialDialog:
         return result
 
     def first_readings(self) -> list[Reading]:
-        """Return ten readings or more, fewer when they do not come within a second.
+        """Return ten readings or more, or those of one second.
 
         Raises:
-            LinkTimeoutError: none came, or none that was whole.
+            LinkTimeoutError: no reading was received.
         """
         readings: list[Reading] = []
         before = self.received_bytes
@@ -99,11 +99,11 @@ class SerialDialog:
         return readings
 
     def raise_no_reply(self, baudrate: int) -> None:
-        """Raise: no answer came, and not one good frame.
+        """Raise the error for a sensor without replies and good frames.
 
         Raises:
-            LinkTimeoutError: nothing came at all.
-            LinkError: bytes came, and none of them are this sensor's.
+            LinkTimeoutError: no data were received.
+            LinkError: data were received, but no frame of this sensor.
         """
         if not self.received_bytes:
             raise silent_error()
@@ -115,7 +115,7 @@ class SerialDialog:
         )
 
     def measure_rate(self, timing: StreamTiming, seconds: float) -> float:
-        """Return the rate [Hz], the lower one by the device's clock and by ours.
+        """Return the frame rate [Hz], the lower one by device clock and host clock.
 
         Raises:
             LinkTimeoutError: the stream is silent.
@@ -155,8 +155,8 @@ class SerialDialog:
 
 
 def silent_error() -> LinkTimeoutError:
-    """Return the error for a port that is open and brings nothing."""
-    # 100 ms is the limit that counts while running; a start-up waits longer.
+    """Return the error for an open port without data."""
+    # 100 ms is the limit in the running loop; the start-up waits longer.
     return LinkTimeoutError(
         "No F/T data for 100 ms (port open, 0 bytes).", hint="Check power and cable."
     )

@@ -1,4 +1,4 @@
-"""When the samples of a wrist sensor were taken, and whether they can be trusted."""
+"""Timestamps and validity of the samples of a wrist sensor."""
 
 import math
 
@@ -6,20 +6,19 @@ from acquisition.devices import WrenchSample
 from ft_sensor.reading import Reading, StreamTiming, Wrench
 from ft_sensor.serial_line.clock_fit import WINDOW_NS, ClockFit
 
-LONGEST_STEP_NS = 1_000_000_000  # a clock that moves further at once has jumped
-_UNSEEN = 0.75  # periods too late, for a whole window: a frame was lost unseen
-_SILENT_NS = 30_000_000  # longer than an adapter collects bytes
-_FEWEST = 20  # samples of a span that says something of an axis
-_ALIKE = 0.1  # share by which a pause of the device and of the host may differ
+LONGEST_STEP_NS = 1_000_000_000  # a larger step of the device's clock is a jump
+_UNSEEN = 0.75  # periods of delay throughout a window: a frame was lost
+_SILENT_NS = 30_000_000  # longer than an adapter buffers
+_FEWEST = 20  # samples in a span for a verdict on an axis
+_ALIKE = 0.1  # relative difference of a pause by device and host clock
 
 
 class DeviceClock:
-    """The time of a device that shows a clock or counts its frames.
+    """Time base of a device with a clock or frame counter.
 
     Attributes:
-        lost: samples missing by the device's own count.
-        jumps: times it showed something else than time that had passed: the device
-            was restarted and has lost the settings of its opening.
+        lost: samples missing by the device's clock or counter.
+        jumps: jumps of the clock: the device was restarted and has lost its settings.
     """
 
     def __init__(self, timing: StreamTiming) -> None:
@@ -32,10 +31,10 @@ class DeviceClock:
     def steps(
         self, readings: list[Reading], arrival_ns: int, discarded: int
     ) -> list[int]:
-        """Return the time since the reading before, for each [ns]; 0 or less: jumped.
+        """Return the time step of each reading [ns]; 0 or less = a jump.
 
-        What is missing is counted. `discarded`: damaged bytes among the readings; the
-        device's own count tells more.
+        Also counts missing samples. `discarded` (damaged bytes) is not used, the
+        device's counter is more precise.
         """
         del discarded
         if not readings:
@@ -59,15 +58,14 @@ class DeviceClock:
 
 
 class FrameCounter:
-    """The time of a device that shows none: its frames are counted.
+    """Time base of a device without clock and counter: frames are counted.
 
-    Damaged bytes and long silence tell of lost frames at once. A loss without a sign
-    makes every later frame arrive whole periods after the time it is counted for, and
-    is put right then.
+    Damaged bytes and long silence reveal lost frames at once. An unnoticed loss delays
+    every later frame by whole periods relative to the count and is corrected then.
 
     Attributes:
-        lost: samples taken to be missing.
-        jumps: none; there is nothing that could jump.
+        lost: samples assumed missing.
+        jumps: always 0.
     """
 
     def __init__(self, timing: StreamTiming) -> None:
@@ -83,7 +81,7 @@ class FrameCounter:
     def steps(
         self, readings: list[Reading], arrival_ns: int, discarded: int
     ) -> list[int]:
-        """Return the time since the reading before, for each [ns]."""
+        """Return the time step of each reading [ns]."""
         self._discarded += discarded
         if not readings:
             return []
@@ -100,14 +98,14 @@ class FrameCounter:
         return [first] + [round(period_ns)] * (len(readings) - 1)
 
     def correct(self, excess_ns: int, device_ns: int) -> int:
-        """Return what has to be added to the count [ns].
+        """Return the correction of the count [ns].
 
         Args:
-            excess_ns: by which a frame came later than its count says [ns].
-            device_ns: its count [ns].
+            excess_ns: delay of a frame relative to its count [ns].
+            device_ns: count of the frame [ns].
         """
         period_ns = self._timing.period_ns
-        if excess_ns < -_UNSEEN * period_ns:  # no frame comes before it was sent
+        if excess_ns < -_UNSEEN * period_ns:  # too early: too many were assumed lost
             periods = round(excess_ns / period_ns)
         elif self._begun_ns is None:
             self._begun_ns, self._least_ns = device_ns, excess_ns
@@ -126,60 +124,60 @@ class FrameCounter:
 
 
 class StuckAxes:
-    """Notices axes that repeat one number while others change.
+    """Detects axes that repeat one value while others change.
 
-    Span by span: an axis that shows throughout a span what it showed at its beginning
-    is stuck until it shows something else. Noise clears all six with the first samples
-    of a span; what is left of it costs nothing. Exactly zero is what a sensor shows
-    that does not measure an axis, and a number beyond the range is told as saturated.
+    An axis that keeps its value throughout a span is stuck until the value changes.
+    Noise clears all six axes within the first samples of a span, so the check is cheap.
+    Exact zeros are excluded (an axis that the sensor does not measure), and so are
+    saturated axes.
     """
 
     def __init__(self, span_ns: int) -> None:
-        """Take how long a span is [ns]; 0 = nothing is judged."""
+        """Set the length of a span [ns]; 0 = no check."""
         self._span_ns = span_ns
         self._begun_ns = 0
-        self._shown: Wrench | None = None
+        self._first_wrench: Wrench | None = None
         self._compared = 0
         self._still: list[int] = []
         self._stuck: list[int] = []
 
     def are_there(self, reading: Reading, t_ns: int) -> bool:
-        """Return whether an axis is stuck at a reading, the next one in order."""
-        shown = self._shown
-        if shown is None or t_ns - self._begun_ns >= self._span_ns:
+        """Return whether an axis is stuck, given the next reading."""
+        first = self._first_wrench
+        if first is None or t_ns - self._begun_ns >= self._span_ns:
             return self._begin(reading, t_ns)
         if self._still:
             wrench = reading.wrench
             self._compared += 1
-            self._still = [axis for axis in self._still if wrench[axis] == shown[axis]]
+            self._still = [axis for axis in self._still if wrench[axis] == first[axis]]
             self._stuck = [axis for axis in self._stuck if axis in self._still]
         return bool(self._stuck)
 
     def _begin(self, reading: Reading, t_ns: int) -> bool:
-        """End a span with a reading, and begin the next one."""
-        wrench, shown = reading.wrench, self._shown
-        if shown is not None and self._compared >= _FEWEST:
+        """End a span at a reading and begin the next one."""
+        wrench, first = reading.wrench, self._first_wrench
+        if first is not None and self._compared >= _FEWEST:
             self._stuck = [
                 axis
                 for axis in self._still
-                if wrench[axis] == shown[axis] != 0.0
+                if wrench[axis] == first[axis] != 0.0
                 and not reading.saturated >> axis & 1
             ]
-        self._begun_ns, self._shown, self._compared = t_ns, wrench, 0
+        self._begun_ns, self._first_wrench, self._compared = t_ns, wrench, 0
         self._still = list(range(len(wrench))) if self._span_ns else []
         return bool(self._stuck)
 
 
 class SampleTimestamper:
-    """Turns readings into dated samples and notices what is missing or frozen.
+    """Converts readings to timestamped samples; detects losses and frozen values.
 
-    The newest reading of a batch left the sensor one wire time before it was read, at
-    the latest; the others lie before it by the differences of the device's clock. What
-    delayed them by chance is taken out by a `ClockFit`. Dates only rise. A device whose
-    clock jumped was restarted and has to be opened again: its samples are not valid.
+    The newest reading of a batch left the sensor at least one wire time before it was
+    read; the others precede it by differences of the device's clock. A `ClockFit`
+    removes random delays. Timestamps increase strictly. After a jump of its clock the
+    device was restarted and has to be reopened: its samples are invalid.
 
     Attributes:
-        frozen: readings whose numbers or clock stood still, or cannot be trusted.
+        frozen: readings with frozen values or clock.
     """
 
     def __init__(self, timing: StreamTiming) -> None:
@@ -195,36 +193,38 @@ class SampleTimestamper:
 
     @property
     def lost(self) -> int:
-        """Samples missing by the device's clock or count."""
+        """Samples missing by the device's clock or counter."""
         return self._device.lost
 
     @property
     def jumps(self) -> int:
-        """Times the device was restarted, by its clock; nothing is valid from then."""
+        """Restarts of the device by its clock; later samples are invalid."""
         return self._device.jumps
 
     def date(
         self, readings: list[Reading], arrival_ns: int, discarded: int = 0
     ) -> list[WrenchSample]:
-        """Return the samples of `readings`, all read at `arrival_ns`.
+        """Return the samples of `readings`, all received at `arrival_ns`.
 
-        `discarded`: bytes among them that belonged to no good frame.
+        `discarded`: bytes outside good frames in the same read.
         """
         steps = self._device.steps(readings, arrival_ns, discarded)
         if not readings:
             return []
-        # A clock that jumped says nothing about the time between two frames.
-        apart = [step if 0 < step < LONGEST_STEP_NS else 0 for step in steps[1:]]
-        t_ns = arrival_ns - self._timing.wire_ns - sum(apart)
+        # After a jump the time between two frames is unknown.
+        intervals = [step if 0 < step < LONGEST_STEP_NS else 0 for step in steps[1:]]
+        t_ns = arrival_ns - self._timing.wire_ns - sum(intervals)
         samples: list[WrenchSample] = []
-        for reading, step_ns, next_ns in zip(readings, steps, [*apart, 0], strict=True):
-            dated_ns = self._fitted(t_ns, step_ns)
+        for reading, step_ns, next_ns in zip(
+            readings, steps, [*intervals, 0], strict=True
+        ):
+            dated_ns = self._fitted_time(t_ns, step_ns)
             samples.append(self._sample(reading, dated_ns, step_ns > 0))
             t_ns += next_ns
         return samples
 
-    def _fitted(self, latest_ns: int, step_ns: int) -> int:
-        """Return when a frame was sent, `latest_ns` at the latest [monotonic ns]."""
+    def _fitted_time(self, latest_ns: int, step_ns: int) -> int:
+        """Return the send time of a frame, at most `latest_ns` [monotonic ns]."""
         if not 0 < step_ns < LONGEST_STEP_NS:
             self._fit.restart()
         self._device_ns += max(step_ns, 0)
@@ -251,7 +251,7 @@ class SampleTimestamper:
             and not self._stuck.are_there(reading, t_ns)
         )
         self.frozen += not is_live
-        # Of six numbers of 32 bits no sum overflows: it is finite if all of them are.
+        # The sum of six 32-bit floats cannot overflow: finite if and only if all are.
         is_number = math.isfinite(sum(wrench))
         is_valid = is_live and reading.is_trusted and is_number
         return WrenchSample(

@@ -1,6 +1,5 @@
-"""One make of sensor a module: its protocol, its start-up, its settings.
+"""Makes of sensors, one module each: protocol, start-up, settings.
 
 Bota, Robotous and OptoForce on a serial line, ATI on the network, Barrett on the arm's
-bus. A new make is a
-new module here and an entry in the registry.
+bus. A new make is a new module here and an entry in the registry.
 """

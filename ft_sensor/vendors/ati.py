@@ -1,8 +1,8 @@
 """RDT, the protocol of ATI's network sensors (Net F/T, Ethernet Axia) over UDP.
 
-A request has 8 bytes: 0x1234, command, number of samples; a record has 36: number of
-the packet, number of the measurement, status, and six counts, all of them big-endian.
-Counts become newtons and newton metres by the two scales of the sensor's own web page.
+A request has 8 bytes: 0x1234, command, number of samples. A record has 36: RDT sequence
+number, F/T sequence number, status, six counts; all big-endian. Counts are converted to
+N and N m with the two scales given on the sensor's web page.
 """
 
 import struct
@@ -14,14 +14,14 @@ from ft_sensor.serial_line.framing import FrameScanner
 PORT = 49152
 FRAME_SIZE = 36
 STOP, STREAM = 0x0000, 0x0002
-MODULUS = 1 << 32  # of both numbers
-LATE = 1000  # packets behind the newest that came late or twice; further back: restart
+MODULUS = 1 << 32  # of both sequence numbers
+LATE = 1000  # packets; late or duplicate up to here, a restart if further behind
 _REQUEST = struct.Struct(">HHI")
 _RECORD = struct.Struct(">III6i")
 _MARK = 0x1234
-_ERROR = 1 << 31  # set with every failure
+_ERROR = 1 << 31  # summary bit of all failures
 _SATURATED = 1 << 17
-_LATCHED = 1 << 16  # a monitor condition of the user's own: no failure
+_LATCHED = 1 << 16  # user-defined monitor condition, not a failure
 _NOT_BROKEN = _ERROR | _SATURATED | _LATCHED
 _WORDS = {
     31: "error",
@@ -35,9 +35,9 @@ class RdtRecord:
     """One record.
 
     Attributes:
-        number: of the packet since the stream was started.
-        measurement: number of the measurement in the sensor.
-        status: 32 bits; 0 = well.
+        number: RDT sequence number since the start of the stream.
+        measurement: F/T sequence number.
+        status: 32 bits; 0 = no fault.
         counts: fx fy fz tx ty tz.
     """
 
@@ -48,12 +48,12 @@ class RdtRecord:
 
 
 def encode_request(command: int, count: int = 0) -> bytes:
-    """Return a request; a `count` of 0 is without end."""
+    """Return a request for `count` samples, 0 = continuous."""
     return _REQUEST.pack(_MARK, command, count)
 
 
 def decode_request(data: bytes) -> tuple[int, int] | None:
-    """Return command and count of a request; None where it is none."""
+    """Return command and count of a request; None if it is not one."""
     if len(data) != _REQUEST.size:
         return None
     mark, command, count = _REQUEST.unpack(data)
@@ -75,24 +75,24 @@ def decode_record(data: bytes, start: int = 0) -> RdtRecord:
 
 
 def status_words(status: int) -> tuple[str, ...]:
-    """Return what the set bits of a status say; by number where no name is known."""
+    """Return the meanings of the set status bits; by number if not documented."""
     bits = (bit for bit in range(31, -1, -1) if status >> bit & 1)
     return tuple(_WORDS.get(bit, f"failure, bit {bit}") for bit in bits)
 
 
 class RdtScanner(FrameScanner[Reading]):
-    """Records in the order of their numbers, each once.
+    """Delivers records in order of sequence number, each once.
 
-    Packets that overtook each other within one read are put in order. One that comes
-    after a newer one was handed over, and one that comes twice, are dropped; the loss
-    of the former is counted by the numbers.
+    Reordered packets within one read are sorted. Packets that arrive after a newer one
+    was delivered, and duplicates, are dropped; the former show as lost by the sequence
+    numbers.
 
     Attributes:
-        late: records dropped because a newer one or the same one had come.
+        late: dropped late or duplicate records.
     """
 
     def __init__(self, counts: Wrench, ranges: Wrench) -> None:
-        """Take counts per N and N m, and what is measured at most [N, N m]."""
+        """Set counts per N and N m, and the measuring ranges [N, N m]."""
         self.late = 0
         self._gains = tuple(1.0 / value for value in counts)
         self._ranges = ranges
@@ -110,7 +110,7 @@ class RdtScanner(FrameScanner[Reading]):
         wrench = (fx * gx, fy * gy, fz * gz, tx * hx, ty * hy, tz * hz)
         saturated = axes_beyond(wrench, self._ranges)
         if record.status & _SATURATED:
-            saturated = ALL_AXES  # it says that, not where
+            saturated = ALL_AXES  # the axis is not reported
         broken = record.status & ~_NOT_BROKEN
         is_error = bool(record.status & _ERROR) and not record.status & _SATURATED
         is_trusted = not broken and not is_error
@@ -122,9 +122,9 @@ class RdtScanner(FrameScanner[Reading]):
         start = self._newest
         if start is None:
             start = (readings[0].ticks - 1) % MODULUS
-        ahead = [_ahead(reading.ticks, start) for reading in readings]
+        ahead = [_signed_difference(reading.ticks, start) for reading in readings]
         is_restarted = min(ahead) < -LATE
-        if is_restarted:  # its numbers began anew: whoever dates them sees a jump
+        if is_restarted:  # sequence restarted: the timestamper detects the jump
             self._newest = readings[-1].ticks
             return readings
         fresh: list[Reading] = []
@@ -141,7 +141,7 @@ class RdtScanner(FrameScanner[Reading]):
         return fresh
 
 
-def _ahead(number: int, start: int) -> int:
-    """Return by how much a number is ahead of another one, across the wrap."""
+def _signed_difference(number: int, start: int) -> int:
+    """Return number - start modulo the wrap, signed."""
     half = MODULUS // 2
     return (number - start + half) % MODULUS - half

@@ -1,4 +1,4 @@
-"""An ATI sensor on the network: stopped, started, and its records checked."""
+"""Driver part of ATI network sensors: start and stop of the stream, settings."""
 
 from dataclasses import dataclass
 from typing import Annotated, Literal
@@ -20,24 +20,24 @@ from ft_sensor.serial_line.link import OpenedPort, PortSettings
 from ft_sensor.serial_line.startup import SerialDialog, silent_error
 from ft_sensor.vendors import ati
 
-NETWORK = 100_000_000  # bit/s of its Ethernet
-RATE = 1000  # Hz, as its web page is to be set
-_FROZEN_NS = 50_000_000  # 32-bit counts of noise never repeat that long
-_STUCK_NS = 250_000_000  # nor does one of them
+NETWORK = 100_000_000  # bit/s, fast Ethernet
+RATE = 1000  # Hz, to be set on its web page
+_FROZEN_NS = 50_000_000  # noisy 32-bit counts never repeat for that long
+_STUCK_NS = 250_000_000  # the same for a single axis
 _ANSWER_NS = NS_PER_S // 2
-_QUIET_NS = 100_000_000  # what was under way when it was told to stop
+_QUIET_NS = 100_000_000  # for packets in transit after the stop
 _TRIES = 3  # requests may be lost
 
 
 @dataclass(frozen=True, slots=True)
 class AtiSettings:
-    """What the sensor's web page says of it.
+    """Settings as on the sensor's web page.
 
     Attributes:
         counts_per_force: counts per N.
         counts_per_torque: counts per N m.
-        ranges: fx fy fz tx ty tz it measures up to [N, N m].
-        rate: records a second [Hz].
+        ranges: measuring ranges fx fy fz tx ty tz [N, N m].
+        rate: record rate [Hz].
     """
 
     counts_per_force: float
@@ -55,8 +55,8 @@ class AtiSettings:
 class AtiDevice:
     """Implements `ft_sensor.serial_line.sensor.SerialDevice` for RDT.
 
-    RDT answers no request: that a sensor obeys is seen by its stream, which ends and
-    begins. Nothing of its settings can be asked for; they stand in rig.toml.
+    RDT does not acknowledge requests: success shows only by the end and start of the
+    stream. Settings cannot be read; they are given in rig.toml.
     """
 
     stop = ati.encode_request(ati.STOP)
@@ -81,15 +81,15 @@ class AtiDevice:
         return ati.RdtScanner(self._settings.counts, self.ranges)
 
     def status_words(self, status: int) -> tuple[str, ...]:
-        """Return what the set bits of `status` say."""
+        """Return the meanings of the set bits of `status`."""
         return ati.status_words(status)
 
     def start(self, dialog: SerialDialog) -> dict[str, str]:
-        """End a stream that may be running, and start a new one.
+        """Stop a running stream, if any, and start a new one.
 
         Raises:
             LinkError: the network failed.
-            LinkTimeoutError: the sensor is silent, or goes on when it is stopped.
+            LinkTimeoutError: the sensor is silent, or does not stop streaming.
             DeviceFaultError: it reports a failure.
         """
         self._end_stream(dialog)
@@ -125,11 +125,11 @@ class AtiDevice:
         )
 
     def _refuse_failure(self, readings: list[Reading]) -> None:
-        ill = next((r for r in reversed(readings) if not r.is_trusted), None)
-        if ill is not None:
-            words = ", ".join(self.status_words(ill.status))
+        faulty = next((r for r in reversed(readings) if not r.is_trusted), None)
+        if faulty is not None:
+            words = ", ".join(self.status_words(faulty.status))
             raise DeviceFaultError(
-                f"The F/T sensor reports: {words} (status 0x{ill.status:08x}).",
+                f"The F/T sensor reports: {words} (status 0x{faulty.status:08x}).",
                 hint="Its web page tells more; check the cable of the transducer.",
             )
 
@@ -155,24 +155,24 @@ class AtiSection(SensorSection):
     )
 
     def known_ranges(self) -> Wrench | None:
-        """Return what it measures at most [N, N m], if that is given."""
+        """Return the measuring ranges [N, N m], None if not given."""
         return self.ranges
 
     def open_port(self, port: str) -> OpenedPort:
-        """Open the way to the sensor at the address `port`.
+        """Open a UDP port to the sensor at the address `port`.
 
         Raises:
-            SettingsError: it is no address.
-            LinkError: no way leads there.
+            SettingsError: not a valid address.
+            LinkError: no route to the address.
         """
         address = parse_address(port, ati.PORT)
         return OpenedPort(DatagramPort(address, ati.FRAME_SIZE), "")
 
     def build(self, line: PortSettings) -> AtiDevice:
-        """Return the sensor at the end of `line`.
+        """Return the sensor on `line`.
 
         Raises:
-            SettingsError: what its web page says is missing.
+            SettingsError: a setting from its web page is missing.
         """
         scales = self.counts_per_force, self.counts_per_torque
         if scales[0] is None or scales[1] is None or self.ranges is None:

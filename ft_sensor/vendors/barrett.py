@@ -1,4 +1,4 @@
-"""Barrett's wrist sensor: node 8 of the arm's bus, asked along with the positions."""
+"""Barrett's wrist sensor: node 8 of the arm's bus, polled along with the positions."""
 
 from dataclasses import asdict, dataclass
 from typing import Literal
@@ -27,14 +27,14 @@ _GET_FT = encode_get(property_number(Device.SENSOR, "FT"))
 _VERS, _ROLE, _SN, _STAT = 0, 1, 2, 5  # the same asleep and awake
 _MS = 1_000_000
 _WAKE_NS = 10 * _MS
-_BOOT_NS = 1_000 * _MS  # the bus stays silent while a transceiver comes up
-_ANSWER_NS = 50 * _MS  # it answers within 1 ms; a slow adapter may sit on it
-_QUESTIONS = 20  # before the sensor is believed to be there
+_BOOT_NS = 1_000 * _MS  # no traffic while the transceiver powers up
+_ANSWER_NS = 50 * _MS  # the sensor answers within 1 ms; a slow adapter adds latency
+_QUESTIONS = 20  # requests of the start-up check
 
 
 @dataclass(frozen=True, slots=True)
 class _Identity:
-    """Identity that node 8 reported; None = none."""
+    """Identity reported by node 8; None = not reported."""
 
     role: int | None = None
     vers: int | None = None
@@ -46,10 +46,10 @@ class BarrettSensor:
     """The force/torque sensor on a WAM's bus.
 
     Implements `WrenchSensor` and, for the arm's driver, `BusDevice`: the driver sends
-    its questions and hands it the frames.
+    its requests and passes received frames to it.
 
     Attributes:
-        counters: what was heard and dropped.
+        counters: counters of replies and errors.
     """
 
     def __init__(self, link: Link, clock: Clock) -> None:
@@ -62,11 +62,11 @@ class BarrettSensor:
         self._inbox: list[WrenchSample] = []
 
     def open(self) -> None:
-        """Wake the sensor if it sleeps and see that it answers; the loop must not run.
+        """Wake the sensor if necessary and check its replies; the loop must not run.
 
         The arm's start-up wakes it with the pucks; opened before that, it is woken
-        here. ROLE and VERS are not relied upon, as they were wrong in old firmware:
-        that force and torque come when asked for is what counts. No tare is sent.
+        here. ROLE and VERS are not checked, because old firmware reports wrong values:
+        replies to force and torque requests decide. No tare command is sent.
 
         Raises:
             LinkTimeoutError: node 8 is silent, or sends no force and torque.
@@ -92,18 +92,18 @@ class BarrettSensor:
         self._identity = _Identity(role, vers, serial_number, answered)
 
     def poll_frame(self, t_ns: int) -> tuple[int, bytes]:
-        """Return the question that leaves at `t_ns`."""
+        """Return identifier and payload of the request sent at `t_ns`."""
         self._pairing.ask(t_ns)
         return SENSOR_NODE, _GET_FT
 
     def on_frame(self, can_id: int, data: Payload) -> None:
-        """Take a frame of the bus; all but force and torque are ignored."""
+        """Handle a frame of the bus; all but force and torque are ignored."""
         sample = self._pairing.on_frame(can_id, data)
         if sample is not None:
             self._inbox.append(sample)
 
     def poll(self, now_ns: int) -> list[WrenchSample]:
-        """Return what has been heard since the last call, oldest first."""
+        """Return the samples since the last call, oldest first."""
         samples, self._inbox = self._inbox, []
         return samples
 
@@ -116,18 +116,18 @@ class BarrettSensor:
             "firmware": f"{_text(identity.vers)} (unreliable)",
             "role": _role_text(identity.role),
             "port": "the arm's CAN bus",
-            "ranges": " ".join(f"{most:g}" for most in RANGES),
+            "ranges": " ".join(f"{limit:g}" for limit in RANGES),
             "nominal_rate": "one sample per cycle",
             "measured_rate": f"{identity.answered} of {_QUESTIONS} questions answered",
             "time": "question handed over + 191 us; filter delay unknown",
         }
 
     def stream_metadata(self) -> dict[str, str]:
-        """Return what became of its answers, as text."""
+        """Return the counters of replies, as text."""
         return {name: str(value) for name, value in asdict(self.counters).items()}
 
     def close(self) -> None:
-        """Forget what was heard; the bus is the arm's."""
+        """Drop pending samples; the bus belongs to the arm's driver."""
         self._inbox = []
 
     def _wake(self) -> None:
@@ -148,7 +148,7 @@ class BarrettSensor:
             )
 
     def _exchange(self) -> WrenchSample | None:
-        """Ask outside the loop; return the answer, None if it does not come."""
+        """Request a sample outside the loop; None after a timeout."""
         self._properties.drain()
         now_ns = self._clock.now_ns()
         deadline_ns = now_ns + _ANSWER_NS
@@ -177,20 +177,20 @@ def _role_text(role: int | None) -> str:
 
 
 class BarrettSection(SensorSection):
-    """[ft_sensor] of a sensor on the arm's bus: it has no line and no options."""
+    """[ft_sensor] of a sensor on the arm's bus, without line and options."""
 
     kind: Literal["barrett"] = Field(examples=["barrett"])
     port: str = Field(default="none", examples=["none"])
     baudrate: Whole = Field(default=1_000_000, gt=0, le=4_000_000, examples=[1_000_000])
 
     def known_ranges(self) -> Wrench:
-        """Return what it measures at most [N, N m]."""
+        """Return the measuring ranges [N, N m]."""
         return RANGES
 
     @property
     def is_on_bus(self) -> bool:
-        """Whether it is asked over the arm's bus and has no port."""
+        """Whether the sensor is polled on the arm's bus and has no port."""
         return True
 
     def build(self, line: PortSettings) -> None:
-        """Return None: the arm's driver asks it."""
+        """Return None: the arm's driver polls the sensor."""

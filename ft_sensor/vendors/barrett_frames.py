@@ -1,7 +1,7 @@
-"""Force and torque of Barrett's wrist sensor: two frames that make one sample.
+"""Pairing of the force and torque frames of Barrett's wrist sensor.
 
-One question (GET FT) has two answers without a number: force, then torque. The status
-that says whether they can be believed comes with the torque.
+A request (GET FT) has two replies without a sequence number: force, then torque. The
+status byte, which tells whether the data are valid, is part of the torque frame.
 """
 
 from dataclasses import dataclass
@@ -21,18 +21,18 @@ from wam.bus.frames import (
 
 FORCE_ID = group_id(Group.FORCE, SENSOR_NODE)
 TORQUE_ID = group_id(Group.TORQUE, SENSOR_NODE)
-# Data sheet: fx fy fz tx ty tz [N, N m]; fz is good for 135 N, its frame for 127.996.
+# Data sheet: fx fy fz tx ty tz [N, N m]; fz 135 N, but its frame holds up to 127.996.
 RANGES = (80.0, 80.0, 127.99, 2.75, 2.75, 2.75)
-# Handed over right after the position request, the question has left 2 x 58 us later,
-# and the sensor takes 75 us more until it samples, as the pucks do.
+# Queued right after the position request, the request is sent 2 x 58 us later; the
+# sensor samples 75 us after that (ASSUMED as for the pucks).
 SAMPLING_DELAY_NS = 191_000
 _RETARE, _BAD = 0x80, 0x40
 
 
 def status_words(status: int) -> tuple[str, ...]:
-    """Return what the seventh byte of a torque frame reports, in words.
+    """Return the meanings of the status byte of a torque frame.
 
-    Which bit stands for which gauge is not known; bit 0 is taken for gauge 1.
+    The order of the gauge bits is undocumented; bit 0 is taken for gauge 1.
     """
     words = ("data bad now",) if status & _BAD else ()
     gauges = [n for n in range(1, 7) if status >> n - 1 & 1]
@@ -42,14 +42,14 @@ def status_words(status: int) -> tuple[str, ...]:
 
 @dataclass(slots=True)
 class BarrettCounters:
-    """What happened to the answers since the sensor was made.
+    """Counters of replies since construction.
 
     Attributes:
         samples: pairs of force and torque.
-        unanswered: questions that no pair came to before the next question.
+        unanswered: requests without a pair before the next request.
         unpaired: a force without its torque, or the reverse.
-        unasked: pairs without a question.
-        malformed: frames that contradict the protocol.
+        unasked: pairs without a request.
+        malformed: frames that violate the protocol.
     """
 
     samples: int = 0
@@ -60,11 +60,11 @@ class BarrettCounters:
 
 
 class WrenchPairing:
-    """Joins the two answers to a question, in either order, to a dated sample.
+    """Combines the two replies to a request, in either order, to a timestamped sample.
 
-    What is left alone when the next question leaves is dropped. A sample is dated by
-    its question, 191 us after it was handed over; an adapter that delivers an answer
-    only after the next question makes it a cycle too young.
+    A single reply is dropped at the next request. The time of a sample is that of its
+    request plus 191 us; a reply delivered after the next request is dated one cycle
+    too late.
     """
 
     def __init__(self, counters: BarrettCounters) -> None:
@@ -74,14 +74,14 @@ class WrenchPairing:
         self._torque: tuple[Triple, int] | None = None
 
     def ask(self, t_ns: int) -> None:
-        """Note that a question leaves at `t_ns`."""
+        """Register a request sent at `t_ns`."""
         self._counters.unpaired += (self._force is None) != (self._torque is None)
         self._counters.unanswered += self._asked_ns is not None
         self._force = self._torque = None
         self._asked_ns = t_ns
 
     def on_frame(self, can_id: int, data: Payload) -> WrenchSample | None:
-        """Take a frame; return the sample that it completes. Others are ignored."""
+        """Handle a frame; return the sample that it completes, or None."""
         try:
             if can_id == FORCE_ID:
                 force = decode_force(data)
@@ -110,7 +110,7 @@ class WrenchPairing:
         self._counters.samples += 1
         wrench = (*force, *torque)
         beyond = axes_beyond(wrench, RANGES)
-        if status & ~_RETARE:  # a gauge, or bad data: which axes is unknown
+        if status & ~_RETARE:  # gauge saturated or data bad: the axes are unknown
             beyond = ALL_AXES
         return WrenchSample(
             t_ns=asked_ns + SAMPLING_DELAY_NS,

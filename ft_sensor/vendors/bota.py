@@ -1,8 +1,8 @@
-"""The serial protocol of the Bota sensors of generation 1, without any I/O.
+"""Codec of the serial protocol of Bota sensors of generation 1; no I/O.
 
-One frame is 37 bytes: header 0xAA, status, three forces, three torques, the device's
-own microseconds, a temperature and a CRC-16/X-25 over bytes 1 to 34. Commands are
-short ASCII strings without an end mark; the device acknowledges each with
+A frame has 37 bytes: header 0xAA, status, three forces, three torques, device clock in
+microseconds, temperature and a CRC-16/X-25 over bytes 1 to 34. Commands are short ASCII
+strings without a terminator; the device acknowledges each with
 ``r,<digit>,<letter>,<code>``, code 0 meaning accepted.
 """
 
@@ -19,7 +19,7 @@ from ft_sensor.serial_line.framing import FrameScanner
 
 HEADER = 0xAA
 FRAME_SIZE = 37
-CLOCK_MODULUS = 1 << 32  # of its microseconds
+CLOCK_MODULUS = 1 << 32  # us
 SINC_STEP_NS = 19_531.25  # output period per unit of sinc length
 BAUD_CODES = {9600: 0, 57600: 1, 115200: 2, 230400: 3, 460800: 4}
 MAX_COMMAND_SIZE = 64  # the device's input buffer
@@ -60,7 +60,7 @@ _WORDS = {
 
 
 def status_words(status: int) -> tuple[str, ...]:
-    """Return what the set bits of `status` say, lowest bit first."""
+    """Return the meanings of the set bits of `status`, lowest bit first."""
     words = [text for bit, text in _WORDS.items() if status & bit]
     reserved = status & ~sum(_WORDS)
     if reserved:
@@ -69,13 +69,13 @@ def status_words(status: int) -> tuple[str, ...]:
 
 
 class BotaFrame(NamedTuple):
-    """One measurement as it was on the wire; a tuple, because there are many.
+    """One measurement as on the wire; a tuple for speed.
 
     Attributes:
         status: status bits, see `BotaStatus`.
         wrench: fx fy fz tx ty tz in the sensor frame [N, N m].
-        device_us: the device's clock, wraps at 2**32 [us].
-        temperature: inside the sensor [degrees Celsius].
+        device_us: device clock, wraps at 2**32 [us].
+        temperature: temperature inside the sensor [degrees Celsius].
     """
 
     status: int
@@ -84,15 +84,15 @@ class BotaFrame(NamedTuple):
     temperature: float
 
 
-# Without the words of a call, which take longer than the frame.
+# Skips NamedTuple's __new__, which takes longer than decoding the frame.
 _as_frame = partial(tuple[int | float | Wrench].__new__, BotaFrame)
 
 
 def crc_x25(data: bytes) -> int:
     """Return the CRC-16/X-25 of `data`.
 
-    X-25 is the bit-reversed twin of the CRC of `binascii.crc_hqx`: reversing the bits
-    of every byte going in and of the result coming out turns one into the other.
+    X-25 is the reflected form of the CRC of `binascii.crc_hqx`: reversing the bits of
+    every input byte and of the result converts one to the other.
     """
     crc = crc_hqx(data.translate(_REVERSED_BITS), _CRC_START)
     return (_REVERSED_BITS[crc & 0xFF] << 8 | _REVERSED_BITS[crc >> 8]) ^ 0xFFFF
@@ -112,8 +112,8 @@ def encode_frame(frame: BotaFrame) -> bytes:
 def decode_frame(data: bytes, start: int = 0) -> BotaFrame | None:
     """Return the frame in the 37 bytes from `start`; None if they are not one.
 
-    Data followed by its own checksum always leaves the same residue, so the stored
-    checksum is not compared but run through.
+    The CRC over data and checksum has a constant residue, so the checksum need not be
+    extracted and compared.
     """
     checked = data[start + 1 : start + FRAME_SIZE]
     if len(checked) != FRAME_SIZE - 1 or data[start] != HEADER:
@@ -137,7 +137,7 @@ def scanner(ranges: Wrench) -> FrameScanner[Reading]:
         if not status:
             return Reading(device_us, wrench, 0, True, 0)
         beyond = 0
-        if status & _OVER_RANGE:  # which axis it is, the device does not say
+        if status & _OVER_RANGE:  # the device does not report the axis
             beyond = axes_beyond(wrench, ranges) or ALL_AXES
         is_trusted = not status & _UNTRUSTED
         return Reading(device_us, wrench, status, is_trusted, beyond)
@@ -162,7 +162,7 @@ def filter_command(sinc: int, is_fir_on: bool) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class Acknowledgement:
-    """The device's answer to the command that begins with `letter`; 0 = accepted."""
+    """The device's reply to the command beginning with `letter`; code 0 = accepted."""
 
     letter: str
     code: int
@@ -174,7 +174,7 @@ def encode_acknowledgement(answer: Acknowledgement) -> bytes:
 
 
 def find_acknowledgements(data: bytes) -> list[Acknowledgement]:
-    """Return the acknowledgements in `data`, which may be binary around them."""
+    """Return the acknowledgements in `data`, possibly embedded in binary frames."""
     return [
         Acknowledgement(match[1].decode("ascii"), int(match[2][:9]))
         for match in _ACKNOWLEDGEMENT.finditer(data)
@@ -183,7 +183,7 @@ def find_acknowledgements(data: bytes) -> list[Acknowledgement]:
 
 @dataclass(frozen=True, slots=True)
 class BootText:
-    """What the device says of itself after power-on; empty where it did not."""
+    """Boot message of the device; "" for missing fields."""
 
     is_started: bool = False
     name: str = ""
@@ -192,12 +192,12 @@ class BootText:
 
     @property
     def is_complete(self) -> bool:
-        """The last line has arrived."""
+        """Whether the last line has been received."""
         return bool(self.firmware)
 
 
 def find_boot_text(data: bytes) -> BootText:
-    """Return the known tokens in `data`; text around them is not documented."""
+    """Return the known fields in `data`; the text around them is undocumented."""
 
     def line(pattern: re.Pattern[bytes]) -> str:
         match = pattern.search(data)
@@ -207,7 +207,7 @@ def find_boot_text(data: bytes) -> BootText:
 
 
 def encode_boot_text(text: BootText) -> bytes:
-    """Return `text` as a device prints it."""
+    """Return the boot message as a device sends it."""
     lines = (
         "App Init",
         f"name: {text.name}",

@@ -1,4 +1,4 @@
-"""A Bota sensor of generation 1: from any mode to a stream to be trusted."""
+"""Driver part of Bota sensors of generation 1: start-up from any mode, settings."""
 
 from dataclasses import dataclass
 from typing import Annotated, Literal
@@ -17,30 +17,30 @@ from ft_sensor.vendors import bota
 from ft_sensor.vendors.bota import BootText, BotaStatus
 
 BAUDRATE = 460800
-# Of the SensONE as commonly given, in no document at hand: rig.toml may know better.
+# Commonly quoted for the SensONE, not verified; rig.toml can override them.
 RANGES: Wrench = (500.0, 500.0, 1200.0, 15.0, 15.0, 12.0)
-_FROZEN_NS = 50_000_000  # real noise never repeats six floats that long
-_STUCK_NS = 250_000_000  # nor one: a recorded sensor repeated one for 160 ms at 100 Hz
-_LISTEN_NS = 3 * NS_PER_S  # a sensor that the opening reset boots within this
+_FROZEN_NS = 50_000_000  # noise never repeats six floats for that long
+_STUCK_NS = 250_000_000  # one float repeated for 160 ms in a recording at 100 Hz
+_LISTEN_NS = 3 * NS_PER_S  # boot time of a sensor that was reset by opening the port
 _SETTLE_NS = NS_PER_S // 2
 _ANSWER_NS = 2 * NS_PER_S
-_KEYSTROKE_NS = 5_000_000  # the device takes commands no faster
+_KEYSTROKE_NS = 5_000_000  # least time between two command bytes
 _RESET_NS = 1_500_000_000
 _TRIES = 3
-_RESETS = 5  # the matrix may need several starts to become active
+_RESETS = 5  # the calibration matrix may take several starts to become active
 _PLAUSIBLE_OF_TEN = 8
-_MAX_FORCE = 500.0  # [N]; beyond it at rest the numbers are no forces
+_MAX_FORCE = 500.0  # [N]; larger values at rest are raw gauge data
 _MAX_TORQUE = 50.0  # [N m]
 
 
 @dataclass(frozen=True, slots=True)
 class BotaSettings:
-    """How a Bota sensor is set up.
+    """Settings of a Bota sensor.
 
     Attributes:
         sinc: sinc filter length; the rate is 51200 / sinc [Hz].
         is_fir_on: FIR filter on: cut-off 189 Hz at sinc 64, without it 1255 Hz.
-        ranges: fx fy fz tx ty tz it measures up to [N, N m].
+        ranges: measuring ranges fx fy fz tx ty tz [N, N m].
     """
 
     sinc: int = 64
@@ -48,7 +48,7 @@ class BotaSettings:
     ranges: Wrench = RANGES
 
     def __post_init__(self) -> None:
-        """Refuse what no sensor can do.
+        """Validate the settings.
 
         Raises:
             SettingsError: the sinc length is out of range.
@@ -66,7 +66,7 @@ class BotaDevice:
     stop = bota.CONFIGURE
 
     def __init__(self, line: PortSettings, settings: BotaSettings) -> None:
-        """Take line and settings.
+        """Set up line and timing; no I/O.
 
         Raises:
             SettingsError: the line cannot carry the stream.
@@ -93,17 +93,17 @@ class BotaDevice:
         return bota.scanner(self.ranges)
 
     def status_words(self, status: int) -> tuple[str, ...]:
-        """Return what the set bits of `status` say."""
+        """Return the meanings of the set bits of `status`."""
         return bota.status_words(status)
 
     def start(self, dialog: SerialDialog) -> dict[str, str]:
-        """Set the sensor up and start its stream; return who it is and how it is set.
+        """Configure the sensor, start its stream, and return its description.
 
-        Takes boot text or a running stream, for about three seconds; a sensor in
-        configuration mode says neither and is spoken to all the same.
+        Waits up to three seconds for a boot message or a running stream; a sensor in
+        configuration mode sends neither and is configured without.
 
         Raises:
-            LinkError: the port failed, or bytes came that are not this sensor's.
+            LinkError: the port failed, or the data are not this sensor's.
             LinkTimeoutError: the sensor is silent or does not answer.
             DeviceFaultError: it refused a command, or its calibration matrix stays
                 inactive.
@@ -111,7 +111,7 @@ class BotaDevice:
         self._boot, self._answers = BootText(), 0
         dialog.wait_for(lambda: self._first_sign(dialog), _LISTEN_NS)
         if self._boot.is_complete:
-            # It takes no commands before its stream runs.
+            # Commands are ignored until the stream runs.
             dialog.wait_for(lambda: dialog.frames > 0 or None, _SETTLE_NS)
         self._start_until_plausible(dialog)
         fir = "on" if self._settings.is_fir_on else "off"
@@ -144,13 +144,13 @@ class BotaDevice:
         )
 
     def _set_up(self, dialog: SerialDialog) -> None:
-        """Bring the sensor from any mode to a running stream; several tries."""
+        """Bring the sensor from any mode to a running stream, with retries."""
         for tries_left in reversed(range(_TRIES)):
             try:
                 self._configure_and_run(dialog)
             except (DeviceFaultError, LinkTimeoutError):
-                known = self._answers or dialog.frames or self._boot.is_started
-                if not known:
+                has_signs = self._answers or dialog.frames or self._boot.is_started
+                if not has_signs:
                     dialog.raise_no_reply(self.line.baudrate)
                 if not tries_left:
                     raise
@@ -158,7 +158,7 @@ class BotaDevice:
                 return
 
     def _configure_and_run(self, dialog: SerialDialog) -> None:
-        # A sensor already in configuration mode need not answer this one.
+        # A sensor already in configuration mode may not acknowledge this one.
         self._ask(dialog, bota.CONFIGURE)
         for command in (
             bota.communication_command(self.line.baudrate),
@@ -180,7 +180,7 @@ class BotaDevice:
                 )
 
     def _ask(self, dialog: SerialDialog, command: bytes) -> int | None:
-        """Send `command`; return the code of its answer, None when there is none."""
+        """Send `command`; return the code of its reply, None without a reply."""
         for key in command:
             dialog.write(bytes((key,)))
             dialog.pause(_KEYSTROKE_NS)
@@ -197,7 +197,7 @@ class BotaDevice:
 
 
 def _is_plausible(readings: list[Reading]) -> bool:
-    """Return whether most of the first ten readings look like forces."""
+    """Return whether most of the first ten readings are plausible."""
     good = [
         not reading.status & BotaStatus.RAW_GAUGE
         and all(abs(force) < _MAX_FORCE for force in reading.wrench[:3])
@@ -217,7 +217,7 @@ class BotaSection(SensorSection):
 
     Attributes:
         sinc: filter length, see `BotaSettings`.
-        ranges: of this very sensor [N, N m]; left out: as commonly given.
+        ranges: measuring ranges of this unit [N, N m]; default: commonly quoted ones.
     """
 
     kind: Literal["bota"] = Field(examples=["bota"])
@@ -226,10 +226,10 @@ class BotaSection(SensorSection):
     ranges: _Ranges | None = Field(default=None, examples=[[*RANGES]])
 
     def known_ranges(self) -> Wrench:
-        """Return what it measures at most [N, N m]."""
+        """Return the measuring ranges [N, N m]."""
         return self.ranges or RANGES
 
     def build(self, line: PortSettings) -> BotaDevice:
-        """Return the sensor at the end of `line`."""
+        """Return the sensor on `line`."""
         settings = BotaSettings(self.sinc, ranges=self.ranges or RANGES)
         return BotaDevice(line, settings)

@@ -1,8 +1,8 @@
-"""The serial protocol of the OptoForce / OnRobot HEX 6-axis sensors, without any I/O.
+"""Codec of the serial protocol of OptoForce / OnRobot HEX 6-axis sensors; no I/O.
 
-A data frame is 22 bytes: header AA 07 08 10, a 16-bit counter, status, six counts and a
-16-bit sum, all big-endian. What one count means differs from unit to unit: the report
-that came with it gives six sensitivities.
+A data frame has 22 bytes: header AA 07 08 10, 16-bit counter, status, six counts and
+16-bit sum, all big-endian. The scale differs from unit to unit: the sensitivity report
+of the unit gives six sensitivities.
 """
 
 import struct
@@ -18,7 +18,7 @@ SPEED_CODES = {1000: 1, 333: 3, 100: 10, 30: 33, 10: 100}
 STOPPED = 0
 FILTER_CODES = {0: 0, 500: 1, 150: 2, 50: 3, 15: 4, 5: 5}
 ASK_SERIAL = bytes((0xAB, 0x00, 0x12, 0x08, 0x00, 0xC5))
-FULL_COUNTS = 32000  # a count beyond is no measurement
+FULL_COUNTS = 32000  # full scale; larger counts are saturated
 
 _CONFIGURATION = bytes((0xAA, 0x00, 0x32, 0x03))
 _ANSWER = bytes((0xAA, 0x00, 0x50, 0x01))
@@ -37,7 +37,7 @@ class OptoForceFrame:
     """One measurement as it was on the wire.
 
     Attributes:
-        counter: of transmitted frames, wraps at 65536.
+        counter: frame counter, wraps at 65536.
         status: see `status_words`.
         counts: fx fy fz tx ty tz as sent, 16 bits each.
     """
@@ -78,13 +78,13 @@ def decode_frame(data: bytes, start: int = 0) -> OptoForceFrame | None:
 def encode_configuration(speed: int, low_pass: int, zero: int = 0) -> bytes:
     """Return the 9 bytes that set speed and filter, by their codes.
 
-    `zero`: 255 takes the present load as zero, 0 clears the stored offset.
+    `zero`: 255 stores the present load as offset, 0 clears the stored offset.
     """
     return _summed(_CONFIGURATION + bytes((speed, low_pass, zero)))
 
 
 def decode_configuration(data: bytes) -> tuple[int, int, int] | None:
-    """Return (speed, filter, zero) of 9 bytes; None if they are no configuration."""
+    """Return (speed, filter, zero) of a configuration; None if it is not one."""
     if len(data) != 9 or not data.startswith(_CONFIGURATION) or not _is_summed(data):
         return None
     return data[4], data[5], data[6]
@@ -96,25 +96,25 @@ def encode_configuration_answer(code: int) -> bytes:
 
 
 def find_configuration_answer(data: bytes) -> int | None:
-    """Return the code of the newest answer in `data`, binary around it or not."""
-    answer = _newest(data, _ANSWER, 7)
+    """Return the code of the newest reply in `data`, or None."""
+    answer = _newest_reply(data, _ANSWER, 7)
     return None if answer is None else answer[4]
 
 
 def encode_serial_number(name: str) -> bytes:
-    """Return the 14 bytes that answer the question for the serial number."""
+    """Return the 14-byte reply to a request for the serial number."""
     return _summed(_SERIAL + name.encode("ascii").ljust(8, b"\0")[:8])
 
 
 def find_serial_number(data: bytes) -> str | None:
     """Return the serial number in `data`; None if there is none."""
-    answer = _newest(data, _SERIAL, 14)
+    answer = _newest_reply(data, _SERIAL, 14)
     if answer is None:
         return None
     return answer[4:12].split(b"\0")[0].decode("ascii", errors="replace").strip()
 
 
-def _newest(data: bytes, header: bytes, size: int) -> bytes | None:
+def _newest_reply(data: bytes, header: bytes, size: int) -> bytes | None:
     start = data.rfind(header)
     while start >= 0:
         answer = data[start : start + size]
@@ -125,7 +125,7 @@ def _newest(data: bytes, header: bytes, size: int) -> bytes | None:
 
 
 def is_older_protocol(data: bytes) -> bool:
-    """Return whether `data` looks like the stream of firmware before this protocol."""
+    """Return whether `data` looks like the stream of an older protocol."""
     return sum(data.count(begin) for begin in _OLD_FRAMES) >= 8
 
 
@@ -135,7 +135,7 @@ def overloaded_axes(status: int) -> int:
 
 
 def status_words(status: int) -> tuple[str, ...]:
-    """Return what a status says: the DAQ's state, the sensor's, overloaded axes."""
+    """Return the meaning of a status: state of DAQ and sensor, overloaded axes."""
     daq, sensor = status >> 13 & 0x7, status >> 10 & 0x7
     words: list[str] = []
     if daq:

@@ -1,4 +1,4 @@
-"""An OptoForce / OnRobot HEX sensor: matched to its report, set up, started."""
+"""Driver part of OptoForce / OnRobot HEX sensors: identity, start-up, settings."""
 
 from dataclasses import dataclass
 from math import inf
@@ -18,7 +18,7 @@ from ft_sensor.vendors import optoforce
 
 BAUDRATE = 1_000_000
 RATE = 1000  # Hz; 500 would be an undocumented code
-_FROZEN_NS = NS_PER_S  # its counts may repeat for a while, not so long
+_FROZEN_NS = NS_PER_S  # coarse counts may repeat, but not for that long
 _ANSWER_NS = NS_PER_S // 2
 _LISTEN_NS = NS_PER_S // 2
 _TRIES = 3
@@ -26,11 +26,11 @@ _TRIES = 3
 
 @dataclass(frozen=True, slots=True)
 class OptoForceSettings:
-    """How a HEX sensor is set up, and what its report says.
+    """Settings of a HEX sensor and the contents of its sensitivity report.
 
     Attributes:
-        sensitivity: counts per N and per N m, from the report of this very unit.
-        serial_number: of the unit that the report belongs to.
+        sensitivity: counts per N and per N m, from the report of this unit.
+        serial_number: serial number in the report.
         filter_hz: cut-off of its low-pass, a key of `optoforce.FILTER_CODES`; 0 = off.
     """
 
@@ -39,10 +39,10 @@ class OptoForceSettings:
     filter_hz: int = 150
 
     def __post_init__(self) -> None:
-        """Refuse what the sensor does not know.
+        """Validate the settings.
 
         Raises:
-            SettingsError: unknown filter, or a sensitivity that is no scale.
+            SettingsError: unknown filter, or a sensitivity of zero.
         """
         if self.filter_hz not in optoforce.FILTER_CODES:
             raise SettingsError(
@@ -57,7 +57,7 @@ class OptoForceSettings:
 
 
 def _full_range(sensitivity: Wrench) -> Wrench:
-    """Return the wrench at full counts [N, N m]; an axis without counts has no end."""
+    """Return the wrench at full scale [N, N m]; infinite for a sensitivity of zero."""
     fx, fy, fz, tx, ty, tz = (
         abs(optoforce.FULL_COUNTS / value) if value else inf for value in sensitivity
     )
@@ -67,13 +67,13 @@ def _full_range(sensitivity: Wrench) -> Wrench:
 class OptoForceDevice:
     """Implements `ft_sensor.serial_line.sensor.SerialDevice` for a HEX sensor.
 
-    No setting can be read back: its acknowledgement is checked, and its rate.
+    Settings cannot be read back: acknowledgement and frame rate are checked.
     """
 
     stop = optoforce.encode_configuration(optoforce.STOPPED, 0)
 
     def __init__(self, line: PortSettings, settings: OptoForceSettings) -> None:
-        """Take line and settings.
+        """Set up line and timing; no I/O.
 
         Raises:
             SettingsError: the line cannot carry the stream.
@@ -97,17 +97,17 @@ class OptoForceDevice:
         return optoforce.scanner(self._settings.sensitivity)
 
     def status_words(self, status: int) -> tuple[str, ...]:
-        """Return what a status says."""
+        """Return the meaning of a status."""
         return optoforce.status_words(status)
 
     def start(self, dialog: SerialDialog) -> dict[str, str]:
-        """See that it is the unit of the report, set it up and start its stream.
+        """Check the serial number, configure the sensor and start its stream.
 
         Raises:
-            LinkError: the port failed, or bytes came that are not this sensor's.
+            LinkError: the port failed, or the data are not this sensor's.
             LinkTimeoutError: the sensor is silent or does not answer.
-            DeviceFaultError: it is another unit, runs firmware of an older protocol,
-                refused its settings, or reports a failure.
+            DeviceFaultError: not the unit of the report, an older protocol, refused
+                settings, or a reported failure.
         """
         dialog.wait_for(lambda: dialog.frames > 0 or None, _LISTEN_NS)
         self._configure(dialog, self.stop)
@@ -173,9 +173,9 @@ class OptoForceDevice:
         )
 
     def _refuse_failure(self, readings: list[Reading]) -> None:
-        ill = next((r for r in reversed(readings) if not r.is_trusted), None)
-        if ill is not None:
-            words = ", ".join(self.status_words(ill.status))
+        faulty = next((r for r in reversed(readings) if not r.is_trusted), None)
+        if faulty is not None:
+            words = ", ".join(self.status_words(faulty.status))
             raise DeviceFaultError(
                 f"The F/T sensor reports: {words}.",
                 hint="Check the cable between sensor and DAQ; cycle its power.",
@@ -201,14 +201,14 @@ class OptoForceSection(SensorSection):
     )
 
     def known_ranges(self) -> Wrench | None:
-        """Return what it measures at most [N, N m], if its report is given."""
+        """Return the measuring ranges [N, N m], None without sensitivities."""
         return _full_range(self.sensitivity) if self.sensitivity else None
 
     def build(self, line: PortSettings) -> OptoForceDevice:
-        """Return the sensor at the end of `line`.
+        """Return the sensor on `line`.
 
         Raises:
-            SettingsError: what its report says is missing.
+            SettingsError: sensitivity or serial number is missing.
         """
         if self.sensitivity is None or self.serial_number is None:
             raise SettingsError(

@@ -1,4 +1,4 @@
-"""Every make of wrist sensor: one member of the union of their settings each.
+"""Registry of all makes of wrist sensors: the union of their settings.
 
 A new make is a module with its section (a `SensorSection` with `kind`, options and
 `build`) and a member here.
@@ -21,7 +21,7 @@ SECTIONS: dict[str, type[SensorSection]] = {
     get_args(section.model_fields["kind"].annotation)[0]: section
     for section in get_args(AnySensor)
 }
-SERIAL_KINDS = tuple(  # those with a port, not on the arm's bus
+SERIAL_KINDS = tuple(  # with a port, not on the arm's bus
     kind
     for kind, section in SECTIONS.items()
     if section.model_fields["port"].is_required()

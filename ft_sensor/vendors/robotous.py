@@ -1,9 +1,9 @@
-"""The serial protocol of the Robotous RFT sensors, without any I/O.
+"""Codec of the serial protocol of Robotous RFT sensors; no I/O.
 
-Every packet begins with 0x55 and ends with an 8-bit sum of its data field and 0xAA.
-Commands have eight data bytes, answers and samples sixteen, of which the first repeats
-the command. A sample holds six big-endian counts and one overload bit an axis; there is
-no counter and no clock.
+A packet begins with 0x55 and ends with the 8-bit sum of its data field and 0xAA.
+Commands have eight data bytes, replies and samples sixteen, the first of which repeats
+the command. A sample has six big-endian counts and one overload bit per axis, but no
+counter and no clock.
 """
 
 import struct
@@ -26,7 +26,7 @@ BIAS, OVERLOADS = 0x11, 0x12
 
 BAUD_CODES = {115200: 4, 921600: 1, 460800: 2, 230400: 3, 57600: 5}
 RATE_CODES = {200: 0, 10: 1, 20: 2, 50: 3, 100: 4, 333: 6, 500: 7, 1000: 8}
-# The manual's order; a sample header of the maker has the opposite one.
+# Order of the manual; the maker's C header has the opposite order.
 FILTER_CODES = {500: 1, 300: 2, 200: 3, 150: 4, 100: 5, 50: 6, 40: 7, 30: 8}
 ERRORS = {1: "not supported", 2: "out of range", 3: "could not be stored"}
 
@@ -35,7 +35,7 @@ _COUNTS = struct.Struct(">6h")
 
 @dataclass(frozen=True, slots=True)
 class RobotousModel:
-    """What a model measures.
+    """Ranges and scale of a model.
 
     Attributes:
         ranges: rated load fx fy fz tx ty tz [N, N m].
@@ -69,7 +69,7 @@ class RobotousFrame:
 
     Attributes:
         counts: fx fy fz tx ty tz as sent, 16 bits each.
-        overload: bits 5 to 0: fx fy fz tx ty tz a fifth beyond rated load.
+        overload: bits 5 to 0: fx fy fz tx ty tz more than 20 % above rated load.
     """
 
     counts: tuple[int, int, int, int, int, int]
@@ -83,7 +83,7 @@ def encode_command(command: int, *parameters: int) -> bytes:
 
 
 def encode_answer(command: int, *content: int) -> bytes:
-    """Return the 19 bytes that answer `command`, with up to 15 bytes of content."""
+    """Return the 19-byte reply to `command`, with up to 15 bytes of content."""
     return _packed(bytes((command, *content)).ljust(16, b"\0"))
 
 
@@ -101,7 +101,7 @@ def _packed(data: bytes) -> bytes:
 
 
 def is_packet(data: bytes, start: int = 0) -> bool:
-    """Return whether the 19 bytes from `start` are a whole answer or sample."""
+    """Return whether the 19 bytes from `start` are a valid reply or sample."""
     return (
         len(data) - start >= FRAME_SIZE
         and data[start] == SOP
@@ -111,7 +111,7 @@ def is_packet(data: bytes, start: int = 0) -> bool:
 
 
 def decode_frame(data: bytes, start: int = 0) -> RobotousFrame | None:
-    """Return the streamed sample in the 19 bytes from `start`; None if it is none."""
+    """Return the streamed sample in the 19 bytes from `start`, or None."""
     if not is_packet(data, start) or data[start + 1] != STREAM:
         return None
     fx, fy, fz, tx, ty, tz = _COUNTS.unpack_from(data, start + 2)
@@ -119,7 +119,7 @@ def decode_frame(data: bytes, start: int = 0) -> RobotousFrame | None:
 
 
 def decode_command(data: bytes) -> tuple[int, bytes] | None:
-    """Return (command, seven parameter bytes) of 11 bytes; None if they are none."""
+    """Return (command, seven parameter bytes) of a command packet, or None."""
     if len(data) != COMMAND_SIZE or data[0] != SOP or data[10] != EOP:
         return None
     if sum(data[1:9]) & 0xFF != data[9]:
@@ -128,7 +128,7 @@ def decode_command(data: bytes) -> tuple[int, bytes] | None:
 
 
 def find_answer(data: bytes, command: int) -> bytes | None:
-    """Return the 15 bytes that the newest answer to `command` in `data` holds."""
+    """Return the 15 content bytes of the newest reply to `command`, or None."""
     for start in range(len(data) - FRAME_SIZE, -1, -1):
         if is_packet(data, start) and data[start + 1] == command:
             return data[start + 2 : start + 17]
@@ -136,7 +136,7 @@ def find_answer(data: bytes, command: int) -> bytes | None:
 
 
 def text_of(content: bytes) -> str:
-    """Return the printable text of an answer's content."""
+    """Return the text in a reply's content."""
     return content.split(b"\0")[0].decode("ascii", errors="replace").strip()
 
 
@@ -146,27 +146,27 @@ def overloaded_axes(overload: int) -> int:
 
 
 def status_words(status: int) -> tuple[str, ...]:
-    """Return what the overload bits of a sample say."""
+    """Return the meanings of the overload bits of a sample."""
     axes = axis_names(overloaded_axes(status))
     return tuple(f"{axis} more than 20 % above rated load" for axis in axes)
 
 
 def scanner(torque_counts: Callable[[], float]) -> FrameScanner[Reading]:
-    """Return a scanner for samples; the model tells the `torque_counts` per N m."""
+    """Return a scanner for samples; `torque_counts` gives the counts per N m."""
 
     def read(data: bytes, start: int) -> Reading | None:
         frame = decode_frame(data, start)
         if frame is None:
             return None
         fx, fy, fz, tx, ty, tz = frame.counts
-        newtons, turns = 1.0 / FORCE_COUNTS, 1.0 / torque_counts()
+        newtons, newton_metres = 1.0 / FORCE_COUNTS, 1.0 / torque_counts()
         wrench = (
             fx * newtons,
             fy * newtons,
             fz * newtons,
-            tx * turns,
-            ty * turns,
-            tz * turns,
+            tx * newton_metres,
+            ty * newton_metres,
+            tz * newton_metres,
         )
         overload = frame.overload & 0x3F
         beyond = overloaded_axes(overload) if overload else 0

@@ -1,4 +1,4 @@
-"""A Robotous RFT sensor: identified, set up, read back, started."""
+"""Driver part of Robotous RFT sensors: identification, start-up, settings."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -17,18 +17,18 @@ from ft_sensor.vendors import robotous
 from ft_sensor.vendors.robotous import FIRMWARE, MODEL, MODELS, SERIAL, RobotousModel
 
 BAUDRATE = 921600
-_FIRST_BAUDRATE = 115200  # as it leaves the factory, at 200 Hz
+_FIRST_BAUDRATE = 115200  # factory setting, at 200 Hz
 _MOST_BY_BAUDRATE = {57600: 200, 115200: 333, 230400: 500, 460800: 500, 921600: 1000}
-_FROZEN_NS = NS_PER_S  # its counts may repeat for a while, not so long
+_FROZEN_NS = NS_PER_S  # coarse counts may repeat, but not for that long
 _ANSWER_NS = NS_PER_S // 2
 _QUIET_NS = 50_000_000
 _TRIES = 3
-_ABSURD = 1.5  # times the rated load: no measurement
+_ABSURD = 1.5  # multiple of the rated load that is implausible at the start
 
 
 @dataclass(frozen=True, slots=True)
 class RobotousSettings:
-    """How a Robotous sensor is set up.
+    """Settings of a Robotous sensor.
 
     Attributes:
         rate: samples per second, 500 or 1000 [Hz].
@@ -39,7 +39,7 @@ class RobotousSettings:
     filter_hz: int = 150
 
     def __post_init__(self) -> None:
-        """Refuse what the sensor does not know, or what is too slow for the loop.
+        """Validate the settings.
 
         Raises:
             SettingsError: unknown rate or filter.
@@ -59,19 +59,20 @@ class RobotousSettings:
 class RobotousDevice:
     """Implements `ft_sensor.serial_line.sensor.SerialDevice` for a Robotous sensor.
 
-    It has no clock and no counter. Its scale follows from its model, which is asked.
+    The sensor has no clock and no counter. Its scale follows from its model, which is
+    read at the start.
     """
 
     stop = robotous.encode_command(robotous.STOP)
 
     def __init__(self, line: PortSettings, settings: RobotousSettings) -> None:
-        """Take line and settings.
+        """Set up line and timing; no I/O.
 
         Raises:
             SettingsError: the line cannot carry the stream.
         """
         period_ns = NS_PER_S / settings.rate
-        # A sensor fresh from the factory has to be spoken to in its own speed once.
+        # A new sensor has to be configured once at its factory speed.
         is_first = line.baudrate == _FIRST_BAUDRATE
         needed_ns = NS_PER_S / 200 if is_first else period_ns
         line.require(tuple(robotous.BAUD_CODES), robotous.FRAME_SIZE, needed_ns)
@@ -99,19 +100,19 @@ class RobotousDevice:
         return robotous.scanner(lambda: self._model.torque_counts)
 
     def status_words(self, status: int) -> tuple[str, ...]:
-        """Return what the overload bits say."""
+        """Return the meanings of the overload bits."""
         return robotous.status_words(status)
 
     def start(self, dialog: SerialDialog) -> dict[str, str]:
-        """Stop the sensor, identify it, set it up, read that back, start its stream.
+        """Stop and identify the sensor, configure it, verify, and start its stream.
 
         Raises:
-            LinkError: the port failed, or bytes came that are not this sensor's.
+            LinkError: the port failed, or the data are not this sensor's.
             LinkTimeoutError: the sensor is silent or does not answer.
-            DeviceFaultError: it is an unknown model, too slow a model, or refused a
-                setting; or it spoke at the factory's speed and needs its power cycled.
+            DeviceFaultError: unknown or too slow model, refused setting, or a speed
+                changed from the factory's, which takes a power cycle.
         """
-        self._make_quiet(dialog)
+        self._stop_stream(dialog)
         name = self._identify(dialog)
         fields = {
             "model": f"Robotous {name}",
@@ -124,7 +125,7 @@ class RobotousDevice:
         self._set_rate(dialog)
         overloads = self._ask(dialog, robotous.OVERLOADS)
         dialog.write(robotous.encode_command(robotous.STREAM))
-        self._refuse_absurd(dialog.first_readings())
+        self._check_plausible(dialog.first_readings())
         low_pass = f"low-pass {self._settings.filter_hz} Hz"
         return {
             **fields,
@@ -133,8 +134,8 @@ class RobotousDevice:
             "time": "frames counted, fitted to arrival less wire time; no device clock",
         }
 
-    def _make_quiet(self, dialog: SerialDialog) -> None:
-        """End a stream that an earlier program left; this command has no answer."""
+    def _stop_stream(self, dialog: SerialDialog) -> None:
+        """Stop a stream left by an earlier program; this command has no reply."""
         dialog.write(self.stop)
         dialog.pause(_QUIET_NS)
         dialog.discard()
@@ -146,22 +147,22 @@ class RobotousDevice:
             if not dialog.frames:
                 dialog.raise_no_reply(self.line.baudrate)
             raise
-        reply = _model_of(name)
-        if reply is None:
+        model = _model_of(name)
+        if model is None:
             raise DeviceFaultError(
                 f"The F/T sensor reports the name '{name}', whose scale is unknown.",
                 hint=f"Known are {', '.join(MODELS)}.",
             )
-        if reply.most_hz < self._settings.rate:
+        if model.most_hz < self._settings.rate:
             raise DeviceFaultError(
-                f"A {name} sends {reply.most_hz} Hz at most; the loop needs 500.",
+                f"A {name} sends {model.most_hz} Hz at most; the loop needs 500.",
                 hint="Use another model.",
             )
-        self._model, self.ranges = reply, reply.ranges
+        self._model, self.ranges = model, model.ranges
         return name
 
     def _leave_first_baudrate(self, dialog: SerialDialog) -> None:
-        """Let the sensor speak faster from its next power-on; raises in any case."""
+        """Set a higher speed for the next power-on; always raises."""
         self._set(dialog, robotous.SET_BAUDRATE, robotous.BAUD_CODES[BAUDRATE])
         raise DeviceFaultError(
             f"At {_FIRST_BAUDRATE} baud the F/T sensor is too slow for the loop. It "
@@ -171,18 +172,18 @@ class RobotousDevice:
 
     def _set_filter(self, dialog: SerialDialog) -> None:
         cutoff = self._settings.filter_hz
-        wished = (1, robotous.FILTER_CODES[cutoff]) if cutoff else (0, 0)
-        self._set(dialog, robotous.SET_FILTER, *wished)
-        got = self._ask(dialog, robotous.GET_FILTER)
-        if (got[0], got[1] if got[0] else 0) != wished:
-            raise _not_taken("filter", wished, tuple(got[:2]))
+        requested = (1, robotous.FILTER_CODES[cutoff]) if cutoff else (0, 0)
+        self._set(dialog, robotous.SET_FILTER, *requested)
+        readback = self._ask(dialog, robotous.GET_FILTER)
+        if (readback[0], readback[1] if readback[0] else 0) != requested:
+            raise _readback_error("filter", requested, tuple(readback[:2]))
 
     def _set_rate(self, dialog: SerialDialog) -> None:
-        wished = robotous.RATE_CODES[self._settings.rate]
-        self._set(dialog, robotous.SET_RATE, wished)
-        got = self._ask(dialog, robotous.GET_RATE)
-        if got[0] != wished:
-            raise _not_taken("rate", (wished,), (got[0],))
+        requested = robotous.RATE_CODES[self._settings.rate]
+        self._set(dialog, robotous.SET_RATE, requested)
+        readback = self._ask(dialog, robotous.GET_RATE)
+        if readback[0] != requested:
+            raise _readback_error("rate", (requested,), (readback[0],))
 
     def _set(self, dialog: SerialDialog, command: int, *parameters: int) -> None:
         answer = self._ask(dialog, command, *parameters)
@@ -198,10 +199,10 @@ class RobotousDevice:
         return robotous.text_of(self._ask(dialog, command))
 
     def _ask(self, dialog: SerialDialog, command: int, *parameters: int) -> bytes:
-        """Return the 15 bytes of the answer to `command`.
+        """Return the 15 bytes of the reply to `command`, with retries.
 
         Raises:
-            LinkTimeoutError: it did not come, several times.
+            LinkTimeoutError: no reply.
         """
         for _ in range(_TRIES):
             dialog.write(robotous.encode_command(command, *parameters))
@@ -216,7 +217,7 @@ class RobotousDevice:
             hint="Check the cable in both directions; cycle its power.",
         )
 
-    def _refuse_absurd(self, readings: list[Reading]) -> None:
+    def _check_plausible(self, readings: list[Reading]) -> None:
         worst = max(
             abs(value) / rated
             for reading in readings
@@ -230,19 +231,19 @@ class RobotousDevice:
 
 
 def _model_of(name: str) -> RobotousModel | None:
-    """Return what is known of a model that calls itself `name`."""
+    """Return the model of a reported `name`, or None."""
     plain = name.upper().replace(" ", "")
-    for known, model in MODELS.items():
-        if plain.startswith(known):
+    for model_name, model in MODELS.items():
+        if plain.startswith(model_name):
             return model
     return None
 
 
-def _not_taken(
-    what: str, wished: tuple[int, ...], got: tuple[int, ...]
+def _readback_error(
+    what: str, requested: tuple[int, ...], readback: tuple[int, ...]
 ) -> DeviceFaultError:
     return DeviceFaultError(
-        f"The F/T sensor reads back {what} code {got}, set was {wished}.",
+        f"The F/T sensor reads back {what} code {readback}, set was {requested}.",
         hint="Cycle its power and try again; check its firmware.",
     )
 

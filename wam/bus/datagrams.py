@@ -1,8 +1,8 @@
-"""Many datagrams of a socket by one call of the kernel, recvmmsg(2).
+"""Batched socket reads: many datagrams in one system call, recvmmsg(2).
 
-A frame by `socket.recvmsg_into` costs a call of the kernel, a list and a tuple, and the
-last call an exception. Here the kernel fills memory that was laid out once: layouts are
-those of struct mmsghdr, iovec and cmsghdr, as the C library of this machine has them.
+`socket.recvmsg_into` costs a system call, a list and a tuple for each frame, and an
+exception for the last call. Here the kernel fills preallocated memory with the layout
+of struct mmsghdr, iovec and cmsghdr of this machine's C library.
 """
 
 import ctypes
@@ -12,11 +12,12 @@ import socket
 import struct
 from collections.abc import Callable, Iterator
 
-AT_ONCE = 32  # datagrams of one call
+AT_ONCE = 32  # datagrams per call
 _NO_WAIT = int(socket.MSG_DONTWAIT)
 _CONTROL_BYTES = 128  # ancillary data of one datagram
 _HEADER = struct.Struct("@PIPNPNi0PI0P")  # struct mmsghdr
-_SIZES = struct.Struct(f"@{struct.calcsize('@PIPNP')}xN4x0PI0P")  # what is read of it
+# msg_controllen and msg_len of the same struct, all else skipped
+_SIZES = struct.Struct(f"@{struct.calcsize('@PIPNP')}xN4x0PI0P")
 _IOVEC = struct.Struct("@PN")  # struct iovec
 _CONTROL = struct.Struct("@Nii")  # struct cmsghdr
 _ALIGN = struct.calcsize("@N")
@@ -28,7 +29,7 @@ def system_call() -> ReceiveMany:
     """Return recvmmsg of the C library.
 
     Raises:
-        OSError: it has none.
+        OSError: the C library has no recvmmsg.
     """
     try:
         library = ctypes.CDLL(None, use_errno=True)
@@ -41,18 +42,18 @@ class DatagramBatch:
     """Memory for `AT_ONCE` datagrams of up to `room` bytes, filled by one call.
 
     Attributes:
-        payload: datagram i from byte i * room on.
-        control: its ancillary data from byte i * control_room on.
-        control_room: bytes from one to the next.
+        payload: datagrams; datagram i starts at byte i * room.
+        control: ancillary data; that of datagram i starts at byte i * control_room.
+        control_room: stride of `control` [bytes].
     """
 
     control_room = _CONTROL_BYTES
 
     def __init__(self, room: int, receive_many: ReceiveMany) -> None:
-        """Lay the memory out.
+        """Allocate the memory and fill in the headers.
 
         Args:
-            room: bytes of a datagram; what is longer is cut.
+            room: size of a datagram [bytes]; longer ones are truncated.
             receive_many: recvmmsg(2), as `system_call` returns it.
         """
         self._call = receive_many
@@ -70,18 +71,18 @@ class DatagramBatch:
             _HEADER.pack_into(
                 self._headers, _HEADER.size * i, *header, _CONTROL_BYTES, 0, 0
             )
-        self._fresh = bytes(self._headers)
+        self._initial_headers = bytes(self._headers)
         self._pointer = ctypes.c_void_p(_address(self._headers))
         self._view = memoryview(self._headers)
 
     def receive(self, descriptor: int) -> list[tuple[int, ...]]:
-        """Take what waits on a socket, at most `AT_ONCE`, oldest first; never waits.
+        """Read up to `AT_ONCE` queued datagrams, oldest first, without blocking.
 
         Returns:
-            bytes of its ancillary data and bytes of itself, for each datagram.
+            (size of the ancillary data, size of the payload) [bytes] per datagram.
 
         Raises:
-            OSError: the socket has an error and nothing came before it.
+            OSError: the socket has an error and no datagram is queued before it.
         """
         call = self._call
         count = call(descriptor, self._pointer, AT_ONCE, _NO_WAIT, None)
@@ -92,15 +93,16 @@ class DatagramBatch:
             raise OSError(number, os.strerror(number))
         used = count * _HEADER.size
         sizes = list(_SIZES.iter_unpack(self._view[:used]))
-        self._view[:used] = self._fresh[:used]  # the kernel wrote its sizes there
+        # The kernel overwrote the capacities with sizes.
+        self._view[:used] = self._initial_headers[:used]
         return sizes
 
     def ancillary(self, i: int, size: int) -> Iterator[tuple[int, bytes]]:
-        """Yield kind and data of each part of datagram i's ancillary data.
+        """Yield (type, data) of each control message of datagram i.
 
         Args:
-            i: number of the datagram.
-            size: bytes of its ancillary data.
+            i: index of the datagram.
+            size: size of its ancillary data [bytes].
         """
         at = i * _CONTROL_BYTES
         end = at + min(size, _CONTROL_BYTES)

@@ -1,8 +1,8 @@
-"""A bus log in words: who asked what, who answered, how late, who stayed silent.
+"""Translation of a bus log to text: requests, replies, delays and missing replies.
 
-A GET is answered once by each device that it addresses, a SET by nobody. The protocol
-has no sequence numbers: an answer belongs to the oldest open question of its kind, and
-a question asked again after the answer's time limit replaces the one before.
+Each addressed device answers a GET once; a SET has no reply. The protocol has no
+sequence numbers: a reply is matched to the oldest open request of its kind, and a
+request repeated after the reply's time limit replaces the one before.
 """
 
 from enum import Enum
@@ -32,9 +32,9 @@ from wam.bus.frames import (
 from wam.bus.log import JUMP_NS, BusSummary, DecodedLine, LoggedFrame
 from wam.bus.properties import FIRST_RELEASED, Device, PuckMode, PuckStatus, names
 
-LIMIT_NS = 1_000_000  # an answer is late after this
+LIMIT_NS = 1_000_000  # replies after this are late
 _GIVE_UP_NS = 1_000_000_000
-_USUAL_VERS = 200  # of a device whose firmware is unknown
+_DEFAULT_VERS = 200  # assumed firmware where none was reported
 _MEMBERS = {
     Group.BUS: range(1, 8),
     Group.LOWER_TORQUE: range(1, 5),
@@ -52,7 +52,7 @@ _GROUP_NAMES = {
 
 
 class ReplyKind(Enum):
-    """Answers that are not property replies, by the group they are sent to."""
+    """Replies other than property replies, by their destination group."""
 
     POSITION = Group.POSITION
     JOINT_ENCODER = Group.JOINT_ENCODER
@@ -62,7 +62,7 @@ class ReplyKind(Enum):
 
 
 def describe_id(can_id: int) -> str:
-    """Return in words who says what to whom with an 11-bit identifier."""
+    """Return sender, receiver and purpose of an 11-bit identifier as text."""
     address = split_id(can_id)
     who = node_name(address.sender)
     if address.is_group and address.to == Group.PROPERTY:
@@ -71,8 +71,8 @@ def describe_id(can_id: int) -> str:
         return f"{who} reports its {ReplyKind(Group(address.to)).name.lower()}"
     if not address.is_group:
         return f"{who} to {node_name(address.to)}"
-    known = address.to in _GROUP_NAMES
-    whom = _GROUP_NAMES[Group(address.to)] if known else f"group {address.to}"
+    is_named = address.to in _GROUP_NAMES
+    whom = _GROUP_NAMES[Group(address.to)] if is_named else f"group {address.to}"
     return f"{who} to {whom}"
 
 
@@ -82,57 +82,62 @@ _SPECIAL = {
     (Device.SENSOR, "FT"): (ReplyKind.FORCE, ReplyKind.TORQUE),
     (Device.SENSOR, "A"): (ReplyKind.ACCELERATION,),
 }
-_Key = tuple[int, ReplyKind | int]  # node, and what it is to say: a property by number
+_Key = tuple[int, ReplyKind | int]  # node; kind of reply or property number
 
 
 def node_name(node: int) -> str:
-    """Return what a person calls a node of the bus."""
-    known = {HOST: "host", SENSOR_NODE: "F/T sensor", SAFETY_NODE: "safety module"}
-    if node in known:
-        return known[node]
+    """Return the name of a bus node for people, such as "puck 3"."""
+    named_nodes = {
+        HOST: "host",
+        SENSOR_NODE: "F/T sensor",
+        SAFETY_NODE: "safety module",
+    }
+    if node in named_nodes:
+        return named_nodes[node]
     return f"puck {node}" if node in MOTOR_NODES else f"node {node}"
 
 
 class BusReader:
-    """Reads a log frame by frame and learns from it who sleeps and runs what.
+    """Decodes a log frame by frame; tracks firmware and sleep state of each node.
 
     Attributes:
-        tally: what the log adds up to so far.
+        tally: totals so far.
     """
 
     def __init__(self) -> None:
         self.tally = BusSummary()
-        self._open: dict[_Key, list[int]] = {}  # when asked [ns], the oldest key first
+        self._open: dict[_Key, list[int]] = {}  # request times [ns], oldest key first
         self._vers: dict[int, int] = {}
         self._asleep: set[int] = set()
         self._newest_ns = 0
 
     def read(self, frame: LoggedFrame) -> list[DecodedLine]:
-        """Return what `frame` says, after the questions it shows to be unanswered."""
+        """Return the text of `frame`, after lines for requests that have expired."""
         self.tally.frames += 1
-        spoken = self._give_up(frame.utc_ns - _GIVE_UP_NS)
-        spoken += self._hear_clock(frame.utc_ns)
+        lines = self._expire(frame.utc_ns - _GIVE_UP_NS)
+        lines += self._check_clock(frame.utc_ns)
         if not frame.is_of_wam:
-            text = self._say_foreign(frame)
-            return [*spoken, DecodedLine(frame.utc_ns, text)]
+            text = self._decode_foreign(frame)
+            return [*lines, DecodedLine(frame.utc_ns, text)]
         address = split_id(frame.can_id)
         try:
-            text = self._say(frame, address, spoken)
+            text = self._decode(frame, address, lines)
         except FrameError as error:
             text = f"{node_name(address.sender)}: {error.message}"
-        return [*spoken, DecodedLine(frame.utc_ns, text)]
+        return [*lines, DecodedLine(frame.utc_ns, text)]
 
     def finish(self) -> list[DecodedLine]:
-        """Return the questions that had their time before the end of the log.
+        """Return the unanswered requests whose time limit ended within the log.
 
-        One that was asked as the log ended is not counted: its answer may have come.
+        A request still within its limit at the end is not counted: its reply may have
+        come afterwards.
         """
-        spoken = self._give_up(self._newest_ns - LIMIT_NS)
+        lines = self._expire(self._newest_ns - LIMIT_NS)
         self.tally.questions -= sum(map(len, self._open.values()))
-        return spoken
+        return lines
 
-    def _hear_clock(self, utc_ns: int) -> list[DecodedLine]:
-        """Return what is to be said of the time since the frame before."""
+    def _check_clock(self, utc_ns: int) -> list[DecodedLine]:
+        """Return a line if the time since the previous frame is a gap or a jump."""
         passed_ns = utc_ns - self._newest_ns if self._newest_ns else 0
         self._newest_ns = utc_ns
         if passed_ns > JUMP_NS:
@@ -143,28 +148,28 @@ class BusReader:
         if passed_ns < -JUMP_NS:
             self.tally.jumps += 1
             self.tally.questions -= sum(map(len, self._open.values()))
-            self._open.clear()  # when they were asked says nothing any more
+            self._open.clear()  # their request times are of another clock setting
             text = f"TIME GOES BACK by {-passed_ns / NS_PER_S:.3f} s"
             return [DecodedLine(utc_ns, text)]
         return []
 
-    def _say(
-        self, frame: LoggedFrame, address: Address, spoken: list[DecodedLine]
+    def _decode(
+        self, frame: LoggedFrame, address: Address, lines: list[DecodedLine]
     ) -> str:
         if address.sender == HOST:
-            return self._hear_host(frame, address, spoken)
+            return self._decode_host_frame(frame, address, lines)
         who = node_name(address.sender)
         if address.is_group and address.to == Group.PROPERTY:
-            return self._hear_reply(frame, address.sender)
+            return self._decode_property_reply(frame, address.sender)
         if address.is_group and address.to in {answer.value for answer in ReplyKind}:
             answer = ReplyKind(Group(address.to))
-            delay = self._answered((address.sender, answer), frame.utc_ns)
+            delay = self._match_reply((address.sender, answer), frame.utc_ns)
             return f"{who} {_describe(answer, frame.data)}{delay}"
         if address.is_group and address.to == Group.BUS:
             return f"{who} sends to every puck: {frame.data.hex(' ')}"
         return f"{who} sends {frame.can_id:03x} {frame.data.hex(' ')}"
 
-    def _say_foreign(self, frame: LoggedFrame) -> str:
+    def _decode_foreign(self, frame: LoggedFrame) -> str:
         if frame.can_id & ERROR_FLAG and frame.can_id < EXTENDED_FLAG:
             names = error_names(frame.can_id, frame.data)
             self.tally.errors.update(names)
@@ -172,8 +177,8 @@ class BusReader:
         self.tally.foreign += 1
         return f"not a WAM frame: {frame.can_id:x}"
 
-    def _hear_host(
-        self, frame: LoggedFrame, address: Address, spoken: list[DecodedLine]
+    def _decode_host_frame(
+        self, frame: LoggedFrame, address: Address, lines: list[DecodedLine]
     ) -> str:
         nodes, whom = [address.to], node_name(address.to)
         if address.is_group:
@@ -188,23 +193,23 @@ class BusReader:
         name = self._name(nodes[0], request.number)
         if request.value is not None:
             value = self._value(nodes[0], name, request.value)
-            if name == "STAT":  # a puck that is woken says nothing of it
+            if name == "STAT":  # a puck does not acknowledge that it is woken
                 for node in nodes:
                     self._learn(node, name, request.value)
             return f"host sets {name} of {whom} to {value}"
         for node in nodes:
             for kind in self._answers_to(node, request.number):
-                spoken += self._ask((node, kind), frame.utc_ns)
+                lines += self._note_request((node, kind), frame.utc_ns)
         return f"host asks {whom} for {name}"
 
-    def _hear_reply(self, frame: LoggedFrame, node: int) -> str:
+    def _decode_property_reply(self, frame: LoggedFrame, node: int) -> str:
         reply = decode_reply(frame.data)
         value = reply.value or 0
-        delay = self._answered((node, reply.number), frame.utc_ns)
+        delay = self._match_reply((node, reply.number), frame.utc_ns)
         name = self._name(node, reply.number)
         self._learn(node, name, value)
-        shown = self._value(node, name, value)
-        return f"{node_name(node)} answers {name} = {shown}{delay}"
+        value_text = self._value(node, name, value)
+        return f"{node_name(node)} answers {name} = {value_text}{delay}"
 
     def _learn(self, node: int, name: str, value: int) -> None:
         if name == "STAT":
@@ -221,7 +226,7 @@ class BusReader:
         return special.get(node, Device.MOTOR)
 
     def _name(self, node: int, number: int) -> str:
-        table = names(self._device(node), self._vers.get(node, _USUAL_VERS))
+        table = names(self._device(node), self._vers.get(node, _DEFAULT_VERS))
         return table.get(number, f"property {number}")
 
     def _value(self, node: int, name: str, value: int) -> str:
@@ -241,24 +246,24 @@ class BusReader:
         device = self._device(node)
         return _SPECIAL.get((device, self._name(node, number)), (number,))
 
-    def _ask(self, key: _Key, utc_ns: int) -> list[DecodedLine]:
-        """Note a question; return the one it replaces if that had its time."""
+    def _note_request(self, key: _Key, utc_ns: int) -> list[DecodedLine]:
+        """Register a request; return lines for an expired one that it replaces."""
         self.tally.questions += 1
-        asked = self._open.get(key)
-        if asked is not None and utc_ns - asked[-1] <= LIMIT_NS:
-            asked.append(utc_ns)
+        request_times = self._open.get(key)
+        if request_times is not None and utc_ns - request_times[-1] <= LIMIT_NS:
+            request_times.append(utc_ns)
             return []
         replaced = self._drop(key)
         self._open[key] = [utc_ns]
         return replaced
 
-    def _answered(self, key: _Key, utc_ns: int) -> str:
-        asked = self._open.get(key)
-        if asked is None:
+    def _match_reply(self, key: _Key, utc_ns: int) -> str:
+        request_times = self._open.get(key)
+        if request_times is None:
             self.tally.unasked += 1
             return ", UNASKED"
-        delay_ns = utc_ns - asked.pop(0)
-        if not asked:
+        delay_ns = utc_ns - request_times.pop(0)
+        if not request_times:
             del self._open[key]
         self.tally.answers += 1
         self.tally.slowest_ns = max(self.tally.slowest_ns, delay_ns)
@@ -268,8 +273,8 @@ class BusReader:
             f", {'LATE: ' if is_late else ''}{delay_ns // 1000} us after the question"
         )
 
-    def _give_up(self, before_ns: int) -> list[DecodedLine]:
-        """Drop the questions asked until `before_ns`."""
+    def _expire(self, before_ns: int) -> list[DecodedLine]:
+        """Drop the requests sent until `before_ns` and return their lines."""
         dropped: list[DecodedLine] = []
         while self._open:
             key = next(iter(self._open))
@@ -285,10 +290,10 @@ class BusReader:
         else:
             name = self._name(node, kind)
         what = f"{node_name(node)}: {name}"
-        asked = self._open.pop(key, [])
-        if asked:
-            self.tally.silent[what] += len(asked)
-        return [DecodedLine(t, f"UNANSWERED {what}") for t in asked]
+        request_times = self._open.pop(key, [])
+        if request_times:
+            self.tally.silent[what] += len(request_times)
+        return [DecodedLine(t, f"UNANSWERED {what}") for t in request_times]
 
 
 def _describe(answer: ReplyKind, data: bytes) -> str:

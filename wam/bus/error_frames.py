@@ -1,7 +1,7 @@
-"""Error frames of a CAN controller as Linux reports them: classes, counts, condition.
+"""CAN controller error frames as Linux reports them: classes, counts, bus state.
 
-The layout is that of linux/can/error.h: the classes are the low bits of the identifier,
-the detail stands in the eight bytes.
+Layout of linux/can/error.h: the low bits of the identifier are the error classes, the
+eight data bytes hold the details.
 """
 
 from collections import Counter
@@ -17,7 +17,7 @@ _ACKNOWLEDGE = frozenset({0x19, 0x1B})  # slot and delimiter, in data[3]
 
 
 class ErrorClass(IntFlag):
-    """Classes of an error frame, in its identifier."""
+    """Error classes in the identifier of an error frame."""
 
     TX_TIMEOUT = 0x001
     LOST_ARBITRATION = 0x002
@@ -31,7 +31,7 @@ class ErrorClass(IntFlag):
     COUNTERS = 0x200
 
 
-# What each bit of a byte says, by class: (index of the byte, bit, name).
+# (bit, name) of data[1], data[2] and of the identifier
 _CONTROLLER = (
     (0x01, "rx-overflow"),
     (0x02, "tx-overflow"),
@@ -49,7 +49,7 @@ _PROTOCOL = (
     (0x10, "bit"),
     (0x20, "overload"),
 )
-_PLAIN = (
+_CLASSES = (
     (ErrorClass.TX_TIMEOUT, "tx-timeout"),
     (ErrorClass.LOST_ARBITRATION, "lost-arbitration"),
     (ErrorClass.TRANSCEIVER, "transceiver"),
@@ -60,34 +60,34 @@ _CRC = frozenset({0x08, 0x18})  # locations in data[3]
 
 
 def error_names(can_id: int, data: Payload) -> frozenset[str]:
-    """Return what an error frame reports, each once; "other" where nothing is known.
+    """Return the names of the errors in an error frame; "other" if none is known.
 
     Args:
         can_id: identifier with the classes, with or without the flag 0x20000000.
-        data: eight bytes; missing ones count as zero.
+        data: up to eight bytes, padded with zeros.
     """
     detail = bytes(data).ljust(8, b"\0")
-    names = {name for bit, name in _PLAIN if can_id & bit}
-    # esd_usb leaves the class out that its byte 1 belongs to.
+    names = {name for bit, name in _CLASSES if can_id & bit}
+    # The driver esd_usb fills byte 1 without setting the class CONTROLLER.
     if can_id & (ErrorClass.CONTROLLER | ErrorClass.PROTOCOL | ErrorClass.BUS_ERROR):
         names |= {name for bit, name in _CONTROLLER if detail[1] & bit}
     if can_id & ErrorClass.PROTOCOL:
         names |= {name for bit, name in _PROTOCOL if detail[2] & bit}
         names |= {"crc"} if detail[3] in _CRC else set()
-    is_unheard = can_id & (ErrorClass.PROTOCOL | ErrorClass.BUS_ERROR)
+    has_location = can_id & (ErrorClass.PROTOCOL | ErrorClass.BUS_ERROR)
     if can_id & ErrorClass.NO_ACKNOWLEDGEMENT or (
-        is_unheard and detail[3] in _ACKNOWLEDGE
+        has_location and detail[3] in _ACKNOWLEDGE
     ):
         names.add("no-acknowledgement")
     return frozenset(names or {"other"})
 
 
 class BusErrors:
-    """Counts what error frames report and says what became of the bus.
+    """Error frame counters and the bus condition derived from them.
 
     Attributes:
         frames: error frames so far.
-        counts: how often each name of `error_names` was reported.
+        counts: occurrences of each name of `error_names`.
     """
 
     def __init__(self) -> None:
@@ -97,7 +97,7 @@ class BusErrors:
 
     @property
     def condition(self) -> BusCondition:
-        """What the error frames since the last complete cycle say."""
+        """Bus condition according to the error frames since the last complete cycle."""
         return self._condition
 
     def add(self, can_id: int, data: Payload) -> None:
@@ -110,16 +110,16 @@ class BusErrors:
         elif "restarted" in names:
             self._condition = BusCondition.SOUND
         elif self._condition is not BusCondition.OFF:
-            # A lone sender becomes passive and stays so; it never leaves the bus.
+            # A node alone on the bus becomes error passive but never goes bus-off.
             if names & {"no-acknowledgement", "passive"}:
                 self._condition = BusCondition.UNHEARD
             elif "active" in names:
                 self._condition = BusCondition.SOUND
 
     def confirm(self) -> None:
-        """Note that the arm has answered: whatever it was is over."""
+        """Reset the condition to sound: the arm has answered."""
         self._condition = BusCondition.SOUND
 
     def text(self) -> str:
-        """Return the counts in words, "" where there were no error frames."""
+        """Return the counts as text, "" if there were no error frames."""
         return ", ".join(f"{name} {self.counts[name]}" for name in sorted(self.counts))

@@ -1,8 +1,7 @@
-"""The bytes of the WAM's CAN frames: identifiers, properties, positions, torques.
+"""Codec of the WAM's CAN frames: identifiers, properties, positions, torques.
 
-Everything here is arithmetic on bytes; nothing is sent or received. What arrives is
-checked before it is believed: a frame that is not what it claims to be raises
-`FrameError`. Layouts: Barrett's CAN bus specification and the libbarrett driver.
+No I/O. Received frames are validated: a malformed one raises `FrameError`. Layouts:
+Barrett's CAN bus specification and the libbarrett driver.
 """
 
 import struct
@@ -61,7 +60,7 @@ class FrameError(DeviceFaultError):
 
 @dataclass(frozen=True, slots=True)
 class Address:
-    """An 11-bit identifier taken apart.
+    """Fields of an 11-bit identifier.
 
     Attributes:
         sender: node id of the sender, 0 = host.
@@ -75,14 +74,14 @@ class Address:
 
 
 def compose_id(sender: int, to: int, *, is_group: bool) -> int:
-    """Return the identifier of a frame; raises ValueError beyond five bits."""
+    """Return the identifier of a frame; ValueError if a field exceeds five bits."""
     if not (0 <= sender < 32 and 0 <= to < 32):
         raise ValueError(f"nodes and groups are 0 to 31, not {sender} and {to}")
     return (GROUP_BIT if is_group else 0) | sender << 5 | to
 
 
 def split_id(can_id: int) -> Address:
-    """Return the three fields of an 11-bit identifier; raises ValueError beyond."""
+    """Return the fields of an identifier; ValueError if it exceeds 11 bits."""
     if not 0 <= can_id < 0x800:
         raise ValueError(f"{can_id:#x} is not an 11-bit identifier")
     return Address(can_id >> 5 & 0x1F, can_id & 0x1F, bool(can_id & GROUP_BIT))
@@ -104,10 +103,11 @@ MODE_BROADCAST_ID = compose_id(SAFETY_NODE, Group.BUS, is_group=True)
 def is_of_host(can_id: int) -> bool:
     """Return whether only a host sends frames with this 11-bit identifier.
 
-    Devices obey whatever sender a frame names, and they never talk to each other: what
-    they say goes to feedback groups. So a frame to a device of the arm, or to a group
-    that takes questions and commands, is a host's; and so is a position that no motor
-    puck reports, which the safety module would take for a heartbeat.
+    Devices obey a frame whatever its sender field says, and they send to feedback
+    groups only, never to each other. So a frame addressed to a device of the arm, or to
+    a group that takes requests and commands, comes from a host. The same holds for a
+    position report of a node that is no motor puck: the safety module would count it
+    as a heartbeat.
     """
     address = split_id(can_id)
     if address.sender == HOST:
@@ -130,19 +130,19 @@ def position_reply_id(node: int) -> int:
 
 
 class Property(NamedTuple):
-    """A property number with the value that came with it; a GET has none."""
+    """A property number and its value; None in a GET."""
 
     number: int
     value: int | None
 
 
 def encode_get(number: int) -> bytes:
-    """Return the one byte that asks for property `number`."""
+    """Return the one-byte payload of a GET of property `number`."""
     return bytes((_checked_number(number),))
 
 
 def encode_set(number: int, value: int) -> bytes:
-    """Return the six bytes that set property `number` to a signed 32-bit `value`."""
+    """Return the six-byte payload that sets property `number` to an int32 `value`."""
     return struct.pack("<BBi", 0x80 | _checked_number(number), 0, value)
 
 
@@ -153,7 +153,7 @@ def encode_reply(number: int, value: int, *, is_wide: bool) -> bytes:
 
 
 def decode_reply(data: Payload) -> Property:
-    """Return property and value of a reply, signed at the width received.
+    """Return property and value of a reply, sign-extended from the received width.
 
     Raises:
         FrameError: the length is neither 4 nor 6, bit 7 of byte 0 is clear or byte 1
@@ -167,7 +167,7 @@ def decode_reply(data: Payload) -> Property:
 
 
 def decode_request(data: Payload) -> Property:
-    """Return what a host asks for or sets, the same layout seen from the device.
+    """Return property and value of a host's GET or SET, as a device decodes it.
 
     Raises:
         FrameError: neither a GET of one byte nor a SET of four or six.
@@ -184,39 +184,38 @@ def _checked_number(number: int) -> int:
 
 
 def wrap_positions(counts: Sequence[int]) -> list[int]:
-    """Return motor positions [encoder counts] as 22 bits carry them, signed."""
+    """Return motor positions [encoder counts] wrapped to signed 22 bits."""
     half = _POSITION_SIGN
     return [(count + half) % POSITION_MODULUS - half for count in counts]
 
 
 def encode_position(counts: int) -> bytes:
-    """Return the three bytes of one of `encode_positions`."""
+    """Return the three-byte payload of one motor position [encoder counts]."""
     return encode_positions((counts,))[0]
 
 
 def encode_positions(counts: Sequence[int]) -> list[bytes]:
-    """Return three bytes for each motor position, wrapped at 22 bits as on a puck."""
+    """Return a three-byte payload per motor position, wrapped at 22 bits."""
     return [(count % POSITION_MODULUS).to_bytes(3, "big") for count in counts]
 
 
 def decode_position(data: Payload) -> int:
     """Return the motor position [encoder counts] of a position reply.
 
-    The second half of a six-byte reply is a joint encoder's; see
-    `decode_joint_encoder`.
+    The second half of a six-byte reply is the joint encoder: `decode_joint_encoder`.
 
     Raises:
         FrameError: not 3 or 6 bytes.
     """
     if len(data) not in (3, 6):
         raise FrameError("Not a position reply", data)
-    # The two bits above the 22 have no meaning, as for the vendor's library.
+    # libbarrett ignores the two bits above the 22, too.
     counts = int.from_bytes(data[:3], "big") & _POSITION_MASK
     return (counts ^ _POSITION_SIGN) - _POSITION_SIGN
 
 
 def decode_joint_encoder(data: Payload) -> int | None:
-    """Return the joint encoder position [counts] of a position reply, if it has one.
+    """Return the joint encoder position [counts] of a position reply, or None.
 
     Raises:
         FrameError: as `decode_position`.
@@ -229,12 +228,12 @@ def decode_joint_encoder(data: Payload) -> int | None:
 def encode_torques(units: Sequence[float], number: int = 42) -> bytes:
     """Return the packed torque frame of one group.
 
-    Each value is clipped to ±8191 and floored, as libbarrett does; round first what
-    must not be pulled down.
+    Each value is clipped to ±8191 and rounded down, as libbarrett does: the caller
+    rounds to nearest where a bias of half a unit matters.
 
     Args:
         units: three or four torques [puck units]; a missing fourth is 0.
-        number: property number of T for the pucks' firmware.
+        number: number of property T in the pucks' firmware.
     """
     word = 0x80 | number
     for value in units:
@@ -268,12 +267,12 @@ Triple = tuple[float, float, float]
 
 
 def encode_force(force: Triple) -> bytes:
-    """Return the frame of a force [N]; beyond ±128 N it is clipped."""
+    """Return the payload of a force [N], clipped to ±128 N."""
     return _encode_triple(force, _FORCE_PER_N)
 
 
 def decode_force(data: Payload) -> Triple:
-    """Return the force [N] of a frame of 6 bytes; a seventh is left alone.
+    """Return the force [N] of a force frame; a seventh byte is ignored.
 
     Raises:
         FrameError: neither 6 nor 7 bytes.
@@ -284,16 +283,16 @@ def decode_force(data: Payload) -> Triple:
 
 
 def encode_torque(torque: Triple, status: int | None = None) -> bytes:
-    """Return the frame of a torque [N m], with a seventh byte if `status` is given."""
+    """Return the payload of a torque [N m], with `status` as an optional 7th byte."""
     tail = b"" if status is None else bytes((status,))
     return _encode_triple(torque, _TORQUE_PER_NM) + tail
 
 
 def decode_torque(data: Payload) -> tuple[Triple, int]:
-    """Return torque [N m] and status, which is 0 where the device has no complaint.
+    """Return torque [N m] and status byte; 0 = no fault.
 
-    Status: bit 7 = tare again, bit 6 = these data are bad, bits 5..0 = gauges that
-    saturated since the last tare.
+    Status: bit 7 = tare required, bit 6 = invalid data, bits 5..0 = gauges saturated
+    since the last tare.
 
     Raises:
         FrameError: neither 6 nor 7 bytes.
@@ -305,12 +304,12 @@ def decode_torque(data: Payload) -> tuple[Triple, int]:
 
 
 def encode_acceleration(acceleration: Triple) -> bytes:
-    """Return the frame of the sensor's acceleration [m/s²], unit unverified."""
+    """Return the payload of the sensor's acceleration [m/s²], scale unverified."""
     return _encode_triple(acceleration, _ACCELERATION_SCALE)
 
 
 def decode_acceleration(data: Payload) -> Triple:
-    """Return the acceleration [m/s²]; raises FrameError unless it has 6 bytes."""
+    """Return the acceleration [m/s²]; FrameError unless the frame has 6 bytes."""
     if len(data) != 6:
         raise FrameError("Not an acceleration frame", data)
     return _decode_triple(data, _ACCELERATION_SCALE)

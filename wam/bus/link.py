@@ -1,4 +1,4 @@
-"""A CAN bus as the driver sees it: frames of devices, the rest sorted out."""
+"""CAN link of the driver: device frames in, all other frames counted and dropped."""
 
 import errno
 from collections.abc import Callable, Sequence
@@ -12,26 +12,26 @@ from wam.bus.error_frames import ERROR_FLAG, BusErrors
 from wam.bus.frames import MODE_BROADCAST_ID, is_of_host
 
 _FULL = frozenset({errno.ENOBUFS, errno.EAGAIN})  # a queue, a socket's buffer
-DRAIN_AT_MOST = 512  # frames; no flood may keep the loop here
-_PLAUSIBLE_NS = 10 * NS_PER_S  # a stamp further back is of another clock
-_AHEAD_NS = 5_000_000  # frames go on arriving while a bus is drained
-_LARGEST_ID = 0x7FF  # of a frame that a WAM uses
+DRAIN_AT_MOST = 512  # frames; bounds the time of a cycle when the bus is flooded
+_PLAUSIBLE_NS = 10 * NS_PER_S  # an older timestamp is of another clock
+_AHEAD_NS = 5_000_000  # frames keep arriving while the bus is drained
+_LARGEST_ID = 0x7FF  # 11-bit identifiers; the WAM uses no others
 _OF_DEVICES = frozenset(
     can_id
     for can_id in range(_LARGEST_ID + 1)
     if not is_of_host(can_id) and can_id != MODE_BROADCAST_ID
 )
-_can_id = itemgetter(0)  # of a frame
+_can_id = itemgetter(0)
 
 
 class Frame(NamedTuple):
     """A frame as received or sent.
 
     Attributes:
-        can_id: 11-bit identifier; as a transport gives it also Linux's flags, of
-            which an error, an extended or a remote frame has one.
+        can_id: 11-bit identifier; a transport adds Linux's flag of an error, extended
+            or remote frame.
         data: payload.
-        t_ns: when the bus had it, on the host's monotonic clock [ns], 0 = not known.
+        t_ns: time on the bus by the host's monotonic clock [ns], 0 = not known.
     """
 
     can_id: int
@@ -39,16 +39,16 @@ class Frame(NamedTuple):
     t_ns: int
 
 
-as_frame = partial(tuple[int | bytes].__new__, Frame)  # without the words of a call
-Tap = Callable[[Sequence[tuple[int, bytes, int]]], None]  # each like a Frame
+as_frame = partial(tuple[int | bytes].__new__, Frame)  # skips NamedTuple's __new__
+Tap = Callable[[Sequence[tuple[int, bytes, int]]], None]  # of tuples like Frame
 
 
 class Transport(Protocol):
-    """Frames of all kinds, out and in; what a link needs of an adapter.
+    """Adapter interface of a link: sends and receives frames of all kinds.
 
     Attributes:
-        name: what it is, for people.
-        lost: frames that arrived and found no room, as far as it can tell.
+        name: name for people.
+        lost: received frames dropped for lack of buffer space, if the adapter counts.
     """
 
     name: str
@@ -64,11 +64,15 @@ class Transport(Protocol):
         ...
 
     def receive(self) -> list[Frame]:
-        """Return what has arrived, oldest first; never waits, raises LinkError."""
+        """Return the queued frames, oldest first, without blocking.
+
+        Raises:
+            LinkError: the bus is down.
+        """
         ...
 
     def has_unsent(self) -> bool:
-        """Return whether frames wait in this host, as far as it can tell."""
+        """Return whether frames wait in the send queue; False if it is not known."""
         ...
 
     def fileno(self) -> int:
@@ -76,30 +80,30 @@ class Transport(Protocol):
         ...
 
     def close(self) -> None:
-        """Give the adapter back."""
+        """Release the adapter."""
         ...
 
 
 class Link(Protocol):
-    """Frames out, frames in; what a driver needs of a bus."""
+    """Bus interface of the driver."""
 
     @property
     def mode_hints(self) -> int:
-        """Number of changes of mode that the safety module has announced."""
+        """Number of mode changes announced by the safety module."""
         ...
 
     @property
     def errors(self) -> BusErrors:
-        """What error frames of the controller reported."""
+        """Error counters and condition of the bus."""
         ...
 
     @property
     def foreign_id(self) -> int | None:
-        """Identifier of the first frame of another master; None = none ever came."""
+        """Identifier of the first frame from another bus master, or None."""
         ...
 
     def metadata(self) -> dict[str, str]:
-        """Return which transport this is and what it lost, as text for a recording."""
+        """Return transport name and number of lost frames, as text for a recording."""
         ...
 
     def send(self, can_id: int, data: bytes) -> None:
@@ -107,11 +111,11 @@ class Link(Protocol):
         ...
 
     def receive(self) -> list[Frame]:
-        """Return what has arrived, oldest first; never waits."""
+        """Return the device frames received, oldest first, without blocking."""
         ...
 
     def has_unsent(self) -> bool:
-        """Return whether frames wait in this host, as far as the transport can tell."""
+        """Return whether frames wait in the send queue; False if it is not known."""
         ...
 
     def fileno(self) -> int:
@@ -119,36 +123,36 @@ class Link(Protocol):
         ...
 
     def is_readable(self) -> bool:
-        """Return whether `receive` would return something."""
+        """Return whether `receive` would return a frame."""
         ...
 
     def close(self) -> None:
-        """Give the bus back."""
+        """Release the bus."""
         ...
 
 
 class CanLink:
-    """A bus seen by the driver: sent to, drained, never waited on.
+    """Non-blocking CAN link that passes device frames to the driver.
 
-    Frames of hosts (`is_of_host`, the own ones included), remote, extended and error
-    frames are dropped. The safety module's broadcast of a change of mode has no known
-    content: it is counted in `mode_hints` and dropped. A bus does not return what was
-    sent through it, so a frame of a host that arrives is another master's.
+    Frames of hosts (`is_of_host`), remote, extended and error frames are dropped. The
+    content of the safety module's mode broadcast is undocumented: it is counted in
+    `mode_hints` and dropped. A bus does not echo frames sent through it, so a received
+    host frame is another master's.
 
     Attributes:
-        mode_hints: broadcasts of the safety module so far.
-        errors: what error frames of the controller reported.
-        foreign_ids: identifiers of hosts' frames that have arrived so far.
-        foreign_id: the first of them; None = none has.
+        mode_hints: mode broadcasts of the safety module so far.
+        errors: error counters and condition of the bus.
+        foreign_ids: identifiers of the host frames received so far.
+        foreign_id: the first of them; None if there is none.
     """
 
     def __init__(self, transport: Transport, tap: Tap | None = None) -> None:
-        """Take over a transport.
+        """Take ownership of a transport.
 
         Args:
-            transport: to the bus.
-            tap: takes every data frame with an 11-bit identifier, sent or received;
-                all that have arrived at once together.
+            transport: adapter of the bus.
+            tap: called with every data frame with an 11-bit identifier, sent or
+                received; frames received together come in one call.
         """
         self._tap = tap
         self.mode_hints = 0
@@ -157,12 +161,12 @@ class CanLink:
         self.foreign_id: int | None = None
         self._transport = transport
         self._inbox: list[Frame] = []
-        self._error: LinkError | None = None  # looking came across it
+        self._error: LinkError | None = None  # met by is_readable, raised by receive
         self._is_open = True
 
     def metadata(self) -> dict[str, str]:
-        """Return which transport this is and what it lost, as text for a recording."""
-        return {  # "door" is the word that recordings have had from the first
+        """Return transport name and number of lost frames, as text for a recording."""
+        return {  # "door" is a key of format 1.0
             "link:door": self._transport.name,
             "link:lost_frames": str(self._transport.lost),
         }
@@ -180,7 +184,7 @@ class CanLink:
             self._tap(((can_id, data, 0),))
 
     def receive(self) -> list[Frame]:
-        """Return the device frames that have arrived, oldest first.
+        """Return the device frames received, oldest first.
 
         Raises:
             LinkError: the bus is down.
@@ -193,7 +197,7 @@ class CanLink:
         return frames
 
     def has_unsent(self) -> bool:
-        """Return whether frames wait in this host, as far as the transport can tell."""
+        """Return whether frames wait in the send queue; False if it is not known."""
         return self._is_open and self._transport.has_unsent()
 
     def fileno(self) -> int:
@@ -201,7 +205,7 @@ class CanLink:
         return self._transport.fileno() if self._is_open else -1
 
     def is_readable(self) -> bool:
-        """Return whether a device frame has arrived; a dead bus has none."""
+        """Return whether a device frame has arrived; False on a broken bus."""
         if not self._inbox:
             try:
                 self._drain()
@@ -211,7 +215,7 @@ class CanLink:
         return bool(self._inbox)
 
     def close(self) -> None:
-        """Give the bus back; a second call does nothing."""
+        """Release the bus; a second call does nothing."""
         if self._is_open:
             self._is_open = False
             self._transport.close()
@@ -224,7 +228,7 @@ class CanLink:
             self._sort(arrived)
 
     def _sort(self, arrived: list[Frame]) -> None:
-        """Show plain frames to the tap and keep those of devices."""
+        """Pass 11-bit data frames to the tap and keep those of devices."""
         if _OF_DEVICES.issuperset(map(_can_id, arrived)):
             self._inbox += arrived
         else:
@@ -235,7 +239,7 @@ class CanLink:
             self._tap(arrived)
 
     def _note_others(self, arrived: list[Frame]) -> None:
-        """Note what is no frame of a device: errors, changes of mode, hosts."""
+        """Count the other frames: errors, mode broadcasts, other masters."""
         for frame in arrived:
             can_id = frame[0]
             if can_id > _LARGEST_ID:
@@ -250,15 +254,15 @@ class CanLink:
 
 
 def plausible_times(now_ns: int) -> tuple[int, int]:
-    """Return between which times a frame that is at hand at `now_ns` was on the bus.
+    """Return the range of bus times (earliest, latest] of a frame read at `now_ns`.
 
-    The earliest, which is no such time any more, and the latest [monotonic ns].
+    All times are monotonic [ns]; the earliest is excluded.
     """
     return now_ns - _PLAUSIBLE_NS, now_ns + _AHEAD_NS
 
 
 def broken_link(channel: str, error: Exception) -> LinkError:
-    """Return what to raise when a bus refused to send or to receive."""
+    """Return the LinkError for a failed send or receive."""
     number = error_number(error)
     is_full = number in _FULL or (number is None and "full" in str(error).lower())
     if is_full:
@@ -273,6 +277,10 @@ def broken_link(channel: str, error: Exception) -> LinkError:
 
 
 def error_number(error: Exception) -> int | None:
-    """Return the system's error number, which python-can keeps in its own field."""
-    own = getattr(error, "error_code", None)
-    return own if isinstance(own, int) else getattr(error, "errno", None)
+    """Return the errno of an exception of the system or of python-can."""
+    python_can_errno = getattr(error, "error_code", None)
+    return (
+        python_can_errno
+        if isinstance(python_can_errno, int)
+        else getattr(error, "errno", None)
+    )

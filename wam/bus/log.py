@@ -18,13 +18,13 @@ _LINE = re.compile(
     r"((?:[0-9A-F]{2}){0,8}|R[0-8]?|#[0-9A-F](?:[0-9A-F]{2}){0,64})(?: [RT])?",
     re.ASCII | re.IGNORECASE,
 )
-_WRITE_AT = 4096  # frames kept back at most
-_REORDERED = 256  # frames; a log has replies after later questions, never by more
-JUMP_NS = NS_PER_S  # back by more: the clock was set, or a second log begins
+_WRITE_AT = 4096  # frames buffered
+_REORDERED = 256  # frames; bounds how far replies stand behind later requests
+JUMP_NS = NS_PER_S  # a larger step back: the clock was set, or a second log begins
 
 
 class CanLogError(TractionError):
-    """A bus log that is not what it should be."""
+    """A malformed bus log."""
 
     exit_code = 6
 
@@ -35,12 +35,12 @@ class LoggedFrame:
 
     Attributes:
         utc_ns: UTC [ns since 1970], whole microseconds.
-        line: its line in the log, 1 is the first.
+        line: line number in the log, from 1.
         channel: name of the bus.
         can_id: identifier.
-        data: payload, empty for a remote frame and one of CAN FD.
-        is_of_wam: a classic data frame with an 11-bit identifier; a WAM uses no
-            others.
+        data: payload, empty for remote and CAN FD frames.
+        is_of_wam: a classic data frame with an 11-bit identifier, the only kind that
+            a WAM uses.
     """
 
     utc_ns: int
@@ -61,21 +61,21 @@ class DecodedLine:
 
 @dataclass(slots=True)
 class BusSummary:
-    """What a log adds up to.
+    """Totals of a log.
 
     Attributes:
-        frames: all of them.
-        foreign: frames no WAM uses: extended, remote, of CAN FD.
-        questions: answers asked for; a group is asked once per member.
-        answers: those that came.
-        late: those that came after more than 1 ms.
-        slowest_ns: the longest wait for an answer.
-        unasked: answers without a question.
-        jumps: times at which the log's clock goes back by more than 1 s.
-        gaps: times without a frame of more than 1 s.
-        longest_gap_ns: the longest of them.
-        errors: what error frames of the controller reported, by name.
-        silent: questions without an answer, by device and property.
+        frames: number of frames.
+        foreign: frames that no WAM uses: extended, remote, CAN FD.
+        questions: replies requested; a group request counts once per member.
+        answers: replies to a request.
+        late: replies after more than 1 ms.
+        slowest_ns: longest reply time.
+        unasked: replies without a request.
+        jumps: steps back of the log's clock by more than 1 s.
+        gaps: intervals of more than 1 s without a frame.
+        longest_gap_ns: longest of them.
+        errors: errors reported by the CAN controller, by name.
+        silent: requests without a reply, by device and property.
     """
 
     frames: int = 0
@@ -93,15 +93,15 @@ class BusSummary:
 
 
 _OVERHEAD, _STUFFABLE = 47, 34  # bits of a frame without data
-_STUFFED = 0.1  # bits put in for each of those that may need it; at most a quarter
+_STUFFED = 0.1  # mean stuff bits per stuffable bit; 0.25 is the worst case
 
 
 class BusTraffic:
-    """Counts what passes on a bus; implements `wam.bus.link.Tap`.
+    """Bus load counter; implements `wam.bus.link.Tap`.
 
     Attributes:
         counts: frames by identifier.
-        bits: about how many bits they took.
+        bits: estimated bits on the wire.
     """
 
     def __init__(self) -> None:
@@ -109,30 +109,29 @@ class BusTraffic:
         self.bits = 0.0
 
     def __call__(self, frames: Sequence[tuple[int, bytes, int]]) -> None:
-        """Count frames that were heard."""
+        """Count frames."""
         for can_id, data, _ in frames:
             self.counts[can_id] += 1
             size = 8 * len(data)
             self.bits += _OVERHEAD + size + _STUFFED * (_STUFFABLE + size)
 
     def load(self, seconds: float, bitrate: int) -> float:
-        """Return the share of the time in which the bus was busy."""
+        """Return the bus load as a share of 1, over `seconds` at `bitrate` [bit/s]."""
         return self.bits / (seconds * bitrate)
 
 
 def format_frame(utc_ns: int, channel: str, can_id: int, data: bytes) -> str:
-    """Return the line, without its end, of a data frame with an 11-bit identifier."""
-    seconds, rest_ns = divmod(utc_ns, NS_PER_S)
-    return (
-        f"({seconds}.{rest_ns // 1000:06d}) {channel} {can_id:03X}#{data.hex().upper()}"
-    )
+    """Return the log line of an 11-bit data frame, without the newline."""
+    seconds, fraction_ns = divmod(utc_ns, NS_PER_S)
+    time = f"{seconds}.{fraction_ns // 1000:06d}"
+    return f"({time}) {channel} {can_id:03X}#{data.hex().upper()}"
 
 
 def parse_frame(text: str, line: int) -> LoggedFrame:
     """Return the frame of one line of a log.
 
     Raises:
-        CanLogError: it is not in candump's format; the message names `line`.
+        CanLogError: the line is not in candump's format; the message names `line`.
     """
     match = _LINE.fullmatch(text)
     if match is None:
@@ -153,9 +152,9 @@ def parse_frame(text: str, line: int) -> LoggedFrame:
 
 
 def read_lines(file: TextIO) -> Iterator[str]:
-    """Return the lines of a log; the rest of one that is too long is passed over.
+    """Yield the lines of a log, truncated to `LONGEST_LINE` characters.
 
-    A file without line ends must not fill the memory.
+    The limit keeps a file without newlines from filling the memory.
     """
     while line := file.readline(LONGEST_LINE):
         yield line
@@ -166,13 +165,13 @@ def read_lines(file: TextIO) -> Iterator[str]:
 def parse_log(
     lines: Iterable[str], tell: Callable[[CanLogError], None]
 ) -> Iterator[LoggedFrame]:
-    """Return the frames of a log in the order of their times.
+    """Yield the frames of a log sorted by time.
 
-    Where time goes back by more than `JUMP_NS`, what follows keeps its place.
+    Sorting starts anew where time steps back by more than `JUMP_NS`.
 
     Args:
-        lines: of the log, with or without their ends.
-        tell: hears of each line that is malformed, which is left out.
+        lines: lines of the log, with or without newlines.
+        tell: called with the error of each malformed line, which is skipped.
     """
     waiting: list[LoggedFrame] = []
     newest_ns = 0
@@ -196,10 +195,10 @@ def parse_log(
 
 
 class CanLog:
-    """Collects frames and writes them as text; a disk that fails ends the log only.
+    """Buffered writer of a bus log; a disk error ends the log and nothing else.
 
     Attributes:
-        failure: why the log ended early, empty if it did not.
+        failure: error that ended the log early, "" if there was none.
     """
 
     def __init__(
@@ -213,12 +212,12 @@ class CanLog:
         self._frames: list[tuple[int, int, bytes]] = []
 
     def add(self, can_id: int, data: bytes, t_ns: int = 0) -> None:
-        """Note a frame.
+        """Buffer a frame.
 
         Args:
             can_id: 11-bit identifier.
             data: payload.
-            t_ns: monotonic time at which it passed [ns]; 0 = now.
+            t_ns: monotonic time on the bus [ns]; 0 = now.
         """
         utc_ns = (t_ns or self._clock.now_ns()) + self._offset_ns
         self._frames.append((utc_ns, can_id, data))
@@ -226,7 +225,7 @@ class CanLog:
             self.flush()
 
     def flush(self) -> None:
-        """Write what has been noted; never raises."""
+        """Write the buffered frames; never raises."""
         frames, self._frames = self._frames, []
         if self.failure or not frames:
             return

@@ -1,8 +1,8 @@
-"""What the pucks call their properties: numbers by device, firmware and name.
+"""Property numbers of the pucks by device, firmware and name.
 
-The numbers moved with the firmware, so no driver may know one by heart: it reads VERS
-and asks here. The tables are libbarrett's, written as `NAME number@first_version`; a
-dash means that the property does not exist from that version on.
+The numbers changed between firmware versions, so a driver reads VERS and looks them up
+here. The tables are libbarrett's, written as `NAME number@first_version`; a dash means
+that the property does not exist from that version on.
 """
 
 from enum import Enum, IntEnum
@@ -170,7 +170,7 @@ VOLTL2 95@32 97@33 95@36 50@61
 ZERO 55@32 56@33 55@36 42@61"""
 
 
-MODERN = 61  # from here on motor and safety firmware have tables of their own
+MODERN = 61  # first firmware with separate tables for motors and safety module
 FIRST_RELEASED, NEWEST_DOCUMENTED = 32, 200
 POLES_OF_WRIST = 6
 POLES_OF_GIMBALS = 8
@@ -178,7 +178,7 @@ MAGNETIC_ENCODER = 0x0100
 
 
 class Device(Enum):
-    """Kinds of tables a device can follow."""
+    """Kinds of device, each with its own property table."""
 
     MOTOR = "motor puck"
     SAFETY = "safety module"
@@ -218,7 +218,7 @@ class PuckMode(IntEnum):
 
 
 def device_of(role: int, stat: int = PuckStatus.READY) -> Device | None:
-    """Return the table a device follows, None for a role no driver knows."""
+    """Return the kind of device of a ROLE and STAT, None for an unknown role."""
     if stat == PuckStatus.RESET:
         return Device.MONITOR
     kinds = {
@@ -235,7 +235,7 @@ def property_number(device: Device, name: str, vers: int = MODERN) -> int:
     """Return the number of property `name` on `device` with firmware `vers`.
 
     Raises:
-        SettingsError: that firmware does not have the property.
+        SettingsError: the firmware does not have the property.
     """
     number = numbers(device, vers).get(name)
     if number is None:
@@ -248,7 +248,7 @@ def property_number(device: Device, name: str, vers: int = MODERN) -> int:
 
 @cache
 def numbers(device: Device, vers: int = MODERN) -> dict[str, int]:
-    """Return every property of `device` with firmware `vers` and its number."""
+    """Return the property numbers of `device` with firmware `vers`, by name."""
     common = dict(COMMON)
     if device is Device.MONITOR:
         return common | {"LOCK": 8, "SAVE": 9, "LOAD": 10}
@@ -265,7 +265,7 @@ def numbers(device: Device, vers: int = MODERN) -> dict[str, int]:
 
 @cache
 def names(device: Device, vers: int = MODERN) -> dict[int, str]:
-    """Return the names of `numbers` by number, the first where two share one."""
+    """Return the property names by number; the first one where two share a number."""
     table: dict[int, str] = {}
     for name, number in numbers(device, vers).items():
         table.setdefault(number, name)
@@ -273,22 +273,22 @@ def names(device: Device, vers: int = MODERN) -> dict[int, str]:
 
 
 def is_wide(name: str) -> bool:
-    """Return whether a property is answered with 32 bits instead of 16."""
+    """Return whether replies of a property carry 32 bits instead of 16."""
     return name in WIDE
 
 
 def nearest_documented(vers: int) -> int:
-    """Return `vers`, or the firmware next to it whose table is documented."""
+    """Return the documented firmware version nearest to `vers`."""
     return min(max(vers, FIRST_RELEASED), NEWEST_DOCUMENTED)
 
 
 def _shared(motor: dict[str, int]) -> dict[str, int]:
-    """Return the properties of modern motor firmware that every device has."""
+    """Return the part of a modern motor table that all devices share."""
     return {name: number for name, number in motor.items() if number <= 41}
 
 
 def _at(table: str, vers: int) -> dict[str, int]:
-    """Return the numbers that hold for firmware `vers`."""
+    """Return the property numbers of a table for firmware `vers`."""
     numbers_by_name: dict[str, int] = {}
     for line in table.splitlines():
         name, *entries = line.split()

@@ -15,17 +15,17 @@ from wam.bus.frames import (
 )
 from wam.bus.link import Frame, Link
 
-_ANSWER_NS = 50_000_000  # a puck answers within 1 ms; a slow adapter may sit on it
+_ANSWER_NS = 50_000_000  # a puck answers within 1 ms; a slow adapter adds latency
 
 
 class PropertyClient:
     """Reads and sets properties of devices outside the loop, one at a time.
 
-    Replies carry no sequence number, so each is matched by device and property, and
-    what came too late for an earlier question is drained first.
+    Replies carry no sequence number: each is matched by device and property, and stale
+    frames are drained before a request.
 
     Attributes:
-        late_replies: frames that answered no open question, so far.
+        late_replies: frames so far that matched no open request.
     """
 
     def __init__(self, link: Link, clock: Clock) -> None:
@@ -35,11 +35,11 @@ class PropertyClient:
 
     @property
     def bus_condition(self) -> BusCondition:
-        """What the bus's controller reported last."""
+        """Bus condition last reported by the CAN controller."""
         return self._link.errors.condition
 
     def get(self, node: int, number: int, within_ns: int = _ANSWER_NS) -> int | None:
-        """Return the value of property `number` of `node`, None if it is silent.
+        """Return the value of property `number` of `node`, None after a timeout.
 
         Raises:
             LinkError: the bus is down.
@@ -56,7 +56,7 @@ class PropertyClient:
         return None
 
     def require(self, node: int, number: int, name: str) -> int:
-        """Return the value of a property that must be there.
+        """Return the value of a property; raise if the device does not answer.
 
         Raises:
             LinkTimeoutError: the device does not answer.
@@ -80,11 +80,11 @@ class PropertyClient:
         self._link.send(group_id(group, HOST), encode_set(number, value))
 
     def drain(self) -> None:
-        """Discard frames that belong to no open question."""
+        """Discard the frames that are waiting."""
         self.late_replies += len(self._link.receive())
 
     def pause(self, duration_ns: int) -> None:
-        """Send nothing for `duration_ns`."""
+        """Wait for `duration_ns`."""
         self._clock.sleep_until(self._clock.now_ns() + duration_ns)
 
     def _find(self, can_id: int, number: int) -> int | None:

@@ -1,6 +1,6 @@
-"""The kernel's own CAN socket: frames with the bus's time, without an object for each.
+"""Raw CAN socket of Linux with timestamps, read without an object per frame.
 
-Options and layouts are Linux's (linux/can.h, linux/can/raw.h, asm-generic/socket.h);
+Options and layouts are those of linux/can.h, linux/can/raw.h and asm-generic/socket.h;
 Python's socket module has no names for most of them.
 """
 
@@ -16,33 +16,33 @@ from wam.bus.datagrams import AT_ONCE, DatagramBatch, ReceiveMany
 from wam.bus.error_frames import ERROR_MASK
 from wam.bus.link import DRAIN_AT_MOST, Frame, as_frame, broken_link, plausible_times
 
-LONGEST_QUEUE = 16  # frames, about one cycle: what waits longer is stale
+LONGEST_QUEUE = 16  # frames, about one cycle: torques that wait longer are stale
 _RESTART_MS = 100
 _FRAME = struct.Struct("=IB3x8s")  # struct can_frame
 _pack = _FRAME.pack
-_DATA_BYTES = 8  # at most
+_DATA_BYTES = 8
 _ERROR_FILTER = 2  # of SOL_CAN_RAW
 _TIMESTAMPING, _LOST, _MEMORY = 37, 40, 55  # of SOL_SOCKET: also SO_RXQ_OVFL, MEMINFO
-_STAMPS_WANTED = 0x04 | 0x08 | 0x10 | 0x40  # of hardware and software, received
+_STAMPS_WANTED = 0x04 | 0x08 | 0x10 | 0x40  # RX hardware, RX software, report both
 _STAMPS = struct.Struct("@qqqqqq")  # software, unused, hardware: seconds, nanoseconds
-_STAMPED = struct.Struct("@Nii6q")  # nearly all ancillary data: stamps and nothing else
+_STAMPED = struct.Struct("@Nii6q")  # the usual ancillary data: one message of stamps
 _SLOT = struct.Struct(f"{_STAMPED.format}{DatagramBatch.control_room - _STAMPED.size}x")
 _TOTAL = struct.Struct("=I")
-_MEMORY_BYTES, _WAITING_AT = 36, 8
-_RECEIVE_BUFFER = 1 << 21  # bytes; the kernel grants what it may
-_GET_FLAGS, _GET_QUEUE = 0x8913, 0x8942
+_MEMORY_BYTES, _WAITING_AT = 36, 8  # size of SO_MEMINFO, offset of wmem_alloc
+_RECEIVE_BUFFER = 1 << 21  # bytes; the kernel clips it to its limit
+_GET_FLAGS, _GET_QUEUE = 0x8913, 0x8942  # SIOCGIFFLAGS, SIOCGIFTXQLEN
 _REQUEST = struct.Struct("@16sI20x")  # struct ifreq
-_NAME_AT_MOST = 15  # characters
+_LONGEST_NAME = 15  # characters
 _UP, _RUNNING = 0x1, 0x40
 
 
 class InterfaceState(NamedTuple):
-    """A network interface as the kernel sees it.
+    """State of a network interface.
 
     Attributes:
-        is_up: somebody raised it.
-        has_carrier: its controller takes part in the bus; False after bus-off.
-        queue_length: how many frames it holds back at most.
+        is_up: the interface is set up.
+        has_carrier: the controller takes part in the bus; False after bus-off.
+        queue_length: capacity of the send queue [frames].
     """
 
     is_up: bool
@@ -51,10 +51,10 @@ class InterfaceState(NamedTuple):
 
 
 def setup_command(channel: str, bitrate: int) -> str:
-    """Return what sets a SocketCAN interface up, `bitrate` in bit/s.
+    """Return the shell command that sets up a SocketCAN interface, `bitrate` [bit/s].
 
-    A queue of one cycle holds no stale torques, and a controller that has left the bus
-    comes back by itself.
+    The send queue holds one cycle, so that no stale torques are sent, and the
+    controller restarts by itself after bus-off.
     """
     return (
         f"ip link set {channel} up txqueuelen {LONGEST_QUEUE} "
@@ -63,15 +63,15 @@ def setup_command(channel: str, bitrate: int) -> str:
 
 
 def interface_state(channel: str) -> InterfaceState:
-    """Return the state of an interface such as "can0"; needs no rights.
+    """Return the state of an interface such as "can0"; needs no privileges.
 
     Raises:
-        OSError: it does not exist.
+        OSError: the interface does not exist.
     """
-    import fcntl  # Linux has it, as it has the sockets; simulations need neither
+    import fcntl  # not on every platform that can simulate
 
     name = channel.encode()
-    if not 0 < len(name) <= _NAME_AT_MOST or b"\0" in name:
+    if not 0 < len(name) <= _LONGEST_NAME or b"\0" in name:
         raise OSError(errno.ENODEV, "No such device")
 
     def ask(request: int) -> int:
@@ -86,7 +86,7 @@ def interface_state(channel: str) -> InterfaceState:
 
 
 def open_socket(channel: str) -> socket.socket:
-    """Return a raw CAN socket on an interface, error frames of all classes asked for.
+    """Return a raw CAN socket bound to an interface, with all error frames enabled.
 
     Raises:
         OSError: the kernel has no CAN, or no such interface.
@@ -105,8 +105,8 @@ class SocketcanTransport:
     """A raw CAN socket of Linux; implements `Transport`.
 
     Attributes:
-        name: what it is, for people.
-        lost: frames that the socket had no room for.
+        name: name for people.
+        lost: frames dropped because the receive buffer was full.
     """
 
     def __init__(
@@ -116,29 +116,29 @@ class SocketcanTransport:
         clock: Clock,
         receive_many: ReceiveMany,
     ) -> None:
-        """Take over a bound socket; times are of `clock`.
+        """Take ownership of a bound socket.
 
         Args:
-            opened: raw CAN socket, or one of datagrams that carries can_frames.
-            channel: its interface, for messages.
-            clock: which the times of frames are of.
+            opened: raw CAN socket, or a datagram socket that carries can_frames.
+            channel: name of its interface, for messages.
+            clock: time base of the frames' times.
             receive_many: recvmmsg(2), as `system_call` returns it.
         """
         self.name = "kernel socket"
         self.lost = 0
         self._socket, self._channel, self._clock = opened, channel, clock
-        # Names looked up once: with cold caches each costs half a microsecond.
+        # Bound once: an attribute lookup with cold caches costs half a microsecond.
         self._send, self._descriptor = opened.send, opened.fileno
         self._adapter = AdapterClock()
         self._batch = DatagramBatch(_FRAME.size, receive_many)
-        self._error: OSError | None = None  # it came behind frames
+        self._error: OSError | None = None  # raised after the frames before it
         opened.setblocking(False)
         for option, value in (
             (_TIMESTAMPING, _STAMPS_WANTED),
             (_LOST, 1),
             (socket.SO_RCVBUF, _RECEIVE_BUFFER),
         ):
-            with contextlib.suppress(OSError):  # of an old kernel
+            with contextlib.suppress(OSError):  # an old kernel lacks the option
                 opened.setsockopt(socket.SOL_SOCKET, option, value)
 
     def fileno(self) -> int:
@@ -146,10 +146,10 @@ class SocketcanTransport:
         return self._socket.fileno()
 
     def has_unsent(self) -> bool:
-        """Return whether frames wait to be sent; False if the kernel does not tell."""
+        """Return whether frames wait in the send queue; False if it is not known."""
         try:
             memory = self._socket.getsockopt(socket.SOL_SOCKET, _MEMORY, _MEMORY_BYTES)
-        except OSError:  # of a kernel before 4.12, or a closed socket
+        except OSError:  # kernel before 4.12, or closed socket
             return False
         return _TOTAL.unpack_from(memory, _WAITING_AT)[0] > 0
 
@@ -161,7 +161,7 @@ class SocketcanTransport:
             raise broken_link(self._channel, error) from error
 
     def receive(self) -> list[Frame]:
-        """Return what has arrived, oldest first; raises LinkError."""
+        """Return the queued frames, oldest first; raises LinkError."""
         if self._error is not None:
             error, self._error = self._error, None
             raise broken_link(self._channel, error) from error
@@ -176,11 +176,11 @@ class SocketcanTransport:
         return frames
 
     def close(self) -> None:
-        """Close the socket; what is queued leaves all the same."""
+        """Close the socket; queued frames are still sent."""
         self._socket.close()
 
     def _take(self, frames: list[Frame]) -> int:
-        """Append what one call of the kernel brings; return how many datagrams."""
+        """Append the frames of one system call; return the number of datagrams."""
         batch = self._batch
         arrived = batch.receive(self._descriptor())
         if not arrived:
@@ -193,15 +193,15 @@ class SocketcanTransport:
             arrived,
             _FRAME.iter_unpack(batch.payload),
             _SLOT.iter_unpack(batch.control),
-            strict=False,  # the memory has room for more
+            strict=False,  # the batch may be filled in part
         ):
             if size != _FRAME.size:
                 continue
             data = room if length >= _DATA_BYTES else room[:length]
-            _, _, kind, seconds, rest, _, _, own_seconds, own_rest = stamped
+            _, _, kind, seconds, nanoseconds, _, _, own_seconds, own_rest = stamped
             is_plain = kind == _TIMESTAMPING and not (own_seconds or own_rest)
             if control_size == _STAMPED.size and is_plain:
-                utc_ns = seconds * NS_PER_S + rest
+                utc_ns = seconds * NS_PER_S + nanoseconds
             else:
                 utc_ns = self._utc_ns(batch.ancillary(number, control_size))
             t_ns = utc_ns - offset_ns
@@ -211,16 +211,16 @@ class SocketcanTransport:
         return len(arrived)
 
     def _utc_ns(self, parts: Iterable[tuple[int, bytes]]) -> int:
-        """Return when a frame was on the bus [ns], 0 = not known.
+        """Return the bus time of a frame by its control messages [UTC ns], 0 = unknown.
 
         Args:
-            parts: kind and data of each part of its ancillary data.
+            parts: (type, data) of each control message.
         """
         utc_ns = 0
         for kind, data in parts:
             if kind == _TIMESTAMPING and len(data) == _STAMPS.size:
-                seconds, rest, _, _, own_seconds, own_rest = _STAMPS.unpack(data)
-                utc_ns = seconds * NS_PER_S + rest
+                seconds, nanoseconds, _, _, own_seconds, own_rest = _STAMPS.unpack(data)
+                utc_ns = seconds * NS_PER_S + nanoseconds
                 if own_seconds or own_rest:
                     self.name = "kernel socket, time of the adapter"
                     own_ns = own_seconds * NS_PER_S + own_rest
@@ -231,15 +231,15 @@ class SocketcanTransport:
 
 
 class AdapterClock:
-    """Maps an adapter's own clock to UTC by the least delay seen.
+    """Maps an adapter's clock to UTC by the minimum observed delay.
 
-    A frame is stamped by the adapter first and by the kernel some delay later. The
-    smallest difference of the two is the offset of the clocks; it is let go slowly, so
-    that it follows clocks which drift apart.
+    The adapter stamps a frame first, the kernel after some delay. The smallest
+    difference of the two is the clock offset; it is relaxed slowly, to follow clock
+    drift.
     """
 
-    _DRIFT = 1e-4  # most that two oscillators differ in rate
-    _STEP_NS = 20_000_000  # a larger change is a clock that was set, or began again
+    _DRIFT = 1e-4  # largest rate difference of two oscillators
+    _STEP_NS = 20_000_000  # a larger change: a clock was set or restarted
 
     def __init__(self) -> None:
         self._offset_ns: int | None = None
@@ -249,8 +249,8 @@ class AdapterClock:
         """Return the adapter's time `own_ns` as UTC [ns].
 
         Args:
-            kernel_ns: UTC at which the kernel had the frame, 0 = not known.
-            own_ns: the adapter's time, of any epoch.
+            kernel_ns: kernel timestamp of the frame [UTC ns], 0 = not known.
+            own_ns: adapter's timestamp [ns] since any epoch.
         """
         if not kernel_ns:
             return 0 if self._offset_ns is None else own_ns + self._offset_ns

@@ -1,7 +1,7 @@
-"""The transports of a CAN bus: the kernel's own socket, and python-can for the rest.
+"""Transports of a CAN bus: raw socket for SocketCAN, python-can for other adapters.
 
-A transport sends and drains and never waits. Frames carry Linux's flags in their
-identifier, and the time at which the bus had them on the host's monotonic clock.
+Transports never block. Frames carry Linux's flags in the identifier and their time on
+the bus by the host's monotonic clock.
 """
 
 import errno
@@ -60,7 +60,7 @@ def open_transport(
         interface: python-can's name of the adapter.
         channel: the adapter's name, such as "can0".
         bitrate: [bit/s]; a SocketCAN interface has its own and ignores it.
-        clock: which the times of frames are of.
+        clock: time base of the frames' times.
 
     Raises:
         LinkError: the adapter is missing, down or unknown.
@@ -77,21 +77,21 @@ def open_transport(
 class PythonCanTransport:
     """A bus of python-can; implements `Transport`.
 
-    An adapter stamps what it receives by UTC or by the monotonic clock [s], or not at
-    all; a stamp of neither is none.
+    Adapters stamp frames by UTC, by the monotonic clock [s], or not at all; a timestamp
+    plausible by neither clock is discarded.
 
     Attributes:
-        name: what it is, for people.
-        lost: 0, python-can does not tell.
+        name: name for people.
+        lost: 0, python-can does not report losses.
     """
 
     def __init__(self, bus: CanBus, clock: Clock) -> None:
-        """Take a bus over; times are of `clock`."""
+        """Take ownership of a bus; frame times are by `clock`."""
         self.name = "python-can"
         self.lost = 0
         self._bus = bus
         self._clock = clock
-        self._error: Exception | None = None  # it came behind frames
+        self._error: Exception | None = None  # raised after the frames before it
         try:
             self._descriptor = bus.fileno()
         except NotImplementedError:
@@ -102,12 +102,12 @@ class PythonCanTransport:
         return self._descriptor
 
     def has_unsent(self) -> bool:
-        """Return False: python-can does not tell."""
+        """Return False: python-can does not report its send queue."""
         return False
 
     def send(self, can_id: int, data: bytes) -> None:
         """Queue a data frame with an 11-bit identifier; raises LinkError."""
-        # positionally: stamp, identifier, is it an extended one
+        # timestamp, identifier, is_extended_id; positional arguments are faster
         message = can.Message(0.0, can_id, False, data=data)
         try:
             self._bus.send(message)
@@ -115,7 +115,7 @@ class PythonCanTransport:
             raise broken_link(self._bus.channel_info, error) from error
 
     def receive(self) -> list[Frame]:
-        """Return what has arrived, oldest first; raises LinkError."""
+        """Return the queued frames, oldest first; raises LinkError."""
         arrived: list[can.Message] = []
         receive = self._bus.recv
         try:

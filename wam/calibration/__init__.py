@@ -1,7 +1,7 @@
-"""Gravity and friction of a real arm: where they are measured and what is kept.
+"""Identification of gravity and friction of a real arm, and the calibration files.
 
-`poses` plans measurement poses and the way between them, `gravity_file` is the file
-that a calibration writes and the control law reads. For friction `excitation` plans the
-way, `sliding` reduces what was recorded, `friction_fit` identifies, `friction_file`
-keeps. Begin with `poses`.
+Gravity: `poses` plans measurement poses and the path through them, `gravity_file`
+stores the result for the control law. Friction: `excitation` plans the path, `sliding`
+reduces the recording, `friction_fit` identifies, `friction_file` stores. Begin with
+`poses`.
 """

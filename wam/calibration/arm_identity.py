@@ -1,4 +1,4 @@
-"""Which arm a file belongs to: the serial numbers of its seven motor pucks."""
+"""Arm identity of a calibration file: serial numbers of the seven motor pucks."""
 
 from collections.abc import Sequence
 from typing import Annotated
@@ -15,13 +15,12 @@ SerialNumbers = tuple[_Serial, _Serial, _Serial, _Serial, _Serial, _Serial, _Ser
 def check_same_arm(
     name: str, noted: Sequence[int] | None, pucks: Sequence[int | None]
 ) -> None:
-    """Refuse what was measured on another arm; what is unknown is no contradiction.
+    """Refuse a calibration of another arm; unknown serial numbers are accepted.
 
     Args:
-        name: of the file or setting.
-        noted: serial numbers of the seven pucks that it was measured with; None = it
-            does not say.
-        pucks: serial numbers of this arm's, None where a puck does not say.
+        name: name of the file or setting.
+        noted: serial numbers of the seven pucks in the file; None = not recorded.
+        pucks: serial numbers of this arm's seven pucks, None = unknown.
 
     Raises:
         SettingsError: a puck has another serial number.
@@ -29,15 +28,15 @@ def check_same_arm(
     if noted is None:
         return
     pairs = list(zip(noted, pucks, strict=True))
-    others = [
+    mismatches = [
         f"puck {number} was {theirs}, is {ours}"
         for number, (theirs, ours) in enumerate(pairs, 1)
         if ours is not None and ours != theirs
     ]
-    if others:
-        which = "another arm" if len(others) == len(pairs) else "other pucks"
+    if mismatches:
+        which = "another arm" if len(mismatches) == len(pairs) else "other pucks"
         raise SettingsError(
-            f"{name} was measured with {which}: {', '.join(others)}.",
+            f"{name} was measured with {which}: {', '.join(mismatches)}.",
             hint="Name the file of this arm, or calibrate again; after a repair zero "
             "the arm anew.",
         )

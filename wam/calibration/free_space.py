@@ -1,4 +1,4 @@
-"""Where the arm may move by itself: above a floor and clear of everything."""
+"""Space for automatic motion: above a floor, without collisions."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,72 +13,73 @@ from wam.model.constants import ArmConstants, Array
 
 OFFSET = 0.03  # rad; a pose is approached from this far on both sides
 UPRIGHT = (0.0, -0.4, 0.0, 1.8, 0.0, -0.4, 0.0)  # rad; elbow and foot are high
-STEP = 0.04  # rad between two looks at a path
-_SLACK = 0.002  # m a path may sag below its ends
+STEP = 0.04  # rad between two checked points of a path
+_SLACK = 0.002  # m that a path may sag below its ends
 
 
 @dataclass(frozen=True, slots=True)
 class FreeSpace:
-    """Where the arm may move by itself.
+    """Space in which the arm may move by itself.
 
     Attributes:
-        floor: height that sole, plate and elbow stay above [m].
-        clearance: distances to itself and its surroundings; None = `floor` alone.
+        floor: lowest height of sole, plate and elbow [m].
+        clearance: collision distances to itself and its surroundings; None = check
+            `floor` only.
     """
 
     floor: float
     clearance: ArmClearance | None = None
 
     def holds(self, q: Array) -> bool:
-        """Return whether the arm may stand at `q` [rad], shape (7,)."""
+        """Return whether the pose `q` [rad], shape (7,), is free of collision."""
         return (
             self.clearance is None
             or self.clearance.nearest(q).distance > CLEARANCE_MARGIN
         )
 
     def is_clear(self, model: ArmModel, start: Array, goal: Array) -> bool:
-        """Return whether the arm may go straight from `start` to `goal` [rad], (7,)."""
+        """Return whether the straight path `start` to `goal` [rad], (7,), is clear."""
         if not is_clear(model, start, goal, self.floor):
             return False
         return self.clearance is None or self.clearance.first_hit(start, goal) is None
 
 
 def check_poses(model: ArmModel, poses: Sequence[Array], space: FreeSpace) -> None:
-    """Refuse poses that a person has chosen before anything moves.
+    """Refuse unsafe poses of a person's choice before the arm moves.
 
     Args:
         model: the arm with its tool.
         poses: joint positions [rad], shape (7,) each.
-        space: where the arm may move.
+        space: space in which the arm may move.
 
     Raises:
-        SettingsError: a pose, its approach or the way to it from the upright pose is
-            beyond a stop or too close to something.
+        SettingsError: a pose, its approach or the path from the upright pose is beyond
+            a joint stop or in collision.
     """
     constants = model.constants
     low, high = constants.q_lower + OFFSET, constants.q_upper - OFFSET
     for number, pose in enumerate(poses, 1):
         if not ((pose >= low) & (pose <= high)).all():
             joint = int(np.maximum(low - pose, pose - high).argmax()) + 1
-            raise _refused(number, f"joint {joint} is beyond its stop")
+            raise _pose_error(number, f"joint {joint} is beyond its stop")
         if space.clearance is not None:
             _check_gaps(number, pose, space.clearance)
         if not is_clear(model, np.array(UPRIGHT), pose, space.floor):
-            raise _refused(number, f"the arm would come below {space.floor:.2f} m")
+            raise _pose_error(number, f"the arm would come below {space.floor:.2f} m")
 
 
 def _check_gaps(number: int, pose: Array, clearance: ArmClearance) -> None:
-    """Refuse a pose that brings two bodies together, there or on the way to it."""
+    """Refuse a pose in collision, or whose path from the upright pose is."""
     gaps = [clearance.nearest(pose + side) for side in (-OFFSET, 0.0, OFFSET)]
     closest = min(gaps, key=lambda gap: gap.distance)
     if closest.distance <= CLEARANCE_MARGIN:
-        raise _refused(number, closest.text())
+        raise _pose_error(number, closest.text())
     hit = clearance.first_hit(np.array(UPRIGHT), pose)
     if hit is not None:
-        raise _refused(number, f"on the way to it {hit.text()}")
+        raise _pose_error(number, f"on the way to it {hit.text()}")
 
 
-def _refused(number: int, why: str) -> SettingsError:
+def _pose_error(number: int, why: str) -> SettingsError:
     return SettingsError(
         f"Pose {number} cannot be used: {why}.",
         hint=f"Bodies stay {1e3 * CLEARANCE_MARGIN:.0f} mm apart. Change this pose or "
@@ -87,10 +88,10 @@ def _refused(number: int, why: str) -> SettingsError:
 
 
 def check_rise(model: ArmModel, start: Array, space: FreeSpace) -> None:
-    """Refuse a start from which the way up is not free.
+    """Refuse a start whose path to the upright pose is not clear.
 
     Raises:
-        SettingsError: the arm would go down first, or come too close to something.
+        SettingsError: the path goes down first or collides.
     """
     upright = np.array(UPRIGHT)
     hint = "Lift the foot clear of everything and start again."
@@ -123,18 +124,18 @@ def lowest(model: ArmModel, q: NDArray[np.float64]) -> Array:
 
 
 def is_clear(model: ArmModel, start: Array, goal: Array, floor: float) -> bool:
-    """Return whether the arm stays above `floor` [m] on the straight way.
+    """Return whether the arm stays above `floor` [m] on the straight path.
 
-    An end that is lower itself, such as the foot in its container, may be left and
-    reached, but nothing on the way is lower than the lower end.
+    An end below `floor`, such as the foot in its container, is allowed if no point of
+    the path is lower than the lower end.
     """
     heights = lowest(model, straight_way(start, goal, STEP))
     return bool(heights.min() >= min(floor, heights[0], heights[-1]) - _SLACK)
 
 
 def elbow_of(constants: ArmConstants, q: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the elbow's axis [m], shape (n, 3), the link's width off its height."""
+    """Return the elbow axis lowered by the link's width [m], shape (n, 3)."""
     reach, width = constants.d[2], abs(constants.a[2])
-    out = reach * np.sin(q[:, 1])
-    x, y = out * np.cos(q[:, 0]), out * np.sin(q[:, 0])
+    radius = reach * np.sin(q[:, 1])
+    x, y = radius * np.cos(q[:, 0]), radius * np.sin(q[:, 0])
     return np.stack([x, y, reach * np.cos(q[:, 1]) - width], axis=-1)

@@ -1,4 +1,4 @@
-"""A calibration of friction as TOML: what was identified, and how well."""
+"""Friction calibration as TOML: identified parameters and their uncertainty."""
 
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
@@ -27,14 +27,14 @@ _Seven = tuple[_Number, _Number, _Number, _Number, _Number, _Number, _Number]
 
 @dataclass(frozen=True, slots=True)
 class FrictionCalibration:
-    """Friction of an arm as identified.
+    """Identified friction of an arm.
 
     Attributes:
-        fit: friction of the motors and how well it is known.
-        foot: name of the foot that was on.
-        gravity: which gravity was subtracted: cad, shipped or calibrated.
-        measured_utc: when.
-        is_simulated: the arm was a simulated one.
+        fit: friction of the motors and its uncertainty.
+        foot: name of the mounted foot.
+        gravity: subtracted gravity model: cad, shipped or calibrated.
+        measured_utc: time of the measurement.
+        is_simulated: the arm was simulated.
         is_forced: a person accepted it although `check_friction` refuses it.
         arm: serial numbers of the seven pucks; None = unknown.
     """
@@ -49,7 +49,7 @@ class FrictionCalibration:
 
 
 class _FitTable(TomlTable):
-    """How well the motors are known."""
+    """Uncertainty of the motors' parameters."""
 
     deviation: _Seven
     asymmetry_deviation: _Seven
@@ -71,7 +71,7 @@ class _FitTable(TomlTable):
 
 
 class _FrictionFile(TomlFile):
-    """A calibration in the order of its file; figures of joints are for people."""
+    """File layout of a calibration; the joint values are for people, not read back."""
 
     foot: str
     gravity: str
@@ -104,7 +104,7 @@ def friction_to_toml(calibration: FrictionCalibration, constants: ArmConstants) 
         is_simulated=calibration.is_simulated,
         is_forced=calibration.is_forced,
         arm=calibration.arm,
-        **_of_joints(constants, fit.friction),
+        **_joint_values(constants, fit.friction),
         coulomb_deviation=joint_deviation(constants, fit.deviation).tolist(),
         coulomb_lower_bound=joint_coulomb(constants, fit.lower_bound).tolist(),
         motors=fit.friction.metadata(),
@@ -122,18 +122,20 @@ def friction_to_toml(calibration: FrictionCalibration, constants: ArmConstants) 
 def truth_to_toml(
     friction: MotorFriction, load_at: Array, constants: ArmConstants
 ) -> str:
-    """Return what a simulated arm really has, in the layout of a calibration.
+    """Return the true friction of a simulated arm in the layout of a calibration.
 
     Args:
-        friction: of the simulated motors.
-        load_at: torques at which a calibration states Coulomb friction [N m], (7,).
-        constants: of the arm.
+        friction: friction of the simulated motors.
+        load_at: reference loads of the calibration's Coulomb friction [N m], (7,).
+        constants: constants of the arm.
     """
     coulomb = friction.coulomb + friction.load * (load_at - friction.load_at)
-    presliding = friction.presliding * coulomb / friction.coulomb  # as stiff as it is
-    there = replace(friction, coulomb=coulomb, load_at=load_at, presliding=presliding)
+    presliding = friction.presliding * coulomb / friction.coulomb  # same stiffness
+    at_load = replace(friction, coulomb=coulomb, load_at=load_at, presliding=presliding)
     file = _FrictionFile.model_construct(
-        is_simulated=True, **_of_joints(constants, there), motors=there.metadata()
+        is_simulated=True,
+        **_joint_values(constants, at_load),
+        motors=at_load.metadata(),
     )
     return file.text("Friction that the simulated arm really has. SI units.")
 
@@ -173,8 +175,8 @@ def friction_from_toml(text: str, name: str) -> FrictionCalibration:
     )
 
 
-def _of_joints(constants: ArmConstants, friction: MotorFriction) -> dict[str, Any]:
-    """Return what a joint that turns alone meets [N m], joints 1 to 7."""
+def _joint_values(constants: ArmConstants, friction: MotorFriction) -> dict[str, Any]:
+    """Return friction torques of each joint turning alone [N m], joints 1 to 7."""
     return {
         "coulomb": joint_coulomb(constants, friction.coulomb).tolist(),
         "asymmetry": joint_asymmetry(constants, friction.asymmetry).tolist(),

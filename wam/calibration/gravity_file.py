@@ -1,4 +1,4 @@
-"""A gravity calibration as TOML: first moments, how well they fit, what was fitted."""
+"""Gravity calibration as TOML: first moments, residuals and measured torques."""
 
 from dataclasses import dataclass, replace
 from typing import Annotated, Self
@@ -30,18 +30,18 @@ _Seven = tuple[Number, Number, Number, Number, Number, Number, Number]
 
 @dataclass(frozen=True, slots=True)
 class GravityCalibration:
-    """First moments of an arm with a tool, as measured.
+    """Measured first moments of an arm with its tool.
 
     Attributes:
-        mus: first moments [kg m], shape (7, 3), the tool's included.
-        residual: rms of torque that they leave unexplained [N m].
-        rank: directions of gravity that the poses showed.
-        foot: name of the foot that was fitted.
-        tool: what hung on the plate.
-        measured_utc: when.
-        is_simulated: the arm was a simulated one.
-        poses: joint positions at which was measured [rad], shape (n, 7).
-        torques: what held the arm there [N m], shape (n, 7).
+        mus: first moments including the tool's [kg m], shape (7, 3).
+        residual: rms torque residual of the fit [N m].
+        rank: rank of the regressor over the poses.
+        foot: name of the mounted foot.
+        tool: sensor and foot on the tool plate.
+        measured_utc: time of the measurement.
+        is_simulated: the arm was simulated.
+        poses: joint positions of the measurements [rad], shape (n, 7).
+        torques: holding torques [N m], shape (n, 7).
         is_forced: a person accepted it although `check_gravity` refuses it.
         arm: serial numbers of the seven pucks; None = unknown.
     """
@@ -66,7 +66,7 @@ class _BodyTable(TomlTable):
 
 
 class _ToolTable(TomlTable):
-    """What `tool_metadata` gives."""
+    """Layout of `tool_metadata`."""
 
     sole: _Vector
     sensor_height: Number
@@ -147,11 +147,11 @@ def gravity_from_toml(text: str, name: str) -> GravityCalibration:
 
 
 def check_gravity(constants: ArmConstants, calibration: GravityCalibration) -> None:
-    """Refuse what `traction calibrate gravity` refuses, from what was measured.
+    """Repeat the checks of `traction calibrate gravity` on the stored measurements.
 
     Raises:
-        SettingsError: the torques are not explained, the poses show too little, a joint
-            was zeroed elsewhere, or no such arm weighs this.
+        SettingsError: large residuals, rank-deficient poses, wrong joint zeros, or
+            moments far from the drawings.
     """
     q, tool = calibration.poses, calibration.tool
     fit = fit_of(constants, calibration.mus, q, calibration.torques)
@@ -166,14 +166,14 @@ def check_gravity(constants: ArmConstants, calibration: GravityCalibration) -> N
 
 
 def fits_tool(calibration: GravityCalibration, tool: Tool) -> bool:
-    """Return whether `tool` weighs what the tool of the calibration weighed."""
+    """Return whether mass and centre of mass of `tool` match the calibrated tool's."""
     pairs = (
         (calibration.tool.sensor, tool.sensor),
         (calibration.tool.foot, tool.foot),
     )
-    return all(_weighs_the_same(theirs, ours) for theirs, ours in pairs)
+    return all(_has_same_moment(theirs, ours) for theirs, ours in pairs)
 
 
-def _weighs_the_same(one: Body, other: Body) -> bool:
+def _has_same_moment(one: Body, other: Body) -> bool:
     is_near = np.abs(one.com - other.com) <= _SAME
     return abs(one.mass - other.mass) <= _SAME and bool(is_near.all())

@@ -1,4 +1,4 @@
-"""What joints that turn alone meet, from the friction of the motors."""
+"""Friction of single joints, derived from the friction of the motors."""
 
 import numpy as np
 
@@ -12,22 +12,22 @@ def joint_deviation(constants: ArmConstants, deviation: Array) -> Array:
 
 
 def joint_asymmetry(constants: ArmConstants, asymmetry: Array) -> Array:
-    """Return half of forwards less backwards at each joint alone [N m], shape (7,)."""
+    """Return half of (forward - backward) friction of each joint alone [N m], (7,)."""
     return constants.j2mp.T @ asymmetry
 
 
 def speed_curve(
     constants: ArmConstants, friction: MotorFriction, joint: int, speeds: Array
 ) -> Array:
-    """Return the torque against a joint that turns alone [N m], shape (n,).
+    """Return the friction torque of a joint turning alone [N m], shape (n,).
 
-    Mean of both ways, at the torque at which `coulomb` holds, without the ripple.
+    Mean of both directions at the reference load, without ripple.
 
     Args:
-        constants: of the arm.
-        friction: of its motors.
+        constants: constants of the arm.
+        friction: friction of its motors.
         joint: 0-6.
-        speeds: of the joint [rad/s], shape (n,), above 0.
+        speeds: joint speeds [rad/s], shape (n,), above 0.
     """
     shares = np.abs(constants.j2mp[:, joint])
     motors = speeds[:, None] * shares
@@ -37,5 +37,5 @@ def speed_curve(
 
 
 def joint_breakaway(constants: ArmConstants, friction: MotorFriction) -> Array:
-    """Return the torque that breaks each joint away, mean of both ways [N m], (7,)."""
+    """Return the break-away torque of each joint, mean of both senses [N m], (7,)."""
     return joint_coulomb(constants, friction.coulomb * friction.breakaway)

@@ -1,4 +1,4 @@
-"""Where a calibration measures, and the way there, over safe ground."""
+"""Measurement poses of a calibration and a collision-free path through them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,26 +21,26 @@ from wam.model.clearance import straight_way
 from wam.model.constants import Array
 from wam.model.moments import regressor
 
-APPROACH_SPEED = 0.05  # rad/s, on the last bit
+APPROACH_SPEED = 0.05  # rad/s, for the last OFFSET before a pose
 POINT_SPEED = 0.3  # m/s of sole and elbow; the safety module warns at 0.5
-MARGIN = 0.2  # rad a pose stays away from the joint stops: no wall is near
-# Turns of the wrist from the upright pose (joint index, rad), the most telling first.
+MARGIN = 0.2  # rad from a pose to the joint stops, clear of the soft walls
+# Wrist turns from the upright pose (joint index, rad), the most informative first.
 _TILTS = ((5, -1.2), (4, 1.0), (4, -1.0), (5, -0.6))
 _CANDIDATES = 1000
 _SEED = 7
-# How far from the upright pose a candidate may be [rad]: no wild contortions. Gravity
-# does not see joint 1, so the arm is not swung about.
+# Largest deviation of a candidate from the upright pose [rad]. Joint 1 is vertical: its
+# angle has no effect on gravity torques, so it stays at 0.
 REACH = np.array([0.0, 1.2, 1.1, 1.3, 1.3, 1.0, 1.0])
 
 
 @dataclass(frozen=True, slots=True)
 class MeasurementPose:
-    """A place on the way.
+    """A waypoint of the path.
 
     Attributes:
         q: joint positions [rad], shape (7,).
-        speed: largest joint speed on the way to it [rad/s].
-        pose: number of the pose measured here; None = on the way only.
+        speed: largest joint speed on the leg to it [rad/s].
+        pose: index of the pose measured here; None = transit only.
     """
 
     q: Array
@@ -49,44 +49,46 @@ class MeasurementPose:
 
 
 def choose_poses(model: ArmModel, count: int, space: FreeSpace) -> list[Array]:
-    """Return `count` poses [rad], shapes (7,), that show gravity best.
+    """Return `count` poses [rad], shapes (7,), that are most informative on gravity.
 
-    Out of many in which the arm keeps within `space`, each next one is that which adds
-    most to the information on the first moments (the determinant of Y^T Y grows most).
-    The choice is always the same.
+    Greedy D-optimal design over random candidates within `space`: each next pose
+    maximises the growth of det(Y^T Y) of the first moments' regressor. Deterministic.
 
     Raises:
-        SettingsError: not as many poses are within `space`.
+        SettingsError: fewer than `count` candidates are within `space`.
     """
     reachable = _candidates(model, space, count)
     blocks = [regressor(model.constants, q) for q in reachable]
-    return _in_short_order([reachable[i] for i in _most_telling(blocks, count)])
+    return _nearest_neighbour_order(
+        [reachable[i] for i in _most_informative(blocks, count)]
+    )
 
 
 def choose_orientations(model: ArmModel, count: int, space: FreeSpace) -> list[Array]:
-    """Return `count` poses [rad], shapes (7,), that turn the tool to all sides.
+    """Return `count` poses [rad], shapes (7,), with diverse tool orientations.
 
-    As `choose_poses`, for a force sensor: each next pose adds most to the information
-    on weight and offset, which are seen as m g d + b along three axes, d being the
-    direction of gravity in frame 7.
+    As `choose_poses`, for a force sensor: D-optimal for weight and offset in the
+    reading m g d + b per axis, d being the direction of gravity in frame 7.
 
     Raises:
-        SettingsError: not as many poses are within `space`.
+        SettingsError: fewer than `count` candidates are within `space`.
     """
     reachable = _candidates(model, space, count)
     down = [-model.plate_pose(q)[1][2] for q in reachable]
     blocks = [np.append(direction, 1.0)[None, :] for direction in down]
-    return _in_short_order([reachable[i] for i in _most_telling(blocks, count)])
+    return _nearest_neighbour_order(
+        [reachable[i] for i in _most_informative(blocks, count)]
+    )
 
 
 def tilted_pair(model: ArmModel, space: FreeSpace) -> list[Array]:
-    """Return two poses that a short turn of the wrist leads between [rad], (7,) each.
+    """Return two poses that differ by a turn of the wrist [rad], (7,) each.
 
-    Between them gravity turns far about an axis across z7, so that a sensor that is
-    turned about z7 shows it.
+    Gravity turns far about an axis perpendicular to z7 between them, which reveals a
+    sensor mounted at a wrong angle about z7.
 
     Raises:
-        SettingsError: no turn of the wrist is clear.
+        SettingsError: no turn of the wrist is free of collision.
     """
     upright = np.array(UPRIGHT)
     for joint, angle in _TILTS:
@@ -100,8 +102,8 @@ def tilted_pair(model: ArmModel, space: FreeSpace) -> list[Array]:
     )
 
 
-def _most_telling(blocks: Sequence[Array], count: int) -> list[int]:
-    """Return which `count` of the regressors (k, p) tell most, one after the other."""
+def _most_informative(blocks: Sequence[Array], count: int) -> list[int]:
+    """Return the indices of `count` regressors (k, p) by greedy D-optimal selection."""
     rows, parameters = blocks[0].shape
     information = 1e-3 * np.eye(parameters)
     chosen: list[int] = []
@@ -127,10 +129,10 @@ def plan_halts(
     *,
     is_two_sided: bool = True,
 ) -> list[MeasurementPose]:
-    """Return the halts: each pose from below and from above, in every joint.
+    """Return the waypoints that approach each pose from both sides, in every joint.
 
-    The way begins at `start` [rad], shape (7,), goes by the upright pose and ends at
-    `start`. A straight way in joint space that would leave `space` goes by the upright
+    The path begins at `start` [rad], shape (7,), goes by the upright pose and ends at
+    `start`. A straight leg in joint space that would leave `space` goes by the upright
     pose; a pose that cannot be reached from there is left out. Where friction does not
     matter (`is_two_sided` false) each pose is reached once, directly.
 
@@ -139,27 +141,27 @@ def plan_halts(
     """
     upright = np.array(UPRIGHT)
     check_rise(model, start, space)
-    way: list[tuple[Array, int | None]] = [(upright, None)]
+    path: list[tuple[Array, int | None]] = [(upright, None)]
     reachable = [pose for pose in poses if space.is_clear(model, upright, pose)]
     for number, pose in enumerate(reachable):
-        if not space.is_clear(model, way[-1][0], pose):
-            way.append((upright, None))
+        if not space.is_clear(model, path[-1][0], pose):
+            path.append((upright, None))
         if not is_two_sided:
-            way.append((pose, number))
+            path.append((pose, number))
             continue
         for side in (-OFFSET, OFFSET):
-            way += [(pose + side, None), (pose, number)]
-    way += [(upright, None), (start, None)]
-    before = [start, *(q for q, _ in way[:-1])]
+            path += [(pose + side, None), (pose, number)]
+    path += [(upright, None), (start, None)]
+    starts = [start, *(q for q, _ in path[:-1])]
     return [
         MeasurementPose(
             q,
             APPROACH_SPEED
             if pose is not None and is_two_sided
-            else leg_speed(model, here, q),
+            else leg_speed(model, previous, q),
             pose,
         )
-        for here, (q, pose) in zip(before, way, strict=True)
+        for previous, (q, pose) in zip(starts, path, strict=True)
     ]
 
 
@@ -174,25 +176,25 @@ def leg_speed(model: ArmModel, start: Array, goal: Array) -> float:
 
 
 def way_seconds(start: Array, halts: Sequence[MeasurementPose]) -> float:
-    """Return how long the moves take without the stops [s]."""
-    total, here = 0.0, start
+    """Return the travel time without the stops [s]."""
+    total, position = 0.0, start
     for halt in halts:
-        total += JointMove(here, halt.q, halt.speed).duration
-        here = halt.q
+        total += JointMove(position, halt.q, halt.speed).duration
+        position = halt.q
     return total
 
 
 def _candidates(model: ArmModel, space: FreeSpace, count: int) -> list[Array]:
-    """Return poses that are within `space`, also where they are approached.
+    """Return random poses within `space`, checked at both ends of their approach, too.
 
     Raises:
         SettingsError: there are fewer than `count`.
     """
     rng = np.random.default_rng(_SEED)
-    away = MARGIN + OFFSET
+    margin = MARGIN + OFFSET
     constants = model.constants
     drawn = np.array(UPRIGHT) + REACH * rng.uniform(-1.0, 1.0, (_CANDIDATES, 7))
-    drawn = np.clip(drawn, constants.q_lower + away, constants.q_upper - away)
+    drawn = np.clip(drawn, constants.q_lower + margin, constants.q_upper - margin)
     sides = (-OFFSET, 0.0, OFFSET)
     heights = np.min([lowest(model, drawn + side) for side in sides], axis=0)
     reachable = [
@@ -209,12 +211,12 @@ def _candidates(model: ArmModel, space: FreeSpace, count: int) -> list[Array]:
     return reachable
 
 
-def _in_short_order(poses: list[Array]) -> list[Array]:
-    """Return the poses so that each next one is the nearest of those left."""
-    left, here = list(poses), np.array(UPRIGHT)
+def _nearest_neighbour_order(poses: list[Array]) -> list[Array]:
+    """Return the poses in nearest-neighbour order from the upright pose."""
+    remaining, position = list(poses), np.array(UPRIGHT)
     ordered: list[Array] = []
-    while left:
-        distances = [float(np.abs(q - here).max()) for q in left]
-        here = left.pop(int(np.argmin(distances)))
-        ordered.append(here)
+    while remaining:
+        distances = [float(np.abs(q - position).max()) for q in remaining]
+        position = remaining.pop(int(np.argmin(distances)))
+        ordered.append(position)
     return ordered

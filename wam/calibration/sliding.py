@@ -1,4 +1,4 @@
-"""From recorded cycles to what resists each motor as it slides and breaks away."""
+"""Friction torque of each motor while it slides and breaks away, from recorded legs."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -13,30 +13,30 @@ from wam.model.constants import Array
 from wam.model.friction import ELASTIC, motor_turns
 from wam.model.moments import regressor
 
-HALF = 10  # samples on each side of the centre of a line fit: 42 ms in all
-# Joint 7 turns at its own pace and breaks away within 20 ms, which HALF would flatten.
+HALF = 10  # samples on each side of a centred line fit: 42 ms in all
+# Joint 7 accelerates faster and breaks away within 20 ms: HALF would smooth it out.
 _QUICK_MOTOR, _QUICK_HALF = 6, 4
-_QUICK_SPAN = 60  # samples before it has broken away
-_SLOW = 0.02  # rad/s up to which a leg shows where motors break away
+_QUICK_SPAN = 60  # samples evaluated before break-away
+_SLOW = 0.02  # rad/s; break-away is evaluated on legs up to this speed
 _PERIOD = PERIOD_NS * 1e-9  # s
 _STRIDE = 10  # samples from one row to the next
-_SLOWEST = 2e-3  # rad/s of the joint: below it nothing is called sliding
-# rad of the joint from a reversal until the bristle is bent as by steady sliding
+_SLOWEST = 2e-3  # rad/s of the joint; slower motion is not sliding
+# rad of the joint after a reversal until the bristle deflection is that of sliding
 _WINDING = np.array([6e-3] * 4 + [10e-3] * 3)
-_BREAKING = np.array([3e-3] * 4 + [5e-3] * 3)  # rad by which a motor has broken away
+_BREAKING = np.array([3e-3] * 4 + [5e-3] * 3)  # rad of travel that is a break-away
 _FEWEST_BENT, _BENT_SPAN = 20, 0.4  # samples, and share of the torque they span
 FEWEST = 60  # rows of a motor, in each sense a quarter of them
-BLOCK = 2.0  # s of neighbouring rows whose residuals may be alike
+BLOCK = 2.0  # s; residuals of rows within a block may be correlated
 
 
 @dataclass(frozen=True, slots=True)
 class RecordedLeg:
-    """One leg of the way, cycle by cycle.
+    """Recording of one leg, one row per cycle.
 
     Attributes:
         q: joint positions [rad], shape (n, 7).
         tau: joint torques as sent [N m], shape (n, 7).
-        speed: at which the quickest joint was sent [rad/s].
+        speed: commanded speed of the fastest joint [rad/s].
     """
 
     q: NDArray[np.float64]
@@ -46,19 +46,19 @@ class RecordedLeg:
 
 @dataclass(frozen=True, slots=True)
 class SlidingRows:
-    """What one motor showed; arrays of shape (n,) at the motor unless stated.
+    """Friction data of one motor; motor-side arrays of shape (n,) unless stated.
 
     Attributes:
         angle: [rad].
-        speed: [rad/s]; 0 where it broke away.
-        sense: of the motion, +1 or -1.
-        load: torque that the weight puts on it [N m].
-        friction: torque that neither weight nor inertia explains [N m].
-        inertia: torque that accelerates the arm by its model [N m].
-        gravity: torque by first moments of 1 kg m, shape (n, 21).
-        block: number of the stretch of 2 s; residuals within one may be alike.
-        compliance: how far the motor gave way before it broke away [rad/(N m)], one
-            for each slow leg on which that shows, shape (m,).
+        speed: [rad/s]; 0 in break-away rows.
+        sense: sense of motion, +1 or -1.
+        load: gravity torque [N m].
+        friction: motor torque less gravity and inertia [N m].
+        inertia: inertial torque of the model [N m].
+        gravity: torque per first moment of 1 kg m, shape (n, 21).
+        block: number of the 2 s block, for correlated residuals.
+        compliance: presliding compliance before break-away [rad/(N m)], one value per
+            slow leg on which it is measurable, shape (m,).
     """
 
     angle: Array
@@ -90,12 +90,12 @@ class _Motion:
 def sliding_rows(
     model: ArmModel, weighed: ArmModel, legs: Sequence[RecordedLeg]
 ) -> list[SlidingRows]:
-    """Return what each of the seven motors showed on `legs`.
+    """Return the friction data of the seven motors on `legs`.
 
     Args:
         model: the arm with its tool.
-        weighed: the arm as its gravity was calibrated.
-        legs: recorded one after the other.
+        weighed: the arm with calibrated gravity.
+        legs: recordings in order of time.
     """
     parts: list[list[SlidingRows]] = [[] for _ in range(7)]
     first = 0
@@ -104,16 +104,16 @@ def sliding_rows(
             continue
         motion = _motion(model, weighed, leg)
         for motor in range(7):
-            parts[motor].append(_of_motor(model, weighed, motion, motor, leg, first))
+            parts[motor].append(_motor_rows(model, weighed, motion, motor, leg, first))
         first += 1 + int(len(leg.q) * _PERIOD / BLOCK)
-    return [_joined(part) for part in parts]
+    return [_concatenated(part) for part in parts]
 
 
 def check_enough(motor: int, rows: SlidingRows) -> None:
-    """Refuse rows in which a motor did not slide enough either way.
+    """Refuse the data of a motor with too few rows in total or in either sense.
 
     Raises:
-        SettingsError: it did not.
+        SettingsError: too few rows.
     """
     fewer = min(int((rows.sense > 0.0).sum()), int((rows.sense < 0.0).sum()))
     if len(rows) >= FEWEST and fewer >= FEWEST // 4:
@@ -126,18 +126,18 @@ def check_enough(motor: int, rows: SlidingRows) -> None:
 
 
 def _motion(model: ArmModel, weighed: ArmModel, leg: RecordedLeg) -> _Motion:
-    """Return the leg with the same smoothing for everything in it."""
+    """Return the smoothed leg at the motors; all signals share one filter."""
     j2mp = model.constants.j2mp
     to_motors = np.linalg.inv(j2mp)
-    q, qd = _line(leg.q)
-    tau, _ = _line(leg.tau)
-    qdd = _line(qd)[1]
-    rows = _every(len(q))
+    q, qd = _smooth(leg.q)
+    tau, _ = _smooth(leg.tau)
+    qdd = _smooth(qd)[1]
+    rows = _row_indices(len(q))
     inertial, weights = np.zeros_like(q), np.zeros_like(q)
     for i in rows:
         inertial[i] = model.mass_matrix(q[i]) @ qdd[i] + model.coriolis(q[i], qd[i])
         weights[i] = weighed.gravity(q[i])
-    # Weight changes slowly: in between it is a straight line.
+    # The dynamics are evaluated at every 10th sample and interpolated linearly.
     for joint in range(7):
         for table in (inertial, weights):
             table[:, joint] = np.interp(np.arange(len(q)), rows, table[rows, joint])
@@ -151,11 +151,11 @@ def _motion(model: ArmModel, weighed: ArmModel, leg: RecordedLeg) -> _Motion:
     )
 
 
-def _every(count: int) -> NDArray[np.int64]:
+def _row_indices(count: int) -> NDArray[np.int64]:
     return np.arange(2 * HALF, count - 2 * HALF, _STRIDE)
 
 
-def _line(values: Array, half: int = HALF) -> tuple[Array, Array]:
+def _smooth(values: Array, half: int = HALF) -> tuple[Array, Array]:
     """Return value and slope [1/s] of centred line fits, shapes as `values` (n, 7)."""
     steps = np.arange(-half, half + 1)
     mean = np.full(2 * half + 1, 1.0 / (2 * half + 1))
@@ -166,7 +166,7 @@ def _line(values: Array, half: int = HALF) -> tuple[Array, Array]:
     return np.stack(level, axis=-1), np.stack(rate, axis=-1)
 
 
-def _of_motor(
+def _motor_rows(
     model: ArmModel,
     weighed: ArmModel,
     motion: _Motion,
@@ -174,95 +174,97 @@ def _of_motor(
     leg: RecordedLeg,
     first: int,
 ) -> SlidingRows:
-    """Return the rows of one motor on one leg; its blocks are counted from `first`."""
-    turns = float(motor_turns(model.constants)[motor])
+    """Return the rows of one motor on one leg; block numbers begin at `first`."""
+    ratio = float(motor_turns(model.constants)[motor])
     angle, speed = motion.angle[:, motor], motion.speed[:, motor]
-    rows = _every(len(angle))
-    rows = rows[_is_sliding(angle, speed, rows, turns, float(_WINDING[motor]))]
-    v = speed[rows]
-    sense = np.where(v < 0.0, -1.0, 1.0)
+    rows = _row_indices(len(angle))
+    rows = rows[_is_sliding(angle, speed, rows, ratio, float(_WINDING[motor]))]
+    row_speed = speed[rows]
+    sense = np.where(row_speed < 0.0, -1.0, 1.0)
     friction = motion.friction[rows, motor]
-    given = np.empty(0)
+    compliance = np.empty(0)
     if leg.speed <= _SLOW:
         friction_before = motion.friction[:, motor]
         if motor == _QUICK_MOTOR:
-            friction_before = _quick_friction(model, weighed, leg, motor, turns)
-        broken = _break_away(motion.angle[:, motor], friction_before, motor, turns)
-        if broken is not None:
-            index, way = broken
+            friction_before = _quick_friction(model, weighed, leg, motor, ratio)
+        breakaway = _break_away(motion.angle[:, motor], friction_before, motor, ratio)
+        if breakaway is not None:
+            index, break_sense = breakaway
             rows = np.append(rows, index)
-            v, sense = np.append(v, 0.0), np.append(sense, way)
+            row_speed, sense = np.append(row_speed, 0.0), np.append(sense, break_sense)
             friction = np.append(friction, friction_before[index])
             if motor != _QUICK_MOTOR:
-                given = _compliance(way * angle[:index], way * friction_before[:index])
+                compliance = _compliance(
+                    break_sense * angle[:index], break_sense * friction_before[:index]
+                )
     to_motors = np.linalg.inv(model.constants.j2mp)[:, motor]
-    weighing = [to_motors @ regressor(model.constants, motion.q[i]) for i in rows]
+    gravity = [to_motors @ regressor(model.constants, motion.q[i]) for i in rows]
     return SlidingRows(
         angle=angle[rows],
-        speed=v,
+        speed=row_speed,
         sense=sense,
         load=motion.load[rows, motor],
         friction=friction,
         inertia=motion.inertia[rows, motor],
-        gravity=np.array(weighing).reshape(-1, 21),
+        gravity=np.array(gravity).reshape(-1, 21),
         block=first + (rows * _PERIOD / BLOCK).astype(np.int64),
-        compliance=given,
+        compliance=compliance,
     )
 
 
 def _is_sliding(
-    angle: Array, speed: Array, rows: NDArray[np.int64], turns: float, winding: float
+    angle: Array, speed: Array, rows: NDArray[np.int64], ratio: float, winding: float
 ) -> NDArray[np.bool_]:
-    """Return at which of `rows` the motor has long slid one way."""
+    """Return at which of `rows` the motor is in steady sliding."""
     is_sliding = np.zeros(len(rows), dtype=bool)
-    slowest, far = _SLOWEST * turns, winding * turns
-    way, turned_at, k = 0.0, float(angle[0]), 0
-    fast = np.abs(speed) > slowest
+    slowest, settled_travel = _SLOWEST * ratio, winding * ratio
+    sense, reversal, k = 0.0, float(angle[0]), 0
+    is_fast = np.abs(speed) > slowest
     for i in range(int(rows[-1]) + 1):
-        now = float(np.sign(speed[i])) if fast[i] else 0.0
-        if now not in {0.0, way}:
-            way, turned_at = now, float(angle[i])
+        current = float(np.sign(speed[i])) if is_fast[i] else 0.0
+        if current not in {0.0, sense}:
+            sense, reversal = current, float(angle[i])
         if i == rows[k]:
-            is_far = abs(float(angle[i]) - turned_at) > far
-            window = fast[i - HALF : i + HALF + 1]
-            is_sliding[k] = now == way and is_far and bool(window.all())
+            is_settled = abs(float(angle[i]) - reversal) > settled_travel
+            window = is_fast[i - HALF : i + HALF + 1]
+            is_sliding[k] = current == sense and is_settled and bool(window.all())
             k += 1
     return is_sliding
 
 
-def _broken_at(angle: Array, motor: int, turns: float) -> int | None:
-    """Return the sample at which a motor has broken away; None = too soon or never."""
-    moved = np.abs(angle - angle[0])
-    beyond = np.flatnonzero(moved > float(_BREAKING[motor]) * turns)
+def _breakaway_index(angle: Array, motor: int, ratio: float) -> int | None:
+    """Return the sample of a motor's break-away; None if too early or none."""
+    travel = np.abs(angle - angle[0])
+    beyond = np.flatnonzero(travel > float(_BREAKING[motor]) * ratio)
     if not len(beyond) or beyond[0] <= 3 * HALF:
         return None
     return int(beyond[0])
 
 
 def _break_away(
-    angle: Array, friction: Array, motor: int, turns: float
+    angle: Array, friction: Array, motor: int, ratio: float
 ) -> tuple[int, float] | None:
-    """Return (sample, sense) where the motor resisted most before it turned."""
-    end = _broken_at(angle, motor, turns)
+    """Return (sample, sense) of the peak friction torque before break-away."""
+    end = _breakaway_index(angle, motor, ratio)
     if end is None:
         return None
-    way = float(np.sign(angle[end] - angle[0]))
-    resisting = way * friction[2 * HALF : end]
-    return 2 * HALF + int(resisting.argmax()), way
+    sense = float(np.sign(angle[end] - angle[0]))
+    resisting = sense * friction[2 * HALF : end]
+    return 2 * HALF + int(resisting.argmax()), sense
 
 
 def _compliance(angle: Array, friction: Array) -> Array:
-    """Return how far a motor gives way per torque before it breaks away, (0,) or (1,).
+    """Return the presliding compliance [rad/(N m)], shape (1,), or (0,) if unknown.
 
-    A line through angle over torque where the bristle is elastic: below its plastic
-    share of the largest torque.
+    Slope of angle over torque in the elastic range, below the share `ELASTIC` of the
+    largest torque.
 
     Args:
         angle: in the sense of the motion, up to the largest torque [rad].
         friction: in that sense [N m].
     """
-    begun = 2 * HALF
-    angle, friction = angle[begun:], friction[begun:]
+    start = 2 * HALF
+    angle, friction = angle[start:], friction[start:]
     if len(friction) < _FEWEST_BENT:
         return np.empty(0)
     is_elastic = friction <= ELASTIC * friction[-1]
@@ -275,26 +277,26 @@ def _compliance(angle: Array, friction: Array) -> Array:
 
 
 def _quick_friction(
-    model: ArmModel, weighed: ArmModel, leg: RecordedLeg, motor: int, turns: float
+    model: ArmModel, weighed: ArmModel, leg: RecordedLeg, motor: int, ratio: float
 ) -> Array:
-    """Return the friction of a motor before it breaks away, smoothed over 18 ms.
+    """Return the friction torque before break-away, smoothed over 18 ms [N m], (n,).
 
-    0 where it is not asked for, shape (n,).
+    0 outside the `_QUICK_SPAN` samples before break-away.
     """
     friction = np.zeros(len(leg.q))
-    end = _broken_at(leg.q @ model.constants.j2mp[motor], motor, turns)
+    end = _breakaway_index(leg.q @ model.constants.j2mp[motor], motor, ratio)
     if end is None:
         return friction
     to_motor = np.linalg.inv(model.constants.j2mp)[:, motor]
-    q, qd = _line(leg.q, _QUICK_HALF)
-    tau, qdd = _line(leg.tau, _QUICK_HALF)[0], _line(qd, _QUICK_HALF)[1]
+    q, qd = _smooth(leg.q, _QUICK_HALF)
+    tau, qdd = _smooth(leg.tau, _QUICK_HALF)[0], _smooth(qd, _QUICK_HALF)[1]
     for i in range(max(end - _QUICK_SPAN, 0), end):
         inertial = model.mass_matrix(q[i]) @ qdd[i] + model.coriolis(q[i], qd[i])
         friction[i] = (tau[i] - inertial - weighed.gravity(q[i])) @ to_motor
     return friction
 
 
-def _joined(parts: Sequence[SlidingRows]) -> SlidingRows:
+def _concatenated(parts: Sequence[SlidingRows]) -> SlidingRows:
     names = SlidingRows.__slots__
     columns = {n: np.concatenate([getattr(part, n) for part in parts]) for n in names}
     return SlidingRows(**columns)

@@ -24,19 +24,19 @@ from wam.control.soft_walls import SoftWalls
 from wam.model.arm_model import ArmModel
 from wam.model.gravity import VirtualMass, compensation
 
-TORQUE_SHARE = 0.9  # of the torque limits that a move or a hold may use, with gravity
-_HELD = frozenset({ArmState.HOLD, ArmState.DAMP, ArmState.GUIDE})  # by springs
-_POWERED = frozenset({ArmState.FLOAT, *_HELD})
+TORQUE_SHARE = 0.9  # of the torque limits: bound of a move or hold including gravity
+_SPRING_STATES = frozenset({ArmState.HOLD, ArmState.DAMP, ArmState.GUIDE})
+_POWERED = frozenset({ArmState.FLOAT, *_SPRING_STATES})
 
 
 @dataclass(slots=True, eq=False)
 class Moving:
-    """The mode of an arm in hold that moves by itself, or keeps the goal of a move.
+    """Mode of an arm in hold that makes a move or keeps its goal.
 
     Attributes:
-        path: of the joints.
-        begun_ns: when the move began [ns].
-        stuck_motor: the motor that it turns in vain, 1-7; 0 = none.
+        path: joint path.
+        begun_ns: start time of the move [ns].
+        stuck_motor: motor driven without moving, 1-7; 0 = none.
     """
 
     path: JointMove
@@ -44,25 +44,24 @@ class Moving:
     stuck_motor: int = 0
 
     def reference(self, now_ns: int) -> tuple[Vector, Vector]:
-        """Return (positions [rad], velocities [rad/s]) wanted now, shapes (7,)."""
+        """Return reference (positions [rad], velocities [rad/s]), shapes (7,)."""
         return move_reference(self.path, (now_ns - self.begun_ns) * 1e-9)
 
 
-# In hold an arm may move by itself or be in a proof; other modes are bare states.
+# In hold an arm may make a move or be in a proof; the other modes are plain states.
 Mode = ArmState | Moving | Proof
 
 
 class FootController(ControlLaw):
     """Torques of float, guide, hold and damp.
 
-    float: gravity of everything plus the virtual mass, no damping, or slips would lose
-    their bounce; where it was calibrated, most of the dry friction of the drives is
-    taken off the hand. hold and damp: gravity, joint damping and springs of bounded
-    torque that keep the joints where they are. guide: the same, weak enough for a hand
-    that carries the foot. The virtual mass is ramped to 0 in all but float. Joint 7 is
-    locked in all four, and soft walls stand before the stops. In hold the arm can be
-    sent somewhere; joint PD then follows the move and keeps the goal until a state is
-    entered, hold included.
+    float: gravity compensation of arm and tool plus the virtual mass, without damping,
+    which would suppress the bounce-back of slips; if calibrated, most of the drives'
+    dry friction is compensated. hold and damp: gravity compensation, joint damping and
+    position springs of bounded torque. guide: the same, weak enough to be led by hand.
+    The virtual mass is ramped to 0 in all states but float. Joint 7 is locked in all
+    four, and soft walls act before the stops. In hold the arm can make a move: joint PD
+    follows it and keeps the goal until a state is entered, hold included.
     """
 
     def __init__(
@@ -86,17 +85,17 @@ class FootController(ControlLaw):
         self._watch = MotorWatch(model.constants)
 
     def enter(self, state: ArmState, reading: ArmReading) -> None:
-        """Begin `state`; torques change continuously except for the damping.
+        """Enter `state`; torques are continuous except for the damping.
 
-        A move ends. An arm that stands still already goes on to, where it is.
+        A move ends. Entering the present hold state again changes nothing.
         """
         now = reading.host_ns
-        if state not in _HELD:
+        if state not in _SPRING_STATES:
             self._hold.release()
         elif state is self._mode:
             return
         else:
-            self._hold.begin(reading.q, self._own_torque(reading))
+            self._hold.begin(reading.q, self._move_spring(reading))
         if self._friction is not None and state is not ArmState.FLOAT:
             self._friction.rest(now)
         self._mode = state
@@ -107,14 +106,14 @@ class FootController(ControlLaw):
             self._lock.release(now)
 
     def move_to(self, goal: Vector, speed: float, reading: ArmReading) -> float:
-        """Go to `goal` [rad], shape (7,), on a straight line; return how long [s].
+        """Start a straight move to `goal` [rad], shape (7,); return its duration [s].
 
-        No joint is faster than `speed` [rad/s] but joint 7, which is released for the
-        move and then turns at 0.5 rad/s. Only in hold.
+        `speed` [rad/s] limits all joints but joint 7, which is released for the move
+        and turns at 0.5 rad/s. Only in hold.
 
         Raises:
-            ValueError: the arm does not hold, `goal` is beyond a stop or not finite, or
-                `speed` is not within 0..0.5 rad/s.
+            ValueError: the arm is not in hold, `goal` is beyond a stop or not finite,
+                or `speed` is not within 0..0.5 rad/s.
         """
         constants, mode = self._model.constants, self._mode
         if self.is_proving() or (
@@ -129,7 +128,7 @@ class FootController(ControlLaw):
         if not 0.0 < speed <= TOP_SPEED:
             raise ValueError(f"{speed} rad/s is not within 0..{TOP_SPEED}")
         now = reading.host_ns
-        # From where the arm is held, or the torque would jump.
+        # Start at the reference of the spring, not at q: the torque stays continuous.
         if isinstance(mode, Moving):
             start, _ = mode.reference(now)
         else:
@@ -142,25 +141,25 @@ class FootController(ControlLaw):
         return path.duration
 
     def prove(self, goal: ProofGoal, reading: ArmReading) -> None:
-        """Give the arm what `goal` says and nothing else; only in hold.
+        """Start the proof `goal`: its torques replace the control law; only in hold.
 
         Raises:
-            ValueError: the arm does not hold or moves, or `goal` is none.
+            ValueError: the arm is not in hold or moves, or `goal` is invalid.
         """
         if self._mode is not ArmState.HOLD and not self.is_proving():
-            raise ValueError("an arm is proved in hold only")
+            raise ValueError("a proof begins in hold only")
         self._mode = Proof(goal, self._model.constants, reading)
         self._hold.release()
         self._lock.release(reading.host_ns)
 
     def is_proving(self) -> bool:
-        """Return whether the arm is in a proof: any verdict ends it in idle."""
+        """Return whether the arm is in a proof: any fault then leads to idle."""
         return isinstance(self._mode, Proof)
 
     def proof_excess(
         self, reading: ArmReading, energy: float, *, is_powered: bool
     ) -> MotionExcess | None:
-        """Return what an arm in a proof does that it should not; None = nothing."""
+        """Return the limit of motion that an arm in a proof exceeds, or None."""
         if not isinstance(self._mode, Proof):
             return None
         return self._mode.excess(reading, energy, is_powered=is_powered)
@@ -168,8 +167,8 @@ class FootController(ControlLaw):
     def torque(self, reading: ArmReading) -> tuple[Vector, Vector]:
         """Return (tau, gravity part) [N m], shapes (7,).
 
-        A position that cannot be true, or that follows one that was not, moves no
-        joint: the weight alone is borne until positions are believed again.
+        While a position is implausible (`reading.jump`), only gravity is compensated,
+        until the positions are confirmed.
         """
         now = reading.host_ns
         gravity = compensation(self._model, reading.q, self._mass.at(now))
@@ -187,7 +186,7 @@ class FootController(ControlLaw):
                 tau[LOCKED_JOINT] += lock
             case ArmState.GUIDE:
                 tau = self._hold_torque(reading, gravity, lock, is_guided=True)
-            case _:  # hold and damp; in idle the cycle asks for nothing
+            case _:  # hold and damp; in idle the cycle does not call this
                 tau = self._hold_torque(reading, gravity, lock)
         if self._friction is not None:
             self._compensate(self._friction, tau, reading)
@@ -196,11 +195,11 @@ class FootController(ControlLaw):
         return tau, gravity
 
     def is_moving(self) -> bool:
-        """Return whether a move is made, or its goal is kept."""
+        """Return whether a move is under way or its goal is kept."""
         return isinstance(self._mode, Moving)
 
     def stuck_motor(self) -> int:
-        """Return the motor that the move turns in vain, 1-7; 0 = none."""
+        """Return the motor that a move drives without moving it, 1-7; 0 = none."""
         return self._mode.stuck_motor if isinstance(self._mode, Moving) else 0
 
     def kinetic_energy(self, reading: ArmReading) -> float:
@@ -208,29 +207,29 @@ class FootController(ControlLaw):
         return self._model.kinetic_energy(reading.q, reading.qd)
 
     def joint7_offset(self, reading: ArmReading) -> float:
-        """Return how far joint 7 is from where it was locked [rad]."""
+        """Return the offset of joint 7 from its locked position [rad]."""
         return self._lock.offset(float(reading.q[LOCKED_JOINT]), reading.host_ns)
 
     def _lock_torque(self, reading: ArmReading) -> float:
-        """Return the torque of joint 7's lock [N m]; 0 once it has faded."""
+        """Return the torque of joint 7's lock [N m]; 0 after it has faded."""
         q7 = float(reading.q[LOCKED_JOINT])
-        if isinstance(self._mode, Moving) or self._mode in _HELD:
+        if isinstance(self._mode, Moving) or self._mode in _SPRING_STATES:
             self._lock.follow(q7, reading.host_ns)
         return self._lock.torque(q7, reading.qd7_raw, reading.host_ns)
 
     def _move_torque(
         self, move: Moving, reading: ArmReading, gravity: Vector, lock: float
     ) -> Vector:
-        """Return `gravity` and the PD along a move [N m], shape (7,).
+        """Return `gravity` plus the PD torque of a move [N m], shape (7,).
 
-        A move never asks for what the guard would stop it for.
+        Clipped below the torque limits, so that a move never trips the guard.
         """
         constants = self._model.constants
         q, qd = move.reference(reading.host_ns)
         tau = gravity + joint_pd(
             constants.kp, constants.kd, q - reading.q, qd - reading.qd
         )
-        tau[LOCKED_JOINT] += lock  # fades from the moment of its release
+        tau[LOCKED_JOINT] += lock  # fades after its release
         tau = np.clip(tau, -self._largest, self._largest)
         move.stuck_motor = self._watch.stuck_motor(q, tau - gravity, reading)
         return tau
@@ -243,36 +242,33 @@ class FootController(ControlLaw):
         *,
         is_guided: bool = False,
     ) -> Vector:
-        """Return `gravity`, springs and dampers [N m], shape (7,).
+        """Return `gravity` plus springs and dampers [N m], shape (7,).
 
-        What is added never makes a torque larger than its share of the limit: a fast
-        arm that is to hold would be stopped for its torques instead.
+        The sum is bounded by a share of the torque limit: otherwise braking a fast arm
+        would trip the guard.
         """
         tau = self._hold.torque(reading, is_guided=is_guided)
-        # Plain numbers: seven of them are bounded faster than numpy looks at an array.
+        # Python floats: for seven values the loop is faster than numpy calls.
         rows = zip(tau.tolist(), gravity.tolist(), self._largest.tolist(), strict=True)
-        tau = gravity + np.array([_within(*row) for row in rows])
+        tau = gravity + np.array([_clipped(*row) for row in rows])
         tau[LOCKED_JOINT] = gravity[LOCKED_JOINT] + lock
         return tau
 
     def _compensate(
         self, friction: FrictionCompensation, tau: Vector, reading: ArmReading
     ) -> None:
-        """Add to `tau` [N m] what a bristle per motor takes of its dry friction.
-
-        Joint 7 is left to its lock.
-        """
+        """Add the friction compensation to `tau` [N m], except at joint 7 (locked)."""
         if self._mode is ArmState.FLOAT:
             depth = None if self._walls is None else self._walls.depth(reading.q)
             tau[:LOCKED_JOINT] += friction.torque(reading, tau, depth)[:LOCKED_JOINT]
-        elif (rest := friction.resting(reading.host_ns)) is not None:
-            tau[:LOCKED_JOINT] += rest[:LOCKED_JOINT]
+        elif (fading := friction.resting(reading.host_ns)) is not None:
+            tau[:LOCKED_JOINT] += fading[:LOCKED_JOINT]
             np.clip(tau, -self._largest, self._largest, out=tau)
 
-    def _own_torque(self, reading: ArmReading) -> Vector | None:
-        """Return the torque of a move's spring [N m], shape (7,); None without a move.
+    def _move_spring(self, reading: ArmReading) -> Vector | None:
+        """Return the spring torque of a move [N m], shape (7,); None without a move.
 
-        The springs of hold begin with it.
+        The springs of hold take over with this torque.
         """
         if not isinstance(self._mode, Moving):
             return None
@@ -281,6 +277,6 @@ class FootController(ControlLaw):
         return joint_pd(constants.kp, constants.kd, q - reading.q, np.zeros(7))
 
 
-def _within(tau: float, gravity: float, most: float) -> float:
-    """Return what of `tau` keeps the sum with `gravity` within `most` [N m]."""
-    return min(max(tau, min(-most - gravity, 0.0)), max(most - gravity, 0.0))
+def _clipped(tau: float, gravity: float, limit: float) -> float:
+    """Return `tau` clipped so that |tau + gravity| <= `limit` [N m]."""
+    return min(max(tau, min(-limit - gravity, 0.0)), max(limit - gravity, 0.0))

@@ -1,15 +1,15 @@
-"""Part of the dry friction of the drives taken off the hand that leads the arm.
+"""Partial compensation of the drives' dry friction while a person leads the arm.
 
-One bristle per motor follows the counts of its encoder, in the form that Hayward,
-Armstrong, Altpeter and Dupont (2009) give for measured positions alone. With dq the
-step of a cycle and z in shares of the deflection z_o at which it slides,
+One bristle per motor follows the encoder counts, in the position-only form of Hayward,
+Armstrong, Altpeter and Dupont (2009). With dq the step of a cycle and z the deflection
+as a share of z_o, at which the bristle slides,
 
     z <- clip(z + dq / z_o (1 - alpha |z|), -1, 1),    tau = c F_low z
 
-alpha is 0 where the step unbends the bristle. No velocity enters, so there is neither a
-filter's lag nor its noise, and an arm at rest is pushed as far as it went. The torque
-never exceeds what surely rubs, or the arm would move by itself: F_low is the lower end
-of what a calibration found for that sense of motion, at the worst place of a turn.
+alpha is 0 where the step reduces |z|. No velocity enters, hence no filter lag or noise;
+at rest the torque keeps its value. To never move the arm by itself, the torque stays
+below the true friction: F_low is the calibration's lower bound for that sense of motion
+at the minimum of the ripple.
 """
 
 from dataclasses import dataclass
@@ -21,28 +21,28 @@ from wam.model.constants import ArmConstants, Array
 from wam.model.friction import ELASTIC, MotorFriction, motor_turns, plastic_share
 
 LARGEST_SHARE = 0.8
-SWUNG_MOTOR = "friction:swung_motor"  # in the recording
-_MARGIN = 0.9  # of what surely rubs: share (1 + error) never exceeds it
+SWUNG_MOTOR = "friction:swung_motor"  # metadata key of the recording
+_MARGIN = 0.9  # of the true friction: upper bound of share (1 + error)
 _SIGMAS = 1.96
-# Four times what is assumed of real bristles: a stiffer one would hunt.
+# Four times the assumed presliding of the drives: a stiffer bristle would limit-cycle.
 _PRESLIDING = np.array([4.0, 4.0, 4.0, 4.0, 8.0, 8.0, 8.0]) * 1e-3  # rad of the joint
-_FADE_NS = 100_000_000  # ns, when the arm is let go of or held
-_AT_WALL = 0.02  # rad, in which it fades before a stop
-# A motor whose bristle is bent the other way so often within a second swings.
+_FADE_NS = 100_000_000  # after float has ended
+_AT_WALL = 0.02  # rad of wall depth over which the compensation fades
+# So many sign changes of the deflection within a second are an oscillation.
 _SWINGS, _SWING_NS = 12, 1_000_000_000
-_BENT = 0.7
+_BENT = 0.7  # |z| that counts for a sign change
 
 
 @dataclass(frozen=True, slots=True)
 class KnownFriction:
-    """Dry friction of the motors that surely is there.
+    """Lower bound of the motors' dry friction.
 
     Attributes:
-        forward: of motion in the positive sense [N m], shape (7,), 0 or more.
-        backward: of motion in the negative sense [N m], shape (7,), 0 or more.
+        forward: in positive motion [N m], shape (7,), 0 or more.
+        backward: in negative motion [N m], shape (7,), 0 or more.
         error: relative uncertainty of the Coulomb torques, shape (7,).
-        load: what is lost per N m that a motor bears less than `load_at`, shape (7,).
-        load_at: torques at which the others hold [N m], shape (7,).
+        load: decrease per N m of motor load below `load_at`, shape (7,).
+        load_at: reference loads [N m], shape (7,).
     """
 
     forward: Array
@@ -55,39 +55,37 @@ class KnownFriction:
 def known_friction(
     friction: MotorFriction, deviation: Array, asymmetry_deviation: Array
 ) -> KnownFriction:
-    """Return the lower end of an identified friction, 95 %.
-
-    At the smallest place of its ripple.
+    """Return the lower 95 % bound of identified friction at the minimum of its ripple.
 
     Args:
-        friction: as identified.
-        deviation: of its Coulomb torques [N m], shape (7,).
-        asymmetry_deviation: of its asymmetries [N m], shape (7,).
+        friction: identified friction.
+        deviation: standard deviation of the Coulomb torques [N m], shape (7,).
+        asymmetry_deviation: standard deviation of the asymmetries [N m], shape (7,).
     """
-    doubt = _SIGMAS * np.hypot(deviation, asymmetry_deviation)
-    least = 1.0 - np.hypot(friction.ripple_sin, friction.ripple_cos)
-    level = friction.coulomb - doubt
+    margin = _SIGMAS * np.hypot(deviation, asymmetry_deviation)
+    ripple_minimum = 1.0 - np.hypot(friction.ripple_sin, friction.ripple_cos)
+    coulomb = friction.coulomb - margin
     return KnownFriction(
-        forward=np.maximum((level + friction.asymmetry) * least, 0.0),
-        backward=np.maximum((level - friction.asymmetry) * least, 0.0),
+        forward=np.maximum((coulomb + friction.asymmetry) * ripple_minimum, 0.0),
+        backward=np.maximum((coulomb - friction.asymmetry) * ripple_minimum, 0.0),
         error=_SIGMAS * deviation / friction.coulomb,
-        load=np.maximum(friction.load, 0.0) * least,
+        load=np.maximum(friction.load, 0.0) * ripple_minimum,
         load_at=friction.load_at,
     )
 
 
 class FrictionCompensation:
-    """Torques of the bristles of seven motors, in float only.
+    """Friction compensation of the seven motors, in float only.
 
     Attributes:
-        swung_motor: the first motor that swung to and fro as no hand does, 1-7; 0 =
-            none. Its friction is not what was calibrated: nothing is compensated since.
+        swung_motor: first motor that oscillated faster than a hand can, 1-7; 0 = none.
+            Its friction is below the calibrated one, so compensation has ended.
     """
 
     def __init__(
         self, constants: ArmConstants, known: KnownFriction, share: float
     ) -> None:
-        """Compensate `share` of what is known, motor by motor.
+        """Compensate `share` of the known friction of each motor.
 
         Raises:
             ValueError: `share` is outside 0..0.8.
@@ -114,31 +112,30 @@ class FrictionCompensation:
         self._begin([])
 
     def metadata(self) -> dict[str, str]:
-        """Return for the recording which motor ended the compensation, "0" = none."""
+        """Return the oscillating motor as metadata of the recording, "0" = none."""
         return {SWUNG_MOTOR: str(self.swung_motor)}
 
     def rest(self, now_ns: int) -> None:
-        """Stop compensating; what is pushed fades within a tenth of a second."""
+        """Stop compensating; the torque fades within 0.1 s."""
         if self._counts:
-            self._fading = self._push()
+            self._fading = self._bristle_torque()
             self._rested_ns = now_ns
             self._begin([])
 
     def resting(self, now_ns: int) -> Array | None:
-        """Return what is left of the torques since `rest` [N m], (7,); None = 0."""
+        """Return the fading torques after `rest` [N m], (7,); None = all 0."""
         share = 1.0 - (now_ns - self._rested_ns) / _FADE_NS
         return self._fading * share if share > 0.0 else None
 
     def torque(
         self, reading: ArmReading, load_torque: Array, depth: Array | None = None
     ) -> Array:
-        """Return joint torques [N m], shape (7,), after the step of this cycle.
+        """Update the bristles and return joint torques [N m], shape (7,).
 
         Args:
-            reading: of this cycle; a motor that did not answer goes no step.
-            load_torque: torques of the joints without compensation [N m], shape (7,).
-            depth: how far each joint is inside its soft wall [rad], shape (7,); None =
-                no joint is.
+            reading: reading of this cycle; the bristle of a silent motor is unchanged.
+            load_torque: joint torques without compensation [N m], shape (7,).
+            depth: depth of each joint in its soft wall [rad], shape (7,); None = all 0.
         """
         now = reading.host_ns
         if self.swung_motor == 0:
@@ -149,13 +146,13 @@ class FrictionCompensation:
             fading = self.resting(now)
             return np.zeros(7) if fading is None else fading
         self._load_torques = self._of_torques.dot(load_torque).tolist()
-        return self._push(depth)
+        return self._bristle_torque(depth)
 
     def _begin(self, counts: list[int]) -> None:
         self._counts = counts
         self._z = [0.0] * 7
-        self._bent = [0] * 7  # which way each bristle was bent last
-        self._turned: list[list[int]] = [[] for _ in range(7)]  # when it went over [ns]
+        self._last_sign = [0] * 7  # sign of the last large deflection
+        self._sign_changes_ns: list[list[int]] = [[] for _ in range(7)]
 
     def _follow(self, counts: list[int]) -> None:
         if not self._counts:
@@ -172,30 +169,30 @@ class FrictionCompensation:
             self._counts[motor] = now
 
     def _watch(self, now_ns: int) -> None:
-        """Notice a motor whose bristle goes from one end to the other and back."""
+        """Detect a motor whose deflection oscillates between both ends."""
         for motor, z in enumerate(self._z):
-            way = 1 if z > _BENT else -1 if z < -_BENT else 0
-            if way == 0 or way == self._bent[motor]:
+            sign = 1 if z > _BENT else -1 if z < -_BENT else 0
+            if sign == 0 or sign == self._last_sign[motor]:
                 continue
-            self._bent[motor] = way
-            turned = [*self._turned[motor], now_ns][-_SWINGS:]
-            self._turned[motor] = turned
-            if len(turned) == _SWINGS and now_ns - turned[0] < _SWING_NS:
+            self._last_sign[motor] = sign
+            changes = [*self._sign_changes_ns[motor], now_ns][-_SWINGS:]
+            self._sign_changes_ns[motor] = changes
+            if len(changes) == _SWINGS and now_ns - changes[0] < _SWING_NS:
                 self.swung_motor = motor + 1
                 return
 
-    def _push(self, depth: Array | None = None) -> Array:
-        # Plain numbers: seven of them are done before numpy has looked at an array.
-        push: list[float] = []
+    def _bristle_torque(self, depth: Array | None = None) -> Array:
+        # Python floats: for seven values the loop is faster than numpy calls.
+        torques: list[float] = []
         state = zip(self._z, self._load_torques, self._rows, strict=True)
         for z, load_torque, (_, forward, backward, load, load_at) in state:
             level = forward if z > 0.0 else backward
-            if load and (less := load_at - abs(load_torque)) > 0.0:
-                level = max(level - load * less, 0.0)
-            push.append(z * level)
-        tau = np.array(push)
+            if load and (unload := load_at - abs(load_torque)) > 0.0:
+                level = max(level - load * unload, 0.0)
+            torques.append(z * level)
+        tau = np.array(torques)
         if depth is not None:
-            # Both motors of a differential let go where either of its joints stops.
+            # Both motors of a differential fade if either of its joints is at a wall.
             free = 1.0 - np.minimum(np.abs(depth) / _AT_WALL, 1.0)
             tau *= np.where(self._j2mp != 0.0, free, 1.0).min(axis=1)
         return self._to_joints.dot(tau)

@@ -1,12 +1,12 @@
-"""Joint 7 held by software: a stiff spring and a damper, engaged without a bump."""
+"""Software lock of joint 7: a stiff spring and damper with bumpless engagement."""
 
 from dataclasses import dataclass
 
 from acquisition.clock import PERIOD_NS
 
 LOCKED_JOINT = 6  # joint 7
-_LONGEST_NS = 1_000_000_000  # later than this the lock begins anew
-RAMP = 0.5  # the lock takes hold and lets go within this time [s]
+_LONGEST_NS = 1_000_000_000  # a longer pause is not a slow cycle
+RAMP = 0.5  # engagement and release [s]
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,10 +15,10 @@ class LockGains:
 
     Attributes:
         kp: stiffness [N m/rad].
-        kd: damping [N m s/rad], on the unfiltered one-cycle difference of q7: on the
+        kd: damping [N m s/rad] of the unfiltered one-cycle difference of q7; with the
             filtered velocity the lock oscillates by several degrees.
         limit: largest torque [N m]; puck 7 cannot deliver more than 1.36.
-        speed: largest speed of a reference that is moved [rad/s].
+        speed: largest speed of the reference [rad/s].
     """
 
     kp: float = 20.0
@@ -28,55 +28,55 @@ class LockGains:
 
     @property
     def reach(self) -> float:
-        """Displacement at which the spring gives the largest torque [rad]."""
+        """Displacement at which the spring torque reaches its limit [rad]."""
         return self.limit / self.kp if self.kp > 0.0 else float("inf")
 
 
 class JointLock:
-    """Keeps joint 7 where it was when the lock was engaged, or where it is moved to."""
+    """Lock of joint 7 at the position of engagement, or at a reference moved later."""
 
     def __init__(self, gains: LockGains | None = None) -> None:
         self._gains = gains or LockGains()
         self._is_engaged = False
-        self._from = 0.0  # where the reference was at `_moved_ns`
+        self._from = 0.0  # reference at `_moved_ns`
         self._goal = 0.0
         self._moved_ns = 0
-        self._share = 0.0  # of the lock's strength at `_since_ns`
+        self._share = 0.0  # of the full stiffness, at `_since_ns`
         self._since_ns = 0
-        self._cycle_ns = 0  # the cycle in which its torque was asked for last
-        self._slow = 1.0  # periods of the loop that passed before it
+        self._cycle_ns = 0  # last cycle with a call of `torque`
+        self._slow = 1.0  # length of that cycle in periods of the loop
 
     @property
     def is_engaged(self) -> bool:
-        """Whether the lock holds."""
+        """Whether the lock is engaged."""
         return self._is_engaged
 
     def engage(self, q7: float, now_ns: int) -> None:
-        """Lock at `q7` [rad]; does nothing if the lock holds already.
+        """Lock at `q7` [rad]; does nothing if engaged.
 
-        A lock that is still letting go takes hold again with the strength it has left,
-        at a reference that gives the torque it gives now, and moves that to `q7`.
+        A lock that is still fading starts from its remaining stiffness and the present
+        reference, so the torque is continuous; the reference then moves to `q7`.
         """
         if self._is_engaged:
             return
-        left = self._stiffness_share(now_ns)
-        self._from = self.reference(now_ns) if left > 0.0 else q7
+        remaining = self._stiffness_share(now_ns)
+        self._from = self.reference(now_ns) if remaining > 0.0 else q7
         self._goal = q7
         self._is_engaged = True
         self._moved_ns = self._since_ns = now_ns
-        self._share = left
+        self._share = remaining
 
     def move(self, q7: float, now_ns: int) -> None:
-        """Let the reference go to `q7` [rad] at its largest speed, if engaged."""
+        """Move the reference to `q7` [rad] at its largest speed, if engaged."""
         if self._is_engaged:
             self._from = self.reference(now_ns)
             self._goal = q7
             self._moved_ns = now_ns
 
     def follow(self, q7: float, now_ns: int) -> None:
-        """Keep the reference where the largest torque reaches joint 7 at `q7` [rad].
+        """Keep the reference within the reach of the spring from `q7` [rad].
 
-        A joint that is turned further stays where it is left.
+        A joint that is turned by more than the reach does not spring back.
         """
         reference, reach = self.reference(now_ns), self._gains.reach
         if self._is_engaged and abs(q7 - reference) > reach:
@@ -84,7 +84,7 @@ class JointLock:
             self._moved_ns = now_ns
 
     def release(self, now_ns: int) -> None:
-        """Let joint 7 go: spring and damper fade within `RAMP`."""
+        """Release joint 7: spring and damper fade within `RAMP`."""
         if self._is_engaged:
             self._share = self._stiffness_share(now_ns)
             self._is_engaged = False
@@ -92,23 +92,23 @@ class JointLock:
             self._since_ns = now_ns
 
     def reference(self, now_ns: int) -> float:
-        """Return where the lock holds joint 7 at `now_ns` [rad]."""
-        way = self._gains.speed * (now_ns - self._moved_ns) * 1e-9
-        return self._from + min(max(self._goal - self._from, -way), way)
+        """Return the reference of joint 7 at `now_ns` [rad]."""
+        travel = self._gains.speed * (now_ns - self._moved_ns) * 1e-9
+        return self._from + min(max(self._goal - self._from, -travel), travel)
 
     def offset(self, q7: float, now_ns: int) -> float:
-        """Return how far joint 7 is from its reference [rad]; 0 when released."""
+        """Return the offset of joint 7 from its reference [rad]; 0 when released."""
         return q7 - self.reference(now_ns) if self._is_engaged else 0.0
 
     def torque(self, q7: float, qd7_raw: float, now_ns: int) -> float:
         """Return the torque about joint 7 [N m] without gravity, clipped.
 
-        A torque is held until the next cycle. Over a longer one the damper would
-        reverse the light joint's motion instead of ending it, and the spring more so:
-        the damping falls with the period, the stiffness with its square.
+        The torque is constant until the next cycle. In a late cycle the gains are too
+        high for the light joint (the discrete loop becomes unstable): damping is scaled
+        by 1 / period, stiffness by 1 / period^2.
         """
         share = self._stiffness_share(now_ns)
-        # The damper is there from the start, and fades with the spring at the end.
+        # Full damping at once on engagement; it fades with the spring on release.
         damping = 1.0 if self._is_engaged else share
         slow = self._slowness(now_ns)
         gains = self._gains
@@ -119,7 +119,7 @@ class JointLock:
     def _slowness(self, now_ns: int) -> float:
         """Return the time since the last cycle in periods of the loop, at least 1."""
         since_ns = now_ns - self._cycle_ns
-        if since_ns:  # the first torque of this cycle
+        if since_ns:  # first call in this cycle
             is_known = since_ns < _LONGEST_NS
             self._slow = max(since_ns / PERIOD_NS, 1.0) if is_known else 1.0
             self._cycle_ns = now_ns

@@ -1,4 +1,4 @@
-"""The torques of a proof: none, one joint's, or a share of the weight."""
+"""Torques of a proof (powered test): zero, one joint's, or a share of gravity."""
 
 import numpy as np
 
@@ -15,12 +15,12 @@ from acquisition.devices import ArmReading, Vector
 from wam.model.constants import ArmConstants
 
 _JOINTS = 7
-_KEEPS = 2.0  # of another arm's friction: what keeps the partner of a lifted joint
-_AT_THE_TOP = 0.3  # s, a lifted joint stays there
+_KEEPS = 2.0  # times the friction of the CAD arm: holds the coupled joint in a lift
+_AT_THE_TOP = 0.3  # s that a lifted joint stays up
 
 
 class Proof:
-    """One proof, from where the arm lies when its motors get power."""
+    """One powered test, relative to the pose in which the motors get power."""
 
     def __init__(
         self,
@@ -32,19 +32,20 @@ class Proof:
         """Begin at `reading`.
 
         Raises:
-            ValueError: the goal is none: no such joint, or a number that is not finite.
+            ValueError: invalid goal: no such joint, a value that is not finite, or too
+                long without feedback.
         """
         needs_joint = goal.kind in (ProofKind.RAMP, ProofKind.LIFT)
         if not (1 if needs_joint else 0) <= goal.joint <= _JOINTS:
             raise ValueError(f"there is no joint {goal.joint}")
         if not (np.isfinite(goal.torque) and 0.0 < goal.seconds <= 60.0):
-            raise ValueError(f"{goal} is no proof")
+            raise ValueError(f"{goal} is not a valid proof")
         if goal.silence_ns > limits.silence * NS_PER_S:
             raise ValueError(f"{goal} leaves the arm unwatched for too long")
         self.goal = goal
         self._constants = constants
         self._limits = limits
-        self._ways = limits.ways(goal)
+        self._travel_limits = limits.ways(goal)
         self._q: list[float] = []
         self._begun_ns = 0
         self._has_moved = False
@@ -56,7 +57,7 @@ class Proof:
         self._has_moved = False
 
     def torque(self, reading: ArmReading, gravity: Vector) -> Vector:
-        """Return the torques [N m], shape (7,); `gravity` is what bears the arm."""
+        """Return the torques [N m], shape (7,), given those of gravity compensation."""
         tau = np.zeros(_JOINTS)
         if reading.jump is not None:
             return tau
@@ -66,57 +67,61 @@ class Proof:
         if goal.kind is ProofKind.GRAVITY:
             return share * gravity
         if goal.kind is ProofKind.RAMP:
-            way = float(reading.q[i]) - self._q[i]
-            if way * np.sign(goal.torque) >= self._limits.reach[i]:
+            travel = float(reading.q[i]) - self._q[i]
+            if travel * np.sign(goal.torque) >= self._limits.reach[i]:
                 self._has_moved = True
             tau[i] = 0.0 if self._has_moved else share * goal.torque
         elif goal.kind is ProofKind.LIFT:
             tau[i] = self._lift(reading, i, seconds)
             if partner := PARTNERS.get(goal.joint):
-                most = _KEEPS * float(self._constants.coulomb[partner - 1])
-                tau[partner - 1] = self._pull(reading, partner - 1, 0.0, most)
+                limit = _KEEPS * float(self._constants.coulomb[partner - 1])
+                tau[partner - 1] = self._pd_torque(reading, partner - 1, 0.0, limit)
         return tau
 
     def _lift(self, reading: ArmReading, i: int, seconds: float) -> float:
-        """Return the torque that takes joint `i` up and back [N m]."""
+        """Return the torque that moves joint `i` up and back [N m]."""
         limits, goal = self._limits, self.goal
         up = limits.lift_way / limits.lift_speed
         down = seconds - up - _AT_THE_TOP
         height = min(seconds / up, 1.0) if down <= 0.0 else 1.0 - down / up
         if height < 0.0:
-            return 0.0  # it lies on its stop again
+            return 0.0  # back on its stop
         sense = float(np.sign(goal.torque))
-        way = sense * height * limits.lift_way
-        return self._pull(reading, i, way, abs(goal.torque))
+        offset = sense * height * limits.lift_way
+        return self._pd_torque(reading, i, offset, abs(goal.torque))
 
-    def _pull(self, reading: ArmReading, i: int, way: float, most: float) -> float:
-        """Return what pulls joint `i` to `way` from its begin, `most` at most [N m]."""
+    def _pd_torque(
+        self, reading: ArmReading, i: int, offset: float, limit: float
+    ) -> float:
+        """Return the PD torque of joint `i` to start + `offset`, clipped to `limit`."""
         kp, kd = float(self._constants.kp[i]), float(self._constants.kd[i])
-        wanted = self._q[i] + way
-        pull = kp * (wanted - float(reading.q[i])) - kd * float(reading.qd[i])
-        return min(max(pull, -most), most)
+        reference = self._q[i] + offset
+        torque = kp * (reference - float(reading.q[i])) - kd * float(reading.qd[i])
+        return min(max(torque, -limit), limit)
 
     def excess(
         self, reading: ArmReading, energy: float, *, is_powered: bool
     ) -> MotionExcess | None:
-        """Return what the arm does that it should not; None = nothing.
+        """Return the exceeded limit of motion, or None.
 
-        Without power a hand may move it: it begins anew, where it is then.
+        Without power a person may move the arm: the test then restarts at its pose.
 
         Args:
-            reading: of this cycle.
+            reading: reading of this cycle.
             energy: kinetic energy of the arm [J].
-            is_powered: its motors have power.
+            is_powered: the motors have power.
         """
         if not is_powered:
             self._begin(reading)
             return None
         if energy > self._limits.energy:
             return MotionExcess("kinetic energy", energy, self._limits.energy, "J")
-        rows = zip(reading.q.tolist(), self._q, self._ways, strict=True)
+        rows = zip(reading.q.tolist(), self._q, self._travel_limits, strict=True)
         for number, (q, start, (low, high)) in enumerate(rows, 1):
-            way = q - start
-            if not low <= way <= high:
-                limit = low if way < low else high
-                return MotionExcess(f"the way of joint {number}", way, limit, "rad")
+            travel = q - start
+            if not low <= travel <= high:
+                limit = low if travel < low else high
+                return MotionExcess(
+                    f"the travel of joint {number}", travel, limit, "rad"
+                )
         return None

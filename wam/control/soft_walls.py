@@ -1,8 +1,8 @@
-"""Soft walls: before a joint stop a spring pushes back and a damper brakes.
+"""Soft walls: a spring and a damper before each joint stop.
 
-From 0.1 rad inside the stop the spring grows to half the joint's torque limit at the
-stop itself. A wall is there only once the joint has been in front of it: the home
-position lies on or past two stops, and an arm that starts there is not thrown off.
+From 0.1 rad before the stop the spring grows to half the joint's torque limit at the
+stop. A wall is armed once the joint has been in front of it: the home position lies on
+or past two stops, and an arm that starts there must not be thrown off.
 """
 
 from dataclasses import dataclass
@@ -14,21 +14,21 @@ from acquisition.devices import ArmReading, Vector
 
 DEPTH = 0.1  # rad
 _FULL_DEPTH = 0.2  # rad in which the spring would reach the torque limit
-# A wall takes a joint no further than this: beyond the limit the guard steps in, and
-# would blame the foot's mass.
+# Walls stay below the torque limit: beyond it the guard would stop the arm and report a
+# wrong mass of the foot.
 _SHARE = 0.95  # of the torque limit
 _ALL_ARMED = 0x7F
 
 
 @dataclass(frozen=True, slots=True)
 class Walls:
-    """Where the walls are and how strong.
+    """Positions and gains of the walls, seven values each.
 
     Attributes:
-        lower: lower stops [rad], seven.
-        upper: upper stops [rad], seven.
-        torque: torque limits [N m], seven; a wall gives half of it at the stop.
-        damping: dampers [N m s/rad], seven, against motion into the wall.
+        lower: lower stops [rad].
+        upper: upper stops [rad].
+        torque: torque limits [N m]; the spring gives half of it at the stop.
+        damping: damping of motion into the wall [N m s/rad].
     """
 
     lower: tuple[float, ...]
@@ -38,7 +38,7 @@ class Walls:
 
 
 class SoftWalls:
-    """The walls of seven joints; remembers which ones have been armed."""
+    """Soft walls of seven joints, each armed once its joint has been in front of it."""
 
     def __init__(self, walls: Walls) -> None:
         self._walls = walls
@@ -53,9 +53,9 @@ class SoftWalls:
         return self._walls.torque
 
     def depth(self, q: Vector) -> Vector | None:
-        """Return how far joints are inside walls [rad], (7,), above 0 at a lower.
+        """Return the depths in the walls [rad], (7,), positive at lower stops.
 
-        None where no joint is.
+        None if no joint is inside a wall.
         """
         if are_between(self._lower, q.tolist(), self._upper):
             return None
@@ -63,10 +63,7 @@ class SoftWalls:
         return np.maximum(lower - q, 0.0) - np.maximum(q - upper, 0.0)
 
     def apply(self, tau: Vector, reading: ArmReading) -> None:
-        """Add to joint torques `tau` [N m], shape (7,), what the walls push.
-
-        Never so much that a joint would get more than its torque limit in all.
-        """
+        """Add the wall torques to `tau` [N m], shape (7,), within the torque limits."""
         # An extrapolated position arms nothing.
         may_arm = reading.is_complete and self._armed != _ALL_ARMED
         q = reading.q.tolist()
@@ -84,19 +81,19 @@ class SoftWalls:
                 tau[joint] = self._bounded(joint, float(tau[joint]), push)
 
     def _push(self, joint: int, depth: float, speed: float) -> float:
-        """Return the torque of one wall; `depth` > 0 lies at the lower stop."""
+        """Return the torque of one wall [N m]; `depth` > 0 means the lower stop."""
         walls = self._walls
         limit = walls.torque[joint]
         inward = 1.0 if depth > 0.0 else -1.0
         spring = limit / _FULL_DEPTH * abs(depth)
         brake = walls.damping[joint] * max(-inward * speed, 0.0)
-        # The damper comes in with the spring, or touching the wall would be a blow.
+        # The damper grows with the depth: full damping at contact would be an impact.
         share = min(abs(depth) / DEPTH, 1.0)
         return inward * (spring + share * brake)
 
     def _bounded(self, joint: int, tau: float, push: float) -> float:
-        """Return `tau` with as much of `push` as the joint's limit leaves."""
-        most = _SHARE * self._walls.torque[joint]
+        """Return `tau` plus `push`, with the push limited to the joint's limit."""
+        limit = _SHARE * self._walls.torque[joint]
         if push > 0.0:
-            return max(tau, min(tau + push, most))
-        return min(tau, max(tau + push, -most))
+            return max(tau, min(tau + push, limit))
+        return min(tau, max(tau + push, -limit))

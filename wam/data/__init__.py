@@ -1,4 +1,4 @@
 """Constants of the arm as TOML.
 
-`wam.model.constants` reads them; sources of every number stand in the file.
+`wam.model.constants` reads them; the file names the source of every number.
 """

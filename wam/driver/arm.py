@@ -1,4 +1,4 @@
-"""The Barrett WAM as the loop sees it: start-up, positions in, torques out, idle."""
+"""Driver of the Barrett WAM: start-up, positions in, torques out, idle."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -40,22 +40,22 @@ from wam.driver.transmission import MOTORS, Transmission
 
 _MS = NS_PER_MS
 _ALL_FRESH = (1 << MOTORS) - 1
-# Pucks without power are silent first; asked in these many incomplete cycles at once,
-# the module says whether it was a stop, even when one question or answer is lost.
+# An E-stop first shows as silent pucks: in the first incomplete cycles the safety
+# module is asked for its mode at once, repeatedly in case a frame is lost.
 _URGENT_CYCLES = 3
-_FIRST_POSITIONS_NS = 1_000 * _MS  # as long as the vendor's library waits for them
-_DOUBTED = 5  # cycles until positions that were late are not asked for again
-_IGNORED_SPEED_FAULTS = 5  # the safety module's history, as libbarrett says
+_FIRST_POSITIONS_NS = 1_000 * _MS  # as in the vendor's library
+_DOUBTED = 5  # cycles until the next cycle without a request, after a late reply
+_IGNORED_SPEED_FAULTS = 5  # length of the safety module's history, as in libbarrett
 
 
 class WamArm:
-    """A seven-joint WAM on a CAN link, an `acquisition.devices.Arm`.
+    """A seven-joint WAM on a CAN link; implements `acquisition.devices.Arm`.
 
-    Call `start` first; after an E-stop the pucks have lost their positions and `start`
-    is due again.
+    Call `start` first, and again after an E-stop, in which the pucks lose their
+    positions.
 
     Attributes:
-        counters: what was dropped since the driver was made.
+        counters: counts of lost, late and malformed frames since construction.
     """
 
     def __init__(
@@ -65,7 +65,14 @@ class WamArm:
         settings: ArmSettings | None = None,
         lost: LostPositions | None = None,
     ) -> None:
-        """Start nothing yet; `lost` is what earlier starts know of this arm."""
+        """Prepare the driver without bus traffic.
+
+        Args:
+            link: CAN link to the arm.
+            clock: clock of the loop.
+            settings: settings of the driver.
+            lost: record of lost positions from earlier starts.
+        """
         self._lost = lost or LostPositions()
         self._link = link
         self._clock = clock
@@ -85,40 +92,40 @@ class WamArm:
 
     @property
     def transmission(self) -> Transmission:
-        """The transmission with the constants read from the pucks."""
+        """Transmission with the constants read from the pucks."""
         return self._started().transmission
 
     @property
     def answers(self) -> list[dict[str, int | None]]:
-        """What pucks 1 to 7 said of themselves at the last start, refused or not."""
+        """Properties of pucks 1 to 7 read at the last start, even if it was refused."""
         return self._answers
 
     @property
     def sent_ns(self) -> int:
-        """When torques were last handed to the bus [monotonic ns], 0 = never."""
+        """Time of the last torque frames [monotonic ns], 0 = never."""
         return self._traffic.sent_ns
 
     @property
     def safety(self) -> SafetyModule:
-        """The safety module, for use outside the loop."""
+        """Client of the safety module, for use outside the loop."""
         return self._safety
 
     def survey(self) -> BusSurvey:
-        """Return what counts who is on the bus; not while the loop runs."""
+        """Return a bus survey; not for use while the loop runs."""
         return BusSurvey(self._link, self._clock)
 
     def attach_device(self, bus_device: BusDevice) -> None:
-        """Ask a device on the arm's bus along with the positions from now on."""
+        """Poll another device on the arm's bus in every cycle from now on."""
         self._traffic.bus_device = bus_device
 
     def start(self) -> ArmInfo:
-        """Find, wake and question the pucks; the arm can be read afterwards.
+        """Find, wake and check the pucks; the arm can be read afterwards.
 
         Raises:
-            PreflightError: a puck or the safety module is missing, in E-stop, asleep
-                for good, of another kind, or there twice.
-            DeviceFaultError: a device reports an error or nonsense.
-            LinkTimeoutError: a device stopped answering on the way.
+            PreflightError: a puck or the safety module is missing, in E-stop, does not
+                wake up, is of another kind, or is present twice.
+            DeviceFaultError: a device reports an error or an invalid value.
+            LinkTimeoutError: a device stopped answering during start-up.
             LinkError: the bus is down.
         """
         start_up = StartUp(self._properties, self._clock, self._settings, self._lost)
@@ -132,8 +139,8 @@ class WamArm:
         firmware = [puck.vers for puck in info.pucks]
         self._poller.health.begin(health, firmware, self._clock.now_ns())
         self._poller.watch.begin(start_up.answers, firmware)
-        most = [answers.get("MT") for answers in start_up.answers]
-        self._poller.commands.begin(most, firmware)
+        torque_limits = [answers.get("MT") for answers in start_up.answers]
+        self._poller.commands.begin(torque_limits, firmware)
         self._traffic.set_firmware(firmware[0])  # P and T are the same in all seven
         transmission = Transmission(
             self._settings.j2mp,
@@ -143,8 +150,8 @@ class WamArm:
         )
         self._motion = JointEstimator(transmission, self._settings)
         self._show_positions()
-        dated = zip(info.pucks, self.health(), strict=True)
-        pucks = tuple(replace(puck, health=health) for puck, health in dated)
+        with_times = zip(info.pucks, self.health(), strict=True)
+        pucks = tuple(replace(puck, health=health) for puck, health in with_times)
         return replace(
             info,
             pucks=pucks,
@@ -153,12 +160,12 @@ class WamArm:
         )
 
     def read(self, now_ns: int) -> ArmReading:
-        """Ask for the joint positions at `now_ns` and return them.
+        """Request the joint positions at `now_ns` and return them.
 
-        Never raises for missing replies and waits until `give_up_ns` at most. Missing
-        joints go on at their last velocity, and stand still after 50 ms of silence.
-        In one of `unasked_every` cycles it does not ask, while nothing is missing and
-        every position is believed.
+        Waits until `give_up_ns` at most; missing replies raise nothing. Joints without
+        a reply are extrapolated with their last velocity for 50 ms, then held. One in
+        `unasked_every` cycles sends no request (see `skip`), unless positions are
+        missing or implausible.
         """
         self._until_unasked -= 1
         if self._until_unasked <= 0 and not self._missing_cycles:
@@ -167,13 +174,13 @@ class WamArm:
         return self._reading(now_ns)
 
     def skip(self, now_ns: int) -> ArmReading:
-        """Ask for no position and return what is late, with all joints extrapolated.
+        """Send no request, detect stale replies, and extrapolate all joints.
 
-        Replies carry no number: those that are late by whole cycles look as if they
-        were in time, until a cycle comes that has not asked.
+        Replies carry no sequence number: replies late by whole cycles look punctual
+        until a cycle without a request.
         """
         motors, age_ns = self._traffic.skip(now_ns)
-        # A lock or a damper on old positions is none: what is late is proved soon.
+        # Lock and damper must not run on stale positions: confirm a late reply soon.
         self._until_unasked = _DOUBTED if motors else self._settings.unasked_every
         self._late_in_a_row = self._late_in_a_row + 1 if motors else 0
         reading = self._reading(now_ns, is_unasked=True)
@@ -182,9 +189,13 @@ class WamArm:
         return reading
 
     def answer_time(self, questions: int) -> int:
-        """Return from a question for STAT to its answer, median [ns]; not in the loop.
+        """Return the median reply time of a GET of STAT [ns]; not in the loop.
 
-        Each puck is asked so many `questions`; 0 = none was answered.
+        Args:
+            questions: number of requests per puck.
+
+        Returns:
+            0 if no request was answered.
 
         Raises:
             LinkError: the bus is down.
@@ -197,7 +208,10 @@ class WamArm:
         return int(median(times)) if times else 0
 
     def listen(self, now_ns: int) -> ArmReading:
-        """Ask for no position, or the module would not idle; does not wait."""
+        """Receive without requesting positions or waiting.
+
+        Position replies are the heartbeat: without them the safety module idles.
+        """
         self._traffic.listen(now_ns)
         return self._reading(now_ns)
 
@@ -212,7 +226,7 @@ class WamArm:
         is_complete = fresh == _ALL_FRESH
         self._missing_cycles = 0 if is_complete else self._missing_cycles + 1
         if not (is_complete and self._is_commanded):
-            # No torque frame may follow to carry the question.
+            # Otherwise `send` asks the status question, after the torques.
             traffic.ask(is_urgent=0 < self._missing_cycles <= _URGENT_CYCLES)
         self._is_commanded = False
         return ArmReading(
@@ -236,10 +250,10 @@ class WamArm:
         )
 
     def send(self, tau: Vector, tau_gravity: Vector) -> Vector:
-        """Send joint torques [N m] and return them as sent: clipped, rounded.
+        """Send joint torques [N m] and return them as sent: clipped and rounded.
 
-        When the bus refuses a frame, its motors keep their last torque and so does the
-        answer; see `counters.link_errors`.
+        If the bus refuses a frame, its motors keep their last torque and the result
+        reports that; see `counters.link_errors`.
 
         Raises:
             DeviceFaultError: a torque is not a number, or `start` was not called.
@@ -253,58 +267,58 @@ class WamArm:
         return command.tau if is_sent else transmission.tau(self._traffic.sent)
 
     def safety_mode(self) -> SafetyMode:
-        """Return the last known mode; UNKNOWN when the module stopped answering."""
+        """Return the last known mode; UNKNOWN if the module stopped answering."""
         return self._poller.mode
 
     @property
     def safety_heard_ns(self) -> int:
-        """When the safety module last reported its mode [monotonic ns], 0 = never."""
+        """Time of the safety module's last mode report [monotonic ns], 0 = never."""
         return self._poller.heard_ns
 
     def safety_warnings(self) -> tuple[str, ...]:
-        """Return the monitors of the safety module that warn, as last heard."""
+        """Return the safety module's monitors in warning, as last reported."""
         return self._poller.warnings
 
     def safety_faults(self) -> tuple[str, ...]:
-        """Return the monitors of the safety module in fault, as last heard."""
+        """Return the safety module's monitors in fault, as last reported."""
         return self._poller.faults
 
     @property
     def bus_condition(self) -> BusCondition:
-        """What became of the bus at the last question for positions."""
+        """Condition of the bus at the last request for positions."""
         return self._traffic.condition
 
     def health(self) -> tuple[PuckHealth, ...]:
-        """Return the newest reports of pucks 1 to 7 and their times; does not wait."""
+        """Return the newest telemetry of pucks 1 to 7 without waiting."""
         return tuple(self._poller.health.pucks)
 
     def idle(self) -> bool:
-        """Idle the arm: module to IDLE, confirmed, then zero torque.
+        """Idle the arm: safety module to IDLE, confirmed, then zero torque.
 
-        Zero torque while ACTIVE would be free fall, so without the confirmation none
-        is sent, nor when a puck contradicts the module: it keeps its torque until it
-        agrees, or the module has taken its power. Where the module does not obey, the
-        heartbeat stops the arm within 0.1 s of the last reading.
+        Zero torque while ACTIVE would drop the arm, so it is sent only after the module
+        confirms IDLE and no puck contradicts it; until then the pucks keep their torque
+        or lose their power. If the module does not obey, its heartbeat monitor stops
+        the arm within 0.1 s of the last reading.
         Never raises. Returns whether the module confirmed.
         """
         if self._is_closed:
             return self._poller.mode in SHORTED
         mode = self._safety.lower_to_idle(self._settings.idle_ns)
         if mode is SafetyMode.IDLE and self._are_driven():
-            mode = SafetyMode.ACTIVE  # whatever the module says
+            mode = SafetyMode.ACTIVE  # the pucks contradict the module
         self._poller.note_mode(mode, self._clock.now_ns())
         if self._poller.mode not in SHORTED:
             self._poller.is_lowering = True
             return False
         self._traffic.transmit([0] * MOTORS)
-        self._look_at_pendant()
+        self._update_pendant()
         return True
 
     def _are_driven(self) -> bool:
-        """Return whether a puck obeys torques behind an idle module.
+        """Return whether a puck is still in torque mode although the module is IDLE.
 
-        One that missed the module's word is told by itself. Where all contradict it,
-        it is the module that is wrong.
+        A single puck missed the module's broadcast and is set to idle directly. If all
+        seven contradict the module, the module is wrong.
         """
         driven = self._safety.driven()
         if driven and len(driven) < MOTORS:
@@ -320,19 +334,19 @@ class WamArm:
         return bool(driven)
 
     def close(self) -> None:
-        """Idle the arm and give the bus back; a second call does nothing."""
+        """Idle the arm and release the bus; a second call does nothing."""
         if not self._is_closed:
             self.idle()
             self._is_closed = True
             self._link.close()
 
     def define_position(self, q: Vector) -> None:
-        """Tell the pucks that the joints stand at `q` [rad], shape (7,); IDLE only.
+        """Set the pucks' positions to the joint positions `q` [rad], (7,); IDLE only.
 
         Raises:
             PreflightError: the safety module is not IDLE.
-            DeviceFaultError: pucks or module do not take it.
-            LinkError: the bus is down or a puck silent.
+            DeviceFaultError: the pucks or the module do not accept the positions.
+            LinkError: the bus is down or a puck is silent.
         """
         motion = self._started()
         mode = self._safety.mode()
@@ -347,17 +361,17 @@ class WamArm:
         for node, value in zip(MOTOR_NODES, counts, strict=True):
             self._properties.set(node, self._traffic.p_number, value)
             self._properties.pause(_MS)
-        # The module must see the new positions while it still ignores speed.
+        # The module must see the jump of the positions while it ignores speed faults.
         self._begin_at_rest()
-        _check_taken(motion.transmission, counts, motion.counts)
+        _check_positions_set(motion.transmission, counts, motion.counts)
         self._safety.mark_zeroed()
         self._lost.clear()
 
     def _show_positions(self) -> None:
-        """Read the first positions, which to the safety module may be a jump.
+        """Read the first positions, which the safety module may take for a jump.
 
-        Its history is full of them before it judges speed again; the vendor's library
-        leaves it what is left of the excuse.
+        Speed faults are ignored until its history holds the new positions, then
+        monitored again; libbarrett leaves the remaining count in place.
         """
         self._safety.ignore_speed_faults(_IGNORED_SPEED_FAULTS)
         self._begin_at_rest()
@@ -366,15 +380,15 @@ class WamArm:
             self._traffic.exchange(self._clock.now_ns())
         self._safety.heed_speed_faults()
         motor = self._traffic.balance.doubled()
-        if motor and self._link.foreign_id is None:  # or the loop names who else asks
+        if motor and self._link.foreign_id is None:  # another master: the loop reports
             raise PreflightError(
                 f"Puck {motor} answers more often than it is asked.",
                 hint="Look for a second puck of that number, a second program, or an "
                 "adapter that repeats frames.",
             )
 
-    def _look_at_pendant(self) -> None:
-        """Learn why the arm is idle; without an answer the last one stands."""
+    def _update_pendant(self) -> None:
+        """Update the pendant state after idling; keep it if there is no reply."""
         if self._motion is None:
             return
         try:
@@ -392,7 +406,7 @@ class WamArm:
         return self._motion
 
     def _begin_at_rest(self) -> None:
-        """Take the positions as they are, with velocity zero."""
+        """Initialise the estimator at the reported positions with zero velocity."""
         deadline_ns = self._clock.now_ns() + _FIRST_POSITIONS_NS
         stale = self.counters.stale
         while (now_ns := self._clock.now_ns()) < deadline_ns:
@@ -404,10 +418,10 @@ class WamArm:
                 return
             self._properties.pause(_MS)
         silent = [n for n in MOTOR_NODES if self._traffic.received[n - 1] is None]
-        if late := self.counters.stale - stale:
+        if late_replies := self.counters.stale - stale:
             raise LinkTimeoutError(
-                f"{pucks_verb(silent)} not report a position in time: {late} replies "
-                "came after the next question.",
+                f"{pucks_verb(silent)} not report a position in time: {late_replies} "
+                "replies came after the next question.",
                 hint="Is the CAN adapter slow (USB), or the bus busy? See: ip -s link.",
             )
         raise LinkTimeoutError(
@@ -416,12 +430,14 @@ class WamArm:
         )
 
 
-def _check_taken(
+def _check_positions_set(
     transmission: Transmission, wanted: Sequence[int], reported: Sequence[int]
 ) -> None:
-    """Raise DeviceFaultError unless the joints stand where they were set to stand."""
-    apart = [have - want for have, want in zip(reported, wanted, strict=True)]
-    error = np.abs(transmission.joints(apart))
+    """Raise DeviceFaultError unless the reported positions are those that were set."""
+    differences = [
+        actual - target for actual, target in zip(reported, wanted, strict=True)
+    ]
+    error = np.abs(transmission.joints(differences))
     if error.max() > HOME_LIMIT:
         joint = int(error.argmax()) + 1
         raise DeviceFaultError(

@@ -1,8 +1,8 @@
-"""Whether the pucks do as they are told: mode and torque, asked for in turn.
+"""Verification of commands: reads back mode and torque of each puck in turn.
 
-Torque frames are not acknowledged, and a puck that has left torque mode goes on telling
-its position. So each is asked what it holds, and the answer compared with what was
-sent.
+Torque frames are not acknowledged, and a puck that has left torque mode still reports
+its position. Each puck is therefore asked for MODE and T, and the values are compared
+with those sent.
 """
 
 from collections import deque
@@ -14,21 +14,21 @@ from wam.bus.frames import MOTOR_NODES, Property
 from wam.bus.properties import Device, PuckMode, nearest_documented, property_number
 
 _MODE: Final = 8  # the same in every firmware
-# A puck that misses a single frame, or answers before the newest, is in order.
+# T may match any of the recent frames: one may be lost, or sent after the request.
 _RECENT: Final = 4  # torque frames
-_NEVER: Final = 2**31
-_TRIES: Final = 5  # a suspicion that is answered no more is dropped
+_UNLIMITED: Final = 2**31
+_TRIES: Final = 5  # requests without a reply until a suspicion is dropped
 
 
 class CommandWatch:
-    """Asks for MODE and T of pucks 1 to 7 in turn, and judges what they answer.
+    """Reads MODE and T of pucks 1 to 7 in turn and compares them with the commands.
 
-    A first contradiction is a suspicion only: the pucks of an arm that the pendant has
-    just idled, or activated, hold something else than the host believes. The same
-    question is put again once the safety module has said that it is active still.
+    A first mismatch is only a suspicion, because the pendant may just have idled or
+    activated the arm. The request is repeated after the safety module has confirmed
+    that it is still active.
 
     Attributes:
-        is_suspicious: the module is to be asked for its mode, then the puck again.
+        is_suspicious: a mismatch awaits confirmation by the module and a second read.
     """
 
     def __init__(self) -> None:
@@ -37,20 +37,20 @@ class CommandWatch:
         self._tries = 0
         self._next = 0
         self._sent: deque[Sequence[int]] = deque(maxlen=_RECENT)
-        self._limits: Sequence[int] = [_NEVER] * len(MOTOR_NODES)
+        self._limits: Sequence[int] = [_UNLIMITED] * len(MOTOR_NODES)
         self._questions: list[tuple[int, int]] = []
 
     def begin(self, limits: Sequence[int | None], firmware: Sequence[int]) -> None:
-        """Begin after a start: nothing is sent yet.
+        """Reset after a start.
 
         Args:
-            limits: the most that each puck makes, MT [puck units]; None = not known.
-            firmware: of each puck; it decides under which number it is asked for T.
+            limits: torque limit MT of each puck [puck units]; None = not known.
+            firmware: firmware of each puck, which determines the number of T.
         """
         self.is_suspicious = False
         self._next = 0
         self._sent.clear()
-        self._limits = [_NEVER if limit is None else limit for limit in limits]
+        self._limits = [_UNLIMITED if limit is None else limit for limit in limits]
         self._questions = [
             question
             for node, vers in zip(MOTOR_NODES, firmware, strict=True)
@@ -58,16 +58,16 @@ class CommandWatch:
         ]
 
     def note_sent(self, units: Sequence[int]) -> None:
-        """Take the torques of a cycle as the bus took them [puck units], seven."""
+        """Record the torques sent in a cycle [puck units], seven."""
         self._sent.append(tuple(units))
 
     def forget(self) -> None:
-        """Expect nothing any more: the arm is idle, or not asked to be driven."""
+        """Stop checking: the arm is idle or not commanded."""
         self.is_suspicious = False
         self._sent.clear()
 
     def question(self) -> tuple[int, int] | None:
-        """Return (node, property number) to ask for; None while nothing is sent."""
+        """Return the next request (node, property number); None before any torque."""
         if not self._sent or not self._questions:
             return None
         if self.is_suspicious and self._tries < _TRIES:
@@ -80,21 +80,21 @@ class CommandWatch:
     def judge(
         self, node: int, reply: Property, now_ns: int, active_ns: int
     ) -> MotorChange | None:
-        """Return how puck `node` contradicts what it was told; None = not proved.
+        """Return the confirmed mismatch of puck `node` with its command, or None.
 
         Args:
-            node: its number.
-            reply: what it answered; other properties than these are ignored.
+            node: puck number.
+            reply: its reply; other properties than MODE and T are ignored.
             now_ns: time of this cycle [ns].
-            active_ns: when the module last said that it is active [ns].
+            active_ns: time of the module's last report of ACTIVE [ns].
         """
         if not self._sent or not self._questions or reply.value is None:
             return None
         asked = self._questions[self._next]
         if (node, reply.number) != asked:
             return None
-        difference = self._difference(node, reply)
-        if difference is None:
+        mismatch = self._mismatch(node, reply)
+        if mismatch is None:
             self.is_suspicious = False
             return None
         if not self.is_suspicious:
@@ -102,22 +102,24 @@ class CommandWatch:
             self._suspect_ns = now_ns
             self._tries = 0
             return None
-        return difference if active_ns > self._suspect_ns else None
+        return mismatch if active_ns > self._suspect_ns else None
 
     def is_to_be_confirmed(self, active_ns: int) -> bool:
-        """Return whether the module has still to say that it is active."""
+        """Return whether a suspicion awaits the module's report of ACTIVE."""
         return self.is_suspicious and active_ns <= self._suspect_ns
 
-    def _difference(self, node: int, reply: Property) -> MotorChange | None:
+    def _mismatch(self, node: int, reply: Property) -> MotorChange | None:
         value = reply.value
         assert value is not None
         if reply.number == _MODE:
             if value == PuckMode.TORQUE:
                 return None
             return MotorChange(node, "MODE", PuckMode.TORQUE, value)
-        most = self._limits[node - 1]
-        held = [max(-most, min(units[node - 1], most)) for units in self._sent]
-        return None if value in held else MotorChange(node, "T", held[-1], value)
+        limit = self._limits[node - 1]
+        expected = [max(-limit, min(units[node - 1], limit)) for units in self._sent]
+        return (
+            None if value in expected else MotorChange(node, "T", expected[-1], value)
+        )
 
 
 def _t_number(vers: int) -> int:

@@ -1,6 +1,6 @@
-"""The frames of one cycle: positions asked for, torques sent, devices watched.
+"""Bus traffic of one cycle: position requests, torques, status polling.
 
-Time-outs follow the measured budget of one 2 ms cycle on a 1 Mbit/s bus.
+Time-outs follow the measured budget of a 2 ms cycle on a 1 Mbit/s bus.
 """
 
 from dataclasses import dataclass, field
@@ -28,24 +28,24 @@ from wam.driver.transmission import MOTORS
 
 _ARM_ID = group_id(Group.ARM)
 _LOWER_ID, _WRIST_ID = group_id(Group.LOWER_TORQUE), group_id(Group.WRIST_TORQUE)
-_MARGIN_NS = 200_000  # by which two exchanges differ
+_MARGIN_NS = 200_000  # variation of the duration of an exchange
 _POSITION_INDEX: Final = {position_reply_id(n): n - 1 for n in MOTOR_NODES}
 
 
 @dataclass(slots=True)
 class LinkCounters:
-    """What the loop dropped on its way, counted instead of logged.
+    """Counters of communication errors; the loop counts instead of logging.
 
     Attributes:
-        missing: questions for its position that each of motors 1 to 7 left open.
-        stale: position replies that came after their cycle, or twice.
-        late: position replies that came when none was asked for, after their cycle was
-            taken for complete.
-        rejected: positions that jumped.
-        malformed: frames that contradict the protocol.
-        link_errors: times the bus refused.
-        withheld: torques not sent because earlier frames had not left.
-        link: the bus, which says what its transport is and what was lost there.
+        missing: position requests without a reply, motors 1 to 7.
+        stale: position replies after the end of their cycle, or duplicate.
+        late: position replies in cycles without a request: they answer an earlier cycle
+            that seemed complete.
+        rejected: implausible positions.
+        malformed: frames that violate the protocol.
+        link_errors: frames refused by the bus.
+        withheld: torques not sent because earlier frames were still queued.
+        link: the CAN link, for its own counters.
     """
 
     link: Link
@@ -62,7 +62,7 @@ class LinkCounters:
         return ", ".join(f"{name} {value}" for name, value in self.metadata().items())
 
     def metadata(self) -> dict[str, str]:
-        """Return the counters as text for a recording, motors 1 to 7 in one line."""
+        """Return the counters as metadata of a recording, motors 1 to 7 in one line."""
         return {
             "link:missing_replies": " ".join(map(str, self.missing)),
             "link:late_replies": str(self.stale),
@@ -77,36 +77,35 @@ class LinkCounters:
 
 
 class BusDevice(Protocol):
-    """A device that is asked along with the positions, such as a wrist sensor.
+    """A device polled along with the positions, such as a wrist sensor.
 
-    The loop never waits for it: its frames are heard when they have come, in this cycle
-    or in a later one.
+    The loop never waits for it; a reply may arrive in a later cycle.
     """
 
     def poll_frame(self, t_ns: int) -> tuple[int, bytes]:
-        """Return identifier and bytes of the question that leaves at `t_ns`."""
+        """Return identifier and payload of the request sent at `t_ns`."""
         ...
 
     def on_frame(self, can_id: int, data: Payload) -> None:
-        """Take a frame that is no position, of whatever device; never raises."""
+        """Handle a frame other than a position, of any device; never raises."""
         ...
 
 
 class CycleTraffic:
-    """What host and arm say to each other while the loop runs; never raises.
+    """Bus traffic of the running loop; never raises.
 
     Attributes:
         received: positions of this cycle [counts], motors 1 to 7, None = no reply.
-        arm_ns: when the last of them arrived [ns], 0 = none did.
-        bus_ns: when the bus had the last of them [ns], 0 = it does not tell.
-        sent: torques that the bus took last [puck units], motors 1 to 7.
-        sent_ns: when it took them [ns], 0 = never.
-        poller: safety module and pucks, asked in the free bus time.
-        bus_device: asked right after the positions, while the pucks latch theirs.
-        counters: what was dropped so far.
-        balance: of position replies and the questions for them.
-        condition: what became of the bus at the last question for positions.
-        took_ns: from the last question to the last reply that was awaited [ns].
+        arm_ns: arrival time of the last reply [ns], 0 = none.
+        bus_ns: bus time of the last reply [ns], 0 = not known.
+        sent: torques last accepted by the bus [puck units], motors 1 to 7.
+        sent_ns: time of acceptance [ns], 0 = never.
+        poller: poller of safety module and pucks in the free bus time.
+        bus_device: other device, polled right after the position request.
+        counters: error counters.
+        balance: balance of position replies and requests.
+        condition: condition of the bus at the last position request.
+        took_ns: duration of the last complete exchange [ns].
     """
 
     def __init__(self, link: Link, clock: Clock, settings: ArmSettings) -> None:
@@ -121,9 +120,9 @@ class CycleTraffic:
         self.balance = ReplyBalance()
         self.condition = BusCondition.SOUND
         self.took_ns = 0
-        self._asked_ns = 0  # when positions were asked for last
+        self._asked_ns = 0  # last position request
         self._errors_seen = 0  # error frames
-        self._owed = 0  # bit i set = motor i+1 may still answer an earlier question
+        self._owed = 0  # bit i set = motor i+1 may still answer an earlier request
         self._link = link
         self._clock = clock
         self._settings = settings
@@ -137,10 +136,11 @@ class CycleTraffic:
         self._t_number = property_number(Device.MOTOR, "T", vers)
 
     def exchange(self, now_ns: int) -> None:
-        """Ask for all positions at `now_ns`; waits until `give_up_ns` at most.
+        """Request all positions at `now_ns`; waits until `give_up_ns` at most.
 
-        Replies carry no number. What has come by now is late and thrown away. A motor
-        that owes an earlier answer is given the time to send two: the last one counts.
+        Replies carry no sequence number. Replies received before the request are late
+        and dropped. A motor that still owes an earlier reply is given time for two: the
+        last one counts.
         """
         self.poller.begin_cycle(now_ns)
         self.arm_ns = self.bus_ns = 0
@@ -173,14 +173,14 @@ class CycleTraffic:
                 self.counters.missing[i] += self._owed >> i & 1
 
     def skip(self, now_ns: int) -> tuple[int, int]:
-        """Ask for no position at `now_ns`; return what comes all the same.
+        """Send no position request at `now_ns` and collect stale replies.
 
-        A reply that is late by whole cycles comes when its cycle's own would: the bus
-        is listened to for as long as the last exchange took, and a little more.
+        A reply late by whole cycles arrives when a punctual one would, so the wait is
+        the duration of the last exchange plus a margin.
 
         Returns:
-            Bits of the motors that answer an earlier question, and the age of the last
-            of these answers [ns] if it is of the last question.
+            Bits of the motors that answered an earlier request, and the age of the last
+            reply [ns], assuming the latest request.
         """
         self.poller.begin_cycle(now_ns)
         self.arm_ns = self.bus_ns = 0
@@ -190,16 +190,16 @@ class CycleTraffic:
             self.received = [None] * MOTORS
             self._ask_bus_device()
             settings, clock = self._settings, self._clock
-            usual_ns = max(settings.first_look_ns, self.took_ns + _MARGIN_NS)
-            deadline_ns = now_ns + min(usual_ns, settings.give_up_ns)
+            expected_ns = max(settings.first_look_ns, self.took_ns + _MARGIN_NS)
+            deadline_ns = now_ns + min(expected_ns, settings.give_up_ns)
             clock.sleep_until(min(now_ns + settings.first_look_ns, deadline_ns))
-            came = self._collect()
+            reply_count = self._collect()
             while clock.now_ns() < deadline_ns and clock.wait(self._link, deadline_ns):
-                came += self._collect()
-            if came:
+                reply_count += self._collect()
+            if reply_count:
                 motors = (1 << MOTORS) - 1 & ~self._missing()
                 age_ns = clock.now_ns() - self._asked_ns
-                self.counters.late += came
+                self.counters.late += reply_count
         except LinkError:
             self.condition = BusCondition.DOWN
             self.counters.link_errors += 1
@@ -208,7 +208,7 @@ class CycleTraffic:
         return motors, age_ns
 
     def listen(self, now_ns: int) -> None:
-        """Take what is not a position; ask for none at `now_ns`, and do not wait."""
+        """Handle received frames without a position request at `now_ns` or waiting."""
         self.poller.begin_cycle(now_ns)
         self.arm_ns = self.bus_ns = 0
         try:
@@ -219,17 +219,17 @@ class CycleTraffic:
         self.received = [None] * MOTORS
 
     def take_bus_error(self) -> bool:
-        """Return whether the controller reported an error since the last time."""
+        """Return whether the CAN controller reported an error since the last call."""
         frames = self._link.errors.frames
         is_new = frames != self._errors_seen
         self._errors_seen = frames
         return is_new
 
     def transmit(self, units: list[int]) -> bool:
-        """Send torques [puck units]; return False when the bus did not take a frame.
+        """Send torques [puck units]; return False if the bus did not accept a frame.
 
-        While motors are silent and frames still wait in this host, a torque would wait
-        too and act when it is stale: none is sent then.
+        None are sent while motors are silent and frames are queued in this host: they
+        would be delivered late, as stale torques.
         """
         if self._owed and self._link.has_unsent():
             self.counters.withheld += 1
@@ -246,14 +246,14 @@ class CycleTraffic:
         return True
 
     def ask(self, *, is_urgent: bool = False) -> None:
-        """Ask the status question that is due in the free bus time."""
+        """Send the status request that is due in the free bus time."""
         try:
             self.poller.ask(is_urgent=is_urgent)
         except LinkError:
             self.counters.link_errors += 1
 
     def _ask_bus_device(self) -> None:
-        """Ask the other device on the bus; a refusal does not cost the positions."""
+        """Poll the other device on the bus; a refused frame does not end the cycle."""
         if self.bus_device is None:
             return
         can_id, data = self.bus_device.poll_frame(self._clock.now_ns())
@@ -271,19 +271,19 @@ class CycleTraffic:
         while (None in self.received or self._owed) and clock.now_ns() < deadline_ns:
             if not clock.wait(self._link, deadline_ns):
                 break
-            if more := self._collect():
-                arrived += more
+            if new_replies := self._collect():
+                arrived += new_replies
                 self.arm_ns = clock.now_ns()
         self.counters.stale += arrived - MOTORS + self.received.count(None)
 
     def _missing(self) -> int:
-        """Return the bits of the motors whose reply has not come."""
+        """Return the bits of the motors without a reply."""
         if None not in self.received:
             return 0
         return sum(1 << i for i, c in enumerate(self.received) if c is None)
 
     def _collect(self) -> int:
-        """Sort what has arrived and return how many positions there were."""
+        """Handle the received frames and return the number of position replies."""
         arrived, received, replies = 0, self.received, self.balance.replies
         for can_id, data, t_ns in self._link.receive():
             index = _POSITION_INDEX.get(can_id)

@@ -1,4 +1,4 @@
-"""Who is on the arm's bus: every device is called, and those that are late again."""
+"""Discovery of the devices on the arm's bus, with retries for those still booting."""
 
 from collections.abc import Iterable, Sequence
 
@@ -13,39 +13,38 @@ from wam.driver.safety_module import SafetyModule
 _STAT = 5  # the same in every firmware
 _MS = 1_000_000
 _EXPECTED = (*MOTOR_NODES, SAFETY_NODE)
-# A puck in reset is silent for up to 2 s; a second look comes after the time to boot.
-_SECOND_LOOKS = 2
-_SECOND_LOOK_NS = 50 * _MS  # it waits as long as for a puck that was woken
+# A puck in reset is silent for up to 2 s; retries follow after the boot time.
+_RETRIES = 2
+_RETRY_WAIT_NS = 50 * _MS  # reply time limit of a retry, as for a woken puck
 _WRIST_NODES = [5, 6, 7]
 
 
 def discover_pucks(
     properties: PropertyClient, clock: Clock, boot_ns: int
 ) -> dict[int, int]:
-    """Return STAT by node of everything on the bus, the arm being complete.
+    """Return STAT by node of all devices on the bus; raise unless the arm is complete.
 
-    Healthy devices answer within 1 ms. If one of the arm is silent, the bus is left
-    alone for `boot_ns` [ns], since it may be booting, and then it is asked again, twice
-    at most.
+    Healthy devices answer within 1 ms. A silent device of the arm may be booting: it is
+    asked again after `boot_ns` [ns] without traffic, twice at most.
 
     Raises:
         UnfitDeviceError: a puck or the safety module is silent, or the arm is in
             E-stop.
-        DeviceFaultError: a puck says that it does not work.
+        DeviceFaultError: a puck reports an error.
         LinkError: the bus is down.
     """
     try:
-        stats = _ask(properties, range(1, 32), _MS)
+        stats = _read_stats(properties, range(1, 32), _MS)
     except LinkFullError:
         _check_bus(properties.bus_condition)
         raise
     mode = _mode(properties, clock, stats)
-    for _ in range(_SECOND_LOOKS):
+    for _ in range(_RETRIES):
         silent = [node for node in _EXPECTED if node not in stats]
-        if not silent or mode is SafetyMode.E_STOP:  # without power nobody answers
+        if not silent or mode is SafetyMode.E_STOP:  # the pucks have no power
             break
         properties.pause(boot_ns)
-        stats.update(_ask(properties, silent, _SECOND_LOOK_NS))
+        stats.update(_read_stats(properties, silent, _RETRY_WAIT_NS))
         mode = _mode(properties, clock, stats)
     if not stats:
         _check_bus(properties.bus_condition)
@@ -59,10 +58,10 @@ def pucks_verb(nodes: Sequence[int]) -> str:
     return f"Puck {names} does" if len(nodes) == 1 else f"Pucks {names} do"
 
 
-def _ask(
+def _read_stats(
     properties: PropertyClient, nodes: Iterable[int], within_ns: int
 ) -> dict[int, int]:
-    """Return STAT by node of those of `nodes` that answer in time."""
+    """Return STAT of those of `nodes` that answer in time, by node."""
     stat_by_node: dict[int, int] = {}
     for node in nodes:
         stat = properties.get(node, _STAT, within_ns)
@@ -81,10 +80,10 @@ def _mode(
 
 
 def _check_bus(condition: BusCondition) -> None:
-    """Say why nobody answers where the bus's controller knows it.
+    """Raise the CAN controller's reason for a silent bus, if it reports one.
 
     Raises:
-        UnfitDeviceError: it has left the bus, or is alone on it.
+        UnfitDeviceError: bus-off, or no other node acknowledges.
     """
     if condition is BusCondition.OFF:
         raise UnfitDeviceError(
@@ -104,7 +103,7 @@ def _check_present(stats: dict[int, int], mode: SafetyMode) -> None:
     present = [node for node in MOTOR_NODES if node in stats]
     missing = [node for node in MOTOR_NODES if node not in stats]
     if SAFETY_NODE not in stats:
-        raise _without_safety(stats, missing)
+        raise _missing_safety_module(stats, missing)
     if missing and mode is SafetyMode.E_STOP:
         raise UnfitDeviceError(
             "The arm is in E-stop: its pucks have no power.",
@@ -121,17 +120,21 @@ def _check_present(stats: dict[int, int], mode: SafetyMode) -> None:
         raise UnfitDeviceError(
             f"{pucks_verb(missing)} not answer ({others}).", hint=hint
         )
-    ill = [n for n in present if stats[n] not in (PuckStatus.RESET, PuckStatus.READY)]
-    if ill:
+    faulty = [
+        n for n in present if stats[n] not in (PuckStatus.RESET, PuckStatus.READY)
+    ]
+    if faulty:
         raise DeviceFaultError(
-            f"{pucks_verb(ill)} not work: STAT {stats[ill[0]]}.",
+            f"{pucks_verb(faulty)} not work: STAT {stats[faulty[0]]}.",
             hint="Switch the arm off and on, then start again.",
         )
 
 
-def _without_safety(stats: dict[int, int], missing: list[int]) -> UnfitDeviceError:
-    """Return the error that names everything that is silent at once."""
-    others = ",".join(map(str, stats)) or "nobody"
+def _missing_safety_module(
+    stats: dict[int, int], missing: list[int]
+) -> UnfitDeviceError:
+    """Return the error that names the safety module and all silent pucks."""
+    others = ",".join(map(str, stats)) or "no device"
     who = "The safety module does"
     if missing and stats:
         names = ",".join(map(str, missing))

@@ -1,4 +1,4 @@
-"""How the motor pucks feel: temperatures, bus voltage, last error, and since when."""
+"""Puck telemetry: temperatures, bus voltage, last error, and age of the report."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -9,22 +9,21 @@ from acquisition.clock import NS_PER_S
 from wam.bus.frames import MOTOR_NODES, Property
 from wam.bus.properties import MODERN, Device, nearest_documented, property_number
 
-# The loop asks each puck something every 0.7 s; four questions without an answer and
-# older reports are no longer news.
+# Each puck is polled every 0.7 s; a report is stale after four requests without reply.
 NEWS_NS = 3 * NS_PER_S
-HOT = 60  # where a puck by its own default (OTEMP) is too hot [degrees Celsius]
+HOT = 60  # over-temperature limit of a puck, default of OTEMP [degrees Celsius]
 
 
 @dataclass(frozen=True, slots=True)
 class PuckHealth:
-    """Newest report of one puck and its time; None = it never answered.
+    """Newest telemetry of one puck; None = never reported.
 
     Attributes:
         puck_degc: temperature of the puck (TEMP) [degrees Celsius].
         motor_degc: temperature of its motor (THERM) [degrees Celsius].
         bus_voltage: voltage of the power bus (VBUS) [V].
         error: its last error (ERROR), 0 = none.
-        heard_ns: monotonic time of its last answer [ns].
+        heard_ns: monotonic time of the last report [ns].
     """
 
     puck_degc: int | None = None
@@ -34,7 +33,7 @@ class PuckHealth:
     heard_ns: int | None = None
 
     def is_news(self, now_ns: int) -> bool:
-        """Return whether the puck has answered lately."""
+        """Return whether the last report is recent."""
         return self.heard_ns is not None and now_ns - self.heard_ns <= NEWS_NS
 
 
@@ -49,33 +48,33 @@ _QUESTIONS = tuple((node, name) for name in _FIELDS for node in MOTOR_NODES)
 
 @cache
 def _numbers(vers: int) -> dict[str, int]:
-    """Return the number of each property that is asked for, by name."""
-    known = nearest_documented(vers)
-    return {name: property_number(Device.MOTOR, name, known) for name in _FIELDS}
+    """Return the numbers of the telemetry properties, by name."""
+    firmware = nearest_documented(vers)
+    return {name: property_number(Device.MOTOR, name, firmware) for name in _FIELDS}
 
 
 def ask_health(ask: Callable[[int], int | None], vers: int) -> PuckHealth:
-    """Return what a puck with firmware `vers` answers to `ask(number)`.
+    """Read the telemetry of a puck with firmware `vers` through `ask(number)`.
 
-    When that was is for the caller to know: see `HealthTable.begin`.
+    `heard_ns` is left to the caller: see `HealthTable.begin`.
     """
     answers = {_FIELDS[name]: ask(number) for name, number in _numbers(vers).items()}
     return PuckHealth(**answers)
 
 
 class HealthTable:
-    """The newest answers of all pucks, and the question that comes next.
+    """Newest telemetry of all pucks and the order of polling.
 
     Attributes:
-        pucks: health of pucks 1 to 7.
+        pucks: telemetry of pucks 1 to 7.
     """
 
     def __init__(self) -> None:
         self.pucks: list[PuckHealth] = [PuckHealth() for _ in MOTOR_NODES]
         self._next = 0
-        self._learn([MODERN] * len(MOTOR_NODES))
+        self._set_firmware([MODERN] * len(MOTOR_NODES))
 
-    def _learn(self, firmware: Sequence[int]) -> None:
+    def _set_firmware(self, firmware: Sequence[int]) -> None:
         """Use the property numbers of the firmware of pucks 1 to 7."""
         tables = [_numbers(vers) for vers in firmware]
         self._questions = [(node, tables[node - 1][name]) for node, name in _QUESTIONS]
@@ -85,7 +84,7 @@ class HealthTable:
         ]
 
     def next_question(self) -> tuple[int, int]:
-        """Return (node, property number); all 28 come in turn."""
+        """Return the next request (node, property number), 28 in rotation."""
         question = self._questions[self._next]
         self._next = (self._next + 1) % len(self._questions)
         return question
@@ -93,18 +92,18 @@ class HealthTable:
     def begin(
         self, pucks: Sequence[PuckHealth], firmware: Sequence[int], now_ns: int
     ) -> None:
-        """Take what pucks 1 to 7 have answered by `now_ns`, at start-up.
+        """Set the telemetry of pucks 1 to 7 read at start-up, at `now_ns`.
 
-        `firmware` of each decides under which number it is asked from now on.
+        `firmware` of each puck determines its property numbers from now on.
         """
-        self._learn(firmware)
+        self._set_firmware(firmware)
         self.pucks[:] = [
             replace(puck, heard_ns=now_ns if puck != PuckHealth() else None)
             for puck in pucks
         ]
 
     def note(self, node: int, reply: Property, now_ns: int) -> None:
-        """Take the answer of puck `node`; other properties than these are ignored."""
+        """Store a telemetry reply of puck `node`; other properties are ignored."""
         field = self._fields[node - 1].get(reply.number)
         if field is not None:
             old = self.pucks[node - 1]
@@ -112,27 +111,31 @@ class HealthTable:
 
 
 def temperature_range(pucks: Sequence[PuckHealth], now_ns: int) -> str:
-    """Return the coldest and hottest of pucks and motors, such as "31-36 °C".
+    """Return the temperature range of pucks and motors, such as "31-36 °C".
 
-    Pucks that have not answered lately do not count and are named with their age.
+    Pucks with a stale report are excluded and named with its age.
     """
-    texts = [
+    temperatures = [
         degc
         for puck in pucks
         for degc in (puck.puck_degc, puck.motor_degc)
         if degc is not None and puck.is_news(now_ns)
     ]
-    known = f"{min(texts)}-{max(texts)} °C" if texts else "temperatures unknown"
+    range_text = (
+        f"{min(temperatures)}-{max(temperatures)} °C"
+        if temperatures
+        else "temperatures unknown"
+    )
     silent = [
         f"puck {node} silent for {(now_ns - puck.heard_ns) / NS_PER_S:.0f} s"
         for node, puck in enumerate(pucks, 1)
         if puck.heard_ns is not None and not puck.is_news(now_ns)
     ]
-    return ", ".join([known, *silent])
+    return ", ".join([range_text, *silent])
 
 
 def complaints(pucks: Sequence[PuckHealth], now_ns: int) -> list[str]:
-    """Return what pucks 1 to 7 complain of, such as "puck 3 at 72 °C (limit 60)"."""
+    """Return warnings of pucks 1 to 7, such as "puck 3 at 72 °C (limit 60)"."""
     texts: list[str] = []
     for node, puck in enumerate(pucks, 1):
         if not puck.is_news(now_ns):
@@ -145,10 +148,9 @@ def complaints(pucks: Sequence[PuckHealth], now_ns: int) -> list[str]:
 
 
 def health_metadata(pucks: Sequence[PuckHealth], now_ns: int) -> dict[str, str]:
-    """Return the answers as text for a recording, pucks 1 to 7 in each line.
+    """Return the telemetry as metadata of a recording, pucks 1 to 7 in each line.
 
-    "?" stands for what was never reported, or not lately; the age [s] is of the last
-    answer.
+    "?" = never reported or stale; ages [s] are those of the last report.
     """
     ages = [
         "?" if p.heard_ns is None else f"{(now_ns - p.heard_ns) / NS_PER_S:.1f}"

@@ -1,4 +1,4 @@
-"""Where home is, compared with the absolute encoders of the motors."""
+"""Check of the home position against the absolute encoders of the motors."""
 
 from collections.abc import Sequence
 
@@ -7,7 +7,7 @@ import numpy as np
 from acquisition.errors import IDLE_ARM, PreflightError
 from wam.model.constants import ArmConstants, Array
 
-HOME_LIMIT = 0.03  # rad; by eye an arm is put against its stops to about a degree
+HOME_LIMIT = 0.03  # rad; placing an arm against its stops by eye: about a degree
 
 
 def home_error(
@@ -16,25 +16,27 @@ def home_error(
     mech: Sequence[float],
     mech_at_home: Sequence[float],
 ) -> Array:
-    """Return how far the joints are from home [rad], shape (7,).
+    """Return the joints' deviation from home [rad], shape (7,).
 
     Args:
         j2mp: motor angles from joint angles, shape (7, 7).
         cts: counts per motor turn, seven.
-        mech: absolute motor angles now [counts], seven.
-        mech_at_home: the same when home was defined, seven.
+        mech: present absolute motor angles [counts], seven.
+        mech_at_home: absolute motor angles when home was defined [counts], seven.
     """
     turn: Array = np.array(cts, dtype=np.float64)
-    apart = np.array(mech, dtype=np.float64) - np.array(mech_at_home, dtype=np.float64)
-    wrapped = (apart + turn / 2) % turn - turn / 2
+    difference = np.array(mech, dtype=np.float64) - np.array(
+        mech_at_home, dtype=np.float64
+    )
+    wrapped = (difference + turn / 2) % turn - turn / 2
     return np.asarray(np.linalg.solve(j2mp, 2 * np.pi / turn * wrapped), np.float64)
 
 
 def check_home(error: Array) -> None:
-    """Refuse to define home where it was not last time.
+    """Refuse to define home away from the previous home.
 
     Raises:
-        PreflightError: a joint is more than 0.03 rad from where home was.
+        PreflightError: a joint is more than 0.03 rad from the previous home.
     """
     joint = int(np.abs(error).argmax())
     if abs(error[joint]) > HOME_LIMIT:
@@ -54,30 +56,30 @@ def zero_error(
     mech: Sequence[int],
     mech_at_home: Sequence[int],
 ) -> Array:
-    """Return how far the joints are from where their positions put them [rad], (7,).
+    """Return the zero errors of the joints by the absolute encoders [rad], (7,).
 
-    Motors are known within their turn only: an error of joint 1 modulo 0.15 rad, of
-    joint 4 modulo 0.35 rad.
+    The encoders are absolute within one motor turn only: the error of joint 1 is known
+    modulo 0.15 rad, that of joint 4 modulo 0.35 rad.
 
     Args:
-        constants: of the arm.
+        constants: constants of the arm.
         cts: counts per motor turn, seven.
-        counts: positions that the pucks tell [counts], seven.
-        mech: absolute motor angles at the same place [counts], seven.
-        mech_at_home: absolute motor angles where home was defined [counts], seven.
+        counts: positions reported by the pucks [counts], seven.
+        mech: absolute motor angles at the same pose [counts], seven.
+        mech_at_home: absolute motor angles when home was defined [counts], seven.
     """
     turn = np.array(cts, dtype=np.float64)
     home = turn / (2.0 * np.pi) * (constants.j2mp @ constants.home)
     travelled = np.array(counts, dtype=np.float64) - home
-    wanted = (np.array(mech_at_home) + travelled) % turn
-    return home_error(constants.j2mp, cts, mech, wanted.tolist())
+    expected = (np.array(mech_at_home) + travelled) % turn
+    return home_error(constants.j2mp, cts, mech, expected.tolist())
 
 
 def check_zero(error: Array) -> None:
-    """Refuse an arm that is zeroed elsewhere than last time.
+    """Refuse an arm whose zero differs from the previous one.
 
     Raises:
-        PreflightError: a joint is more than 0.03 rad off.
+        PreflightError: a zero error exceeds 0.03 rad.
     """
     joint = int(np.abs(error).argmax())
     if abs(error[joint]) > HOME_LIMIT:

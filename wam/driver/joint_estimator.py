@@ -1,4 +1,4 @@
-"""Positions and velocities of the joints out of the replies of seven motors."""
+"""Joint positions and velocities from the position replies of seven motors."""
 
 from collections.abc import Sequence
 
@@ -8,31 +8,31 @@ from acquisition.devices import PositionJump, Vector
 from wam.driver.settings import ArmSettings
 from wam.driver.transmission import MOTORS, Transmission
 
-_LONGEST_GUESS = 0.05  # s; beyond, a silent joint is taken to stand still
-_STILL = 4  # counts by which a motor at rest may seem to move
+_LONGEST_EXTRAPOLATION = 0.05  # s of extrapolation; afterwards a silent joint is held
+_NOISE_COUNTS = 4  # counts of noise of a motor at rest
 
 
 class JointEstimator:
-    """Positions and velocities of one arm out of replies that may be missing.
+    """Position and velocity estimator that tolerates missing replies.
 
-    Velocities are differences over the time between the requests that were answered,
-    low-passed by `y += (x - y) wT / (1 + wT)` (backward Euler, as in libbarrett).
-    The filter runs on motor rates: it is linear, so joints see the same.
+    Velocities are differences over the time between answered requests, low-passed by
+    `y += (x - y) wT / (1 + wT)` (backward Euler, as in libbarrett). The filter runs on
+    motor rates; it is linear, so the result is the same at the joints.
 
-    A position is believed within what the joints' speed limits allow since the last
-    one that was, times `jump_margin`: sum_j |j2mp[i, j]| speed[j] counts/rad dt. Two
-    leaves a true excess of speed to be seen and judged, while one false position stays
-    below every speed limit in `qd` (the filter takes 0.26 of it per cycle). What is
-    not believed leaves its motor where it was believed last.
+    A position is accepted within the travel that the joints' speed limits allow since
+    the last accepted one, times `jump_margin`: sum_j |j2mp[i, j]| speed[j] counts/rad
+    dt. A margin of 2 still lets the guard see a true overspeed, while one false
+    position stays below every speed limit in `qd` (the filter passes 0.26 of it per
+    cycle). A rejected position leaves its motor at the last accepted one.
 
     Attributes:
-        transmission: between the motors and the joints.
+        transmission: transmission between motors and joints.
         counts: last accepted position of each motor [encoder counts].
         q: joint positions [rad], shape (7,); extrapolated where a reply is missing.
         qd: filtered joint velocities [rad/s], shape (7,).
-        qd7_raw: unfiltered difference of joint 7 over its last two replies [rad/s];
-            zero while it is silent for long or not believed, and taken to stand.
-        jump: the worst position that was not believed in the last update, or None.
+        qd7_raw: unfiltered difference of joint 7 over its last two replies [rad/s]; 0
+            after 50 ms of silence and for a rejected position.
+        jump: the worst position rejected in the last update, or None.
     """
 
     def __init__(self, transmission: Transmission, settings: ArmSettings) -> None:
@@ -58,33 +58,37 @@ class JointEstimator:
         self._t_ns = t_ns
 
     def update(self, t_ns: int, received: Sequence[int | None]) -> int:
-        """Take the replies to the request at `t_ns`; return the bits of the fresh."""
+        """Process the replies to the request at `t_ns`; return the accepted as bits."""
         step = (t_ns - self._t_ns) * 1e-9
         if step <= 0.0:
-            step = 1e-9  # asked twice at one instant: no time, no velocity
+            step = 1e-9  # two requests at the same time: avoids a division by zero
         share = self._pole * step / (1.0 + self._pole * step)
         fresh = 0
         self.jump = None
         times_ns, rates, positions = self._times_ns, self._rates, self._positions
-        known, raw_rates = self.counts, self._raw_rates
-        rows = zip(received, times_ns, known, rates, self._fastest, strict=True)
+        accepted, raw_rates = self.counts, self._raw_rates
+        rows = zip(received, times_ns, accepted, rates, self._fastest, strict=True)
         for i, (counts, since_ns, last, rate, fastest) in enumerate(rows):
             elapsed = (t_ns - since_ns) * 1e-9
             if counts is None:
-                ahead = elapsed if elapsed < _LONGEST_GUESS else _LONGEST_GUESS
+                ahead = (
+                    elapsed
+                    if elapsed < _LONGEST_EXTRAPOLATION
+                    else _LONGEST_EXTRAPOLATION
+                )
                 positions[i] = last + rate * ahead
-                if elapsed >= _LONGEST_GUESS:
+                if elapsed >= _LONGEST_EXTRAPOLATION:
                     raw_rates[i] = 0.0
                 continue
-            farthest, moved = fastest * elapsed + _STILL, counts - last
-            if not -farthest <= moved <= farthest:
+            farthest, travel = fastest * elapsed + _NOISE_COUNTS, counts - last
+            if not -farthest <= travel <= farthest:
                 positions[i], raw_rates[i] = last, 0.0
-                self._note_jump(i, moved, elapsed)
+                self._note_jump(i, travel, elapsed)
                 continue
             if elapsed > 0.0:
-                raw_rates[i] = moved / elapsed
+                raw_rates[i] = travel / elapsed
                 rates[i] = rate + share * (raw_rates[i] - rate)
-            known[i] = counts
+            accepted[i] = counts
             positions[i] = counts
             times_ns[i] = t_ns
             fresh |= 1 << i
@@ -92,7 +96,7 @@ class JointEstimator:
         return fresh
 
     def _note_jump(self, index: int, counts: int, elapsed: float) -> None:
-        """Keep the jump that would be the fastest motion."""
+        """Keep the jump with the highest apparent joint speed."""
         column = self.transmission.joints(
             [counts * (i == index) for i in range(MOTORS)]
         )

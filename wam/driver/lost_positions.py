@@ -1,4 +1,4 @@
-"""Which pucks lost their position and were not zeroed since, kept on the disk."""
+"""Record on disk of pucks that lost their position and were not zeroed since."""
 
 from collections.abc import Collection
 from pathlib import Path
@@ -8,27 +8,27 @@ from acquisition.files import open_directory, replace_file
 
 
 class LostPositions:
-    """What a start found out and the next one cannot see any more.
+    """Record of lost positions that outlives the program.
 
-    A puck that was asleep counts from anywhere. Once it is woken nothing but the safety
-    module's ZERO tells that, which any program on the bus may set.
+    A puck that was asleep has an arbitrary position. Once it is awake, only the safety
+    module's ZERO shows that, which any program on the bus may set.
     """
 
     def __init__(self, path: Path | None = None) -> None:
-        """Keep it in the file `path`; None = in this object only."""
+        """Keep the record in the file `path`; None = in memory only."""
         self._path = path
         self._nodes: tuple[int, ...] = ()
 
     @property
     def is_noted(self) -> bool:
-        """Whether positions were lost and not defined since."""
+        """Whether positions were lost and not redefined since."""
         return bool(self._nodes) or (self._path is not None and self._path.exists())
 
     def note(self, nodes: Collection[int]) -> None:
-        """Note that pucks `nodes` lost their positions.
+        """Record that pucks `nodes` lost their positions.
 
         Raises:
-            PreflightError: the file cannot be written; nothing may be woken then.
+            PreflightError: the file cannot be written; then no puck may be woken.
         """
         self._nodes = tuple(nodes)
         if self._path is None:
@@ -46,10 +46,10 @@ class LostPositions:
             ) from error
 
     def clear(self) -> None:
-        """Forget it: all positions are defined.
+        """Clear the record: all positions are defined.
 
         Raises:
-            PreflightError: the file cannot be taken away; the arm stays refused.
+            PreflightError: the file cannot be removed; the arm stays refused.
         """
         if self._path is not None:
             try:

@@ -1,4 +1,4 @@
-"""The pendant's word PEN: what the safety module's monitors, lamps and buttons show."""
+"""Codec of property PEN: monitors of the safety module, lamps and buttons."""
 
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from acquisition.errors import DeviceFaultError
 
 
 class SafetyLevel(IntEnum):
-    """State of one of the module's monitors; UNKNOWN = it shows none or several."""
+    """State of a monitor; UNKNOWN = no state bit or several are set."""
 
     UNKNOWN = 0
     SAFE = 1
@@ -17,7 +17,7 @@ class SafetyLevel(IntEnum):
 
 
 class PendantButton(IntEnum):
-    """What is pressed on the pendant."""
+    """Button pressed on the pendant."""
 
     E_STOP = 0
     ACTIVATE = 1
@@ -27,14 +27,14 @@ class PendantButton(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class PendantWord:
-    """The word PEN taken apart.
+    """Decoded property PEN.
 
     Attributes:
         velocity, torque, voltage, heartbeat, other: state of each monitor.
         segments: lit segments of the display, bit 0 top, clockwise, bit 6 middle.
-        is_idle_lit: the idle lamp.
-        is_active_lit: the activate lamp.
-        button: what is pressed.
+        is_idle_lit: the idle lamp is lit.
+        is_active_lit: the activate lamp is lit.
+        button: pressed button.
     """
 
     velocity: SafetyLevel
@@ -49,21 +49,21 @@ class PendantWord:
 
     @property
     def faults(self) -> tuple[str, ...]:
-        """Names of the monitors that report a fault."""
+        """Names of the monitors in fault."""
         return tuple(
             name for name in MONITORS if getattr(self, name) is SafetyLevel.FAULT
         )
 
     @property
     def unclear(self) -> tuple[str, ...]:
-        """Names of the monitors that show none or several of their three states."""
+        """Names of the monitors in no state or several."""
         return tuple(
             name for name in MONITORS if getattr(self, name) is SafetyLevel.UNKNOWN
         )
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Names of the monitors that warn."""
+        """Names of the monitors in warning."""
         return tuple(
             name for name in MONITORS if getattr(self, name) is SafetyLevel.WARNING
         )
@@ -73,14 +73,14 @@ MONITORS = ("velocity", "torque", "voltage", "heartbeat", "other")
 
 
 def decode_pendant(word: int, excused: Collection[str] = ()) -> PendantWord:
-    """Return the meaning of PEN, a 32-bit word (libbarrett, safety_module.cpp).
+    """Decode PEN, a 32-bit word (libbarrett, safety_module.cpp).
 
     Args:
-        word: as the module reports it.
-        excused: monitors whose state is UNKNOWN where it makes no sense.
+        word: value reported by the module.
+        excused: monitors for which an invalid state is UNKNOWN instead of an error.
 
     Raises:
-        DeviceFaultError: another monitor shows none or several of its three states.
+        DeviceFaultError: another monitor is in no state or several.
     """
     levels = [_level(word, i, excused) for i in range(len(MONITORS))]
     return PendantWord(
@@ -93,7 +93,7 @@ def decode_pendant(word: int, excused: Collection[str] = ()) -> PendantWord:
 
 
 def encode_pendant(pendant: PendantWord) -> int:
-    """Return the word PEN of a state, as the module reports it."""
+    """Encode PEN as the module reports it."""
     word = pendant.segments << 16 | pendant.button << 26
     word |= pendant.is_idle_lit << 24 | pendant.is_active_lit << 25
     for i, name in enumerate(MONITORS):

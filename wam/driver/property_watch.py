@@ -1,4 +1,4 @@
-"""Properties of the pucks that decide what a torque is, asked again in turn."""
+"""Repeated reading of the puck properties that define torque and count units."""
 
 from collections.abc import Mapping, Sequence
 from typing import Final
@@ -11,39 +11,39 @@ WATCHED: Final = ("IPNM", "MT", "PIDX", "CTS", "VERS")
 
 
 class PropertyWatch:
-    """Asks pucks for what they said at the start, and keeps the first difference.
+    """Re-reads properties of the pucks and keeps the first change since the start.
 
     Attributes:
-        change: the first answer that was another one; None = none was.
+        change: the first changed property, or None.
     """
 
     def __init__(self) -> None:
         self.change: MotorChange | None = None
-        self._known: dict[tuple[int, int], tuple[str, int]] = {}
+        self._initial: dict[tuple[int, int], tuple[str, int]] = {}
         self._questions: list[tuple[int, int]] = []
         self._next = 0
 
     def begin(
         self, answers: Sequence[Mapping[str, int | None]], firmware: Sequence[int]
     ) -> None:
-        """Take what pucks 1 to 7 answered at the start, by name; None = nothing.
+        """Store the properties of pucks 1 to 7 at the start, by name; None = unknown.
 
-        `firmware` of each decides under which number it is asked from now on.
+        `firmware` of each puck determines its property numbers from now on.
         """
         self.change = None
-        self._known.clear()
+        self._initial.clear()
         for name in WATCHED:
             for node in MOTOR_NODES:
                 value = answers[node - 1].get(name)
                 if value is not None:
-                    known = nearest_documented(firmware[node - 1])
-                    number = property_number(Device.MOTOR, name, known)
-                    self._known[node, number] = name, value
-        self._questions = list(self._known)
+                    documented = nearest_documented(firmware[node - 1])
+                    number = property_number(Device.MOTOR, name, documented)
+                    self._initial[node, number] = name, value
+        self._questions = list(self._initial)
         self._next = 0
 
     def next_question(self) -> tuple[int, int] | None:
-        """Return (node, property number), all in turn; None before a start."""
+        """Return the next request (node, property number); None before a start."""
         if not self._questions:
             return None
         question = self._questions[self._next]
@@ -51,10 +51,10 @@ class PropertyWatch:
         return question
 
     def note(self, node: int, reply: Property) -> None:
-        """Take the answer of puck `node`; other properties than these are ignored."""
-        known = self._known.get((node, reply.number))
-        if known is None or reply.value is None or self.change is not None:
+        """Compare a reply of puck `node`; other properties are ignored."""
+        entry = self._initial.get((node, reply.number))
+        if entry is None or reply.value is None or self.change is not None:
             return
-        name, was = known
+        name, was = entry
         if reply.value != was:
             self.change = MotorChange(node, name, was, reply.value)

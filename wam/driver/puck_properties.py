@@ -1,8 +1,8 @@
-"""What motor pucks must say of themselves, and where they say otherwise.
+"""Check of the pucks' properties against a table of expected values.
 
-A driver that reads CTS and IPNM takes the puck's word for what a count and a torque
-mean; PIDX, MT and the groups decide what becomes of a torque without being heard at
-all. So they are held against a table: the one shipped, or what this arm is known to be.
+CTS and IPNM define the units of counts and torques, and a driver has to trust them;
+PIDX, MT and the groups determine which torque a puck applies, without any feedback. So
+all are compared with a table: the shipped one, or the known values of this arm.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -27,20 +27,20 @@ from wam.bus.properties import (
 _Seven = tuple[Whole, Whole, Whole, Whole, Whole, Whole, Whole]
 Values = Sequence[int | None]  # of one property, motors 1 to 7; None = not known
 
-_ALIKE: Final = 0.02  # by which the motors of one differential may differ
-# No torque and no count depends on these.
+_ALIKE: Final = 0.02  # largest relative difference of the motors of a differential
+# Properties without effect on torques and counts.
 _ADVISORY: Final = frozenset({"OTEMP", "VBUS"})
 _MOST_HINTS: Final = 3
 
 
 class Expectation(TomlTable):
-    """What the seven pucks should have of one property.
+    """Expected values of one property of the seven pucks.
 
     Attributes:
-        values: as they should be.
-        low: the least that passes; None = `values`.
-        high: the most that passes; None = `values`.
-        others: rows that may stand in the place of `values`, all seven of them.
+        values: nominal values.
+        low: lower limits; None = `values`.
+        high: upper limits; None = `values`.
+        others: alternative rows of seven values.
         alike: pairs of motors whose values differ by 2 % at most.
     """
 
@@ -63,22 +63,22 @@ class Expectation(TomlTable):
 
     @property
     def lowest(self) -> _Seven:
-        """The least that passes."""
+        """Lower limits."""
         return self.values if self.low is None else self.low
 
     @property
     def highest(self) -> _Seven:
-        """The most that passes."""
+        """Upper limits."""
         return self.values if self.high is None else self.high
 
     def bounds(self, found: Values) -> list[tuple[int, int]]:
-        """Return between what each puck should be, in the row that fits most."""
+        """Return (lower, upper) limits of each puck, of the best matching row."""
         rows = [list(zip(self.lowest, self.highest, strict=True))]
         rows += [[(value, value) for value in other] for other in self.others]
-        return max(rows, key=lambda row: _passing(row, found))
+        return max(rows, key=lambda row: _matches(row, found))
 
 
-def _passing(row: Sequence[tuple[int, int]], found: Values) -> int:
+def _matches(row: Sequence[tuple[int, int]], found: Values) -> int:
     return sum(
         value is not None and low <= value <= high
         for value, (low, high) in zip(found, row, strict=True)
@@ -86,7 +86,7 @@ def _passing(row: Sequence[tuple[int, int]], found: Values) -> int:
 
 
 class PuckTable(TomlTable):
-    """Expected properties by their names; those that are left out are not compared."""
+    """Expected properties by name; missing ones are not compared."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -114,21 +114,21 @@ class PuckTable(TomlTable):
         }
 
     def overridden(self, own: "PuckTable") -> "PuckTable":
-        """Return the table with what `own` says in the place of its own rows."""
+        """Return the table with its rows replaced by those of `own`."""
         return self.model_copy(update=own.rows())
 
 
 @lru_cache(maxsize=1)
 def shipped_table() -> PuckTable:
-    """Return what a WAM is as it left the factory."""
+    """Return the table of a WAM as delivered."""
     return PuckTable.parse((resources.files("wam.data") / "pucks.toml").read_text())
 
 
 def known_table(text: str, name: str) -> PuckTable:
-    """Return the shipped table with what the file `name` says of one arm.
+    """Return the shipped table with the rows of one arm from the file `name`.
 
     Raises:
-        SettingsError: `text` is no such table.
+        SettingsError: `text` is not such a table.
     """
     try:
         return shipped_table().overridden(PuckTable.parse(text))
@@ -146,9 +146,11 @@ ASKED: Final = ("ID", "SN", "PIDX", "GRPA", "GRPB", "GRPC", "POLES", "MT", "OTEM
 def ask_properties(
     ask: Callable[[int], int | None], vers: int
 ) -> dict[str, int | None]:
-    """Return what a puck with firmware `vers` answers to `ask(number)`, by name.
+    """Read the properties of a puck with firmware `vers` through `ask(number)`.
 
-    None = it is silent; what its firmware does not have is left out.
+    Returns:
+        Values by name; None = no reply. Properties unknown to the firmware are left
+        out.
     """
     table = numbers(Device.MOTOR, nearest_documented(vers))
     return {name: ask(table[name]) for name in ASKED if name in table}
@@ -156,15 +158,15 @@ def ask_properties(
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """A property that is not as expected.
+    """An unexpected property value.
 
     Attributes:
         node: puck number, 1 to 7.
-        name: of the property.
-        value: as the puck has it.
-        expected: in words.
-        wanted: what it should be set to; None = only this motor's label tells.
-        is_warning: the arm can be driven all the same.
+        name: name of the property.
+        value: value reported by the puck.
+        expected: expected value as text.
+        wanted: value to set; None = only the motor's label has it.
+        is_warning: the arm can be driven despite it.
     """
 
     node: int
@@ -176,79 +178,83 @@ class Difference:
 
     @property
     def text(self) -> str:
-        """Return it in words."""
+        """The difference as text."""
         return (
             f"{self.name} of puck {self.node} is {self.value}, expected {self.expected}"
         )
 
     def frames(self, vers: int) -> str:
-        """Return which frames set and save it, "" where nothing can be told."""
+        """Return the frames that set and save the value, "" if it is not documented."""
         if self.wanted is None:
             return ""
-        known = nearest_documented(vers)
-        number = property_number(Device.MOTOR, self.name, known)
-        save = property_number(Device.MOTOR, "SAVE", known)
-        words = encode_set(number, self.wanted), encode_set(save, number)
-        return " ".join(f"{self.node:03X}#{data.hex().upper()}" for data in words)
+        documented = nearest_documented(vers)
+        number = property_number(Device.MOTOR, self.name, documented)
+        save = property_number(Device.MOTOR, "SAVE", documented)
+        payloads = encode_set(number, self.wanted), encode_set(save, number)
+        return " ".join(f"{self.node:03X}#{data.hex().upper()}" for data in payloads)
 
 
 def compare(table: PuckTable, found: Mapping[str, Values]) -> list[Difference]:
-    """Return where pucks differ from a table; what is not known does not differ."""
+    """Return the differences of the pucks from a table; unknown values are skipped."""
     differences: list[Difference] = []
     for name, row in table.rows().items():
         if name in found:
-            beyond = _beyond(name, row, found[name])
-            differences += beyond or _unlike(name, row, found[name])
+            out_of_range = _out_of_range(name, row, found[name])
+            differences += out_of_range or _unequal_pairs(name, row, found[name])
     return differences
 
 
-def _beyond(name: str, row: Expectation, found: Values) -> list[Difference]:
+def _out_of_range(name: str, row: Expectation, found: Values) -> list[Difference]:
     differences: list[Difference] = []
     bounds = row.bounds(found)
     for i, (value, (low, high)) in enumerate(zip(found, bounds, strict=True)):
         if value is None or low <= value <= high:
             continue
-        # A puck that would make more than it should is bounded by the host.
-        is_bearable = name in _ADVISORY or (name == "MT" and value > high)
-        is_one = low == high
-        expected = str(low) if is_one else f"{low} to {high}"
-        wanted = low if is_one else row.values[i] if name == "MT" else None
+        # Too high an MT is acceptable: the host limits the torque, too.
+        is_acceptable = name in _ADVISORY or (name == "MT" and value > high)
+        is_exact = low == high
+        expected = str(low) if is_exact else f"{low} to {high}"
+        wanted = low if is_exact else row.values[i] if name == "MT" else None
         differences.append(
-            Difference(i + 1, name, value, expected, wanted, is_bearable)
+            Difference(i + 1, name, value, expected, wanted, is_acceptable)
         )
     return differences
 
 
-def _unlike(name: str, row: Expectation, found: Values) -> list[Difference]:
+def _unequal_pairs(name: str, row: Expectation, found: Values) -> list[Difference]:
     differences: list[Difference] = []
-    for one, other in row.alike:
-        a, b = found[one - 1], found[other - 1]
+    for first, second in row.alike:
+        a, b = found[first - 1], found[second - 1]
         if a is not None and b is not None and abs(a - b) > _ALIKE * max(a, b):
-            expected = f"within 2 % of the {a} of puck {one}"
-            differences.append(Difference(other, name, b, expected))
+            expected = f"within 2 % of the {a} of puck {first}"
+            differences.append(Difference(second, name, b, expected))
     return differences
 
 
 def refuse(differences: Sequence[Difference], firmware: Sequence[int]) -> None:
-    """Tell together what keeps the arm from being driven.
+    """Refuse an arm with differences that are not warnings, naming all of them.
 
     Args:
-        differences: as `compare` gives them; warnings do not count.
-        firmware: of pucks 1 to 7.
+        differences: result of `compare`.
+        firmware: firmware of pucks 1 to 7.
 
     Raises:
-        UnfitDeviceError: there is such a difference.
+        UnfitDeviceError: there is a difference that is not a warning.
     """
     severe = [d for d in differences if not d.is_warning]
     if not severe:
         return
-    ways = [frames for d in severe if (frames := d.frames(firmware[d.node - 1]))]
-    if len(ways) > _MOST_HINTS:
-        ways = [*ways[:_MOST_HINTS], "and so on"]
-    how = f" To set and keep it, the arm idle: {', '.join(ways)}." if ways else ""
+    remedies = [frames for d in severe if (frames := d.frames(firmware[d.node - 1]))]
+    if len(remedies) > _MOST_HINTS:
+        remedies = [*remedies[:_MOST_HINTS], "and so on"]
+    remedy = (
+        f" To set and keep it, the arm idle: {', '.join(remedies)}." if remedies else ""
+    )
     raise UnfitDeviceError(
         f"{'; '.join(d.text for d in severe)}.",
-        hint="Is this the arm and the puck it should be?" + how + " If a puck is right "
+        hint="Is this the arm and the puck it should be?"
+        + remedy
+        + " If a puck is right "
         "as it is, write its value into the file that [arm] properties of rig.toml "
         "names.",
     )

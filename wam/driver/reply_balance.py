@@ -1,28 +1,28 @@
-"""Position replies against questions: does something answer in a puck's name?"""
+"""Balance of position replies and requests: detects a second sender of replies."""
 
 from wam.driver.transmission import MOTORS
 
-_DOUBLED = 5  # replies more than questions; a frame that the bus repeats is one
-_FORGIVEN_EVERY = 50  # questions, after which each balance is a reply nearer to zero
-_MOST_OWED = 30  # questions: as many as go unanswered before the arm is idled
+_DOUBLED = 5  # surplus replies that are an error; a repeated frame is one
+_FORGIVEN_EVERY = 50  # requests, after which each balance moves one reply towards zero
+_MOST_OWED = 30  # requests: as many as go unanswered before the arm is idled
 
 
 class ReplyBalance:
-    """Counts replies and questions of each motor.
+    """Counts position replies and requests of each motor.
 
-    A reply that is late is owed until it comes. Of those that are lost, and of those
-    that come twice by accident, one in 50 questions is forgotten: ten a second.
+    A late reply is owed until it arrives. Lost and duplicate replies are forgiven at
+    one per 50 requests, ten per second.
 
     Attributes:
-        replies: of motors 1 to 7; whoever hears one counts it here.
+        replies: replies of motors 1 to 7; incremented by the receiver.
     """
 
     def __init__(self) -> None:
         self.replies = [0] * MOTORS
-        self._questions = 0  # each asks all motors
+        self._questions = 0  # each goes to all motors
 
     def note_question(self) -> None:
-        """Count a question that the bus took."""
+        """Count a request accepted by the bus."""
         self._questions += 1
         if self._questions % _FORGIVEN_EVERY:
             return
@@ -34,8 +34,8 @@ class ReplyBalance:
                 self.replies[i] = self._questions + max(surplus + 1, -_MOST_OWED)
 
     def doubled(self) -> int:
-        """Return the motor, 1-7, that answers more often than asked; 0 = none does."""
-        most = max(self.replies)
-        if most - self._questions < _DOUBLED:
+        """Return the motor, 1-7, with surplus replies; 0 = none."""
+        largest = max(self.replies)
+        if largest - self._questions < _DOUBLED:
             return 0
-        return self.replies.index(most) + 1
+        return self.replies.index(largest) + 1

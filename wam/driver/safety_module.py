@@ -1,6 +1,6 @@
-"""The safety module: its mode, its fault word, and whether the arm was zeroed.
+"""Client of the safety module: mode, limits, monitors, and zeroed state of the arm.
 
-The host may only ask it to go down; up is the pendant's business.
+The host can only lower the mode (IDLE, E-stop); only the pendant activates the arm.
 """
 
 from collections.abc import Collection
@@ -20,18 +20,18 @@ from wam.bus.property_client import PropertyClient
 from wam.driver.pendant import MONITORS, NO_PENDANT, PendantWord, decode_pendant
 
 COUNTS_PER_SPEED = 4096  # VL1 and VL2 are Q4.12: 1 m/s is 4096
-WARNING_SHARE = 0.9  # of the fault's value, where no warning is given
+WARNING_SHARE = 0.9  # of the fault limit: default of a warning limit
 
 
 @dataclass(frozen=True, slots=True)
 class SafetyLimits:
-    """Limits of the safety module; the defaults are its own after power-up.
+    """Limits of the safety module; the defaults are those after power-up.
 
     Attributes:
-        speed_warning: of elbow and forearm [m/s].
-        speed_fault: beyond it the module takes the arm to IDLE [m/s].
-        torque_warning_units: largest commanded torque of any motor [puck units].
-        torque_fault_units: beyond it the module takes the arm to IDLE [puck units].
+        speed_warning: speed of elbow and forearm with a warning [m/s].
+        speed_fault: speed at which the module idles the arm [m/s].
+        torque_warning_units: commanded motor torque with a warning [puck units].
+        torque_fault_units: torque at which the module idles the arm [puck units].
     """
 
     speed_warning: float = 0.5
@@ -40,7 +40,7 @@ class SafetyLimits:
     torque_fault_units: int = 5204
 
     def words(self) -> dict[str, int]:
-        """Return the value of each property, floored as libbarrett does."""
+        """Return the property values, rounded down as in libbarrett."""
         return {
             "VL1": int(self.speed_warning * COUNTS_PER_SPEED),
             "VL2": int(self.speed_fault * COUNTS_PER_SPEED),
@@ -51,12 +51,12 @@ class SafetyLimits:
 
 _MODE = 8  # the same in every firmware
 _RETRY_NS = 10_000_000
-_ANSWER_NS = 2_000_000  # of a puck; the vendor's library gives up after 1 ms
-_CONFIG_GAP_NS = 10_000_000  # configuration frames closer together are not promised
+_ANSWER_NS = 2_000_000  # reply time limit of a puck; 1 ms in the vendor's library
+_CONFIG_GAP_NS = 10_000_000  # documented spacing of configuration frames
 
 
 def decode_mode(value: int) -> SafetyMode:
-    """Return the mode a MODE reply stands for, UNKNOWN for anything else."""
+    """Return the mode of a MODE reply, UNKNOWN for an invalid value."""
     return SafetyMode(value) if value in (0, 1, 2) else SafetyMode.UNKNOWN
 
 
@@ -64,8 +64,8 @@ class SafetyModule:
     """Client of the safety module, for use outside the loop.
 
     Attributes:
-        defaults: its own limits before `set_limits` set others, in the order of
-            `SafetyLimits.words`; None = it did not answer, () = it was not asked.
+        defaults: power-up limits read by `set_limits`, in the order of
+            `SafetyLimits.words`; None = no reply, () = not read.
     """
 
     def __init__(self, properties: PropertyClient, clock: Clock, vers: int) -> None:
@@ -79,7 +79,7 @@ class SafetyModule:
 
         Raises:
             LinkTimeoutError: the module is silent.
-            DeviceFaultError: it answered a mode that does not exist.
+            DeviceFaultError: it reports an invalid mode.
         """
         value = self._properties.require(SAFETY_NODE, _MODE, "MODE")
         mode = decode_mode(value)
@@ -91,14 +91,14 @@ class SafetyModule:
         return mode
 
     def serial(self) -> int | None:
-        """Return its serial number; None = it does not tell."""
+        """Return the serial number, None without a reply."""
         return self._try_get("SN")
 
     def lower_to_idle(self, within_ns: int) -> SafetyMode:
-        """Ask for IDLE until the module confirms IDLE or E-STOP; return the last mode.
+        """Command IDLE until the module confirms IDLE or E-STOP; return the last mode.
 
-        UNKNOWN means that it never answered; ACTIVE that it did not obey. A bus that
-        is down is tried again as well: its controller may come back.
+        UNKNOWN = it never answered; ACTIVE = it did not obey. A bus that is down is
+        retried: its controller may restart.
         """
         deadline_ns = self._clock.now_ns() + within_ns
         mode = SafetyMode.UNKNOWN
@@ -112,10 +112,7 @@ class SafetyModule:
         return mode
 
     def is_driven(self, node: int) -> bool:
-        """Return whether a motor puck says that it obeys torques.
-
-        In IDLE it does not, whatever the module says. A silent one is not judged.
-        """
+        """Return whether a motor puck reports torque mode; False if it is silent."""
         try:
             mode = self._properties.get(node, _MODE, _ANSWER_NS)
         except LinkError:
@@ -123,11 +120,11 @@ class SafetyModule:
         return mode == PuckMode.TORQUE
 
     def driven(self) -> list[int]:
-        """Return the motor pucks that say that they obey torques."""
+        """Return the motor pucks that report torque mode."""
         return [node for node in MOTOR_NODES if self.is_driven(node)]
 
     def idle_pucks(self, nodes: Collection[int]) -> None:
-        """Tell motor pucks themselves what they missed when the module told it.
+        """Set motor pucks to idle directly, if they missed the module's broadcast.
 
         Raises:
             LinkError: the bus is down.
@@ -136,7 +133,7 @@ class SafetyModule:
             self._properties.set(node, _MODE, PuckMode.IDLE)
 
     def _ask_down(self) -> int | None:
-        """Ask for IDLE once; return MODE as answered, None without an answer."""
+        """Command IDLE once; return the reported MODE, None without a reply."""
         try:
             self._properties.set(SAFETY_NODE, _MODE, SafetyMode.IDLE)
             return self._properties.get(SAFETY_NODE, _MODE, _RETRY_NS)
@@ -144,11 +141,11 @@ class SafetyModule:
             return None
 
     def is_zeroed(self) -> bool:
-        """Return whether a host has defined the positions since power-up."""
+        """Return whether the positions were defined since power-up."""
         return self._get("ZERO") == 1
 
     def mark_zeroed(self) -> None:
-        """Tell the module that positions are defined now.
+        """Set the module's flag that positions are defined.
 
         Raises:
             DeviceFaultError: the module does not confirm.
@@ -161,7 +158,7 @@ class SafetyModule:
             )
 
     def forget_zero(self) -> None:
-        """Tell the module that positions have been lost.
+        """Clear the module's flag that positions are defined.
 
         Raises:
             DeviceFaultError: the module does not confirm.
@@ -175,33 +172,33 @@ class SafetyModule:
             )
 
     def ignore_speed_faults(self, count: int) -> None:
-        """Let the module ignore `count` samples before something makes a jump."""
+        """Let the module ignore `count` samples, before a jump of the positions."""
         self._set("IFAULT", count)
 
     def heed_speed_faults(self) -> None:
-        """Let the module ignore no sample any more.
+        """Let the module monitor the speed again.
 
         Raises:
-            DeviceFaultError: it says that it still does.
+            DeviceFaultError: the module still ignores samples.
         """
         self.ignore_speed_faults(0)
-        left = self._try_get("IFAULT")
-        if left:
+        ignored = self._try_get("IFAULT")
+        if ignored:
             raise DeviceFaultError(
-                f"The safety module has IFAULT = {left}, expected 0: it would let so "
-                "many samples beyond its speed limit pass.",
+                f"The safety module has IFAULT = {ignored}, expected 0: it would let "
+                "so many samples beyond its speed limit pass.",
                 hint="Start again; if it stays so, switch the arm off and on.",
             )
 
     def set_limits(self, limits: SafetyLimits) -> tuple[str, ...]:
-        """Bring VL and TL to their power-up values, then to `limits`.
+        """Reset VL and TL to their power-up values, then set `limits`.
 
         Returns:
-            In words, which of them are read back otherwise; libbarrett does not look.
+            Warnings for values that read back differently; libbarrett does not check.
         """
         wanted = limits.words()
-        # An earlier program may have left others; DEF and LOAD of a property's number
-        # bring back its value of power-up.
+        # An earlier program may have changed them; DEF and LOAD of a property's number
+        # restore its power-up value.
         for name in wanted:
             number = property_number(Device.SAFETY, name, self._vers)
             self._set("DEF", number)
@@ -209,28 +206,28 @@ class SafetyModule:
         self.defaults = tuple(self._try_get(name) for name in wanted)
         for name, value in wanted.items():
             self._set(name, value)
-        kept = {name: self._try_get(name) for name in wanted}
+        readback = {name: self._try_get(name) for name in wanted}
         return tuple(
             f"The safety module does not answer GET {name}; {value} was sent."
-            if kept[name] is None
-            else f"The safety module has {name} = {kept[name]}, expected {value}."
+            if readback[name] is None
+            else f"The safety module has {name} = {readback[name]}, expected {value}."
             for name, value in wanted.items()
-            if kept[name] != value
+            if readback[name] != value
         )
 
     def pendant(self, excused: Collection[str] = ()) -> PendantWord:
-        """Return pendant and monitors; `excused` of them may be UNKNOWN.
+        """Return pendant and monitors; those in `excused` may be UNKNOWN.
 
         Raises:
-            DeviceFaultError: another one makes no sense.
+            DeviceFaultError: another monitor has an invalid state.
             LinkTimeoutError: the module is silent.
         """
         return decode_pendant(self._get("PEN") & 0xFFFFFFFF, excused)
 
     def doubted_pendant(self) -> tuple[PendantWord, str]:
-        """Return pendant and monitors, and in words what is not as documented.
+        """Return pendant and monitors, and a warning if PEN is not as documented.
 
-        Neither silence nor nonsense is an error here: libbarrett does not ask.
+        A missing or invalid reply is not an error: libbarrett does not read PEN.
         """
         word = self._try_get("PEN")
         if word is None:

@@ -1,4 +1,4 @@
-"""Settings of the arm's driver: transmission, limits and the timing of its cycle."""
+"""Settings of the arm's driver: transmission, limits and cycle timing."""
 
 from dataclasses import dataclass, field
 
@@ -16,27 +16,26 @@ def _shipped_j2mp() -> Matrix:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ArmSettings:
-    """Settings of the driver: the arm and the cycle.
+    """Settings of the driver.
 
     Attributes:
         j2mp: motor angles from joint angles, shape (7, 7).
         torque_limits: largest torque the host sends to each motor [puck units].
-        velocity_pole: corner of the velocity filter [rad/s].
-        first_look_ns: from request to the first look at the bus [ns].
-        give_up_ns: from request to the end of waiting for replies [ns].
-        speed_limits: of the guard, for each joint [rad/s].
-        jump_margin: a position is believed up to so many times the speed limits.
-        unasked_every: in one of so many cycles no position is asked for; one that comes
-            then answers an earlier question.
-        safety_poll_cycles: cycles between questions for the safety mode, and between
-            those for the pendant's word.
-        health_poll_cycles: cycles between questions for the health of a puck.
-        watch_poll_cycles: cycles between questions for what a puck said at the start.
-        command_poll_cycles: cycles between questions for what a puck holds; 14 of them
-            ask all seven for mode and torque.
-        safety_limits: what the safety module is set to tolerate.
-        pucks: what the motor pucks have to say of themselves.
-        boot_ns: silence while pucks boot [ns].
+        velocity_pole: corner frequency of the velocity filter [rad/s].
+        first_look_ns: delay from the request to the first read of the bus [ns].
+        give_up_ns: delay from the request to the end of waiting for replies [ns].
+        speed_limits: joint speed limits of the guard [rad/s].
+        jump_margin: positions are accepted up to this multiple of the speed limits.
+        unasked_every: period of cycles without a position request [cycles]; a reply in
+            such a cycle answers an earlier request.
+        safety_poll_cycles: period of requests for the safety mode, and for PEN.
+        health_poll_cycles: period of requests for puck telemetry.
+        watch_poll_cycles: period of requests for properties read at the start.
+        command_poll_cycles: period of read-backs of commands; 14 of them cover mode and
+            torque of all seven pucks.
+        safety_limits: limits of the safety module.
+        pucks: expected properties of the motor pucks.
+        boot_ns: time without traffic while pucks boot [ns].
         idle_ns: longest wait for the safety module to confirm IDLE [ns].
     """
 

@@ -1,4 +1,4 @@
-"""The start-up of a WAM: who is on the bus, healthy, the right arm, and zeroed?"""
+"""Start-up of a WAM: discovery, wake-up, identity and configuration checks."""
 
 from dataclasses import dataclass
 
@@ -31,7 +31,7 @@ from wam.driver.settings import ArmSettings
 
 _VERS, _ROLE, _STAT, _MODE = 0, 1, 5, 8  # the same in every firmware
 _MS = 1_000_000
-_ABSOLUTE_SINCE = 118  # firmware from which MECH can be believed
+_ABSOLUTE_SINCE = 118  # first firmware with a reliable MECH
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,11 +44,11 @@ class PuckInfo:
         role: type in the low five bits, options above.
         cts: encoder counts per motor turn.
         ipnm: torque units per N m at the motor.
-        mech: absolute angle of the motor within its turn, 0..cts-1 [counts]; None =
-            it has no encoder that knows.
+        mech: absolute motor angle within one turn, 0..cts-1 [counts]; None = no
+            absolute encoder.
         was_asleep: the puck had to be woken.
         health: temperatures, voltage and error.
-        serial: serial number; None = it does not tell.
+        serial: serial number; None = not reported.
     """
 
     node: int
@@ -64,21 +64,21 @@ class PuckInfo:
 
 @dataclass(frozen=True, slots=True)
 class ArmInfo:
-    """The arm as found at start-up.
+    """Result of the start-up.
 
     Attributes:
         pucks: the seven motor pucks.
         nodes: every node that answered.
         safety_vers: firmware of the safety module.
         safety_mode: its mode at the end of start-up.
-        pendant: what the pendant shows.
+        pendant: state of pendant and monitors.
         is_zeroed: positions have been defined since power-up.
-        late_replies: replies that came after their question was given up.
-        transport: how the bus was reached, for people.
-        warnings: what is not as documented and does not keep the arm from being driven.
-        safety_serial: serial number of the safety module; None = it does not tell.
-        safety_defaults: limits that it has of itself, in the order of
-            `SafetyLimits.words`; None = it did not answer.
+        late_replies: replies after the time limit of their request.
+        transport: name of the CAN transport.
+        warnings: deviations that do not prevent driving the arm.
+        safety_serial: serial number of the safety module; None = not reported.
+        safety_defaults: power-up limits of the module, in the order of
+            `SafetyLimits.words`; None = no reply.
     """
 
     pucks: tuple[PuckInfo, ...]
@@ -94,9 +94,9 @@ class ArmInfo:
     safety_defaults: tuple[int | None, ...] = ()
 
     def module_identity(self) -> tuple[int | None, ...]:
-        """Return what tells one safety module from another; () = not all is known."""
-        told = (self.safety_vers, self.safety_serial, *self.safety_defaults)
-        return () if None in told else told
+        """Return firmware, serial number and power-up limits; () if one is unknown."""
+        identity = (self.safety_vers, self.safety_serial, *self.safety_defaults)
+        return () if None in identity else identity
 
     def metadata(self) -> dict[str, str]:
         """Return firmware, serial numbers and warnings as text for a recording."""
@@ -110,13 +110,13 @@ class ArmInfo:
 
 
 class StartUp:
-    """The questions to a WAM before it is driven.
+    """Start-up sequence of a WAM.
 
-    It follows libbarrett's start-up, without its waits for a person. What that library
-    neither reads nor verifies is a warning here.
+    Follows libbarrett's sequence without its waits for a person. Properties that
+    libbarrett neither reads nor verifies only give warnings.
 
     Attributes:
-        answers: properties of pucks 1 to 7 by name; None = it did not answer.
+        answers: properties of pucks 1 to 7 by name; None = no reply.
     """
 
     def __init__(
@@ -136,13 +136,13 @@ class StartUp:
         self._warnings: list[str] = []
 
     def run(self) -> ArmInfo:
-        """Return what is there, awake and idle.
+        """Wake, check and describe the arm; pucks of an inactive arm are idle after.
 
         Raises:
-            UnfitDeviceError: a puck or the safety module is missing, in E-stop, asleep
-                for good, or of another kind.
-            DeviceFaultError: a device reports an error or nonsense.
-            LinkTimeoutError: a device stopped answering on the way.
+            UnfitDeviceError: a puck or the safety module is missing, in E-stop, does
+                not wake up, or is of another kind.
+            DeviceFaultError: a device reports an error or an invalid value.
+            LinkTimeoutError: a device stopped answering during start-up.
             LinkError: the bus is down.
         """
         stats = discover_pucks(self._properties, self._clock, self._boot_ns)
@@ -160,8 +160,8 @@ class StartUp:
         self._check_properties(pucks)
         if mode is not SafetyMode.ACTIVE:
             self._idle_pucks(safety)
-        pendant, doubt = safety.doubted_pendant()
-        self._warnings += [doubt] if doubt else []
+        pendant, warning = safety.doubted_pendant()
+        self._warnings += [warning] if warning else []
         return ArmInfo(
             pucks=pucks,
             nodes=tuple(stats),
@@ -176,10 +176,10 @@ class StartUp:
         )
 
     def _forget_positions(self, safety: SafetyModule, asleep: list[int]) -> None:
-        """Have it known that sleeping pucks count from anywhere, before they are woken.
+        """Record that sleeping pucks have lost their positions, before waking them.
 
-        Awake they do not show it any more: a start that ends on the way, or a write
-        that is lost, would leave an arm that passes for zeroed.
+        Afterwards the loss is not visible: an interrupted start or a lost frame would
+        leave an arm that seems zeroed.
 
         Raises:
             DeviceFaultError: the module does not confirm.
@@ -190,10 +190,10 @@ class StartUp:
             safety.forget_zero()
 
     def _idle_pucks(self, safety: SafetyModule) -> None:
-        """Have the pucks of an arm that is not active obey no torque.
+        """Set the pucks of an inactive arm to idle and verify it.
 
         Raises:
-            UnfitDeviceError: one still does.
+            UnfitDeviceError: a puck stays in torque mode.
             LinkError: the bus is down.
         """
         self._properties.set_group(Group.ARM, _MODE, PuckMode.IDLE)
@@ -207,9 +207,9 @@ class StartUp:
             )
 
     def _wake(self, asleep: list[int]) -> None:
-        """Wake nodes, keep silent while they boot, and see that they are there.
+        """Wake nodes, wait without traffic while they boot, and check their status.
 
-        A transceiver that comes up while others talk can push a host off the bus.
+        A transceiver that powers up during traffic can drive the host to bus-off.
         """
         if not asleep:
             return
@@ -218,15 +218,18 @@ class StartUp:
             self._properties.pause(10 * _MS)
         self._properties.pause(self._boot_ns)
         stats = {node: self._properties.get(node, _STAT) for node in asleep}
-        dozing = [n for n in MOTOR_NODES if n in stats and stats[n] != PuckStatus.READY]
-        if dozing:
+        not_ready = [
+            n for n in MOTOR_NODES if n in stats and stats[n] != PuckStatus.READY
+        ]
+        if not_ready:
             raise UnfitDeviceError(
-                f"{pucks_verb(dozing)} not wake up within {self._boot_ns / 1e9:.1f} s.",
+                f"{pucks_verb(not_ready)} not wake up within "
+                f"{self._boot_ns / 1e9:.1f} s.",
                 hint="Switch the arm off and on, then start again.",
             )
 
     def _identify(self, node: int, was_asleep: bool) -> PuckInfo:
-        # Asleep, VERS is the monitor's; only now does it select the right table.
+        # VERS of a sleeping puck is that of its boot monitor; awake it is the firmware.
         vers = self._properties.require(node, _VERS, "VERS")
         role = self._properties.require(node, _ROLE, "ROLE")
         if device_of(role) is not Device.MOTOR:
@@ -250,13 +253,13 @@ class StartUp:
                 )
         health = ask_health(lambda number: self._properties.get(node, number), vers)
         asked = ask_properties(lambda number: self._properties.get(node, number), vers)
-        known = {"VERS": vers, "ROLE": role, "CTS": cts, "IPNM": ipnm}
-        self.answers.append({**asked, **known, "VBUS": health.bus_voltage})
+        required = {"VERS": vers, "ROLE": role, "CTS": cts, "IPNM": ipnm}
+        self.answers.append({**asked, **required, "VBUS": health.bus_voltage})
         serial = asked.get("SN")
         return PuckInfo(node, vers, role, cts, ipnm, mech, was_asleep, health, serial)
 
     def _note_firmware(self, who: str, vers: int) -> None:
-        """Warn of firmware that nobody has described; the nearest known serves it."""
+        """Warn of undocumented firmware; the nearest documented table is used."""
         nearest = nearest_documented(vers)
         if vers != nearest:
             self._warnings.append(
@@ -265,16 +268,18 @@ class StartUp:
             )
 
     def _check_firmware(self, pucks: tuple[PuckInfo, ...]) -> None:
-        """Refuse pucks that one question or one torque frame cannot reach together.
+        """Refuse pucks that group requests and torque frames cannot address together.
 
         Raises:
-            DeviceFaultError: their firmware numbers P or T differently.
+            DeviceFaultError: their firmware versions have different numbers of P or T.
         """
         for vers in sorted({puck.vers for puck in pucks}):
             nodes = ",".join(str(puck.node) for puck in pucks if puck.vers == vers)
             self._note_firmware(f"puck {nodes}", vers)
-        reached = {tuple(_number(p.node, name, p.vers) for name in "PT") for p in pucks}
-        if len(reached) > 1:
+        number_pairs = {
+            tuple(_number(p.node, name, p.vers) for name in "PT") for p in pucks
+        }
+        if len(number_pairs) > 1:
             raise DeviceFaultError(
                 "The firmware versions of the pucks are incompatible: "
                 f"{' '.join(str(puck.vers) for puck in pucks)} number P or T "
@@ -299,10 +304,10 @@ class StartUp:
             )
 
     def _check_properties(self, pucks: tuple[PuckInfo, ...]) -> None:
-        """Hold what the pucks say of themselves against what is expected.
+        """Compare the pucks' properties with the expected ones.
 
         Raises:
-            UnfitDeviceError: a torque or a count would mean something else.
+            UnfitDeviceError: a difference that changes torques or counts.
         """
         answers, rows = self.answers, self._expected.rows()
         for name in rows:
@@ -322,8 +327,8 @@ class StartUp:
                 "Pucks have the same serial number: "
                 f"{' '.join(map(str, serials))}. They cannot be told apart."
             )
-        found: dict[str, Values] = {n: [a.get(n) for a in answers] for n in rows}
-        differences = compare(self._expected, found)
+        values: dict[str, Values] = {n: [a.get(n) for a in answers] for n in rows}
+        differences = compare(self._expected, values)
         self._warnings += [f"{d.text}." for d in differences if d.is_warning]
         refuse(differences, firmware)
 
@@ -333,10 +338,10 @@ class StartUp:
 
 
 def _number(node: int, name: str, vers: int) -> int:
-    """Return the number of a property that puck `node` has to have.
+    """Return the number of a required property of puck `node`.
 
     Raises:
-        DeviceFaultError: its firmware does not have it.
+        DeviceFaultError: its firmware does not have the property.
     """
     try:
         return property_number(Device.MOTOR, name, nearest_documented(vers))

@@ -1,7 +1,7 @@
-"""What is watched beside the loop: safety module and pucks, one question per cycle.
+"""Status polling of safety module and pucks, one request per cycle.
 
-Half a millisecond of a 2 ms cycle is free on the bus; a question and its answer take
-0.15 ms of it.
+Half a millisecond of a 2 ms cycle is free on the bus; a request and its reply take
+0.15 ms.
 """
 
 from collections.abc import Collection
@@ -39,31 +39,30 @@ _SET_STOP = encode_set(_MODE, SafetyMode.E_STOP)
 _SET_PUCK_IDLE = encode_set(_MODE, PuckMode.IDLE)
 _SAFETY_REPLY_ID = property_reply_id(SAFETY_NODE)
 _NODES: Final = {property_reply_id(node): node for node in MOTOR_NODES}
-_UNANSWERED_POLLS = 4  # this many questions without an answer: mode unknown
-_STUBBORN_POLLS = 4  # after so many questions a puck that is driven loses its power
+_UNANSWERED_POLLS = 4  # requests without a reply until the mode is unknown
+_STUBBORN_POLLS = 4  # requests until a puck that stays in torque mode loses its power
 
 
 class StatusPoller:
-    """Asks safety module and pucks how they are and keeps the newest answers.
+    """Polls safety module and pucks and keeps the newest reports.
 
-    In a cycle there is one question at most. The mode goes before the pendant's word,
-    the word before the pucks' health, that before what they are, and that before
-    whether they do as they are told.
+    At most one request per cycle, in order of priority: safety mode, property PEN, puck
+    telemetry, puck properties, read-back of commands.
 
     Attributes:
         mode: last known mode of the safety module.
-        heard_ns: when the module last reported a mode [ns], 0 = never.
-        warnings: monitors of the module that warn.
-        faults: monitors of the module that report a fault.
-        excused: monitors that made no sense at start-up; they are left out.
-        health: the newest answers of the pucks.
-        watch: what they must go on answering.
-        commands: whether they hold what they are told.
-        disobeys: the newest contradiction of a puck, until it is taken.
-        is_lowering: IDLE is sent again with every question for its mode,
-            until it says that it is.
-        contradicted_by: pucks that obeyed torques when the module said IDLE; the module
-            is not believed before they agree, and takes their power if they do not.
+        heard_ns: time of the module's last mode report [ns], 0 = never.
+        warnings: monitors of the module in warning.
+        faults: monitors of the module in fault.
+        excused: monitors with an invalid state at start-up; they are ignored.
+        health: newest telemetry of the pucks.
+        watch: check for changed properties.
+        commands: read-back of commands.
+        disobeys: newest mismatch of a puck with its command, until taken.
+        is_lowering: IDLE is sent with every mode request until the module reports it.
+        contradicted_by: pucks in torque mode although the module reported IDLE. IDLE is
+            not accepted until they agree; if they do not, the module is told to cut
+            their power.
     """
 
     def __init__(self, link: Link, settings: ArmSettings) -> None:
@@ -84,13 +83,13 @@ class StatusPoller:
         self._unanswered = 0
         self._hints_seen = 0
         self._has_asked = False
-        # In cycles; halves and thirds, so that they seldom fall due together.
+        # Countdowns in cycles, staggered so that requests seldom fall due together.
         self._until_mode = 0
         self._until_pendant = settings.safety_poll_cycles // 2
         self._until_health = settings.health_poll_cycles // 3
         self._until_watch = 2 * settings.watch_poll_cycles // 3
         self._until_command = settings.command_poll_cycles
-        self._contradictions = 0  # questions that a contradiction has outlasted
+        self._contradictions = 0  # mode requests since the contradiction
         self.set_firmware(MODERN)
 
     def set_firmware(self, vers: int) -> None:
@@ -98,7 +97,7 @@ class StatusPoller:
         self._pen = property_number(Device.SAFETY, "PEN", nearest_documented(vers))
 
     def begin_cycle(self, now_ns: int) -> None:
-        """Let the cycle of `now_ns` begin; its question may be asked."""
+        """Begin the cycle at `now_ns`; it has one request to spend."""
         self._now_ns = now_ns
         self._has_asked = False
         self._until_mode -= 1
@@ -108,9 +107,9 @@ class StatusPoller:
         self._until_command -= 1
 
     def ask(self, *, is_urgent: bool = False) -> None:
-        """Put the question that is due, if there is one, once in a cycle.
+        """Send the request that is due, if any, once in a cycle.
 
-        The mode is also asked for when it `is_urgent` or its change was announced.
+        The mode is also requested if `is_urgent` or after a mode broadcast.
 
         Raises:
             LinkError: the bus is down.
@@ -123,7 +122,7 @@ class StatusPoller:
         if self._until_mode <= 0 or is_hinted or is_urgent:
             if is_hinted:
                 self._hints_seen = self._link.mode_hints
-                self._until_pendant = 0  # the word says why
+                self._until_pendant = 0  # PEN has the reason
             self._ask_mode()
         elif self._until_pendant <= 0:
             self._until_pendant = self._settings.safety_poll_cycles
@@ -140,15 +139,15 @@ class StatusPoller:
             self._send(self.commands.question())
 
     def _send(self, question: tuple[int, int] | None) -> None:
-        """Ask a puck for a property."""
+        """Send a GET to a puck."""
         if question is not None:
             self._link.send(question[0], encode_get(question[1]))
 
     def on_frame(self, can_id: int, data: Payload) -> None:
-        """Take a frame that is no position.
+        """Handle a frame other than a position.
 
         Raises:
-            DeviceFaultError: its bytes make no sense.
+            DeviceFaultError: the frame is malformed.
         """
         node = _NODES.get(can_id)
         if node is None and can_id != _SAFETY_REPLY_ID:
@@ -167,7 +166,7 @@ class StatusPoller:
         elif reply.number == _MODE:
             mode = decode_mode(reply.value)
             is_doubted = mode is SafetyMode.IDLE and self.contradicted_by
-            # Nonsense leaves the question open.
+            # An invalid mode counts as no reply.
             if mode is not SafetyMode.UNKNOWN and not is_doubted:
                 self.note_mode(mode, self._now_ns)
         elif reply.number == self._pen:
@@ -175,7 +174,7 @@ class StatusPoller:
             self.note_pendant(decode_pendant(word, self.excused))
 
     def note_mode(self, mode: SafetyMode, now_ns: int) -> None:
-        """Take the mode that the module reported by `now_ns`; UNKNOWN = none."""
+        """Set the mode reported by the module at `now_ns`; UNKNOWN = no report."""
         self.mode = mode
         if mode is not SafetyMode.UNKNOWN:
             self.heard_ns = now_ns
@@ -184,10 +183,10 @@ class StatusPoller:
             self.is_lowering = False
             self.commands.forget()
         if mode is SafetyMode.E_STOP:
-            self.contradicted_by.clear()  # they have no power
+            self.contradicted_by.clear()  # the pucks have no power
 
     def begin(self, pendant: PendantWord) -> None:
-        """Take the word of a start; what makes no sense in it is left out later."""
+        """Reset after a start; ignore monitors with an invalid state from now on."""
         self.is_lowering = False
         self.contradicted_by.clear()
         self.disobeys = None
@@ -195,17 +194,17 @@ class StatusPoller:
         self.note_pendant(pendant)
 
     def note_pendant(self, pendant: PendantWord) -> None:
-        """Take the monitors that the module has just reported."""
+        """Set the monitors reported by the module."""
         self.warnings = pendant.warnings
         self.faults = pendant.faults
 
     def contradict(self, nodes: Collection[int]) -> None:
-        """Take pucks that obey torques though the module said IDLE."""
+        """Set the pucks that are in torque mode although the module reported IDLE."""
         self.contradicted_by = set(nodes)
         self._contradictions = 0
 
     def take_disobedience(self) -> MotorChange | None:
-        """Return how a puck contradicted what it was told since the last call."""
+        """Return and clear the newest mismatch of a puck with its command, or None."""
         disobeys, self.disobeys = self.disobeys, None
         return disobeys
 
@@ -217,9 +216,9 @@ class StatusPoller:
             self.note_mode(SafetyMode.IDLE, self._now_ns)
 
     def _ask_mode(self) -> None:
-        """Ask for the mode; only questions asked in their time count as unanswered.
+        """Request the mode; only regular requests count as unanswered.
 
-        A burst of urgent ones on a dead bus must not turn the last known mode into
+        A burst of urgent requests on a dead bus must not turn the last known mode into
         UNKNOWN at once.
         """
         if self._until_mode <= 0:
@@ -227,13 +226,14 @@ class StatusPoller:
             if self._unanswered >= _UNANSWERED_POLLS:
                 self.mode = SafetyMode.UNKNOWN
             self._unanswered += 1
-        # Until IDLE is confirmed the arm may still have torques: it is asked for again.
+        # Until IDLE is confirmed the motors may still have torque: repeat the command.
         if self.is_lowering:
             self._link.send(SAFETY_NODE, _SET_IDLE)
         if self.contradicted_by:
             self._contradictions += 1
             if self._contradictions > _STUBBORN_POLLS:
-                # It pulls for ever; without power the arm sinks in a person's hands.
+                # The puck keeps its last torque for ever. An E-stop cuts its power; the
+                # arm then sinks.
                 self._link.send(SAFETY_NODE, _SET_STOP)
         is_missed = len(self.contradicted_by) < len(MOTOR_NODES)
         for node in self.contradicted_by:

@@ -1,4 +1,4 @@
-"""Who says what on the arm's bus, counted: for an arm that is not known yet."""
+"""Survey of the arm's bus for commissioning: traffic at rest, replies per request."""
 
 from dataclasses import dataclass, field
 
@@ -14,17 +14,17 @@ from wam.bus.frames import (
 from wam.bus.link import Link
 from wam.bus.properties import COMMON
 
-_WINDOW_NS = 5_000_000  # in which every answer to one question has come
+_WINDOW_NS = 5_000_000  # all replies to a request arrive within it
 
 
 @dataclass(frozen=True, slots=True)
 class Heard:
-    """What came while nothing was asked.
+    """Traffic on the bus without requests.
 
     Attributes:
-        frames: of devices.
-        master: identifier of the first frame of another host so far; None = none came.
-        error_frames: that the bus's controller has reported so far.
+        frames: device frames.
+        master: identifier of the first frame of another bus master so far, or None.
+        error_frames: error frames of the CAN controller so far.
     """
 
     frames: int
@@ -34,12 +34,12 @@ class Heard:
 
 @dataclass(frozen=True, slots=True)
 class Answers:
-    """How often each device answers one question.
+    """Number of replies of each device to one request.
 
     Attributes:
-        nodes: devices that were asked.
-        counts: answers to one question, the most of some.
-        differing: of these devices, those that gave two different answers.
+        nodes: requested devices.
+        counts: largest number of replies to one request, per device.
+        differing: devices that gave different replies to one request.
     """
 
     nodes: list[int] = field(default_factory=list[int])
@@ -48,14 +48,14 @@ class Answers:
 
 
 class BusSurvey:
-    """Counts what is on a bus, outside the loop."""
+    """Counts frames and replies on the bus, outside the loop."""
 
     def __init__(self, link: Link, clock: Clock) -> None:
         self._link = link
         self._clock = clock
 
     def listen(self, duration_ns: int) -> Heard:
-        """Ask for nothing for so long and return what was heard.
+        """Listen for `duration_ns` without requests and return the traffic.
 
         Raises:
             LinkError: the bus is down.
@@ -69,21 +69,21 @@ class BusSurvey:
         return Heard(frames, link.foreign_id, link.errors.frames)
 
     def count_answers(self, times: int) -> Answers:
-        """Ask every device of the arm for its status `times` times; count the answers.
+        """Request STAT of every device of the arm `times` times; count the replies.
 
         Raises:
             LinkError: the bus is down.
         """
         answers = Answers()
         for node in (*MOTOR_NODES, SAFETY_NODE):
-            values = [self._answers_of(node) for _ in range(times)]
+            values = [self._replies_of(node) for _ in range(times)]
             answers.nodes.append(node)
             answers.counts.append(max(map(len, values)))
-            if any(len(set(given)) > 1 for given in values):
+            if any(len(set(replies)) > 1 for replies in values):
                 answers.differing.append(node)
         return answers
 
-    def _answers_of(self, node: int) -> list[int]:
+    def _replies_of(self, node: int) -> list[int]:
         link, clock, number = self._link, self._clock, COMMON["STAT"]
         link.receive()
         deadline_ns = clock.now_ns() + _WINDOW_NS
@@ -95,9 +95,9 @@ class BusSurvey:
                 if frame.can_id != property_reply_id(node):
                     continue
                 try:
-                    found, value = decode_reply(frame.data)
+                    reply_number, value = decode_reply(frame.data)
                 except FrameError:
                     continue
-                if found == number and value is not None:
+                if reply_number == number and value is not None:
                     values.append(value)
         return values

@@ -1,8 +1,8 @@
-"""Between motor and joint, encoder counts and radians, joint torque and puck units.
+"""Conversion between joints and motors: radians and counts, N m and puck units.
 
-The cables couple motors 2 and 3, and 5 and 6: `motor = j2mp @ joint`. Power is kept, so
-`tau_motor = inverse(j2mp).T @ tau_joint`. Counts per turn and puck units per N m are
-properties of each puck and must be read from it.
+The cables couple motors 2 and 3, and 5 and 6: `motor = j2mp @ joint`. Power is
+conserved, so `tau_motor = inverse(j2mp).T @ tau_joint`. Counts per turn and puck units
+per N m are properties of each puck and must be read from it.
 """
 
 from collections.abc import Sequence
@@ -18,19 +18,19 @@ from acquisition.devices import Vector
 from acquisition.errors import DeviceFaultError, SettingsError
 
 MOTORS = 7
-# The smaller of the cable's limit (MT) and nine tenths of the safety module's warning.
+# Smaller of the cable's limit (MT) and 0.9 of the safety module's warning limit.
 HOST_TORQUE_LIMITS = (4257, 4257, 4257, 4257, 3900, 3900, 1600)
 
 Matrix = NDArray[np.float64]
 
 
 class TorqueCommand(NamedTuple):
-    """Torques for the pucks; a tuple, because it is made in every cycle.
+    """Torques for the pucks; a tuple for speed, one is made in every cycle.
 
     Attributes:
-        units: torque of each motor [puck units], whole numbers.
-        tau: joint torques those units make [N m], shape (7,).
-        is_clipped: a motor's limit cut the command.
+        units: motor torques [puck units], integers.
+        tau: resulting joint torques [N m], shape (7,).
+        is_clipped: a motor's limit reduced the command.
     """
 
     units: list[int]
@@ -40,7 +40,7 @@ class TorqueCommand(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Transmission:
-    """Cable ratios with the constants of one arm's pucks.
+    """Cable transmission with the constants of one arm's pucks.
 
     Attributes:
         j2mp: motor angles from joint angles, shape (7, 7).
@@ -68,8 +68,8 @@ class Transmission:
         m2jp = np.linalg.inv(j2mp)
         per_rad = np.array(self.cts) / (2 * pi)  # counts per rad at the motor
         ipnm = np.array(self.ipnm, dtype=np.float64)  # puck units per N m
-        # Power is the same on both sides, tau_m . qd_m = tau_q . qd_q, and with
-        # A = j2mp qd_m = A qd_q: so tau_q = A^T tau_m, and tau_m = A^-T tau_q.
+        # Power is conserved, tau_m . qd_m = tau_q . qd_q, with qd_m = A qd_q, A = j2mp:
+        # so tau_q = A^T tau_m and tau_m = A^-T tau_q.
         object.__setattr__(self, "j2mp", j2mp)
         object.__setattr__(self, "_joints_of_counts", m2jp / per_rad)
         object.__setattr__(self, "_counts_of_joints", per_rad[:, None] * j2mp)
@@ -79,24 +79,24 @@ class Transmission:
     def joints(self, counts: Sequence[float]) -> Vector:
         """Return joint positions [rad], shape (7,), of motor positions [counts].
 
-        The same line turns count rates [1/s] into joint velocities [rad/s].
+        Also converts count rates [1/s] to joint velocities [rad/s].
         """
         return self._joints_of_counts.dot(counts)
 
     def exact_counts(self, q: Vector) -> Vector:
-        """Return motor positions [counts, not whole], shape (7,), of joints [rad]."""
+        """Return unrounded motor positions [counts], shape (7,), of joints [rad]."""
         return self._counts_of_joints.dot(q)
 
     def counts(self, q: Vector) -> list[int]:
-        """Return motor positions [counts] of joint positions [rad], floored."""
+        """Return motor positions [counts] of joint positions [rad], rounded down."""
         return [floor(c) for c in self.exact_counts(q).tolist()]
 
     def fastest_counts(self, qd: Vector) -> Vector:
-        """Return count rates [1/s] that joints within ±`qd` [rad/s] cannot exceed."""
+        """Return the largest count rates [1/s] of joint velocities within ±`qd`."""
         return np.abs(self._counts_of_joints).dot(qd)
 
     def exact_units(self, tau: Vector) -> Vector:
-        """Return motor torques [puck units, not whole] of joint torques [N m]."""
+        """Return unrounded motor torques [puck units] of joint torques [N m]."""
         return self._units_of_tau.dot(tau)
 
     def tau(self, units: Sequence[float]) -> Vector:
@@ -106,12 +106,12 @@ class Transmission:
     def command(self, tau: Vector, tau_gravity: Vector) -> TorqueCommand:
         """Return the torques to send for `tau`, within the limits of every motor.
 
-        Where a limit would cut, gravity stays whole and everything else is scaled by
-        one factor, so that the arm neither drops nor pulls aside. Rounding comes
-        before the wire's floor, which alone would pull the arm down.
+        Beyond a limit the gravity part is kept and the remainder scaled by one factor,
+        so that the arm neither drops nor changes the direction of its force. Rounding
+        to nearest avoids the downward bias of the encoder, which rounds down.
 
         Args:
-            tau: joint torques wanted, gravity included [N m], shape (7,).
+            tau: desired joint torques including gravity [N m], shape (7,).
             tau_gravity: their gravity part [N m], shape (7,).
 
         Raises:
@@ -122,40 +122,40 @@ class Transmission:
                 f"Joint torques are not numbers: {tau.tolist()}.",
                 hint="This is an error of the program; nothing was sent.",
             )
-        wanted: list[float] = self.exact_units(tau).tolist()
-        is_clipped = not are_within(wanted, self.torque_limits)
+        exact: list[float] = self.exact_units(tau).tolist()
+        is_clipped = not are_within(exact, self.torque_limits)
         if is_clipped:
             gravity: list[float] = self.exact_units(tau_gravity).tolist()
-            wanted = keep_gravity(wanted, gravity, self.torque_limits)
-        units = [round(unit) for unit in wanted]
+            exact = keep_gravity(exact, gravity, self.torque_limits)
+        units = [round(unit) for unit in exact]
         return TorqueCommand(units, self.tau(units), is_clipped)
 
 
 def keep_gravity(
     wanted: Sequence[float], gravity: Sequence[float], limits: Sequence[float]
 ) -> list[float]:
-    """Return `wanted` cut to ±`limits`, with `gravity` kept and the rest scaled.
+    """Return `wanted` limited to ±`limits`, keeping `gravity`, scaling the remainder.
 
-    If gravity alone exceeds a limit, that motor gets its limit and nothing else is
-    added anywhere. All arguments are in the same unit, one value per motor.
+    If gravity alone exceeds a limit, that motor gets its limit and no remainder is
+    added to any motor. All arguments are in the same unit, one value per motor.
     """
-    held = [
+    kept = [
         min(max(g, -limit), limit) for g, limit in zip(gravity, limits, strict=True)
     ]
-    rest = [unit - g for unit, g in zip(wanted, gravity, strict=True)]
+    remainder = [unit - g for unit, g in zip(wanted, gravity, strict=True)]
     share = min(
         (
-            _room(h, r, limit) / abs(r) if r else inf
-            for h, r, limit in zip(held, rest, limits, strict=True)
+            _headroom(h, r, limit) / abs(r) if r else inf
+            for h, r, limit in zip(kept, remainder, limits, strict=True)
         ),
     )
     share = min(share, 1.0)
-    return [h + share * r for h, r in zip(held, rest, strict=True)]
+    return [h + share * r for h, r in zip(kept, remainder, strict=True)]
 
 
-def _room(held: float, rest: float, limit: float) -> float:
-    """Return how far a motor may still go in the direction of `rest`."""
-    return max(limit - held if rest > 0 else limit + held, 0.0)
+def _headroom(kept: float, remainder: float, limit: float) -> float:
+    """Return the torque left to the limit in the direction of `remainder`."""
+    return max(limit - kept if remainder > 0 else limit + kept, 0.0)
 
 
 def _check(j2mp: Matrix, constants: tuple[tuple[int, ...], ...]) -> None:

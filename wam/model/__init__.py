@@ -1,6 +1,6 @@
-"""The arm as a model: constants, kinematics, gravity, the tool on its wrist.
+"""Arm model: constants, kinematics, dynamics, gravity, tool, collision distances.
 
-`arm_model` and `clearance` import Pinocchio, `constants` reads the table of the arm,
-`tool` the sensor and foot, `gravity` and `moments` what the arm weighs. Begin with
+`arm_model` and `clearance` use Pinocchio, `constants` reads the arm's TOML file, `tool`
+describes sensor and foot, `gravity` and `moments` the gravity torques. Begin with
 `arm_model`.
 """

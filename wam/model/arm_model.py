@@ -17,10 +17,10 @@ from wam.model.tool import Tool
 
 
 def urdf(constants: ArmConstants) -> str:
-    """Return a URDF with links `wam_base`, `wam_l1`..`wam_l7` and seven joints.
+    """Return a URDF with links `wam_base`, `wam_l1`..`wam_l7`, `wam_tool`, 7 joints.
 
-    Joint i + 1 sits at S_i = Tz(d) Tx(a) Rx(alpha) of joint i; `ft_sensor` and the foot
-    are drawn at the end of the last one.
+    Joint i + 1 is at S_i = Tz(d) Tx(a) Rx(alpha) of joint i; `wam_tool`, to which a
+    viewer attaches sensor and foot, is at the end of the last link.
     """
     lines = [
         '<?xml version="1.0"?>',
@@ -61,7 +61,7 @@ _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 @dataclass(frozen=True, slots=True)
 class FootPath:
-    """The sole along a recording, in the base frame.
+    """Trajectory of the sole in the base frame.
 
     Attributes:
         position: centre of the sole [m], shape (n, 3).
@@ -128,8 +128,8 @@ def drive_inertia_matrix(constants: ArmConstants) -> Array:
 class ArmModel:
     """Kinematics and dynamics of the arm with its tool.
 
-    All results are in the base frame: origin where the axes of joints 1 and 2 cross,
-    z up. Arrays that are returned are new; nothing is shared between calls.
+    Results are in the base frame: origin at the intersection of the axes of joints 1
+    and 2, z up. Returned arrays are new, nothing is shared between calls.
     """
 
     def __init__(self, constants: ArmConstants, tool: Tool | None = None) -> None:
@@ -151,7 +151,10 @@ class ArmModel:
         return pin.computeGeneralizedGravity(self._model, self._data, q).copy()
 
     def weight_torque(self, q: Array, mass: float) -> Array:
-        """Return J_c^T (0, 0, -m g): the weight of `mass` [kg] at the foot's centre."""
+        """Return J_c^T (0, 0, -m g) [N m]: weight of `mass` [kg] at the foot's centre.
+
+        Shape (7,).
+        """
         jacobian = pin.computeFrameJacobian(
             self._model, self._data, q, self._foot_com, _AXES
         )
@@ -194,36 +197,37 @@ class ArmModel:
         return self._jacobian(q, self._sole)
 
     def sole_motion(self, q: Array, qd: Array) -> tuple[Array, Array, Array]:
-        """Return (pose (7,), rotation (3, 3), twist (6,)) of the sole at once.
+        """Return (pose (7,), rotation (3, 3), twist (6,)) of the sole.
 
-        The pose is the position [m] and the quaternion x y z w of the rotation, w >= 0.
+        Pose: position [m] and quaternion x y z w, w >= 0. Twist: linear [m/s], then
+        angular [rad/s].
         """
         pin.forwardKinematics(self._model, self._data, q, qd)
         placement = pin.updateFramePlacement(self._model, self._data, self._sole)
         velocity = pin.getFrameVelocity(self._model, self._data, self._sole, _AXES)
         pose = pin.SE3ToXYZQUAT(placement)
         if pose[6] < 0.0:
-            turn = pose[3:]
-            np.negative(turn, turn)
+            quaternion = pose[3:]
+            np.negative(quaternion, quaternion)
         return pose, placement.rotation, velocity.vector
 
     def sole_path(self, q: NDArray[np.float64]) -> FootPath:
-        """Return the sole along joint positions `q` [rad], shape (n, 7).
+        """Return the trajectory of the sole for joint positions `q` [rad], (n, 7).
 
-        All rows at once, joint by joint: the same as `sole_pose` of each to 1e-14.
+        Vectorised over the rows; agrees with `sole_pose` to 1e-14.
         """
-        across = np.ascontiguousarray(q.T)
-        sines, cosines = np.sin(across), np.cos(across)
+        joint_angles = np.ascontiguousarray(q.T)
+        sines, cosines = np.sin(joint_angles), np.cos(joint_angles)
         axes = np.repeat(np.eye(3)[:, :, None], len(q), axis=2)
         x, y, z = axes
         position = np.zeros_like(x)
         for joint in range(7):
-            _turn(x, y, cosines[joint], sines[joint])
-            part = _constant_part(self.constants, joint)
-            a, _, d = part.translation
+            _rotate(x, y, cosines[joint], sines[joint])
+            step = _constant_part(self.constants, joint)
+            a, _, d = step.translation
             if a or d:
                 position += a * x + d * z
-            _turn(y, z, part.rotation[1, 1], part.rotation[2, 1])
+            _rotate(y, z, step.rotation[1, 1], step.rotation[2, 1])
         sole = self.tool.sole if self.tool else np.zeros(3)
         position += sole[0] * x + sole[1] * y + sole[2] * z
         columns = np.ascontiguousarray(axes.transpose(2, 1, 0))
@@ -238,8 +242,8 @@ class ArmModel:
         return pin.computeFrameJacobian(self._model, self._data, q, frame, _AXES).copy()
 
 
-def _turn(u: Array, v: Array, c: Array, s: Array) -> None:
-    """Turn the axes u toward v in place: c u + s v and c v - s u, shapes (3, n)."""
+def _rotate(u: Array, v: Array, c: Array, s: Array) -> None:
+    """Rotate the axes u and v in place: c u + s v and c v - s u, shapes (3, n)."""
     to_u, from_v = s * v, s * u
     u *= c
     u += to_u

@@ -1,7 +1,7 @@
 # pyright: basic, reportMissingImports=false
-"""How far the arm is from itself, the floor and what stands around it.
+"""Collision distances of the arm to itself, the floor and obstacles.
 
-The arm is capsules and balls that enclose its links; what stands around it is boxes.
+The links are enclosed by capsules and spheres, the obstacles are boxes.
 """
 
 from collections.abc import Sequence
@@ -16,12 +16,12 @@ from wam.model.arm_model import build_pinocchio
 from wam.model.constants import ArmConstants, Array
 from wam.model.tool import Tool
 
-BASE_HEIGHT = 0.346  # of the axis of joint 2 above what the arm stands on [m]
-CLEARANCE_MARGIN = 0.03  # m; no pair of bodies comes closer on a way
-STEP = 0.02  # rad between two looks at a way, at most
-_SLACK = 0.002  # m a way may come closer than its ends, where these are close already
+BASE_HEIGHT = 0.346  # height of the axis of joint 2 above the mounting surface [m]
+CLEARANCE_MARGIN = 0.03  # m; least distance of a pair of bodies on a path
+STEP = 0.02  # largest joint step between checked points of a path [rad]
+_SLACK = 0.002  # m that a path may come closer than its ends, if these are close
 _FLOOR = "the floor"
-# What may meet what, by the names of `_bodies`; neighbours always touch.
+# Collision pairs by the names of `_bodies`, without neighbours, which always touch.
 _REACHED_BY = {
     "the base": ("the elbow", "the forearm", "the wrist", "the foot"),
     "the shoulder": ("the forearm", "the wrist", "the foot"),
@@ -32,12 +32,12 @@ _MOVING = ("the upper arm", "the elbow", "the forearm", "the wrist", "the foot")
 
 @dataclass(frozen=True, slots=True)
 class ObstacleBox:
-    """Something that stands still.
+    """A fixed box.
 
     Attributes:
-        name: what it is, with its article.
-        center: of the box in the base frame [m], shape (3,).
-        size: along its own axes [m], shape (3,).
+        name: name with its article, for messages.
+        center: centre in the base frame [m], shape (3,).
+        size: side lengths along its own axes [m], shape (3,).
         rotation: box to base, shape (3, 3).
     """
 
@@ -49,19 +49,19 @@ class ObstacleBox:
 
 @dataclass(frozen=True, slots=True)
 class BodyGap:
-    """Two bodies and how far apart they are [m]; below 0 they overlap."""
+    """Distance of two bodies [m]; negative if they overlap."""
 
     first: str
     second: str
     distance: float
 
     def text(self) -> str:
-        """Return the pair and the gap in words."""
+        """Return pair and distance as text."""
         return f"{self.first} {1e3 * self.distance:.0f} mm from {self.second}"
 
 
 class ArmClearance:
-    """Distances between the bodies of one arm and its surroundings."""
+    """Collision distances of one arm and its surroundings."""
 
     def __init__(
         self,
@@ -70,13 +70,13 @@ class ArmClearance:
         obstacles: Sequence[ObstacleBox] = (),
         floor: float = -BASE_HEIGHT,
     ) -> None:
-        """Enclose the arm.
+        """Build the collision model.
 
         Args:
-            constants: of the arm.
-            tool: below its wrist.
-            obstacles: what stands around it.
-            floor: height of what it stands on [m], base frame.
+            constants: constants of the arm.
+            tool: tool on its plate.
+            obstacles: fixed boxes around the arm.
+            floor: height of the mounting surface in the base frame [m].
         """
         self._model = build_pinocchio(constants)
         self._data = self._model.createData()
@@ -85,7 +85,9 @@ class ArmClearance:
             name: self._add(name, *body) for name, body in _bodies(constants, tool)
         }
         slab = coal.Box(6.0, 6.0, 1.0)
-        indices[_FLOOR] = self._add(_FLOOR, 0, slab, _at(0.0, 0.0, floor - 0.5))
+        indices[_FLOOR] = self._add(
+            _FLOOR, 0, slab, _translation(0.0, 0.0, floor - 0.5)
+        )
         reached_by = {**_REACHED_BY, _FLOOR: _MOVING}
         for box in obstacles:
             placement = pin.SE3(box.rotation, box.center)
@@ -112,10 +114,10 @@ class ArmClearance:
         return self._gap(self.distances(q))
 
     def first_hit(self, start: Array, goal: Array) -> BodyGap | None:
-        """Return what comes closer than the margin on the straight way; None = nothing.
+        """Return the first pair closer than the margin on the straight path, or None.
 
-        A pair that is closer at an end, such as the foot in its container, may be left
-        and reached, but comes no closer on the way.
+        A pair already closer at an end of the path, such as foot and container, is
+        allowed if it comes no closer in between.
 
         Args:
             start: joint positions [rad], shape (7,).
@@ -145,35 +147,35 @@ class ArmClearance:
 
 
 def straight_way(start: Array, goal: Array, step: float = STEP) -> NDArray[np.float64]:
-    """Return joint positions on the straight way, shape (n, 7), n >= 2.
+    """Return joint positions on the straight path, shape (n, 7), n >= 2.
 
-    No joint turns by more than `step` [rad] between two of them.
+    No joint turns by more than `step` [rad] between two rows.
     """
     count = 2 + int(np.abs(goal - start).max() / step)
     return start + np.linspace(0.0, 1.0, count)[:, None] * (goal - start)
 
 
-def _at(x: float, y: float, z: float) -> "pin.SE3":
+def _translation(x: float, y: float, z: float) -> "pin.SE3":
     return pin.SE3(np.eye(3), np.array([x, y, z]))
 
 
 def _bodies(
     constants: ArmConstants, tool: Tool
 ) -> list[tuple[str, tuple[int, "coal.ShapeBase", "pin.SE3"]]]:
-    """Return (name, (joint, shape, place in the joint's frame)) of every link.
+    """Return (name, (joint, shape, placement in the joint's frame)) of every link.
 
-    Joints 3, 5 and 7 turn about the length of upper arm, forearm and foot.
+    Upper arm, forearm and foot are capsules along the axes of joints 3, 5 and 7.
     """
     upper, fore = constants.d[2], constants.d[4]
     x, y, _ = tool.sole.tolist()
     end = float(constants.d[6] + tool.sole[2])
     return [
         ("the base", (0, *_capsule(0.12, -BASE_HEIGHT, -0.10))),
-        ("the shoulder", (1, coal.Sphere(0.15), _at(0.0, 0.0, 0.0))),
+        ("the shoulder", (1, coal.Sphere(0.15), _translation(0.0, 0.0, 0.0))),
         ("the upper arm", (3, *_capsule(0.08, 0.08, upper))),
-        ("the elbow", (4, coal.Sphere(0.09), _at(0.0, 0.0, 0.0))),
+        ("the elbow", (4, coal.Sphere(0.09), _translation(0.0, 0.0, 0.0))),
         ("the forearm", (5, *_capsule(0.065, 0.0, fore))),
-        ("the wrist", (6, coal.Sphere(0.065), _at(0.0, 0.0, 0.0))),
+        ("the wrist", (6, coal.Sphere(0.065), _translation(0.0, 0.0, 0.0))),
         ("the foot", (7, *_capsule(0.045, 0.0, end, x, y))),
     ]
 
@@ -181,6 +183,6 @@ def _bodies(
 def _capsule(
     radius: float, low: float, high: float, x: float = 0.0, y: float = 0.0
 ) -> tuple["coal.Capsule", "pin.SE3"]:
-    """Return a capsule along z from `low` to `high` [m], its round ends included."""
+    """Return a capsule along z from `low` to `high` [m], hemispheres included."""
     length = max(high - low - 2.0 * radius, 1e-3)
-    return coal.Capsule(radius, length), _at(x, y, 0.5 * (low + high))
+    return coal.Capsule(radius, length), _translation(x, y, 0.5 * (low + high))

@@ -1,4 +1,4 @@
-"""The arm's constants, read from TOML and checked."""
+"""Constants of the arm, read from TOML and validated."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -104,14 +104,14 @@ class ConstantsControlSection(SettingsSection):
 
 
 class GravityConstantsSection(SettingsSection):
-    """First moments [kg m] as the maker calibrates them."""
+    """First moments [kg m] and poses of the maker's gravity calibration."""
 
     mus: tuple[_Vector3, _Vector3, _Vector3, _Vector3, _Vector3, _Vector3, _Vector3]
     poses: Many[_Vector7]
 
 
 class ConstantsFile(SettingsSection):
-    """The whole file."""
+    """Layout of the file."""
 
     kinematics: KinematicsSection
     joint_limits: LimitsSection
@@ -136,7 +136,7 @@ class Body:
 
 @dataclass(frozen=True, slots=True)
 class ArmConstants:
-    """What is fixed about the arm; SI, seven joints or motors per array.
+    """Constants of the arm; SI units, seven joints or motors per array.
 
     Attributes:
         alpha: Denavit-Hartenberg twists [rad].
@@ -148,9 +148,9 @@ class ArmConstants:
         j2mp: motor angle = j2mp @ joint angle, shape (7, 7).
         cts: encoder counts per motor turn (factory).
         ipnm: torque units per N m at the motor (factory).
-        poles: motor poles; puck 7 tells wrist from gimbals.
-        mt: torque clamp of each puck [puck units].
-        drive_inertia: at the rotors [kg m^2].
+        poles: motor poles; those of puck 7 distinguish a wrist from gimbals.
+        mt: torque limit of each puck [puck units].
+        drive_inertia: drive inertia at the rotors [kg m^2].
         links: the seven links in their own distal frames.
         mus: first moments of another arm, frames 1..7 [kg m], shape (7, 3).
         calibration_poses: poses of a gravity calibration [rad], shape (n, 7).
@@ -158,7 +158,7 @@ class ArmConstants:
         viscous: viscous friction of another arm [N m s/rad].
         kp: joint position gains [N m/rad].
         kd: joint damping gains [N m s/rad].
-        text: the TOML they came from, for the recording.
+        text: TOML source, for the recording.
     """
 
     alpha: Array
@@ -183,7 +183,7 @@ class ArmConstants:
     text: str
 
 
-@lru_cache(maxsize=8)  # every trial of a study carries the same
+@lru_cache(maxsize=8)  # the trials of a study usually carry the same text
 def _parsed(text: str) -> ConstantsFile:
     return ConstantsFile.model_validate(parse_toml(text))
 
@@ -192,7 +192,7 @@ def load_constants(text: str | None = None) -> ArmConstants:
     """Return the constants in `text` (TOML), by default those shipped.
 
     Raises:
-        SettingsError: `text` is no TOML or not of this form.
+        SettingsError: `text` is not TOML, or not a valid file of constants.
     """
     if text is None:
         text = (resources.files("wam.data") / "wam7.toml").read_text()

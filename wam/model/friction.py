@@ -1,15 +1,15 @@
 """Dry and viscous friction of the drives, as torques at the motors.
 
-Friction sits where the cables run over pulleys, so it is stated for the motors: where a
-differential couples two joints, both of its motors rub whenever either joint turns. The
-steady torque of a motor that turns at w is
+Friction acts where the cables run over pulleys, so it is modelled at the motors: both
+motors of a differential have friction whenever either of its joints turns. The steady
+torque of a motor at speed w is
 
     g(w) = (F_c +- F_a + mu (|tau| - |tau_0|)) (1 + ripple) S(w)
     S(w) = 1 + (s - 1) / (1 + (w / w_s)^2)
 
-in the sense of the motion, plus b w. Below g a bristle gives way elastically, as in the
-elasto-plastic model of Dupont, Hayward, Armstrong and Altpeter: its deflection follows
-the motion by 1 - alpha |z|, z in units of the deflection at which it slides.
+against the motion, plus b w. Below g a bristle deflects elastically, as in the
+elasto-plastic model of Dupont, Hayward, Armstrong and Altpeter (2002): the deflection
+rate is the motion times 1 - alpha |z|, z in units of the sliding deflection.
 """
 
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ import numpy as np
 from wam.model.constants import ArmConstants, Array
 
 _LARGEST = 1e4  # of any parameter
-ELASTIC = 0.7  # share of the sliding deflection below which a bristle only bends
+ELASTIC = 0.7  # share of the sliding deflection up to which a bristle is elastic
 _PLASTIC = 1.0 - ELASTIC
 
 
@@ -29,12 +29,12 @@ class MotorFriction:
     """Friction of the seven drives; N m, rad and rad/s at the motors, shapes (7,).
 
     Attributes:
-        coulomb: F_c, mean of both ways at the torque `load_at` [N m].
-        asymmetry: F_a, half of forwards minus backwards [N m].
-        load: mu, growth with the torque that the motor bears [N m per N m].
-        load_at: |tau_0|, torque at which `coulomb` holds [N m].
-        breakaway: s, torque at standstill as a multiple of sliding torque.
-        stribeck: w_s, speed at which half of the difference is gone [rad/s].
+        coulomb: F_c, mean of both senses at the load `load_at` [N m].
+        asymmetry: F_a, half of (forward - backward) [N m].
+        load: mu, increase with the motor's load torque [N m per N m].
+        load_at: |tau_0|, reference load of `coulomb` [N m].
+        breakaway: s, break-away torque as a multiple of sliding torque.
+        stribeck: w_s, speed at half of the break-away excess [rad/s].
         viscous: b [N m s/rad].
         ripple_sin: share of sin(angle of the motor) in the dry friction.
         ripple_cos: share of cos(angle of the motor).
@@ -53,7 +53,7 @@ class MotorFriction:
     presliding: Array
 
     def metadata(self) -> dict[str, list[float]]:
-        """Return the parameters in plain values, by name."""
+        """Return the parameters as lists, by name."""
         return {
             field.name: getattr(self, field.name).tolist() for field in fields(self)
         }
@@ -62,22 +62,22 @@ class MotorFriction:
         """Return the dry friction of fast sliding [N m], shape (..., 7), above 0.
 
         Args:
-            angle: of the motors [rad], shape (..., 7).
-            tau: torques that the motors bear [N m], shape (..., 7).
-            sense: of the motion, +1 or -1, shape (..., 7).
+            angle: motor angles [rad], shape (..., 7).
+            tau: load torques of the motors [N m], shape (..., 7).
+            sense: sense of motion, +1 or -1, shape (..., 7).
         """
         ripple = self.ripple_sin * np.sin(angle) + self.ripple_cos * np.cos(angle)
         growth = self.load * (np.abs(tau) - self.load_at)
-        level = self.coulomb + growth + sense * self.asymmetry
-        return np.maximum(level, 1e-9) * (1.0 + ripple)
+        base = self.coulomb + growth + sense * self.asymmetry
+        return np.maximum(base, 1e-9) * (1.0 + ripple)
 
     def steady(self, angle: Array, tau: Array, speed: Array) -> Array:
-        """Return the torque against a steady motion at `speed` [N m], shape (..., 7).
+        """Return the friction torque of steady motion at `speed` [N m], (..., 7).
 
         Args:
-            angle: of the motors [rad], shape (..., 7).
-            tau: torques that the motors bear [N m], shape (..., 7).
-            speed: of the motors [rad/s], shape (..., 7); its sign is the sense.
+            angle: motor angles [rad], shape (..., 7).
+            tau: load torques of the motors [N m], shape (..., 7).
+            speed: signed motor speeds [rad/s], shape (..., 7).
         """
         excess = (self.breakaway - 1.0) / (1.0 + (speed / self.stribeck) ** 2)
         sense = np.where(speed < 0.0, -1.0, 1.0)
@@ -86,11 +86,11 @@ class MotorFriction:
 
 
 def friction_of(metadata: Mapping[str, object]) -> MotorFriction:
-    """Return the friction that `MotorFriction.metadata` describes.
+    """Return the friction with the parameters of `MotorFriction.metadata`.
 
     Raises:
         KeyError: a parameter is missing.
-        ValueError: one has not seven finite numbers, or cannot be true.
+        ValueError: not seven finite numbers, or out of range.
     """
     friction = MotorFriction(
         **{field.name: _seven(metadata[field.name]) for field in fields(MotorFriction)}
@@ -111,44 +111,44 @@ def _seven(value: object) -> Array:
 
 
 def plastic_share(deflection: float) -> float:
-    """Return alpha, the share of a motion that slides instead of bending the bristle.
+    """Return alpha of the elasto-plastic model for a growing deflection.
 
-    For a motion that bends it further; one that unbends it is elastic (alpha = 0).
+    For a decreasing deflection alpha is 0 (elastic).
 
     Args:
-        deflection: |z|, 1 = that of steady sliding.
+        deflection: |z|, 1 in steady sliding.
     """
     share = (deflection - ELASTIC) / _PLASTIC
     return 0.0 if share < 0.0 else 1.0 if share > 1.0 else share
 
 
 def joint_coulomb(constants: ArmConstants, coulomb: Array) -> Array:
-    """Return the Coulomb torque at each joint that turns alone [N m], shape (7,).
+    """Return the Coulomb torque of each joint turning alone [N m], shape (7,).
 
     Args:
-        constants: of the arm.
-        coulomb: at the motors [N m], shape (7,).
+        constants: constants of the arm.
+        coulomb: Coulomb torques of the motors [N m], shape (7,).
     """
     return np.abs(constants.j2mp).T @ coulomb
 
 
 def motor_shares(constants: ArmConstants, of_joints: Array, power: int) -> Array:
-    """Return what the motors contribute to a quantity of the joints, shape (7,).
+    """Return motor values whose sum at the joints is a given quantity, shape (7,).
 
-    Torques add up at a joint by |j2mp|, damping by j2mp^2. A differential has one
-    figure for both of its motors: the mean of what its two joints ask for.
+    Torques add up at a joint by |j2mp|, damping by j2mp^2. Both motors of a
+    differential get the mean of the values for its two joints.
 
     Args:
-        constants: of the arm.
+        constants: constants of the arm.
         of_joints: the quantity at the joints, shape (7,).
         power: 1 for torques, 2 for damping.
     """
     weights = np.abs(constants.j2mp) ** power
-    wanted = of_joints / weights.sum(axis=0)
+    per_joint = of_joints / weights.sum(axis=0)
     is_coupled = weights > 0.0
-    return (is_coupled * wanted).sum(axis=1) / is_coupled.sum(axis=1)
+    return (is_coupled * per_joint).sum(axis=1) / is_coupled.sum(axis=1)
 
 
 def motor_turns(constants: ArmConstants) -> Array:
-    """Return how far each motor turns per radian of its quickest joint, shape (7,)."""
+    """Return the largest |d motor / d joint| of each motor, shape (7,)."""
     return np.abs(constants.j2mp).max(axis=1)

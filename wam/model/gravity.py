@@ -10,15 +10,15 @@ from wam.model.moments import (
 )
 from wam.model.tool import Tool
 
-RAMP = 2.0  # the virtual mass comes and goes within this time [s]
+RAMP = 2.0  # ramp of the virtual mass [s]
 MAX_VIRTUAL_MASS = 2.0  # kg
 
 
 class VirtualMass:
-    """A mass that is ramped to its target within two seconds.
+    """Virtual mass at the foot, ramped to its target within two seconds.
 
-    Its weight, not its inertia, is added at the foot's centre of mass: `augmented
-    gravity compensation`.
+    Only its weight acts, not its inertia, at the foot's centre of mass ("augmented
+    gravity compensation").
     """
 
     def __init__(self) -> None:
@@ -27,7 +27,7 @@ class VirtualMass:
         self._since_ns = 0
 
     def aim(self, mass: float, now_ns: int) -> None:
-        """Ramp to `mass` [kg] from where it is now.
+        """Ramp from the present mass to `mass` [kg].
 
         Raises:
             ValueError: `mass` is outside 0..2 kg.
@@ -39,7 +39,7 @@ class VirtualMass:
         self._since_ns = now_ns
 
     def at(self, now_ns: int) -> float:
-        """Return the mass [kg] in force at `now_ns`."""
+        """Return the mass at `now_ns` [kg]."""
         share = (now_ns - self._since_ns) * 1e-9 / RAMP
         return self._from + (self._to - self._from) * min(max(share, 0.0), 1.0)
 
@@ -47,8 +47,8 @@ class VirtualMass:
 def compensation(model: ArmModel, q: Array, virtual_mass: float) -> Array:
     """Return g(q) of arm, sensor and foot plus J_c^T (0, 0, -m_v g) [N m], (7,).
 
-    The first term floats everything; the second presses the foot down with the weight
-    of `virtual_mass` [kg], so in equilibrium the ground carries just that.
+    The first term compensates gravity; the second presses the foot down with the weight
+    of `virtual_mass` [kg], which in equilibrium is the load on the ground.
     """
     tau = model.gravity(q)
     if virtual_mass:
@@ -59,18 +59,18 @@ def compensation(model: ArmModel, q: Array, virtual_mass: float) -> Array:
 def gravity_model(
     constants: ArmConstants, tool: Tool, mus: Array, fitted: Tool | None = None
 ) -> ArmModel:
-    """Return a model whose gravity is that of first moments instead of masses.
+    """Return a model whose gravity is given by first moments instead of masses.
 
-    Moments are linear in the bodies: those of the tool that was on the plate when they
-    were fitted are taken off, `tool` is put on. With the same tool nothing changes.
-    Only the model's gravity and frames mean something; its inertia does not.
+    First moments are linear in the bodies: those of the tool `fitted` are subtracted,
+    those of `tool` added. Only gravity and frames of the model are valid, not its
+    inertia.
 
     Args:
-        constants: of the arm.
-        tool: sensor and foot that are on the plate now.
+        constants: constants of the arm.
+        tool: sensor and foot now on the plate.
         mus: first moments [kg m], shape (7, 3).
-        fitted: what hung on the plate when they were fitted; None = nothing, as for
-            the shipped ones.
+        fitted: tool on the plate during the fit; None = none, as for the shipped
+            moments.
     """
     if fitted is not None:
         mus = _without_tool(constants, mus, fitted)

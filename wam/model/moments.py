@@ -4,8 +4,8 @@ Without masses, the holding torque is linear in mu_j (kg m, frame j), from the t
 
     t_j = g_j x mu_j + R_{j+1} t_{j+1},   tau_j = (R_j t_j)_z
 
-g_j is gravity in frame j, R_j turns frame j into frame j - 1. Only 12 of the 21 numbers
-can be seen in the torques: compare torques, never moments.
+g_j is gravity in frame j, R_j rotates from frame j to frame j - 1. Only 12 of the 21
+parameters are identifiable from torques: compare torques, never moments.
 """
 
 from dataclasses import dataclass
@@ -16,15 +16,15 @@ from numpy.typing import NDArray
 from acquisition.errors import SettingsError
 from wam.model.constants import GRAVITY, ArmConstants, Array, Body
 
-OBSERVABLE = 12  # numbers of the 21 that show in the torques
+OBSERVABLE = 12  # identifiable parameters of the 21
 LARGEST_RESIDUAL = 0.5  # N m rms over all joints and poses
-LARGEST_CONDITION = 30.0  # of what is observable; the shipped poses have 7
+LARGEST_CONDITION = 30.0  # of the identifiable part; the shipped poses have 7
 LARGEST_ZERO_ERROR = 3.0  # degrees
-FARTHEST = 5.0  # N m from the drawings; another arm's moments are 2.3 off at most
-SEEN_ZEROS = (2, 3, 4, 5)  # joints whose zero shows in the torques
-_TURN = 1e-5  # rad of a difference that stands for a slope
-_LEAST_NOISE = 0.01  # N m that torques are known to at best
-_SINGULAR = 1e-3  # of the largest singular value: below it a direction is not seen
+FARTHEST = 5.0  # N m from the drawings; another arm's moments differ by at most 2.3
+SEEN_ZEROS = (2, 3, 4, 5)  # joints whose zero error is identifiable from torques
+_TURN = 1e-5  # step of the finite difference [rad]
+_LEAST_NOISE = 0.01  # lower bound of the torque noise [N m]
+_SINGULAR = 1e-3  # of the largest singular value; smaller ones count as zero
 
 
 def regressor(constants: ArmConstants, q: Array, gravity: float = GRAVITY) -> Array:
@@ -49,15 +49,15 @@ def regressor(constants: ArmConstants, q: Array, gravity: float = GRAVITY) -> Ar
 def gravity_torque(
     constants: ArmConstants, mus: Array, q: Array, gravity: float = GRAVITY
 ) -> Array:
-    """Return the torques that hold an arm of first moments `mus` [N m], shape (7,)."""
+    """Return the holding torques of first moments `mus` [N m], shape (7,)."""
     return regressor(constants, q, gravity) @ mus.ravel()
 
 
 def moments_of_links(constants: ArmConstants, bodies: tuple[Body, ...] = ()) -> Array:
-    """Return the first moments of the links by their masses [kg m], shape (7, 3).
+    """Return first moments from the masses of the links [kg m], shape (7, 3).
 
-    mu_j = m_j com_j + (m_j + ... + m_7) r_j with r_j the step from frame j - 1 to
-    frame j, in frame j. `bodies` hang on the tool plate, in frame 7.
+    mu_j = m_j com_j + (m_j + ... + m_7) r_j with r_j the vector from frame j - 1 to
+    frame j, in frame j. `bodies` are on the tool plate, in frame 7.
     """
     mus = np.zeros((7, 3))
     carried = 0.0
@@ -74,8 +74,8 @@ def moments_of_links(constants: ArmConstants, bodies: tuple[Body, ...] = ()) -> 
 def links_of_moments(constants: ArmConstants, mus: Array) -> tuple[Body, ...]:
     """Return links of 1 kg each whose first moments are `mus` [kg m], shape (7, 3).
 
-    They weigh what the arm weighs in every pose, so a rigid-body library evaluates
-    `mus` at its own speed; their inertia means nothing.
+    Their gravity torques equal those of `mus` in every pose, so a rigid-body library
+    can evaluate them; their inertia is not valid.
     """
     none = np.zeros((3, 3))
     return tuple(
@@ -89,11 +89,10 @@ class MomentFit:
     """Outcome of a gravity calibration.
 
     Attributes:
-        mus: first moments of least norm [kg m], shape (7, 3); with the tool that was
-            fitted.
-        rank: directions that the poses showed, 12 at best.
-        condition: largest over smallest of the singular values of those directions.
-        residuals: measured less explained torques [N m], shape (n, 7).
+        mus: first moments of least norm, mounted tool included [kg m], shape (7, 3).
+        rank: rank of the regressor over the poses, 12 at best.
+        condition: ratio of the largest to the smallest nonzero singular value.
+        residuals: measured minus predicted torques [N m], shape (n, 7).
     """
 
     mus: Array
@@ -110,12 +109,12 @@ class MomentFit:
 def fit_moments(
     constants: ArmConstants, q: NDArray[np.float64], tau: NDArray[np.float64]
 ) -> MomentFit:
-    """Fit first moments to holding torques; `check_fit` says whether to trust them.
+    """Fit first moments to holding torques by least squares; see `check_fit`.
 
     Args:
-        constants: of the arm.
+        constants: constants of the arm.
         q: joint positions at rest [rad], shape (n, 7).
-        tau: holding torques there, free of friction [N m], shape (n, 7).
+        tau: holding torques without friction [N m], shape (n, 7).
     """
     if q.shape != tau.shape or q.ndim != 2 or q.shape[1] != 7:
         raise ValueError(f"q and tau must be (n, 7), got {q.shape} and {tau.shape}")
@@ -130,13 +129,13 @@ def fit_of(
     q: NDArray[np.float64],
     tau: NDArray[np.float64],
 ) -> MomentFit:
-    """Return how well given moments explain holding torques, as `fit_moments` does.
+    """Return rank, condition and residuals of given first moments.
 
     Args:
-        constants: of the arm.
+        constants: constants of the arm.
         mus: first moments [kg m], shape (7, 3).
         q: joint positions at rest [rad], shape (n, 7).
-        tau: holding torques there, free of friction [N m], shape (n, 7).
+        tau: holding torques without friction [N m], shape (n, 7).
     """
     Y = np.vstack([regressor(constants, row) for row in q])
     values = np.linalg.svd(Y, compute_uv=False)
@@ -151,12 +150,12 @@ def fit_of(
 
 @dataclass(frozen=True, slots=True)
 class ZeroErrors:
-    """Errors of the joints' zeros that would explain the torques better.
+    """Estimated zero errors of the joints.
 
     Attributes:
-        joints: numbers of the joints whose zero shows in the torques.
-        errors: true less believed position of each [rad], shape (4,).
-        deviations: standard deviation of each [rad], shape (4,).
+        joints: numbers of the joints with an identifiable zero error.
+        errors: true minus reported position [rad], shape (4,).
+        deviations: standard deviations of the errors [rad], shape (4,).
     """
 
     joints: tuple[int, ...]
@@ -167,31 +166,32 @@ class ZeroErrors:
 def zero_errors(
     constants: ArmConstants, q: NDArray[np.float64], fit: MomentFit
 ) -> ZeroErrors:
-    """Return what the residuals of a fit say about the zeros of joints 2 to 5.
+    """Estimate the zero errors of joints 2 to 5 from the residuals of a fit.
 
-    To first order residuals = P (dg/dq) e, with P the projection on what no moments
-    explain. The zeros of joints 1 and 7 do not show at all (a vertical axis, and
-    moments that turn with it), that of joint 6 hardly: 1 N m would be 1000 degrees.
+    To first order residuals = P (dg/dq) e, with P the projection on the complement of
+    the regressor's range. The zero errors of joints 1 and 7 are not identifiable (a
+    vertical axis; moments that turn with the joint), that of joint 6 hardly: 1 N m
+    would be 1000 degrees.
 
     Args:
-        constants: of the arm.
+        constants: constants of the arm.
         q: joint positions at rest [rad], shape (n, 7).
-        fit: of the torques there.
+        fit: fit of the torques at `q`.
     """
     Y = np.vstack([regressor(constants, row) for row in q])
-    seen = np.linalg.svd(Y, full_matrices=False)[0][:, : fit.rank]
+    basis = np.linalg.svd(Y, full_matrices=False)[0][:, : fit.rank]
     slopes = np.empty((len(Y), len(SEEN_ZEROS)))
     for column, joint in enumerate(SEEN_ZEROS):
-        turned = q.copy()
-        turned[:, joint - 1] += _TURN
-        later = np.vstack([regressor(constants, row) for row in turned])
-        slope = (later - Y) @ fit.mus.ravel() / _TURN
-        slopes[:, column] = slope - seen @ (seen.T @ slope)
+        displaced = q.copy()
+        displaced[:, joint - 1] += _TURN
+        Y_displaced = np.vstack([regressor(constants, row) for row in displaced])
+        slope = (Y_displaced - Y) @ fit.mus.ravel() / _TURN
+        slopes[:, column] = slope - basis @ (basis.T @ slope)
     residuals = fit.residuals.ravel()
     errors = np.linalg.lstsq(slopes, residuals)[0]
-    left = residuals - slopes @ errors
-    free = max(len(left) - fit.rank - len(SEEN_ZEROS), 1)
-    noise = max(float(left @ left) / free, _LEAST_NOISE**2)
+    remaining = residuals - slopes @ errors
+    freedom = max(len(remaining) - fit.rank - len(SEEN_ZEROS), 1)
+    noise = max(float(remaining @ remaining) / freedom, _LEAST_NOISE**2)
     covariance = noise * np.linalg.pinv(slopes.T @ slopes)
     deviations = np.sqrt(np.diag(covariance))
     return ZeroErrors(
@@ -199,22 +199,21 @@ def zero_errors(
     )
 
 
-def check_zeros(found: ZeroErrors) -> None:
-    """Refuse an arm whose torques say that it was zeroed away from home.
+def check_zeros(zeros: ZeroErrors) -> None:
+    """Refuse an arm that was zeroed away from home according to its gravity torques.
 
     Raises:
-        SettingsError: a joint is further off than 3 degrees, and than four standard
-            deviations.
+        SettingsError: a zero error exceeds 3 degrees and four standard deviations.
     """
-    degrees, sure = np.degrees(found.errors), 4.0 * np.degrees(found.deviations)
-    beyond = np.abs(degrees) / np.maximum(sure, LARGEST_ZERO_ERROR)
-    worst = int(beyond.argmax())
-    if beyond[worst] <= 1.0:
+    degrees, thresholds = np.degrees(zeros.errors), 4.0 * np.degrees(zeros.deviations)
+    ratios = np.abs(degrees) / np.maximum(thresholds, LARGEST_ZERO_ERROR)
+    worst = int(ratios.argmax())
+    if ratios[worst] <= 1.0:
         return
     raise SettingsError(
-        f"Joint {found.joints[worst]} seems to be zeroed {degrees[worst]:+.1f} degrees "
+        f"Joint {zeros.joints[worst]} seems to be zeroed {degrees[worst]:+.1f} degrees "
         f"away from home (limit {LARGEST_ZERO_ERROR:g}, standard deviation "
-        f"{sure[worst] / 4.0:.1f}): its weight pulls elsewhere.",
+        f"{thresholds[worst] / 4.0:.1f}), by its gravity torques.",
         hint="Bring the arm home and zero it anew: traction zero.",
     )
 
@@ -222,24 +221,24 @@ def check_zeros(found: ZeroErrors) -> None:
 def check_drawings(
     constants: ArmConstants, mus: Array, bodies: tuple[Body, ...], q: Array
 ) -> None:
-    """Refuse moments of no such arm.
+    """Refuse first moments far from the drawings.
 
     Args:
-        constants: of the arm by its drawings.
-        mus: first moments [kg m], shape (7, 3), with `bodies`.
-        bodies: that hung on the tool plate.
-        q: joint positions at which they are compared [rad], shape (n, 7).
+        constants: constants of the arm by its drawings.
+        mus: first moments including `bodies` [kg m], shape (7, 3).
+        bodies: bodies on the tool plate during the measurement.
+        q: joint positions of the comparison [rad], shape (n, 7).
 
     Raises:
-        SettingsError: somewhere they are more than 5 N m off.
+        SettingsError: a gravity torque differs by more than 5 N m.
     """
     change = (mus - moments_of_links(constants, bodies)).ravel()
-    off = np.array([regressor(constants, row) @ change for row in q])
-    pose, joint = np.unravel_index(np.abs(off).argmax(), off.shape)
-    worst = float(abs(off[pose, joint]))
+    differences = np.array([regressor(constants, row) @ change for row in q])
+    pose, joint = np.unravel_index(np.abs(differences).argmax(), differences.shape)
+    worst = float(abs(differences[pose, joint]))
     if not worst <= FARTHEST:
         raise SettingsError(
-            f"The arm would weigh {worst:.1f} N m otherwise than drawn at joint "
+            f"The gravity torque differs by {worst:.1f} N m from the drawings at joint "
             f"{joint + 1} in pose {pose + 1} (limit {FARTHEST:g}).",
             hint="Is the tool in rig.toml the one that was on, and the arm zeroed at "
             "home?",
@@ -247,11 +246,10 @@ def check_drawings(
 
 
 def check_fit(fit: MomentFit) -> None:
-    """Refuse a fit that would not float the arm.
+    """Refuse a fit that is not good enough to float the arm.
 
     Raises:
-        SettingsError: the poses show fewer than 12 directions or some of them poorly,
-            or no moments explain the torques to 0.5 N m.
+        SettingsError: rank below 12, condition above 30, or residual above 0.5 N m rms.
     """
     if fit.rank < OBSERVABLE:
         raise SettingsError(

@@ -1,4 +1,4 @@
-"""Joint positions that put the sole flat on a plane: near a known pose, or anew."""
+"""Inverse kinematics: joint positions that put the sole flat on a plane."""
 
 import numpy as np
 
@@ -6,13 +6,13 @@ from acquisition.errors import SettingsError
 from wam.model.arm_model import ArmModel
 from wam.model.constants import Array
 
-_CLOSE = 1e-9  # m and rad, where a search ends
+_CLOSE = 1e-9  # convergence of the iteration [m], [rad]
 _LARGEST_STEP = 0.5  # rad
-_STEPS = 60  # of a search from a seed
-_DAMPING = 1e-3  # of its steps
-# Joints 2, 4 and 6 of arms with the elbow up, reaching far, mid and near [rad].
+_STEPS = 60  # iterations from a seed
+_DAMPING = 1e-3  # damping of the iteration
+# Joints 2, 4 and 6 with the elbow up, reaching far, mid and near [rad].
 _SEEDS = ((0.77, 1.19, 1.19), (0.35, 1.75, 1.0), (1.1, 0.7, 1.3))
-_TWISTED = 0.8  # rad that joints 3, 5 and 7 may turn
+_TWISTED = 0.8  # largest angle of joints 3, 5 and 7 [rad]
 
 
 def lowered_to(
@@ -20,17 +20,17 @@ def lowered_to(
 ) -> Array:
     """Return joint positions near `q` with the sole `height` [m] above a point.
 
-    The sole is parallel to the ground. Newton's method on joints 2, 4 and 6.
+    The sole is parallel to the plane. Newton's method on joints 2, 4 and 6.
 
     Args:
         model: the arm with its tool.
         axes: rows x_T, y_T, z_T of the plane in the base frame, shape (3, 3).
         far_end: the point [m], shape (3,).
-        q: joint positions to begin with [rad], shape (7,).
-        height: above the point, along z_T [m].
+        q: initial joint positions [rad], shape (7,).
+        height: height above the point along z_T [m].
 
     Raises:
-        SettingsError: it ends nowhere: out of reach, or `q` is a singular pose.
+        SettingsError: no convergence: out of reach, or `q` is singular.
     """
     goal = far_end + height * axes[2]
     start, q, joints = q, q.copy(), [1, 3, 5]
@@ -54,9 +54,8 @@ def lowered_to(
 def elbow_up(model: ArmModel, axes: Array, far_end: Array) -> Array:
     """Return joint positions with the sole flat on a point, elbow up, shape (7,).
 
-    The foot points along the plane, toward the base or away from it, whichever turns
-    the wrist less. Damped Newton on all joints from three seeds; of the solutions the
-    one whose joints 3, 5 and 7 are turned least.
+    The foot points along the plane, toward the base or away from it. Damped Newton on
+    all joints from three seeds; the solution with the smallest |q3| + |q5| + |q7|.
 
     Args:
         model: the arm with its tool.
@@ -64,48 +63,48 @@ def elbow_up(model: ArmModel, axes: Array, far_end: Array) -> Array:
         far_end: the point [m], shape (3,).
 
     Raises:
-        SettingsError: the arm does not reach it so.
+        SettingsError: no solution within the joint stops.
     """
-    found: list[Array] = []
+    solutions: list[Array] = []
     shoulder = float(np.arctan2(far_end[1], far_end[0]))
     for second, fourth, sixth in _SEEDS:
         seed = np.array([shoulder, second, 0.0, fourth, 0.0, sixth, 0.0])
-        for way in (1.0, -1.0):
-            q = _solved(model, axes, far_end, seed.copy(), way)
+        for heading in (1.0, -1.0):
+            q = _solution(model, axes, far_end, seed.copy(), heading)
             if q is not None:
-                found.append(q)
-    if not found:
+                solutions.append(q)
+    if not solutions:
         raise SettingsError(
             f"The arm cannot put the sole flat on far_end = "
             f"{np.round(far_end, 4).tolist()}: out of reach, or beyond its stops.",
             hint="Correct far_end or the incline, or state start_q. Nothing was "
             "started.",
         )
-    return min(found, key=lambda q: float(np.abs(q[[2, 4, 6]]).sum()))
+    return min(solutions, key=lambda q: float(np.abs(q[[2, 4, 6]]).sum()))
 
 
-def _solved(
-    model: ArmModel, axes: Array, goal: Array, q: Array, way: float
+def _solution(
+    model: ArmModel, axes: Array, goal: Array, q: Array, heading: float
 ) -> Array | None:
-    """Return the solution that a seed leads to; None = none within the stops.
+    """Return the solution reached from a seed; None if none within the stops.
 
     Args:
         model: the arm.
-        axes: of the plane.
+        axes: axes of the plane.
         goal: point for the sole [m].
-        q: the seed; changed.
-        way: 1 = the foot's x axis against x_T, -1 = along it.
+        q: the seed; modified.
+        heading: 1 = the foot's x axis against x_T, -1 = along it.
     """
-    wanted = np.column_stack([-way * axes[0], way * axes[1], -axes[2]])
+    target = np.column_stack([-heading * axes[0], heading * axes[1], -axes[2]])
     lower, upper = model.constants.q_lower, model.constants.q_upper
     for _ in range(_STEPS):
         position, rotation = model.sole_pose(q)
-        turned = 0.5 * sum(
-            (np.cross(rotation[:, k], wanted[:, k]) for k in range(3)), np.zeros(3)
+        rotation_error = 0.5 * sum(
+            (np.cross(rotation[:, k], target[:, k]) for k in range(3)), np.zeros(3)
         )
-        error = np.concatenate([goal - position, turned])
-        is_turned = float(np.einsum("ij,ij->", rotation, wanted)) > 2.9
-        if is_turned and float(np.abs(error).max()) < _CLOSE:
+        error = np.concatenate([goal - position, rotation_error])
+        is_aligned = float(np.einsum("ij,ij->", rotation, target)) > 2.9
+        if is_aligned and float(np.abs(error).max()) < _CLOSE:
             is_within = bool(((lower < q) & (q < upper)).all())
             is_plain = float(np.abs(q[[2, 4, 6]]).max()) < _TWISTED
             return q if is_within and is_plain and q[3] > 0.0 else None

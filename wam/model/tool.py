@@ -1,4 +1,4 @@
-"""What hangs on the tool plate: sensor, foot, sole. Frame 7, z along joint 7."""
+"""Tool on the tool plate: sensor, foot, sole. Frame 7, z along joint 7."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,9 +17,9 @@ class Tool:
         sensor: body of the wrist sensor.
         foot: body of foot and adapter, all below the sensor's gauges.
         sole: centre of the sole [m], shape (3,), in frame 7.
-        sensor_height: origin of the sensor frame above the plate along z7 [m].
+        sensor_height: height of the sensor frame above the plate along z7 [m].
         sensor_angle: rotation of the sensor frame about z7 [rad].
-        sensor_sign: +1 if the sensor reads the load on it, -1 if the reaction.
+        sensor_sign: +1 if the sensor reads the load, -1 if it reads the reaction.
     """
 
     sensor: Body
@@ -36,13 +36,13 @@ def sensor_body() -> Body:
 
 
 def box_inertia(mass: float, size: tuple[float, float, float]) -> Array:
-    """Return the inertia about its centre of a box of `size` [m], shape (3, 3)."""
+    """Return the inertia of a box of `size` [m] about its centre, shape (3, 3)."""
     x, y, z = size
     return mass / 12.0 * np.diag([y * y + z * z, x * x + z * z, x * x + y * y])
 
 
 def tool_metadata(tool: Tool) -> dict[str, Any]:
-    """Return `tool` as plain numbers, for another process or a file."""
+    """Return `tool` as plain numbers and lists, for another process or a file."""
     return {
         "sensor": _body_metadata(tool.sensor),
         "foot": _body_metadata(tool.foot),
@@ -54,7 +54,7 @@ def tool_metadata(tool: Tool) -> dict[str, Any]:
 
 
 def tool_of(fields: Mapping[str, Any]) -> Tool:
-    """Return the tool that `tool_metadata` put into numbers."""
+    """Return the tool described by `tool_metadata`."""
     return Tool(
         sensor=_body_of(fields["sensor"]),
         foot=_body_of(fields["foot"]),

@@ -1018,14 +1018,14 @@ def test_a_proof_goes_on_while_the_arm_does_what_it_should(proving):
 
 
 def test_what_a_proof_should_not_do_ends_it_in_idle(proving):
-    proving.law.excess = MotionExcess("the way of joint 4", 0.03, 0.025, "rad")
+    proving.law.excess = MotionExcess("the travel of joint 4", 0.03, 0.025, "rad")
     proving.run()
     assert (proving.state, proving.reason) == (ArmState.IDLE, Fault.PROOF_MOTION)
     assert proving.cycle.status.verdict.detail == proving.law.excess
 
 
 def test_what_the_guard_says_of_a_proof_goes_before_and_ends_it_in_idle(proving):
-    proving.law.excess = MotionExcess("the way of joint 4", 0.03, 0.025, "rad")
+    proving.law.excess = MotionExcess("the travel of joint 4", 0.03, 0.025, "rad")
     proving.arm.missing = 5
     proving.run()
     assert (proving.state, proving.reason) == (ArmState.IDLE, Fault.CAN_SILENCE)

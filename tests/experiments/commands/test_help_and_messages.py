@@ -554,7 +554,7 @@ CASES = {
     "joint7-slip": fault("joint7-slip@T2+0.1s", words="(limit 50)"),
     "foot-speed": acted(Prompt.RECORDING, _swing),
     "kinetic-energy": acted(Prompt.RECORDING, _swing_hard, 4, "kinetic energy was"),
-    "damp-motion": acted(Prompt.RECORDING, _damp_in_vain, 4, "the sole's way was"),
+    "damp-motion": acted(Prompt.RECORDING, _damp_in_vain, 4, "the sole's travel was"),
     "hold-motion": acted(Prompt.LIFT, _allow_no("hold_travel"), 4, "(limit 0.00)"),
     "proof-motion": acted(Prompt.RECORDING, _prove, 4, "kinetic energy was"),
     "activation-motion": acted(

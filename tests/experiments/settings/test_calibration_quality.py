@@ -71,7 +71,7 @@ SPOILED = {
         lambda s: dataclasses.replace(s, poses=s.poses[:1], torques=s.torques[:1]),
         "of 12 directions of gravity",
     ),
-    "another arm": (_heavier, "N m otherwise than drawn at joint 2"),
+    "another arm": (_heavier, "N m from the drawings at joint 2"),
 }
 
 

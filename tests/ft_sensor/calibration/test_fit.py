@@ -80,7 +80,7 @@ def test_five_orientations_are_too_few():
 
 def test_orientations_that_are_alike_are_refused():
     rotations = np.repeat(orientations(1), 8, axis=0)
-    with pytest.raises(SettingsError, match="too much alike"):
+    with pytest.raises(SettingsError, match="too similar"):
         fit_sensor(rotations, readings(payload(), rotations))
 
 

@@ -93,13 +93,13 @@ def test_an_address_where_nobody_is_ends_as_a_link_error():
     "text", ["", "sensor.local", "1.2.3", "192.168.1.1:0", "192.168.1.1:x", "::1"]
 )
 def test_what_is_no_address_is_refused(text):
-    with pytest.raises(SettingsError, match="no address"):
+    with pytest.raises(SettingsError, match="not an address"):
         parse_address(text, 49152)
 
 
 @pytest.mark.parametrize("text", ["224.0.0.1", "0.0.0.0", "255.255.255.255"])
 def test_the_address_of_many_is_refused(text):
-    with pytest.raises(SettingsError, match="address of many"):
+    with pytest.raises(SettingsError, match="not the address of a single sensor"):
         parse_address(text, 49152)
 
 

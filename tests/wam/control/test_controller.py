@@ -255,7 +255,7 @@ def test_in_a_proof_the_arm_gets_what_it_says_and_not_its_weight(law):
 @pytest.mark.parametrize("state", [s for s in ArmState if s is not ArmState.HOLD])
 def test_no_proof_begins_outside_of_hold(law, state):
     law.enter(state, reading(0.0))
-    with pytest.raises(ValueError, match="proved in hold only"):
+    with pytest.raises(ValueError, match="proof begins in hold only"):
         law.prove(PUSH, reading(1.0))
     assert not law.is_proving()
 
@@ -271,7 +271,7 @@ def test_no_arm_is_left_unwatched_for_longer_than_a_module_may_take(law):
 def test_no_proof_begins_in_a_move(law):
     law.enter(ArmState.HOLD, reading(0.0))
     law.move_to(DOWN, 0.5, reading(1.0))
-    with pytest.raises(ValueError, match="proved in hold only"):
+    with pytest.raises(ValueError, match="proof begins in hold only"):
         law.prove(PUSH, reading(1.0))
     assert law.is_moving()
 
@@ -283,7 +283,7 @@ def test_what_goes_too_far_is_told_in_a_proof_only(law):
     law.prove(PUSH, reading(1.0))
     assert law.proof_excess(reading(1.1), 0.0, is_powered=True) is None
     told = law.proof_excess(reading(1.1, q=astray), 0.0, is_powered=True)
-    assert told.quantity == "the way of joint 4"
+    assert told.quantity == "the travel of joint 4"
     assert law.proof_excess(reading(1.1), 9.0, is_powered=True).unit == "J"
     assert law.proof_excess(reading(1.2, q=astray), 9.0, is_powered=False) is None
     assert law.proof_excess(reading(1.3, q=astray), 0.0, is_powered=True) is None

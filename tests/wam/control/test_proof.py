@@ -215,7 +215,7 @@ def test_the_widest_goals_are_proofs(goal):
     ],
 )
 def test_what_is_no_proof_is_refused(goal):
-    with pytest.raises(ValueError, match=r"no joint|is no proof"):
+    with pytest.raises(ValueError, match=r"no joint|is not a valid proof"):
         Proof(goal, CONSTANTS, reading())
 
 

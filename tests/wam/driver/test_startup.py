@@ -77,7 +77,9 @@ def test_an_empty_bus_is_named_as_one():
     rig = Rig()
     for node in (*range(1, 8), 10):
         rig.network.silence(node)
-    with pytest.raises(PreflightError, match=r"does not answer \(nobody on the bus\)"):
+    with pytest.raises(
+        PreflightError, match=r"does not answer \(no device on the bus\)"
+    ):
         start(rig)
 
 
