@@ -30,7 +30,7 @@ class BusCondition(IntEnum):
     DOWN = 1  # the interface refuses to send and receive
     FULL = 2  # the interface's send queue is full
     OFF = 3  # bus-off: the controller does not take part in the bus
-    UNHEARD = 4  # no node acknowledges frames
+    UNACKNOWLEDGED = 4  # no node acknowledges frames
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +102,7 @@ class ArmReading:
         foreign_id: identifier of a frame from another bus master, or None.
         has_bus_error: the CAN controller reported an error since the last reading.
         bus_ns: monotonic bus time of the last reply [ns], 0 = not known.
-        is_unasked: a cycle without a request, on purpose: all positions are
+        is_without_request: a cycle without a request, on purpose: all positions are
             extrapolated by one cycle.
         late: stale positions in a cycle without a request, or None.
         change: changed property of a motor controller since the start, or None.
@@ -124,7 +124,7 @@ class ArmReading:
     foreign_id: int | None = None
     has_bus_error: bool = False
     bus_ns: int = 0
-    is_unasked: bool = False
+    is_without_request: bool = False
     late: LatePositions | None = None
     change: MotorChange | None = None
     disobeys: MotorChange | None = None

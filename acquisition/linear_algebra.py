@@ -52,7 +52,7 @@ def openblas_settings(cpu: Path = _CPU) -> dict[str, str]:
 
 
 @cache
-def keep_memory() -> bool:
+def keep_heap() -> bool:
     """Let malloc keep large freed blocks for the next matrix.
 
     Returns:

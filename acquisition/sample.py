@@ -186,7 +186,7 @@ def reading_bits(reading: ArmReading, *, is_late: bool) -> int:
         flags |= _DEADLINE_MISSED
     if reading.has_bus_error:
         flags |= _BUS_ERROR
-    if reading.is_unasked:
+    if reading.is_without_request:
         flags |= _ARM_UNASKED
     return flags
 

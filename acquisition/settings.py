@@ -20,7 +20,7 @@ File = Annotated[str, Field(min_length=1, max_length=4096)]  # beside rig.toml
 
 
 @dataclass(frozen=True, slots=True)
-class Usual:
+class UsualRange:
     """Unit and usual range of a number, in addition to its bounds.
 
     Attributes:

@@ -16,10 +16,10 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from acquisition.linear_algebra import keep_memory
+from acquisition.linear_algebra import keep_heap
 from analysis.data.load import load_trial
 from analysis.data.prepare import PreparedTrial, PrepareOptions, prepare_trial
-from analysis.report.held_trial import HeldTrial
+from analysis.report.reduced_trial import ReducedTrial
 from analysis.study.crossval import run_fold
 from analysis.study.models import REPORTED
 from analysis.terrains.table import Table
@@ -70,8 +70,8 @@ def trial_bytes(path: Path) -> float:
     return used
 
 
-def _loaded(path: Path) -> tuple[HeldTrial, PreparedTrial]:
-    trial = HeldTrial.of(load_trial(path))
+def _loaded(path: Path) -> tuple[ReducedTrial, PreparedTrial]:
+    trial = ReducedTrial.of(load_trial(path))
     return trial, prepare_trial(trial.series, PrepareOptions())
 
 
@@ -80,7 +80,7 @@ def worker_rows() -> list[BenchRow]:
 
     The second row is the cost of one likelihood evaluation with its gradient.
     """
-    keep_memory()
+    keep_heap()
     task = folds_of(SLICE)[0]
     task = replace(task, options=replace(task.options, models=REPORTED))
     what = f"a fold of the report's {len(REPORTED)} models"

@@ -17,7 +17,7 @@ from scipy.optimize import least_squares
 from sklearn.gaussian_process import GaussianProcessRegressor
 from threadpoolctl import threadpool_limits
 
-from acquisition.linear_algebra import keep_memory
+from acquisition.linear_algebra import keep_heap
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.samples import SampleTable
 from analysis.gp.arcsine import Arcsine
@@ -26,8 +26,8 @@ from analysis.gp.noise import ConstantNoise
 from analysis.gp.regression import fit_gp
 from analysis.tables.loading import load_tables
 from analysis.tustin.model import TustinBounds, TustinParameters, fit_tustin, predict
-from benchmarks import beside_gpy, beside_tinygp
-from benchmarks.beside_sklearn import KERNELS, fit_theirs, theirs, three_starts
+from benchmarks import peer_gpy, peer_tinygp
+from benchmarks.peer_sklearn import KERNELS, fit_sklearn, theirs, three_starts
 from benchmarks.rows import BenchRow, not_installed
 from benchmarks.study_race import SLICE, race
 
@@ -72,7 +72,7 @@ def many_starts(rows: SampleTable) -> float:
     )
 
 
-def duel(
+def time_alternating(
     ours: Callable[[], object], other: Callable[[], object], rounds: int
 ) -> tuple[float, float]:
     """Run two functions in turn; return the median processor time of each [s]."""
@@ -102,7 +102,7 @@ class SpeedComparison(NamedTuple):
 
     def measured(self) -> dict[str, object]:
         """Return both times, their ratio and both optima."""
-        ours, other = duel(self.ours, self.other, self.rounds)
+        ours, other = time_alternating(self.ours, self.other, self.rounds)
         return {
             "part": self.name,
             "ours_ms": 1e3 * ours,
@@ -121,7 +121,7 @@ def parts(rounds: int) -> list[SpeedComparison]:
     starts = {part: three_starts(part, X, y) for part in KERNELS}
 
     def likelihood_of_theirs(part: str) -> float:
-        model = fit_theirs(part, X, y, starts[part])
+        model = fit_sklearn(part, X, y, starts[part])
         return float(model.log_marginal_likelihood_value_)
 
     return [
@@ -178,8 +178,8 @@ def rows() -> list[BenchRow]:
         peers = [
             beside(what, goal, maker)
             for what, goal, maker in (
-                ("the same against GPy", 10, beside_gpy.fitter),
-                ("the same against tinygp, compiled before", 8, beside_tinygp.fitter),
+                ("the same against GPy", 10, peer_gpy.fitter),
+                ("the same against tinygp, compiled before", 8, peer_tinygp.fitter),
             )
         ]
     ratio = {name: float(str(part["ratio"])) for name, part in by_name.items()}
@@ -211,7 +211,7 @@ def beside(what: str, goal: float, maker: Fitter) -> BenchRow:
         return not_installed(what, goal)
     starts = three_starts("SE fit", X, y)
     reached = fit(starts)  # untimed: tinygp compiles in the first fit
-    ours, other = duel(lambda: fit_gp(X, y), lambda: fit(starts), 3)
+    ours, other = time_alternating(lambda: fit_gp(X, y), lambda: fit(starts), 3)
     gap = fit_gp(X, y).lml - reached
     note = f"log likelihood {gap:+.3f} relative to its own"
     return BenchRow(what, other / ours, "times", goal, True, note)
@@ -241,8 +241,8 @@ def main() -> None:
         help="share of the folds that scikit-learn fits too, drawn at random",
     )
     arguments = parser.parse_args()
-    if arguments.keep_memory:
-        keep_memory()
+    if arguments.keep_heap:
+        keep_heap()
     with threadpool_limits(1):
         results = [part.measured() for part in parts(arguments.rounds)]
         results.append(

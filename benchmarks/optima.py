@@ -25,8 +25,8 @@ from analysis.gp.trial_noise import TrialNoise, TrialRows
 from analysis.study.crossval import FoldTask, choose_rows
 from analysis.study.models import TUSTIN
 from analysis.study.tasks import run_tasks
-from benchmarks.beside_sklearn import KERNELS
 from benchmarks.fit import SLICE, many_starts
+from benchmarks.peer_sklearn import KERNELS
 from benchmarks.study_race import FITS, folds_of, given
 
 _STARTS = 20

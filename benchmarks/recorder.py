@@ -18,7 +18,7 @@ import numpy as np
 from acquisition.clock import NS_PER_S, PERIOD_NS, SystemClock
 from acquisition.devices import WrenchSample
 from acquisition.ipc.child import Child
-from acquisition.ipc.frame_tape import FrameTape
+from acquisition.ipc.frame_ring import FrameRing
 from acquisition.ipc.layout import SharedLayout
 from acquisition.ipc.shared_sensor import pack_wrench
 from acquisition.recording.recorder_process import RemoteRecorder
@@ -48,7 +48,7 @@ class Load:
     def __init__(self, shared: SharedLayout) -> None:
         self._shared = shared
         self._sample = Sample()
-        self._tape = FrameTape(shared.frames, SystemClock())
+        self._tape = FrameRing(shared.frames, SystemClock())
         self._noise = np.random.default_rng(1).normal(size=(997, 7))
         self.cycles = 0
 

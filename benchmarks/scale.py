@@ -27,7 +27,7 @@ import numpy as np
 from analysis.study.crossval import plan_folds, run_fold
 from analysis.study.models import FitOptions
 from analysis.study.store import task_key
-from benchmarks.made_sessions import TERRAINS, make_sessions
+from benchmarks.generated_sessions import TERRAINS, make_sessions
 from benchmarks.rows import BenchRow
 
 TRIALS, SESSIONS = (10, 80, 400, 1600), (10, 100, 1000)

@@ -30,11 +30,11 @@ from analysis.study.models import (
 )
 from analysis.tables.loading import load_tables
 from analysis.tustin.model import TustinFit
-from benchmarks.beside_sklearn import fit_theirs, three_starts
+from benchmarks.peer_sklearn import fit_sklearn, three_starts
 
 SLICE = Path(__file__).parents[1] / "tests" / "data" / "rehearsal_slice.npz"
 _GOAL = 4.0
-# model -> its part in `benchmarks.beside_sklearn`, whether its mean is a Tustin curve
+# model -> its part in `benchmarks.peer_sklearn`, whether its mean is a Tustin curve
 FITS = {
     GP_SE: ("SE fit", False),
     GP_NN: ("NN fit", False),
@@ -66,7 +66,7 @@ class Given(NamedTuple):
         return (rows.inputs - self.centre) / self.scale
 
 
-class Lap(NamedTuple):
+class FoldTimes(NamedTuple):
     """Times and likelihoods of one fold.
 
     Attributes:
@@ -135,20 +135,20 @@ def given(task: FoldTask) -> Given:
     )
 
 
-def lap(task: FoldTask, rounds: int) -> Lap:
+def lap(task: FoldTask, rounds: int) -> FoldTimes:
     """Run one fold on both sides in turn; return times and likelihoods."""
     mine, its, models, likelihoods = [], [], {}, {}
     starts = starts_of(task)
     for _ in range(rounds):
         seconds, models = timed(lambda: run_fold(task).models)
         mine.append(seconds)
-        seconds, likelihoods = timed(lambda: run_theirs(task, starts))
+        seconds, likelihoods = timed(lambda: run_sklearn(task, starts))
         its.append(seconds)
     reached = [(models[name].model.process.lml, likelihoods[name]) for name in FITS]
-    return Lap(statistics.median(mine), statistics.median(its), reached)
+    return FoldTimes(statistics.median(mine), statistics.median(its), reached)
 
 
-def report(laps: list[Lap], alone: float, folds: int) -> dict[str, Any]:
+def report(laps: list[FoldTimes], alone: float, folds: int) -> dict[str, Any]:
     """Return the figures of a race; `alone` is the time of our other folds [s]."""
     mine, its = sum(lap.mine for lap in laps), sum(lap.its for lap in laps)
     ours, theirs = likelihoods_of(laps)
@@ -169,7 +169,7 @@ def report(laps: list[Lap], alone: float, folds: int) -> dict[str, Any]:
     }
 
 
-def compared(laps: list[Lap]) -> list[str]:
+def compared(laps: list[FoldTimes]) -> list[str]:
     """Return a line: in how many fits either side's likelihood is larger."""
     ours, theirs = likelihoods_of(laps)
     worse = int(np.count_nonzero(ours < theirs - 1e-3))
@@ -180,7 +180,7 @@ def compared(laps: list[Lap]) -> list[str]:
     ]
 
 
-def likelihoods_of(laps: list[Lap]) -> tuple[np.ndarray, np.ndarray]:
+def likelihoods_of(laps: list[FoldTimes]) -> tuple[np.ndarray, np.ndarray]:
     """Return our and scikit-learn's likelihoods, one per fit."""
     pairs = [pair for lap in laps for pair in lap.reached]
     ours, theirs = (np.array(column) for column in zip(*pairs, strict=True))
@@ -193,7 +193,7 @@ def starts_of(task: FoldTask) -> dict[str, tuple[Array, ...]]:
     return {n: three_starts(FITS[n][0], rows.X, r) for n, r in rows.outputs.items()}
 
 
-def run_theirs(
+def run_sklearn(
     task: FoldTask, starts: dict[str, tuple[Array, ...]]
 ) -> dict[str, float]:
     """Fit and predict one fold with scikit-learn; return the log likelihoods."""
@@ -203,7 +203,7 @@ def run_theirs(
     held_out = rows.standardised(SampleTable.joined(task.test_trials))
     likelihoods = {}
     for name, (part, _) in FITS.items():
-        model = fit_theirs(part, rows.X, rows.outputs[name], starts[name])
+        model = fit_sklearn(part, rows.X, rows.outputs[name], starts[name])
         model.predict(tested)
         model.predict(held_out, return_std=True)
         likelihoods[name] = float(model.log_marginal_likelihood_value_)

@@ -126,13 +126,13 @@ _BY_CONDITION = {
     BusCondition.DOWN: "interface-down",
     BusCondition.FULL: "unacknowledged",
     BusCondition.OFF: "bus-off",
-    BusCondition.UNHEARD: "unacknowledged",
+    BusCondition.UNACKNOWLEDGED: "unacknowledged",
 }
 BUS_WORDS = {  # of a bus on which nothing can be asked
     BusCondition.DOWN: "The CAN interface refuses to send and receive.",
     BusCondition.FULL: "No device on the CAN bus acknowledges: its queue is full.",
     BusCondition.OFF: "The CAN controller has left the bus (bus-off).",
-    BusCondition.UNHEARD: "No device on the CAN bus acknowledges.",
+    BusCondition.UNACKNOWLEDGED: "No device on the CAN bus acknowledges.",
 }
 # What explains a weight of the foot that is not as expected; the question; the remedy.
 _WEIGHT_WORDS = {

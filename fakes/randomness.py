@@ -62,7 +62,7 @@ class NormalStream:
         return next(self._rest)
 
 
-class DrawnAhead:
+class UniformStream:
     """Uniform numbers in [0, 1), drawn in blocks whose remainder can be given back.
 
     After `give_back` the generator is in the state as if the numbers had been drawn one

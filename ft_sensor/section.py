@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from acquisition.settings import File, Number, SettingsSection, Usual, Whole
+from acquisition.settings import File, Number, SettingsSection, UsualRange, Whole
 from ft_sensor.reading import Wrench
 from ft_sensor.serial_line.link import OpenedPort, PortSettings, open_port
 from ft_sensor.serial_line.sensor import SerialDevice
@@ -18,13 +18,13 @@ class SensorSection(SettingsSection):
 
     port: str = Field(examples=["/dev/ttyUSB0"])
     baudrate: Whole = Field(gt=0, le=4_000_000, examples=[460800])
-    mass: Annotated[Number, Usual(0.03, 0.4, "kg")] = Field(
+    mass: Annotated[Number, UsualRange(0.03, 0.4, "kg")] = Field(
         ge=0.01, le=1.0, examples=[0.136]
     )
-    height: Annotated[Number, Usual(0.0, 0.06, "m")] = Field(
+    height: Annotated[Number, UsualRange(0.0, 0.06, "m")] = Field(
         ge=0, le=0.1, examples=[0.012]
     )
-    angle_deg: Annotated[Number, Usual(-180.0, 180.0, "degrees")] = Field(
+    angle_deg: Annotated[Number, UsualRange(-180.0, 180.0, "degrees")] = Field(
         ge=-360, le=360, examples=[0.0]
     )
     sign: Literal[1, -1] = Field(examples=[1])

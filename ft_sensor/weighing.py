@@ -102,7 +102,7 @@ def weight_change(
     return compare_weights((second - first)[None, :], seen[None, :])
 
 
-def weight_seen(payload: Payload, rotation: Array, known: Array) -> WeightChange:
+def measured_weight(payload: Payload, rotation: Array, known: Array) -> WeightChange:
     """Compare the weight removed by a tare with that of the payload.
 
     Args:

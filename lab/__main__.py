@@ -100,7 +100,7 @@ def _run(scenarios: Sequence[Scenario], options: argparse.Namespace) -> int:
     parts = shares(scenarios, options.machines)
     results = run_machines(parts, options.cache, is_shown=options.console)
     wall = (_CLOCK.now_ns() - start_ns) / NS_PER_S
-    print(report.cycle_words(results))
+    print(report.missed_cycles_line(results))
     print(report.summary(results, wall))
     return 0 if all(result.verdict.is_fine for result in results) else 1
 

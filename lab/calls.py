@@ -15,7 +15,7 @@ PCI_ID = (0x1234, 0x7AC7)  # vendor and device number, unknown to Linux drivers
 REGISTERS_SIZE = 4096
 DONE = 1  # return value of a successful call; otherwise the text holds the error
 FRAME = struct.Struct("=IB3x8s")  # struct can_frame of Linux
-MOST_FRAMES = 256
+MAX_FRAMES = 256
 _PART = struct.Struct("<qII")  # time [ns], number of frames, number of bytes
 _LENGTH = struct.Struct("<I")
 _ASKED_AT, _ANSWERED_AT = 0, 64
@@ -62,7 +62,7 @@ class Exchange:
             ValueError: it exceeds the size of the memory.
         """
         t_ns, count, size = _PART.unpack_from(self._memory, _ASKED_AT)
-        if count > MOST_FRAMES or size > MOST_BYTES:
+        if count > MAX_FRAMES or size > MOST_BYTES:
             raise ValueError(f"a call with {count} frames and {size} bytes.")
         end = FRAMES_IN_AT + count * FRAME.size
         rows = FRAME.iter_unpack(self._memory[FRAMES_IN_AT:end])
@@ -80,7 +80,7 @@ class Exchange:
         Raises:
             ValueError: it exceeds the size of the memory.
         """
-        if len(frames) > MOST_FRAMES or len(data) > MOST_BYTES:
+        if len(frames) > MAX_FRAMES or len(data) > MOST_BYTES:
             raise ValueError(f"an answer of {len(frames)} frames, {len(data)} bytes.")
         packed = b"".join(FRAME.pack(can_id, len(d), d) for can_id, d in frames)
         self._memory[FRAMES_OUT_AT : FRAMES_OUT_AT + len(packed)] = packed

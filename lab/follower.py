@@ -7,10 +7,10 @@ from typing import Protocol
 from acquisition.clock import NS_PER_S, SystemClock
 from lab import report
 from lab.results import (
-    Begun,
-    Finished,
+    AllFinished,
     ScenarioResult,
-    TimerFound,
+    ScenarioStarted,
+    TimerLocation,
     Verdict,
     from_line,
 )
@@ -36,7 +36,7 @@ class ReadConsole(Protocol):
         """Return the next line; None at the end, TimeoutError after `until_ns`."""
         ...
 
-    def correct_timer(self, found: TimerFound) -> None:
+    def correct_timer(self, found: TimerLocation) -> None:
         """Set the true rate of the local timer in the machine's kernel."""
         ...
 
@@ -93,12 +93,12 @@ class Follower:
 
     def _process(self, line: str, machine: ReadConsole) -> None:
         match from_line(line):
-            case Begun(name):
+            case ScenarioStarted(name):
                 self._running = name
                 self._allow(LIMIT, machine.processor_seconds())
-            case TimerFound() as timer:
+            case TimerLocation() as timer:
                 machine.correct_timer(timer)
-            case Finished():
+            case AllFinished():
                 self._is_over = True
             case ScenarioResult() as result:
                 used = machine.processor_seconds() - self._used_before

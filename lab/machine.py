@@ -15,7 +15,7 @@ from lab import local_timer
 from lab.calls import MEMORY_SIZE
 from lab.kernel import Kernel
 from lab.requirements import program
-from lab.results import TimerFound
+from lab.results import TimerLocation
 
 # With -icount an instruction takes 1 ns. The kernel is told that the time stamp counter
 # runs six times faster than it does, so all of its time passes six times slower than
@@ -190,7 +190,7 @@ class Machine:
                 self._used[number] = _cpu_time(process.pid)
         return sum(self._used)
 
-    def correct_timer(self, found: TimerFound) -> None:
+    def correct_timer(self, found: TimerLocation) -> None:
         """Set the true rate of the kernel's local timer; raises DebuggerError."""
         local_timer.correct(self._debugger, found.events, found.offsets, SLOWNESS)
 

@@ -7,14 +7,14 @@ from lab.results import ScenarioResult, Verdict
 _RULE_OF_THREE = 3.0  # 95 % upper bound on the expected count if none was observed
 
 
-def figure_words(figures: Mapping[str, str]) -> str:
+def figures_line(figures: Mapping[str, str]) -> str:
     """Return figures as one line of text."""
     return "; ".join(f"{name}: {value}" for name, value in figures.items())
 
 
 def result_line(result: ScenarioResult) -> str:
     """Return a result as one line of the terminal's table."""
-    words = result.reason or figure_words(result.figures)
+    words = result.reason or figures_line(result.figures)
     # The last line of a traceback holds the error.
     last = words.strip().splitlines()[-1:] or [""]
     seconds = f"{result.seconds:8.2f} s {result.processor:7.1f} s"
@@ -31,7 +31,7 @@ def summary(results: Sequence[ScenarioResult], wall: float) -> str:
     return f"{', '.join(parts) or 'nothing ran'} in {wall:.0f} s of wall time"
 
 
-def cycle_words(results: Sequence[ScenarioResult]) -> str:
+def missed_cycles_line(results: Sequence[ScenarioResult]) -> str:
     """Return a line on the missed cycles of all kept trials, with a 95 % bound."""
     rows = [result.figures for result in results if "cycles" in result.figures]
     cycles = sum(int(row["cycles"]) for row in rows)

@@ -51,21 +51,21 @@ class ScenarioResult:
 
 
 @dataclass(frozen=True, slots=True)
-class Begun:
+class ScenarioStarted:
     """A scenario has begun; if no result follows, the machine hung in it."""
 
     name: str
 
 
 @dataclass(frozen=True, slots=True)
-class Finished:
+class AllFinished:
     """All scenarios have run; `boot_seconds` is the guest time until the first [s]."""
 
     boot_seconds: float
 
 
 @dataclass(frozen=True, slots=True)
-class TimerFound:
+class TimerLocation:
     """Location of the kernel's local timer: the values of two kernel symbols.
 
     Attributes:
@@ -77,10 +77,10 @@ class TimerFound:
     offsets: int
 
 
-Message = ScenarioResult | Begun | Finished | TimerFound
+Message = ScenarioResult | ScenarioStarted | AllFinished | TimerLocation
 
 
-_PLAIN = {kind.__name__: kind for kind in (Begun, Finished, TimerFound)}
+_PLAIN = {kind.__name__: kind for kind in (ScenarioStarted, AllFinished, TimerLocation)}
 
 
 def to_line(message: Message) -> str:

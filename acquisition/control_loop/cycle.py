@@ -18,7 +18,7 @@ from acquisition.control_loop.guard import GuardState, Observation, check
 from acquisition.control_loop.law import ControlLaw, FootObserver
 from acquisition.control_loop.limits import GuardLimits, bounded_torque
 from acquisition.control_loop.loop import Tick
-from acquisition.control_loop.proof import ProofGoal
+from acquisition.control_loop.powered_test import PoweredTestGoal
 from acquisition.control_loop.states import (
     REQUESTS,
     TRANSITIONS,
@@ -107,7 +107,7 @@ class Cycle:
         self._known = 0  # number of the newest verdict when it was requested
         self._is_starting = False
         self._move: tuple[Vector, float] | None = None
-        self._proof: ProofGoal | None = None
+        self._proof: PoweredTestGoal | None = None
         self._silent_until_ns = 0
         self._reported: GuardVerdict | None = None
         self.is_recording = False
@@ -164,7 +164,7 @@ class Cycle:
         """
         self._move = np.array(goal), speed
 
-    def prove(self, goal: ProofGoal) -> None:
+    def prove(self, goal: PoweredTestGoal) -> None:
         """Request a proof, like `move_to`. Any verdict ends it in idle."""
         self._proof = goal
 
@@ -315,7 +315,7 @@ class Cycle:
             is_starting=self._is_starting,
         )
         self._guard, verdict = check(self.limits, self._guard, seen)
-        if self.law.is_proving():
+        if self.law.is_testing():
             verdict = self._judge_proof(reading, verdict)
         reported, self._reported = self._reported, None
         if reported is not None and reported.severity > verdict.severity:
@@ -328,14 +328,16 @@ class Cycle:
         is_silent = reading.host_ns < self._silent_until_ns
         if is_silent and verdict.fault is Fault.CAN_SILENCE:
             verdict = OK  # no request was sent
-        excess = self.law.proof_excess(reading, self._energy, is_powered=is_powered)
+        excess = self.law.powered_test_excess(
+            reading, self._energy, is_powered=is_powered
+        )
         if excess is None or verdict.action is not _NONE:
             return verdict
         return verdict_for(Fault.PROOF_MOTION, excess)
 
     def _act_on(self, verdict: GuardVerdict, reading: ArmReading) -> None:
         """Enter the state demanded by the verdict and latch it."""
-        if self.law.is_proving():  # no other state is known to support this arm
+        if self.law.is_testing():  # no other state is known to support this arm
             verdict = replace(verdict, action=Action.IDLE)
         self._handle(VERDICTS[verdict.action], reading)
         if isinstance(verdict.detail, CircuitCauses):

@@ -416,7 +416,7 @@ def _check_rests(facts: Facts) -> GuardVerdict:
     """Idle in a trial if the sole moves while a motor does not turn."""
     sole = facts.seen.sole
     for i, rest in enumerate(facts.state.rests):
-        travel, limit = dist(rest.sole, sole), facts.limits.still_ways[i]
+        travel, limit = dist(rest.sole, sole), facts.limits.still_travel[i]
         if travel > limit:
             detail = StillMotor(i + 1, 1e3 * travel, 1e3 * limit)  # mm
             return verdict_for(Fault.MOTOR_STILL, detail)

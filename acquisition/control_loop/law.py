@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from acquisition.control_loop.details import MotionExcess
-from acquisition.control_loop.proof import ProofGoal
+from acquisition.control_loop.powered_test import PoweredTestGoal
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import ArmReading, Vector, WrenchSample
 from acquisition.sample import Sample
@@ -31,7 +31,7 @@ class ControlLaw(Protocol):
         """
         ...
 
-    def prove(self, goal: ProofGoal, reading: ArmReading) -> None:
+    def prove(self, goal: PoweredTestGoal, reading: ArmReading) -> None:
         """Start the proof `goal` in hold; its torques replace the control law.
 
         Raises:
@@ -39,11 +39,11 @@ class ControlLaw(Protocol):
         """
         ...
 
-    def is_proving(self) -> bool:
+    def is_testing(self) -> bool:
         """Return whether the arm is in a proof: any fault then leads to idle."""
         ...
 
-    def proof_excess(
+    def powered_test_excess(
         self, reading: ArmReading, energy: float, *, is_powered: bool
     ) -> MotionExcess | None:
         """Return the limit of motion that an arm in a proof exceeds, or None.

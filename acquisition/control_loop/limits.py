@@ -47,7 +47,7 @@ class GuardLimits:
         contact_force_move: force of an obstacle during a move that leads to hold [N]. A
             foot of 1 kg with a wrong sign of the sensor gives 20 N.
         late_per_second: late cycles in a second that lead to hold.
-        still_ways: travel of the sole in a trial while a motor does not turn [m],
+        still_travel: travel of the sole in a trial while a motor does not turn [m],
             seven. With stiction, joint 2 may move by only one motor of its
             differential: with the friction of another arm, motors 2 to 6 rested for at
             most 35, 17, 12, 21 and 33 mm in simulated trials; 1 and 7 may rest.
@@ -82,7 +82,7 @@ class GuardLimits:
     contact_growth: float
     late_per_second: int
     contact_force_move: float = 40.0
-    still_ways: Sequence[float] = (inf, 0.06, 0.06, 0.06, 0.06, 0.06, inf)
+    still_travel: Sequence[float] = (inf, 0.06, 0.06, 0.06, 0.06, 0.06, inf)
     hold_after_missing: int = 5
     idle_after_missing: int = 25
     idle_after_late: int = 3
@@ -94,7 +94,7 @@ class GuardLimits:
 
     def __post_init__(self) -> None:
         """Refuse a row that is too short: joints beyond its end would have no limit."""
-        rows = (self.q_lower, self.q_upper, self.speed, self.torque, self.still_ways)
+        rows = (self.q_lower, self.q_upper, self.speed, self.torque, self.still_travel)
         if any(len(row) != _JOINTS for row in rows):
             lengths = ", ".join(str(len(row)) for row in rows)
             raise ValueError(f"limits of {_JOINTS} joints have {lengths} numbers")

@@ -121,9 +121,9 @@ class Child:
             return ask(self.channel, request)
         except ChannelClosedError:
             self._wait(_PATIENCE)
-            raise ProcessLostError(self.name, self.how_it_ended()) from None
+            raise ProcessLostError(self.name, self.exit_reason()) from None
 
-    def how_it_ended(self) -> str:
+    def exit_reason(self) -> str:
         """Return how the process ended: a signal, or its last error line."""
         code = self._process.poll()
         if code is not None and code < 0:

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from acquisition.control_loop.faults import GuardVerdict, from_plain, to_plain
-from acquisition.control_loop.proof import ProofGoal
+from acquisition.control_loop.powered_test import PoweredTestGoal
 from acquisition.control_loop.states import ArmState, ControlStatus
 from acquisition.devices import BusCondition, SafetyMode
 from acquisition.ipc.latest_value import Slot
@@ -72,10 +72,10 @@ class MoveJoints:
 
 
 @dataclass(frozen=True, slots=True)
-class GiveProof:
+class StartPoweredTest:
     """Start a proof, in hold."""
 
-    goal: ProofGoal
+    goal: PoweredTestGoal
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +89,7 @@ Command = (
     | WatchTrial
     | SetBias
     | MoveJoints
-    | GiveProof
+    | StartPoweredTest
     | LeaveLoop
 )
 
@@ -241,7 +241,7 @@ def _encode(command: Command) -> tuple[int, tuple[float, ...]]:
             return 4, bias
         case MoveJoints(goal, speed):
             return 5, (*goal, speed)
-        case GiveProof(goal):
+        case StartPoweredTest(goal):
             return 6, goal.values
         case LeaveLoop():
             return 7, ()
@@ -261,7 +261,7 @@ def _decode(form: int, values: tuple[float, ...]) -> Command:
         case 5:
             return MoveJoints(values[:7], values[7])
         case 6:
-            return GiveProof(ProofGoal.of(values))
+            return StartPoweredTest(PoweredTestGoal.of(values))
         case 7:
             return LeaveLoop()
         case _:

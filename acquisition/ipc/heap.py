@@ -3,7 +3,7 @@
 import ctypes
 
 
-def give_back_heap() -> None:
+def trim_heap() -> None:
     """Return free heap memory to the kernel, if the C library has malloc_trim.
 
     Otherwise the fragmented heap of a finished trial stays with the process.

@@ -12,7 +12,7 @@ from itertools import accumulate, pairwise
 from acquisition.control_loop.timing import TIMING_DTYPE
 from acquisition.errors import LinkError
 from acquisition.ipc.commands import COMMAND_DTYPE
-from acquisition.ipc.frame_tape import FRAME_DTYPE
+from acquisition.ipc.frame_ring import FRAME_DTYPE
 from acquisition.ipc.latest_value import Slot
 from acquisition.ipc.ring_buffer import LayoutType, RingBuffer
 from acquisition.ipc.shared_memory import LINE, SharedMemory, lines

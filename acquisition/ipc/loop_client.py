@@ -5,17 +5,17 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from acquisition.clock import NS_PER_S, PERIOD_NS, Clock
-from acquisition.control_loop.proof import ProofGoal
+from acquisition.control_loop.powered_test import PoweredTestGoal
 from acquisition.control_loop.states import ArmState, ControlStatus
 from acquisition.ipc.commands import (
     AwaitActivation,
     CommandQueue,
     EnterState,
-    GiveProof,
     LeaveLoop,
     LoopStatus,
     MoveJoints,
     SetBias,
+    StartPoweredTest,
     StatusSlot,
     WatchTrial,
 )
@@ -128,9 +128,9 @@ class LoopClient:
         """
         self._asked = self._commands.post(MoveJoints(tuple(goal), speed))
 
-    def prove(self, goal: ProofGoal) -> None:
+    def prove(self, goal: PoweredTestGoal) -> None:
         """Request a proof, in hold."""
-        self._asked = self._commands.post(GiveProof(goal))
+        self._asked = self._commands.post(StartPoweredTest(goal))
 
     def set_bias(self, bias: Sequence[float]) -> None:
         """Set the sensor's reading without load [N, N m], six numbers."""

@@ -15,12 +15,12 @@ from acquisition.ipc.commands import (
     AwaitActivation,
     CommandQueue,
     EnterState,
-    GiveProof,
     LeaveLoop,
     LoopStatus,
     MoveJoints,
     PostedCommand,
     SetBias,
+    StartPoweredTest,
     StatusSlot,
     WatchTrial,
 )
@@ -28,7 +28,7 @@ from acquisition.ipc.layout import ProcessRole, SharedLayout
 
 MS = 1_000_000
 SILENT_NS = 500 * MS  # without a heartbeat of console or recorder: hold
-LONELY_NS = 60_000 * MS  # without a heartbeat of the console: bell
+NO_HEARTBEAT_NS = 60_000 * MS  # without a heartbeat of the console: bell
 ORPHAN_NS = 1_000 * MS  # hold after the death of the console, then idle
 _FACTS_EVERY = _SOUND_EVERY = RATE_HZ  # cycles, once a second
 
@@ -114,7 +114,7 @@ class LoopServer:
                 cycle.set_bias(bias)
             case MoveJoints(goal, speed):
                 cycle.move_to(goal, speed)
-            case GiveProof(goal):
+            case StartPoweredTest(goal):
                 cycle.prove(goal)
             case LeaveLoop():
                 self.is_over = True
@@ -133,7 +133,7 @@ class LoopServer:
         console_ns = now_ns - heartbeats.last_ns(_CONSOLE)
         if console_ns > SILENT_NS:
             self._cycle.report(verdict_for(Fault.CONSOLE_SILENT))
-            if console_ns > LONELY_NS and self._cycles % _SOUND_EVERY == 0:
+            if console_ns > NO_HEARTBEAT_NS and self._cycles % _SOUND_EVERY == 0:
                 self._hooks.sound()
         if (
             self._cycle.is_recording

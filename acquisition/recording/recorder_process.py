@@ -11,7 +11,7 @@ from acquisition.control_loop.realtime import RealtimeRequest, request
 from acquisition.errors import TrialFileError
 from acquisition.ipc.channel import ChannelClosedError
 from acquisition.ipc.child import Child, ChildContext, name_process
-from acquisition.ipc.heap import give_back_heap
+from acquisition.ipc.heap import trim_heap
 from acquisition.ipc.layout import SharedLayout
 from acquisition.ipc.requests import Dispatcher, Handlers, Request
 from acquisition.recording.recorder import Recorder, TrialRecording
@@ -78,7 +78,7 @@ def main(context: ChildContext) -> None:
                 was_recording = recorder.is_recording
                 dispatcher.answer(context.channel)
                 if was_recording and not recorder.is_recording:
-                    give_back_heap()
+                    trim_heap()
             recorder.drain()
             recorder.publish_state()
     except ChannelClosedError:

@@ -124,12 +124,12 @@ def doubts_of_record(recorded: RecordedTrial) -> list[Doubt]:
         *sensor,
         *_path(recorded, moving),
         *_sideways(recorded.lateral[moving], F_t[moving]),
-        *free_moment(wrench[:, :3], wrench[:, 3:]),
+        *moment_doubts(wrench[:, :3], wrench[:, 3:]),
         *_pressure(recorded, wrench),
     ]
 
 
-def summed_up(judged: Iterable[tuple[str, Sequence[Doubt]]]) -> list[str]:
+def doubt_summary(judged: Iterable[tuple[str, Sequence[Doubt]]]) -> list[str]:
     """Summarise the doubts of many trials, one line per kind.
 
     Args:
@@ -345,7 +345,7 @@ def _sideways(lateral: Array, along: Array) -> Iterator[Doubt]:
         )
 
 
-def free_moment(force: Array, moment: Array) -> Iterator[Doubt]:
+def moment_doubts(force: Array, moment: Array) -> Iterator[Doubt]:
     """Check the moment along the force, which no point of action can produce.
 
     A force at a point has no moment along itself; the moment of a sliding sole about

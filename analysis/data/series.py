@@ -108,7 +108,7 @@ class TractionSeries:
         with np.errstate(over="ignore"):
             return float(1.0 / np.median(np.diff(self.t)))
 
-    def with_forces_from(self, lag: float) -> "TractionSeries":
+    def with_lag_removed(self, lag: float) -> "TractionSeries":
         """Compensate a lag of the forces: take them from `lag` [s] later.
 
         Rows for which no such forces were recorded are dropped.

@@ -99,7 +99,7 @@ def terrain_incline(
     return median(stated) if stated else PAPER_INCLINES.get(terrain)
 
 
-def is_papers(terrain: str, kind: str, incline_deg: float | None) -> bool:
+def is_paper_terrain(terrain: str, kind: str, incline_deg: float | None) -> bool:
     """Whether a terrain matches one of the paper's by name, stones and incline.
 
     Args:
@@ -135,7 +135,7 @@ def surface_of(kind: str) -> str:
     return "rocky" if is_stony(kind) else kind
 
 
-def groups_of(kinds: Mapping[str, str]) -> dict[str, dict[str, str]]:
+def class_labels(kinds: Mapping[str, str]) -> dict[str, dict[str, str]]:
     """Return the class of every terrain at each level: name, stones and surface.
 
     Args:

@@ -22,7 +22,7 @@ _TOLERANCE = 2e-9
 _DROP = 100.0
 
 
-class Climbed(NamedTuple):
+class ClimbResult(NamedTuple):
     """Result of a climb.
 
     Attributes:
@@ -42,7 +42,7 @@ def climb(
     bounds: Array,
     is_known: Callable[[Array, float], bool] = lambda theta, value: False,
     scale: Array | float = 1.0,
-) -> Climbed:
+) -> ClimbResult:
     """Climb from a start to a local maximum.
 
     Args:
@@ -85,4 +85,4 @@ def climb(
         options={"ftol": _TOLERANCE},
     )
     value = -float(result.fun) if has_value else -np.inf
-    return Climbed(inside(result.x), value, int(result.nfev))
+    return ClimbResult(inside(result.x), value, int(result.nfev))

@@ -11,7 +11,7 @@ from analysis.data.series import Array
 from analysis.gp.likelihood import Likelihood
 from analysis.gp.noise import Noise
 from analysis.gp.regression import GaussianProcess
-from analysis.gp.search import climb_from, distinct_tops
+from analysis.gp.search import climb_from, distinct_optima
 
 _SIZES = frozenset({"sf", "sn", "sc"})  # in the unit of the outputs
 _VANISHED = 2.0  # log units below the usual start at which a spread has no gradient
@@ -38,7 +38,7 @@ def refit_gp(
     initial = noise_model.start(float(np.std(y))).tolist()
     defaults = dict(zip(noise_model.names, initial, strict=True))
     starts = []
-    for theta in distinct_tops(process.kernel, process.starts):
+    for theta in distinct_optima(process.kernel, process.starts):
         values = defaults | dict(zip(names, theta.tolist(), strict=True))
         for name, value in defaults.items():
             if name.rpartition("_")[2] in _SIZES:

@@ -21,7 +21,7 @@ import numpy as np
 
 from acquisition.errors import SettingsError
 from analysis.data.series import Array
-from analysis.gp.climb import Climbed, climb
+from analysis.gp.climb import ClimbResult, climb
 from analysis.gp.kernels import Kernel, Role
 from analysis.gp.likelihood import Likelihood
 from analysis.gp.noise import Noise
@@ -132,7 +132,7 @@ class Search:
         parts = self._kernel.names, self._noise.names
         self._scale = np.repeat([1.0, _NOISE_SCALE], [len(names) for names in parts])
         self._began: list[Array] = []
-        self._reached: list[Climbed] = []
+        self._reached: list[ClimbResult] = []
 
     def designed_start(self) -> Array:
         """Return the likeliest of the kernel's starts by a part of the rows."""
@@ -196,7 +196,7 @@ class Search:
         )
 
     @property
-    def _best(self) -> Climbed:
+    def _best(self) -> ClimbResult:
         return max(self._reached, key=lambda optimum: optimum.value)
 
     def _moves_of(self, theta: Array) -> list[list[Array]]:
@@ -261,7 +261,7 @@ def posterior_search(
     return likeliest(Likelihood(kernel, noise, X, r, trials))
 
 
-def distinct_tops(kernel: Kernel, reached: Sequence[Start]) -> list[Array]:
+def distinct_optima(kernel: Kernel, reached: Sequence[Start]) -> list[Array]:
     """Return the distinct optima that starts reached, best first.
 
     Optima too far below the best one are left out.

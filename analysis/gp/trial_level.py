@@ -183,7 +183,7 @@ class TrialLevels:
         return abs(self.other - self.between) > 2.0 * self.error
 
 
-def levels_of(residuals: TrialResiduals) -> TrialLevels:
+def estimate_levels(residuals: TrialResiduals) -> TrialLevels:
     """Estimate the spread between trials and their levels from all residuals.
 
     Raises:

@@ -36,7 +36,7 @@ _LISTED = 12  # names listed in a message
 
 
 @dataclass(frozen=True, slots=True)
-class Clocked:
+class MessageTimes:
     """Times of the messages of a topic, and counts of unused messages.
 
     Attributes:
@@ -87,7 +87,7 @@ class JointChannel:
     """
 
     topic: LogTopic
-    clock: Clocked
+    clock: MessageTimes
     q: Array
     warnings: Sequence[str]
 
@@ -106,7 +106,7 @@ class WrenchChannel:
 
     topic: LogTopic
     frame_id: str
-    clock: Clocked
+    clock: MessageTimes
     wrench: Array
     stuck: Sequence[tuple[int, int]]
 
@@ -214,7 +214,7 @@ class _Rows:
         """Count an unused message by cause."""
         self.left_out[cause] = self.left_out.get(cause, 0) + 1
 
-    def clocked(self, log: LogFile, clock: By | None) -> tuple[Array, Clocked]:
+    def clocked(self, log: LogFile, clock: By | None) -> tuple[Array, MessageTimes]:
         """Return the rows in time order with their times; raises SettingsError."""
         name, count = self.topic.name, len(self.received)
         if count < 3:
@@ -251,7 +251,7 @@ class _Rows:
         order = np.argsort(times, kind="stable")
         in_order = times[order]
         is_new = np.concatenate([[True], np.diff(in_order) > 0])
-        return values[order][is_new], Clocked(
+        return values[order][is_new], MessageTimes(
             in_order[is_new],
             clock or "stamp",
             self.read,

@@ -10,7 +10,7 @@ import numpy as np
 
 from acquisition.errors import SettingsError
 from analysis.data.frozen_channels import frozen_channels
-from analysis.data.plausibility import SLOWEST, doubts_of, free_moment
+from analysis.data.plausibility import SLOWEST, doubts_of, moment_doubts
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.series import Array, TractionSeries
 from analysis.logs.clocks import lag_by_receipts
@@ -30,9 +30,9 @@ from analysis.logs.request import ImportRequest
 from analysis.logs.signs import (
     PRESSED_FORCE,
     moment_warnings,
+    path_warnings,
     side_warnings,
     sign_figures,
-    way_warnings,
 )
 from ft_sensor.payload import Payload
 from wam.model.constants import GRAVITY
@@ -83,7 +83,7 @@ def _numbers(values: Sequence[float]) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Judged:
+class AppliedImport:
     """An import with all user input applied, ready for the checks.
 
     Attributes:
@@ -118,7 +118,7 @@ class Judged:
         return self.record.path.foot @ self.axes[2]
 
 
-def checks_of(judged: Judged, request: ImportRequest) -> list[Check]:
+def checks_of(judged: AppliedImport, request: ImportRequest) -> list[Check]:
     """Check everything that was stated, in the order of the options."""
     quiet = find_quiet(judged.record.t, judged.raw, judged.height)
     return [
@@ -131,7 +131,7 @@ def checks_of(judged: Judged, request: ImportRequest) -> list[Check]:
     ]
 
 
-def sign_checks(judged: Judged, doubts: Sequence[str]) -> list[Check]:
+def sign_checks(judged: AppliedImport, doubts: Sequence[str]) -> list[Check]:
     """Check the signs of the forces in the trials.
 
     Args:
@@ -154,7 +154,7 @@ def sign_checks(judged: Judged, doubts: Sequence[str]) -> list[Check]:
     ]
 
 
-def tare_check(judged: Judged, quiet: Bools) -> Check:
+def tare_check(judged: AppliedImport, quiet: Bools) -> Check:
     """Check the tare by the force of the quiet free foot."""
     stated = tuple(judged.payload.bias[:3].tolist())
     if not quiet.any():
@@ -173,7 +173,7 @@ def tare_check(judged: Judged, quiet: Bools) -> Check:
     return Check("tare", stated, "N", (mean,), spread, how, warning)
 
 
-def mass_check(judged: Judged, request: ImportRequest, quiet: Bools) -> Check:
+def mass_check(judged: AppliedImport, request: ImportRequest, quiet: Bools) -> Check:
     """Check the mass by readings of the free foot in several orientations."""
     sensor = judged.record.path.sensor
     estimate = find_mass(judged.raw[quiet, :3], sensor[quiet], request.sign)
@@ -187,7 +187,7 @@ def mass_check(judged: Judged, request: ImportRequest, quiet: Bools) -> Check:
     return _check("mass", (request.mass,), "kg", estimate, warning)
 
 
-def lag_check(judged: Judged, request: ImportRequest) -> Check:
+def lag_check(judged: AppliedImport, request: ImportRequest) -> Check:
     """Check the lag by starts and stops of the foot."""
     motion = judged.record.motion
     further = find_lag(motion.t, motion.step, judged.values)  # beyond the stated lag
@@ -219,14 +219,14 @@ def clock_check(record: LegRecord) -> Check:
     return Check("clocks apart", (), "ms", value, (), how)
 
 
-def normal_check(judged: Judged) -> Check:
+def normal_check(judged: AppliedImport) -> Check:
     """Check the normal by the path of the pressed foot."""
     pressed = judged.in_trials & (judged.values[:, 2] > PRESSED_FORCE)
     estimate = find_normal(judged.record.path.foot[pressed])
     return _check("normal", tuple(judged.axes[2].tolist()), "", estimate)
 
 
-def direction_check(judged: Judged) -> Check:
+def direction_check(judged: AppliedImport) -> Check:
     """Check the direction by the path of the foot in the trials."""
     foot = judged.record.path.foot
     estimate = find_direction(foot, judged.spans, judged.axes[2])
@@ -244,7 +244,7 @@ def _check(
     return Check(name, stated, unit, value, spread, estimate.how, warning)
 
 
-def warnings_of(judged: Judged) -> list[str]:
+def warnings_of(judged: AppliedImport) -> list[str]:
     """Collect warnings on forces, moments and paths of the trials."""
     rows = judged.in_trials
     values, lateral = judged.values[rows], (judged.force @ judged.axes[1])[rows]
@@ -257,12 +257,12 @@ def warnings_of(judged: Judged) -> list[str]:
         *(
             text
             for first, end in judged.spans
-            for text in way_warnings(foot[first:end], judged.axes)
+            for text in path_warnings(foot[first:end], judged.axes)
         ),
     ]
 
 
-def tare_warnings(judged: Judged, request: ImportRequest) -> list[str]:
+def tare_warnings(judged: AppliedImport, request: ImportRequest) -> list[str]:
     """Collect warnings on the window of a tare."""
     if not isinstance(request.tare, tuple):
         return []
@@ -285,7 +285,7 @@ def tare_warnings(judged: Judged, request: ImportRequest) -> list[str]:
     return warnings
 
 
-def _weight_warnings(judged: Judged) -> list[str]:
+def _weight_warnings(judged: AppliedImport) -> list[str]:
     """Warn of a mass of 0 if the sensor turns under load."""
     turned = turn_deg(judged.record.path.sensor[judged.in_trials])
     if judged.payload.mass or turned <= _LEAST_TURN:
@@ -298,19 +298,19 @@ def _weight_warnings(judged: Judged) -> list[str]:
     ]
 
 
-def _moment_warnings(judged: Judged) -> list[str]:
+def _moment_warnings(judged: AppliedImport) -> list[str]:
     """Compare the moments with the lever of the foot, in the sensor's axes."""
     path = judged.record.path
     wrench = judged.payload.contact(judged.raw, path.sensor)
     force, moment = wrench[:, :3], wrench[:, 3:]
     sliding = judged.in_trials & (judged.values[:, 0] > SLOWEST)
     sliding &= judged.values[:, 2] > PRESSED_FORCE
-    doubts = free_moment(force[sliding], moment[sliding])
+    doubts = moment_doubts(force[sliding], moment[sliding])
     warnings = [replace(doubt, remedy=_OPTIONS).text for doubt in doubts]
     return [*warnings, *moment_warnings(moment, path.lever, force)]
 
 
-def _channel_warnings(judged: Judged) -> list[str]:
+def _channel_warnings(judged: AppliedImport) -> list[str]:
     """Check each channel of the sensor while the foot slides."""
     t, record, warnings = judged.record.t, judged.record, list[str]()
     for first, end in judged.spans:

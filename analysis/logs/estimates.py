@@ -39,7 +39,7 @@ _EXPLAINED = 0.5  # least explained share of the variance of F_t/F_n around even
 _FLAT = 0.002  # difference in that share within which lags are equally good
 SURE = 0.005  # s, lower limit of the uncertainty, because the maximum is flat
 # ground
-SHORTEST_WAY = 0.1  # m of path in the plane
+SHORTEST_PATH = 0.1  # m of path in the plane
 _WIDE = 0.02  # m of width of the path from which a plane can be fitted
 _SPAN = 3.5  # width of a uniform distribution in standard deviations
 
@@ -278,10 +278,10 @@ def find_normal(foot: Array) -> Estimate:
     centred = foot - foot.mean(axis=0)
     _, _, axes = np.linalg.svd(centred, full_matrices=False)
     extents = np.ptp(centred @ axes.T, axis=0)
-    if extents[0] < SHORTEST_WAY:
+    if extents[0] < SHORTEST_PATH:
         return nothing(
             f"the pressed foot moves {extents[0] * 1e3:.0f} mm, "
-            f"{SHORTEST_WAY * 1e3:.0f} mm are needed"
+            f"{SHORTEST_PATH * 1e3:.0f} mm are needed"
         )
     is_plane = extents[1] >= _WIDE
     if is_plane:
@@ -314,10 +314,10 @@ def find_direction(
     chord = np.sum([path[-1] for path in paths] or [np.zeros(3)], axis=0)
     flat = chord - (chord @ normal) * normal
     size = float(np.linalg.norm(flat))
-    if size < SHORTEST_WAY / 2.0:
+    if size < SHORTEST_PATH / 2.0:
         return nothing(
             f"the pressed foot ends {size * 1e3:.0f} mm from where it began, "
-            f"{SHORTEST_WAY / 2.0 * 1e3:.0f} mm are needed"
+            f"{SHORTEST_PATH / 2.0 * 1e3:.0f} mm are needed"
         )
     direction = flat / size
     across = np.cross(normal, direction)

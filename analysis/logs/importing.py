@@ -24,8 +24,8 @@ from analysis.logs.channels import (
     require_no_jump,
 )
 from analysis.logs.checks import (
+    AppliedImport,
     Check,
-    Judged,
     checks_of,
     series_warnings,
     sign_checks,
@@ -144,7 +144,7 @@ def import_log(request: ImportRequest) -> ImportedLog:
         force = payload.to_base(payload.contact(raw, sensor), sensor)
         values = traction(axes, record.path.velocity, force)
         spans = _trial_rows(request, record.t)
-        judged = Judged(record, spans, axes, payload, raw, force, values)
+        judged = AppliedImport(record, spans, axes, payload, raw, force, values)
         checks = checks_of(judged, request)
         doubts = [check.warning for check in checks if check.warning]
         doubts += tare_warnings(judged, request)
@@ -311,7 +311,7 @@ def _trial_rows(request: ImportRequest, t: Array) -> list[tuple[int, int]]:
 def _trial(
     name: str,
     span: tuple[int, int],
-    judged: Judged,
+    judged: AppliedImport,
     request: ImportRequest,
     is_simulated: bool,
 ) -> ImportedTrial:

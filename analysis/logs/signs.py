@@ -90,7 +90,7 @@ def moment_warnings(moment: Array, lever: Array, force: Array) -> list[str]:
     ]
 
 
-def way_warnings(way: Array, axes: Array) -> list[str]:
+def path_warnings(way: Array, axes: Array) -> list[str]:
     """Warn if the path of a stroke deviates from the stated direction or plane.
 
     Args:

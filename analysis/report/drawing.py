@@ -72,7 +72,9 @@ def _draw(key: str, shown: ShownNumbers) -> ReportFigure | None:
     )
 
 
-def kept_figures(shown: ShownNumbers, store: ResultStore | None) -> list[ReportFigure]:
+def cached_figures(
+    shown: ShownNumbers, store: ResultStore | None
+) -> list[ReportFigure]:
     """Return every figure that has numbers, from the cache or newly drawn.
 
     Args:

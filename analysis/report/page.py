@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from acquisition.errors import MissingLibraryError
-from analysis.report.drawing import kept_figures
+from analysis.report.drawing import cached_figures
 from analysis.report.findings import findings_rows, plain_findings
 from analysis.report.page_model import (
     PageSection,
@@ -54,7 +54,7 @@ def write_report(study: Study, out_dir: Path, context: ReportContext) -> Path:
     table = to_csv(study, findings_rows(results))
     write_atomic(out_dir / "fits.csv", table.encode())
     numbers = ShownNumbers(results, context.with_pdf)
-    shown = kept_figures(numbers, context.store)
+    shown = cached_figures(numbers, context.store)
     _file_figures(out_dir / "figures", shown)
     page = out_dir / "report" / "index.html"
     write_atomic(page, render_page(results, shown, context).encode())

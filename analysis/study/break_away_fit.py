@@ -15,7 +15,7 @@ import numpy as np
 
 from analysis.data.prepare import PreparedTrial
 from analysis.data.series import Array
-from analysis.data.terrain_kinds import groups_of
+from analysis.data.terrain_kinds import class_labels
 from analysis.study.push_likelihood import CensoredLikelihood
 from analysis.study.pushes import V_SLIP, FootPush, PushTable, find_pushes
 from analysis.study.slip_risk import BREAK_AWAY, SLIDING, BreakAwayModel, PushLaw
@@ -132,7 +132,7 @@ def fit_break_away(
 
 def fit_planned(task: BreakAwayTask) -> dict[str, BreakAwayModel]:
     """Fit the models of a task, in the order of its terrains; pure."""
-    options, surface = task.options, groups_of(task.kinds)["surface"]
+    options, surface = task.options, class_labels(task.kinds)["surface"]
     candidates = [
         terrain for terrain in task.terrains if len(terrain.pushes) >= LEAST_TRIALS
     ]

@@ -73,7 +73,7 @@ class CovariateRows:
         inputs = [x[kept] for n, x in smooth.further.items() if n not in names]
         further = np.column_stack(inputs) if inputs else None
         columns = [
-            way_since_drop(trial, least) if n == WAY else smooth.further[n][kept]
+            travel_since_drop(trial, least) if n == WAY else smooth.further[n][kept]
             for n in names
         ]
         return cls(
@@ -285,7 +285,7 @@ def _changes(rows: CovariateRows, column: int) -> Array:
     return table[there] - table[here]
 
 
-def way_since_drop(trial: PreparedTrial, least: float) -> Array:
+def travel_since_drop(trial: PreparedTrial, least: float) -> Array:
     """Return the travel since the last drop in force at the kept samples [m], (m,).
 
     A drop is detected once the force is `least` [N] below its peak; before the first

@@ -7,7 +7,7 @@ import numpy as np
 
 from acquisition.errors import SettingsError
 from analysis.data.events import find_slips
-from analysis.data.plausibility import FEWEST, doubts_of, summed_up
+from analysis.data.plausibility import FEWEST, doubt_summary, doubts_of
 from analysis.data.prepare import (
     MINIMUM_KEPT,
     PreparedTrial,
@@ -352,7 +352,7 @@ def notes_of_tables(trials: Mapping[str, Sequence[TractionSeries]]) -> list[str]
 
 def _doubts(terrains: Iterable[Sequence[PreparedTrial]]) -> list[str]:
     """Collect the doubts about trials, one line per reason."""
-    return summed_up((t.name, doubts_of(t)) for trials in terrains for t in trials)
+    return doubt_summary((t.name, doubts_of(t)) for trials in terrains for t in trials)
 
 
 def _all_warnings(

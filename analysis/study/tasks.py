@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from acquisition.cores import available_cores
-from acquisition.linear_algebra import keep_memory
+from acquisition.linear_algebra import keep_heap
 from analysis.study.cluster import run_on_cluster
 from analysis.study.store import ResultStore
 from analysis.study.worker_processes import Call, run_on_processes, running_workers
@@ -93,7 +93,7 @@ def run_batches(
 
     No core idles between batches. Progress counts the tasks of all batches.
     """
-    keep_memory()  # also speeds up fits in this process
+    keep_heap()  # also speeds up fits in this process
     where = workers if isinstance(workers, Workers) else Workers(workers)
     indices = [
         (k, n) for k, batch in enumerate(batches) for n in range(len(batch.tasks))
@@ -152,6 +152,6 @@ def _one_threaded(
     import scipy.linalg  # noqa: F401
     from threadpoolctl import threadpool_limits
 
-    keep_memory()
+    keep_heap()
     with threadpool_limits(1):
         return index, function(task)

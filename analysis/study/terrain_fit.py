@@ -11,7 +11,7 @@ from analysis.data.events import Slip
 from analysis.data.prepare import PreparedTrial
 from analysis.data.quality import PULLED, share_below
 from analysis.data.samples import SampleTable
-from analysis.data.terrain_kinds import Value, is_papers, kind_title
+from analysis.data.terrain_kinds import Value, is_paper_terrain, kind_title
 from analysis.study.crossval import FoldResult, ModelFold
 from analysis.study.models import FitOptions
 from analysis.study.trial_components import TrialComponents
@@ -83,9 +83,9 @@ class TerrainResult:
     units: Mapping[str, str] = field(default_factory=dict[str, str])
 
     @property
-    def is_papers(self) -> bool:
+    def is_paper_terrain(self) -> bool:
         """Whether name, stones and incline match one of the paper's eight terrains."""
-        return is_papers(self.terrain, self.kind, self.incline_deg)
+        return is_paper_terrain(self.terrain, self.kind, self.incline_deg)
 
     @property
     def title(self) -> str:

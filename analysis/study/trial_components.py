@@ -28,7 +28,7 @@ from analysis.gp.trial_level import (
     RestrictedLikelihood,
     TrialLevels,
     TrialResiduals,
-    levels_of,
+    estimate_levels,
 )
 from analysis.gp.trial_noise import TrialNoise, TrialRows
 from analysis.study.models import FitOptions
@@ -155,7 +155,7 @@ def fit_components(task: ComponentsTask) -> TrialComponents | None:
     residuals = TrialResiduals(
         [(trial.t, part) for trial, part in zip(task.trials, parts, strict=True)]
     )
-    levels = levels_of(residuals)
+    levels = estimate_levels(residuals)
     components, likelihood = levels.components, RestrictedLikelihood(residuals)
     theta = components.theta()
     draws = min(task.options.draws, _DRAWS)

@@ -20,7 +20,7 @@ from analysis.terrains.classifier import (
 )
 from analysis.terrains.recognition import Expert, TerrainScores, score_trial
 from analysis.terrains.verdict import WindowLimits
-from analysis.terrains.windows import RESID, WINDOWS, window_features, windows_of
+from analysis.terrains.windows import ROUGHNESS, WINDOWS, window_features, windows_of
 
 # Share of a terrain's own windows that may be rejected as unknown. The aim is at most
 # 10 %: limits set for 10 % reject 10.2 to 10.4 % of the windows of held-out trials.
@@ -103,7 +103,7 @@ class StudyEvidence:
         terrain has its own lower limit of roughness.
         """
         own = [t for t in self.trials[terrain] if t.number != without]
-        roughness = {t.number: t.overlapping[size][:, RESID] for t in own}
+        roughness = {t.number: t.overlapping[size][:, ROUGHNESS] for t in own}
         strain = {t.number: t.strains(terrain, size, overlap=True) for t in own}
         pooled: dict[int, list[Array]] = {}
         for name in self._similar_terrains(terrain):
@@ -288,7 +288,7 @@ def _excluded(
             key = best, trial.number
             if key not in limits:
                 limits[key] = evidence.limits(best, size, trial.number)
-            roughness = float(trial.features[size][k, RESID])
+            roughness = float(trial.features[size][k, ROUGHNESS])
             verdicts.append(limits[key].exclude(roughness, float(strains[best][k])))
     return float(np.mean(verdicts)) if verdicts else None
 

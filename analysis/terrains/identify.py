@@ -13,7 +13,7 @@ import numpy as np
 
 from analysis.data.prepare import PreparedTrial
 from analysis.data.recorded_factors import FOOT
-from analysis.data.terrain_kinds import groups_of
+from analysis.data.terrain_kinds import class_labels
 from analysis.study.models import GP_SE
 from analysis.study.study import Study
 from analysis.study.tasks import run_tasks
@@ -184,7 +184,7 @@ def identify_study(study: Study) -> Identification | None:
     evidence = _evidence(study, rho)
     if len(evidence.trials) < 2:
         return None
-    groups = groups_of(study.kinds) | words_of(study)
+    groups = class_labels(study.kinds) | words_of(study)
     density, error = _by_models(evidence, groups)
     probabilities = {size: surface_probabilities(evidence, size) for size in WINDOWS}
     windows = {size: answers for size, answers in probabilities.items() if answers}
@@ -301,7 +301,7 @@ def _evidence(study: Study, rho: Mapping[str, float]) -> StudyEvidence:
     done = run_tasks(run_score, tasks, workers)
     for task, evidence in zip(tasks, done, strict=True):
         scored.setdefault(task.trial.terrain, []).append(evidence)
-    return StudyEvidence(scored, groups_of(study.kinds)["surface"])
+    return StudyEvidence(scored, class_labels(study.kinds)["surface"])
 
 
 @dataclass(frozen=True, slots=True)

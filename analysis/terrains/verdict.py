@@ -14,12 +14,12 @@ import numpy as np
 
 from analysis.data.prepare import PreparedTrial
 from analysis.data.series import Array
-from analysis.data.terrain_kinds import groups_of
+from analysis.data.terrain_kinds import class_labels
 from analysis.terrains.classifier import FLAT_GROUND, ROCKY_GROUND
 from analysis.terrains.known import KnownTerrain, TerrainDatabase
 from analysis.terrains.logistic import RidgeLogistic
 from analysis.terrains.recognition import Expert, TerrainScores, score_trial
-from analysis.terrains.windows import RESID, window_features
+from analysis.terrains.windows import ROUGHNESS, window_features
 
 NONE = "none"  # none of the known terrains
 
@@ -155,7 +155,7 @@ class _WindowRules:
                 name: limits_of(terrain, window)
                 for name, terrain in database.terrains.items()
             },
-            surface=groups_of(kinds)["surface"],
+            surface=class_labels(kinds)["surface"],
             classifier=None if surfaces is None else surfaces.models.get(window),
         )
 
@@ -163,7 +163,7 @@ class _WindowRules:
         scores, rows = window.scores, window.rows
         best = scores.likeliest(rows)
         strain = float(scores.strain[rows, scores.terrains.index(best)].mean())
-        is_none = self.limits[best].exclude(float(window.features[RESID]), strain)
+        is_none = self.limits[best].exclude(float(window.features[ROUGHNESS]), strain)
         if self.classifier is None:
             rocky, surface = None, scores.likeliest_group(rows, self.surface)
         else:

@@ -28,7 +28,7 @@ FEATURES = (
     "log mean F_t",
     "slope of F_t on F_n",
 )
-RESID = 0  # index of the feature that separates rough from smooth ground
+ROUGHNESS = 0  # index of the feature that separates rough from smooth ground
 _STRIDES = 5  # overlapping windows begin at every fifth of their size
 _STICKING = 0.005  # m/s
 _LEAST = 1e-3  # N, m/s or s, lower limit of values in logarithms

@@ -10,7 +10,7 @@ from experiments.calibration.moving import arrivals
 from experiments.rig.law_calibrations import friction_path
 from experiments.run.pose_walk import PoseWalk
 from experiments.session.store import iso_utc
-from wam.calibration.excitation import CENTRES, FrictionLeg, LegUse, plan_friction
+from wam.calibration.excitation import CENTRES, FrictionLeg, LegPurpose, plan_friction
 from wam.calibration.free_space import FreeSpace
 from wam.calibration.friction_file import (
     FrictionCalibration,
@@ -66,7 +66,7 @@ def collect(context: CalibrationContext) -> RecordedWay:
         halt = arrival.halt
         cycles = rig.backend.loop_client.last(arrival.seconds)
         q, tau = cycles["position"].copy(), cycles["torque_command"].copy()
-        is_held_out = legs[number].use is LegUse.HELD_OUT
+        is_held_out = legs[number].use is LegPurpose.HELD_OUT
         kept = recorded.held_out if is_held_out else recorded.fitted
         kept.append(RecordedLeg(q, tau, halt.speed))
         if halt.pose != pose and halt.pose is not None:

@@ -14,7 +14,7 @@ from experiments.run.pose_walk import PoseWalk
 from experiments.session.store import iso_utc
 from wam.calibration.free_space import FreeSpace
 from wam.calibration.gravity_file import GravityCalibration, gravity_to_toml
-from wam.calibration.poses import MeasurementPose, choose_poses, plan_halts
+from wam.calibration.poses import MeasurementPose, choose_poses, plan_waypoints
 from wam.model.constants import Array
 from wam.model.moments import (
     MomentFit,
@@ -71,7 +71,7 @@ def collect(context: CalibrationContext) -> MeasuredMoments:
 
     def plan(start: Array, space: FreeSpace) -> list[MeasurementPose]:
         chosen = context.poses or choose_poses(model, context.pose_count, space)
-        return plan_halts(model, start, chosen, space)
+        return plan_waypoints(model, start, chosen, space)
 
     walk = PoseWalk(context.console_loop, is_free=True)
     rests: dict[int, list[tuple[Array, Array]]] = {}

@@ -16,10 +16,10 @@ from experiments.calibration.moving import arrivals
 from experiments.rig.rig import Rig
 from experiments.run.pose_walk import PoseWalk
 from experiments.session.store import iso_utc
-from ft_sensor.calibration.fit import SensorFit, check_residual, fit_sensor, turn_words
+from ft_sensor.calibration.fit import SensorFit, check_residual, fit_sensor, turn_text
 from ft_sensor.calibration.sensor_file import SensorCalibration, sensor_to_toml
 from wam.calibration.free_space import FreeSpace
-from wam.calibration.poses import MeasurementPose, choose_orientations, plan_halts
+from wam.calibration.poses import MeasurementPose, choose_orientations, plan_waypoints
 from wam.model.constants import Array
 from wam.model.tool import Tool
 
@@ -81,7 +81,7 @@ def collect(context: CalibrationContext) -> MeasuredOrientations:
         count = context.pose_count
         chosen = list(context.poses) or choose_orientations(model, count, space)
         chosen.append(chosen[0])
-        return plan_halts(model, start, chosen, space, is_two_sided=False)
+        return plan_waypoints(model, start, chosen, space, is_two_sided=False)
 
     walk = PoseWalk(context.console_loop)
     rotations: list[Array] = []
@@ -166,7 +166,7 @@ def show(context: CalibrationContext, weighed: WeighedFoot) -> None:
             f"▲ rig.toml says sign {tool.sensor_sign:+z.0f}: the sensor has the "
             "other one. Its calibration goes before rig.toml."
         )
-    elif turned := turn_words(tool.sensor_angle, fitted.angle):
+    elif turned := turn_text(tool.sensor_angle, fitted.angle):
         context.console.say(
             f"▲ {turned} from angle_deg of rig.toml. Its calibration goes before "
             "rig.toml."

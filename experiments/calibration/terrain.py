@@ -18,7 +18,7 @@ from ft_sensor.calibration.fit import (
     ContainerFit,
     check_terrain,
     fit_terrain,
-    is_inclined_otherwise,
+    has_other_incline,
 )
 from wam.model.constants import Array
 
@@ -112,7 +112,7 @@ def text(context: CalibrationContext, touched: TouchedContainer) -> str:
     rig, fitted = context.rig, touched.fit
     fields = {
         "simulated": str(rig.is_simulated).lower(),
-        FORCED: str(is_inclined_otherwise(fitted, rig.frame)).lower(),
+        FORCED: str(has_other_incline(fitted, rig.frame)).lower(),
         "measured_utc": iso_utc(rig.clock.utc_ns()),
         "residual": f"{fitted.residual:.6f}",
         "roll": f"{fitted.roll:.6f}",

@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.control_loop.faults import CircuitCauses, Fault, GuardVerdict
-from acquisition.control_loop.proof import (
-    PROOF_LIMITS,
-    ProofGoal,
-    ProofKind,
+from acquisition.control_loop.powered_test import (
+    POWERED_TEST_LIMITS,
+    PoweredTestGoal,
+    PoweredTestKind,
 )
 from acquisition.devices import SHORTED, SafetyMode
 from acquisition.errors import PreflightError
@@ -32,7 +32,9 @@ _RAMP_SECONDS = 1.0
 _AFTER = 0.3  # s, recorded beyond the end of a ramp
 _REST = 0.6  # s, without torque at the end of a proof
 _STILL = 1.0  # s, C8
-_LIFT_SECONDS = 2 * PROOF_LIMITS.lift_way / PROOF_LIMITS.lift_speed + 0.6
+_LIFT_SECONDS = (
+    2 * POWERED_TEST_LIMITS.lift_travel / POWERED_TEST_LIMITS.lift_speed + 0.6
+)
 _GRAVITY_SECONDS, _GRAVITY_KEPT = 1.4, 0.6
 _ON_POSE = 0.12  # rad
 _PATIENCE = 120.0  # s
@@ -57,7 +59,7 @@ def lay_down(scene: Scene) -> None:
         PreflightError: it does not lie there, or was not activated in time.
         ArmFaultError, StopRequestedError: as `ConsoleLoop.tick`.
     """
-    if scene.is_proving:
+    if scene.is_testing:
         return
     q = rest_pose(scene.rig.model.constants)
     scene.ask(
@@ -84,7 +86,7 @@ def lay_down(scene: Scene) -> None:
 def _activate(scene: Scene, said: str, *presses: PendantAction) -> None:
     """Have an arm that lies activated without torque; raises as `lay_down`."""
     scene.loop_client.start()
-    scene.prove(ProofGoal(ProofKind.REST))
+    scene.prove(PoweredTestGoal(PoweredTestKind.REST))
     scene.wait(0.1)
     scene.say(f"{said} Keep the hands off the arm: it gets no torque.")
     if scene.simulation is not None:
@@ -96,7 +98,7 @@ def _activate(scene: Scene, said: str, *presses: PendantAction) -> None:
         waited += 0.1
         if waited > _PATIENCE:
             raise preflight_error("not-active", seconds=_PATIENCE)
-    scene.is_proving = True
+    scene.is_testing = True
 
 
 def rest(scene: Scene) -> Values:
@@ -123,16 +125,18 @@ def rest_and_silence(scene: Scene) -> Values:
         return values
     scene.show_share(0.8, "nothing is asked for: the module has to brake")
     reader = scene.rig.shared.cycles.reader()
-    scene.prove(ProofGoal(ProofKind.SILENCE, seconds=PROOF_LIMITS.silence))
+    scene.prove(
+        PoweredTestGoal(PoweredTestKind.SILENCE, seconds=POWERED_TEST_LIMITS.silence)
+    )
     ended: list[str] = []
     try:
-        scene.wait(PROOF_LIMITS.silence + _AFTER)
+        scene.wait(POWERED_TEST_LIMITS.silence + _AFTER)
     except ArmFaultError as fault:
         said = scene.fault_words(fault)
         if not is_heartbeat(fault.verdict):
             ended = [said]
     record = reader.read()
-    if not (ended or scene.is_proving):
+    if not (ended or scene.is_testing):
         said = "The module braked. Press Shift-idle, then Shift-activate."
         _activate(scene, said, "idle", "activate")
     return {
@@ -166,7 +170,7 @@ def _braked_after(values: Values) -> float:
     t_ns, mode = values["silent_ns"], values["silent_mode"]
     is_braked = np.isin(mode, [int(each) for each in SHORTED])
     if not is_braked.any():
-        return 1e3 * PROOF_LIMITS.silence
+        return 1e3 * POWERED_TEST_LIMITS.silence
     first = int(is_braked.argmax())
     heard = np.flatnonzero(values["silent_fresh"][:first])
     last = int(heard[-1]) if heard.size else 0
@@ -177,7 +181,7 @@ def rest_rows(values: Values) -> list[Found]:
     """Return the quantities of an arm without torque."""
     seconds = _seconds(values["t_ns"])
     rows = [
-        found("rest", 1e3 * way, high=1e3 * PROOF_LIMITS.rest[i], joint=i + 1)
+        found("rest", 1e3 * way, high=1e3 * POWERED_TEST_LIMITS.rest[i], joint=i + 1)
         for i, way in enumerate(_ways(values["q"]))
     ]
     return [*rows, *_ended(values), found("active", seconds)]
@@ -188,7 +192,7 @@ def ramps(scene: Scene, joints: Sequence[int] = PUSHED) -> Values:
     lay_down(scene)
     constants, q = scene.rig.model.constants, scene.position()
     weights = scene.rig.law_model.gravity(q)
-    goals: list[ProofGoal] = []
+    goals: list[PoweredTestGoal] = []
     for signed in joints:
         i = abs(signed) - 1
         torque = 2.0 * float(constants.coulomb[i])
@@ -196,7 +200,9 @@ def ramps(scene: Scene, joints: Sequence[int] = PUSHED) -> Values:
             torque += 1.3 * abs(float(weights[i]))
         torque = min(torque, 0.9 * scene.rig.settings.rig.limits.torque[i])
         sense = 1.0 if signed > 0 else -1.0
-        goals.append(ProofGoal(ProofKind.RAMP, i + 1, sense * torque, _RAMP_SECONDS))
+        goals.append(
+            PoweredTestGoal(PoweredTestKind.RAMP, i + 1, sense * torque, _RAMP_SECONDS)
+        )
     values = _proofs(scene, goals, _RAMP_SECONDS + _AFTER)
     return {**values, "weights": weights}
 
@@ -236,7 +242,9 @@ def ramp_rows(values: Values) -> list[Found]:
         q = values["q"][part]
         ways = np.abs(q - q[0]).max(axis=0)
         ways[i] = 0.0
-        most = np.array([PROOF_LIMITS.aside_of(i + 1, j) for j in range(1, 8)])
+        most = np.array(
+            [POWERED_TEST_LIMITS.other_joint_travel(i + 1, j) for j in range(1, 8)]
+        )
         other = int((ways / most).argmax())
         rows.append(
             found(
@@ -249,7 +257,7 @@ def ramp_rows(values: Values) -> list[Found]:
             )
         )
         way = sense * (q[:, i] - q[0, i])
-        reach = PROOF_LIMITS.reach[i]
+        reach = POWERED_TEST_LIMITS.reach[i]
         rows.append(
             found("moved", 1e3 * way.max(), low=1e3 * reach, joint=_signed(i, sense))
         )
@@ -264,12 +272,14 @@ def lift(scene: Scene) -> Values:
     lay_down(scene)
     constants, q = scene.rig.model.constants, scene.position()
     weights = scene.rig.law_model.gravity(q)
-    goals: list[ProofGoal] = []
+    goals: list[PoweredTestGoal] = []
     for signed in LIFTED:
         i = abs(signed) - 1
         most = 1.5 * (abs(float(weights[i])) + float(constants.coulomb[i]))
         most = min(most, 0.9 * scene.rig.settings.rig.limits.torque[i])
-        goals.append(ProofGoal(ProofKind.LIFT, i + 1, most if signed > 0 else -most))
+        goals.append(
+            PoweredTestGoal(PoweredTestKind.LIFT, i + 1, most if signed > 0 else -most)
+        )
     values = _proofs(scene, goals, _LIFT_SECONDS)
     model = scene.rig.law_model
     predicted = np.array([model.gravity(row) for row in values["q"]]).reshape(-1, 7)
@@ -289,7 +299,7 @@ def judge_lift(values: Values) -> Judgement:
         q, tau = values["q"][part][:, i], sense * values["tau"][part][:, i]
         way = sense * (q - q[0])
         rows.append(found("lifted", 1e3 * way.max(), joint=i + 1))
-        low, high = (share * PROOF_LIMITS.lift_way for share in _MIDDLE)
+        low, high = (share * POWERED_TEST_LIMITS.lift_travel for share in _MIDDLE)
         inside = (way > low) & (way < high)
         before = np.arange(len(way)) < int(way.argmax())
         up, down = tau[inside & before], tau[inside & ~before]
@@ -306,13 +316,13 @@ def judge_lift(values: Values) -> Judgement:
 def gravity_ramp(scene: Scene) -> Values:
     """Let the compensation of gravity grow to the whole."""
     lay_down(scene)
-    goal = ProofGoal(ProofKind.GRAVITY, seconds=_GRAVITY_SECONDS)
+    goal = PoweredTestGoal(PoweredTestKind.GRAVITY, seconds=_GRAVITY_SECONDS)
     return _proofs(scene, [goal], _GRAVITY_SECONDS + _GRAVITY_KEPT)
 
 
 def judge_gravity_ramp(values: Values) -> Judgement:
     """Judge whether the compensation moves an arm that lies."""
-    most = [1e3 * PROOF_LIMITS.gravity * way for way in PROOF_LIMITS.rest]
+    most = [1e3 * POWERED_TEST_LIMITS.gravity * way for way in POWERED_TEST_LIMITS.rest]
     rows = [
         found("gravity", 1e3 * way, high=most[i], joint=i + 1)
         for i, way in enumerate(_ways(values["q"]))
@@ -323,7 +333,7 @@ def judge_gravity_ramp(values: Values) -> Judgement:
     )
 
 
-def _proofs(scene: Scene, goals: Sequence[ProofGoal], seconds: float) -> Values:
+def _proofs(scene: Scene, goals: Sequence[PoweredTestGoal], seconds: float) -> Values:
     """Do one proof after the other until one ends in idle; return what was seen."""
     parts: list[NDArray[Any]] = []
     numbers: list[NDArray[Any]] = []
@@ -351,8 +361,8 @@ def _proofs(scene: Scene, goals: Sequence[ProofGoal], seconds: float) -> Values:
     }
 
 
-def _words(goal: ProofGoal) -> str:
-    if goal.kind is ProofKind.GRAVITY:
+def _words(goal: PoweredTestGoal) -> str:
+    if goal.kind is PoweredTestKind.GRAVITY:
         return "compensation grows"
     return f"joint {goal.joint}, up to {goal.torque:+z.1f} N m"
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from acquisition.control_loop.details import CircuitCauses
 from acquisition.control_loop.faults import GuardVerdict
-from acquisition.control_loop.proof import ProofGoal
+from acquisition.control_loop.powered_test import PoweredTestGoal
 from acquisition.devices import SafetyMode
 from acquisition.ipc.loop_client import LoopClient
 from acquisition.simulation import SimulationControl
@@ -41,7 +41,7 @@ class Scene:
         answers: what its pucks said of themselves.
         sensor: what the wrist sensor said of itself; None = it was not opened.
         serials: of its pucks when C2 was last sound; () = it was not.
-        is_proving: the arm is active in a proof.
+        is_testing: the arm is active in a proof.
         stops: by how much each joint's zero is off by its stops [rad], shape (7,);
             None = not measured.
     """
@@ -52,7 +52,7 @@ class Scene:
     answers: Sequence[Mapping[str, int | None]] = ()
     sensor: Mapping[str, str] | None = None
     serials: Sequence[int | None] = ()
-    is_proving: bool = False
+    is_testing: bool = False
     stops: Array | None = None
 
     @property
@@ -205,7 +205,7 @@ class Scene:
 
     def fault_words(self, fault: ArmFaultError) -> str:
         """Return the message of what the guard stopped the arm for."""
-        self.is_proving = False
+        self.is_testing = False
         self.loop_client.advance(TICK)
         context = FaultContext(
             "The step",
@@ -226,7 +226,7 @@ class Scene:
         finally:
             self.console_loop.hand = None
 
-    def prove(self, goal: ProofGoal) -> None:
+    def prove(self, goal: PoweredTestGoal) -> None:
         """Ask the loop for a proof."""
         self.loop_client.prove(goal)
 

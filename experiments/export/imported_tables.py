@@ -9,7 +9,7 @@ from pathlib import Path
 from acquisition.files import open_regular
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.recorded_factors import value_text
-from analysis.logs.channels import Clocked, JointChannel, WrenchChannel
+from analysis.logs.channels import JointChannel, MessageTimes, WrenchChannel
 from analysis.logs.importing import ImportedLog, ImportedTrial
 from analysis.logs.log_file import LogTopic
 from analysis.logs.opening import log_files
@@ -229,7 +229,7 @@ def _topic(
     frame_id: str,
 ) -> ImportedTopic:
     topic: LogTopic = channel.topic
-    clock: Clocked = channel.clock
+    clock: MessageTimes = channel.clock
     median, most = clock.late
     return ImportedTopic(
         what=what,

@@ -17,7 +17,7 @@ from experiments.rig.rig import Rig
 from experiments.settings.load import SHIPPED
 from experiments.settings.rig import CONTACT_LIMITS, WITHIN_RANGE, RigSettings
 from ft_sensor.reading import axis_names, largest_load, largest_traction
-from ft_sensor.serial_line.sensor import BURSTY
+from ft_sensor.serial_line.sensor import BURST_SHARE
 from wam.bus.socketcan import LONGEST_QUEUE, interface_state
 
 CPUS = Path("/sys/devices/system/cpu")
@@ -211,7 +211,7 @@ def check_stream(fields: Mapping[str, str]) -> CheckResult | None:
     text = f"{fields['lost']} of {int(fields['frames']) + int(fields['lost'])} lost"
     text += f", {fields['bad_checks']} damaged"
     bursts, reads = int(fields["bursts"]), int(fields["reads"])
-    is_bursty = bursts > BURSTY * reads
+    is_bursty = bursts > BURST_SHARE * reads
     if is_bursty:
         text += ", arrives in bursts: set the adapter's latency timer to 1 ms"
     is_fine = not is_bursty and fields["lost"] == fields["bad_checks"] == "0"

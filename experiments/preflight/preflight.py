@@ -39,7 +39,7 @@ from experiments.rig.requests import (
     StartArm,
 )
 from experiments.rig.rig import Rig
-from wam.driver.health import complaints, temperature_range
+from wam.driver.health import health_warnings, temperature_range
 from wam.driver.home import HOME_LIMIT, check_zero
 from wam.driver.startup import ArmInfo
 
@@ -156,7 +156,7 @@ def _check_arm(rig: Rig, page: ChecksPage) -> ArmInfo:
     parts += [f"{woken} woken"] if woken else []
     parts += ["zeroed"] if info.is_zeroed else []
     health, now_ns = [puck.health for puck in info.pucks], rig.clock.now_ns()
-    ill = complaints(health, now_ns)
+    ill = health_warnings(health, now_ns)
     parts += [temperature_range(health, now_ns), *ill]
     page.add(WARNING if ill else GOOD, "pucks 1-7", ", ".join(parts))
     for text in info.warnings:

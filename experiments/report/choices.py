@@ -140,7 +140,7 @@ def repeat_study(
         options = choice.options(study.options)
         with fitting(console) as progress:
             other = run_study(series, options, study.simulated, progress, store)
-        others.append((choice.remarked(chain(*trials.values())), other))
+        others.append((choice.with_remark(chain(*trials.values())), other))
     return others
 
 

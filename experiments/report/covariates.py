@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from analysis.data.prepare import prepare_trial
 from analysis.data.recorded_covariates import RECORDED, with_covariates
 from analysis.data.series import TractionSeries
-from analysis.report.held_trial import TrialFiles
+from analysis.report.reduced_trial import TrialFiles
 from analysis.study.covariates import (
     FEWEST,
     WAY,

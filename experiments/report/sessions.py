@@ -7,9 +7,9 @@ from shutil import disk_usage
 
 from acquisition.errors import SessionError, TrialFileError
 from analysis.data.load import load_trial
-from analysis.data.plausibility import summed_up
+from analysis.data.plausibility import doubt_summary
 from analysis.data.recorded_factors import stated_factors
-from analysis.report.held_trial import HeldTrial, TrialFiles
+from analysis.report.reduced_trial import ReducedTrial, TrialFiles
 from analysis.report.sections.rig_health.health import with_tares
 from analysis.study.models import FitOptions
 from analysis.study.store import MOST_BYTES, ResultStore
@@ -38,9 +38,9 @@ _SHARE_OF_DISK = 4  # one part in so many of what is free may be results
 
 def _load_trials(
     sessions: Sequence[SessionFolder], console: Console
-) -> tuple[dict[str, list[HeldTrial]], dict[Path, TruthErrors], list[str]]:
+) -> tuple[dict[str, list[ReducedTrial]], dict[Path, TruthErrors], list[str]]:
     """Return kept trials by terrain, oldest session first; truths; what is left out."""
-    trials: dict[str, list[HeldTrial]] = {}
+    trials: dict[str, list[ReducedTrial]] = {}
     truths: dict[Path, TruthErrors] = {}
     left_out: list[str] = []
     digests = TrialDigests()  # of what was recorded, whatever file it is in
@@ -64,7 +64,7 @@ def _load_trials(
                 left_out.append(f"{name} is the same recording as {original}")
                 console.say(f"▲ left out: {left_out[-1]}")
                 continue
-            trials.setdefault(trial.terrain, []).append(HeldTrial.of(trial))
+            trials.setdefault(trial.terrain, []).append(ReducedTrial.of(trial))
             if (truth := compare_with_truth(trial)) is not None:
                 truths[path] = truth
     return trials, truths, left_out
@@ -82,7 +82,7 @@ class StudySession:
     """
 
     study: Study
-    trials: dict[str, list[HeldTrial]]
+    trials: dict[str, list[ReducedTrial]]
     left_out: list[str]
     truths: dict[Path, TruthErrors]
 
@@ -94,7 +94,9 @@ class StudySession:
     @property
     def doubts(self) -> list[str]:
         """Why trials cannot be what they say they are, a line for each reason."""
-        return summed_up((t.name, t.doubts) for ts in self.trials.values() for t in ts)
+        return doubt_summary(
+            (t.name, t.doubts) for ts in self.trials.values() for t in ts
+        )
 
 
 def results_below(data: Path) -> ResultStore:

@@ -15,7 +15,7 @@ from analysis.report.results import compute_results
 from analysis.report.section import ReportTable
 from analysis.report.sections.beyond_paper.further_columns import covariate_tables
 from analysis.report.sections.rig_health.health import RigTrial
-from analysis.report.sections.sensitivity import plain_choice, side_by_side
+from analysis.report.sections.sensitivity import comparison_table, plain_choice
 from analysis.study.store import ResultStore
 from analysis.study.study import Study
 from experiments.operator.console import Console
@@ -111,7 +111,7 @@ def report_study(
         generated_utc=iso_utc(SystemClock().utc_ns()),
         tables=[
             *reported.cells,
-            *(side_by_side(choice, study, other) for choice, other in others),
+            *(comparison_table(choice, study, other) for choice, other in others),
             *covariate_tables(tested),
             *reported.tables,
         ],

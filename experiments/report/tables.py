@@ -8,7 +8,7 @@ import numpy as np
 
 from analysis.data.recorded_factors import FOOT, value_text
 from analysis.data.terrain_kinds import kind_title
-from analysis.report.held_trial import HeldTrial
+from analysis.report.reduced_trial import ReducedTrial
 from analysis.report.section import ReportSection, ReportTable
 from analysis.report.traction_ratio import traction_ratio
 from analysis.study.models import GP_SE, TUSTIN
@@ -54,7 +54,7 @@ def summary_table(study: Study) -> tuple[list[str], list[list[str]]]:
 
 
 def report_tables(
-    sessions: Sequence[SessionFolder], trials: Mapping[str, Sequence[HeldTrial]]
+    sessions: Sequence[SessionFolder], trials: Mapping[str, Sequence[ReducedTrial]]
 ) -> list[ReportTable]:
     """Return sessions, rejected trials, preflight, settings, provenance and files."""
     every = [trial for group in trials.values() for trial in group]
@@ -133,7 +133,7 @@ def _preflight_table(sessions: Sequence[SessionFolder]) -> ReportTable:
     )
 
 
-def _matrix_table(trials: Mapping[str, Sequence[HeldTrial]]) -> ReportTable:
+def _matrix_table(trials: Mapping[str, Sequence[ReducedTrial]]) -> ReportTable:
     rows = [
         (
             name,
@@ -154,7 +154,7 @@ def _matrix_table(trials: Mapping[str, Sequence[HeldTrial]]) -> ReportTable:
     )
 
 
-def _provenance(trials: Sequence[HeldTrial]) -> ReportTable:
+def _provenance(trials: Sequence[ReducedTrial]) -> ReportTable:
     values: dict[str, set[str]] = {}
     for trial in trials:
         for key, value in trial.metadata["provenance"].items():

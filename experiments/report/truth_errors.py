@@ -16,7 +16,7 @@ from analysis.report.force_uncertainty import (
     uncertainties_of,
     uncertainty_of,
 )
-from analysis.report.held_trial import HeldTrial
+from analysis.report.reduced_trial import ReducedTrial
 from analysis.report.section import ReportSection, ReportTable
 from analysis.study.study import Study
 from analysis.study.terrain_fit import TerrainResult
@@ -100,7 +100,7 @@ _RECOVERED = {"mu_k": "mu", "mu_s": "F_s", "v_S": "v_s", "b": "b"}
 
 def truth_tables(
     study: Study,
-    trials: Mapping[str, Sequence[HeldTrial]],
+    trials: Mapping[str, Sequence[ReducedTrial]],
     truths: Mapping[Path, TruthErrors],
 ) -> list[ReportTable]:
     """Return measured and recovered beside the truth; none without truth files.

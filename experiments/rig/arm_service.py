@@ -34,7 +34,7 @@ from experiments.rig.requests import (
 from wam.bus.link import CanLink
 from wam.driver.arm import WamArm
 from wam.driver.startup import ArmInfo
-from wam.driver.survey import Answers, Heard
+from wam.driver.survey import Answers, RestTraffic
 
 UNASKED_EVERY = 20  # in one of so many cycles they are not
 _AGE_CYCLES = 5  # at the end, in none of which they are
@@ -119,7 +119,7 @@ class ArmService:
         """See `StartArm`."""
         return self.arm.start()
 
-    def listen(self, seconds: float) -> Heard:
+    def listen(self, seconds: float) -> RestTraffic:
         """See `Listen`."""
         return self.arm.survey().listen(round(seconds * NS_PER_S))
 
@@ -142,10 +142,10 @@ class ArmService:
         unasked = late = jumps = 0
         is_judged = False  # complete, and nobody else asks: that is told by the loop
         for number, _ in enumerate(self._periods(_EXCHANGE_PERIODS), 1):
-            is_unasked = number % UNASKED_EVERY == 0
+            is_without_request = number % UNASKED_EVERY == 0
             now_ns = clock.now_ns()
-            reading = arm.skip(now_ns) if is_unasked else arm.read(now_ns)
-            if not is_unasked:
+            reading = arm.skip(now_ns) if is_without_request else arm.read(now_ns)
+            if not is_without_request:
                 is_judged = reading.is_complete and reading.foreign_id is None
                 jumps += reading.jump is not None
                 if reading.is_complete:

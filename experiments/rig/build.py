@@ -13,7 +13,7 @@ from acquisition.control_loop.cycle import Cycle, CycleOutputs
 from acquisition.control_loop.limits import GuardLimits
 from acquisition.devices import WrenchSample, WrenchSensor
 from acquisition.errors import SettingsError
-from acquisition.ipc.frame_tape import FrameTape
+from acquisition.ipc.frame_ring import FrameRing
 from acquisition.ipc.layout import SharedLayout
 from acquisition.ipc.loop_server import LoopHooks, LoopServer, no_sound
 from acquisition.ipc.shared_sensor import SharedSensor, publish
@@ -139,7 +139,7 @@ def build_safety_limits(rig: RigSettings) -> SafetyLimits:
 
 def build_link(transport: Transport, shared: SharedLayout, clock: Clock) -> CanLink:
     """Return the link over a transport; every frame goes into the shared memory too."""
-    return CanLink(transport, FrameTape(shared.frames, clock).add)
+    return CanLink(transport, FrameRing(shared.frames, clock).add)
 
 
 def read_properties(settings: Settings) -> str:

@@ -127,7 +127,7 @@ def typed_wrongly(settings: Settings, wrong: str) -> Settings:
     """
     from fakes.world.wrong_rigs import wrong_rig
 
-    mass = wrong_rig(wrong).departure.foot_typed
+    mass = wrong_rig(wrong).departure.typed_foot_mass
     return settings if mass is None else settings.with_foot_mass(mass)
 
 
@@ -291,7 +291,7 @@ def build_server(settings: Settings, served: ServedArm) -> PuckServer:
     """
     from fakes.serving.home_arm import HomePose, build_home_server
     from fakes.serving.puck_server import open_can_port
-    from fakes.world.plain_world import departure_of
+    from fakes.world.plain_world import deviation_from
 
     truth = None if served.truth is None else asdict(served.truth)
     tool, line = _served_tool(settings, served.tool), None
@@ -308,7 +308,7 @@ def build_server(settings: Settings, served: ServedArm) -> PuckServer:
         served.is_at_rest,
         served.friction,
         served.seed,
-        departure_of(truth, 1 if served.seed is None else served.seed),
+        deviation_from(truth, 1 if served.seed is None else served.seed),
     )
     port = open_can_port(*served.bus, settings.rig.can.bitrate)
     try:

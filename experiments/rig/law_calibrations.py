@@ -25,7 +25,7 @@ from wam.calibration.gravity_file import (
     fits_tool,
     gravity_from_toml,
 )
-from wam.control.friction_compensation import FrictionCompensation, known_friction
+from wam.control.friction_compensation import FrictionCompensation, friction_lower_bound
 from wam.model.arm_model import ArmModel
 from wam.model.constants import ArmConstants, load_constants
 from wam.model.friction import MotorFriction, joint_coulomb
@@ -173,7 +173,7 @@ def build_compensation(
     if fault and not stored.is_forced:
         raise unfit(section.file, fault, "friction", _WITHOUT)
     _check_size(section.file, constants, fit.friction)
-    known = known_friction(fit.friction, fit.deviation, fit.asymmetry_deviation)
+    known = friction_lower_bound(fit.friction, fit.deviation, fit.asymmetry_deviation)
     return FrictionCompensation(constants, known, section.compensation)
 
 

@@ -232,7 +232,7 @@ class MultiProcessBackend:
         for name, child in self._children.items():
             if name not in self._reported and not child.is_alive:
                 self._reported.add(name)
-                raise ProcessLostError(name, child.how_it_ended())
+                raise ProcessLostError(name, child.exit_reason())
         self.recorder.check()
 
     def _rescue(self) -> bool:

@@ -9,7 +9,7 @@ from acquisition.control_loop.realtime import Grant
 from acquisition.devices import SafetyMode
 from acquisition.ipc.requests import Request
 from wam.driver.startup import ArmInfo
-from wam.driver.survey import Answers, Heard
+from wam.driver.survey import Answers, RestTraffic
 
 EXCHANGE_CYCLES = 100  # in which positions are asked for
 
@@ -57,7 +57,7 @@ class StartArm(Request[ArmInfo]):
 
 
 @dataclass(frozen=True, slots=True)
-class Listen(Request[Heard]):
+class Listen(Request[RestTraffic]):
     """Ask for nothing for `seconds`; what was heard. Raises LinkError."""
 
     seconds: float

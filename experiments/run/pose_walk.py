@@ -12,7 +12,7 @@ from experiments.run.console_loop import TICK, ConsoleLoop
 from experiments.run.stop import ArmFaultError
 from experiments.run.surroundings import free_space
 from wam.calibration.free_space import FreeSpace
-from wam.calibration.poses import APPROACH_SPEED, MeasurementPose, way_seconds
+from wam.calibration.poses import APPROACH_SPEED, MeasurementPose, travel_time
 from wam.control.position_control import JointMove, move_reference
 from wam.model.constants import Array
 
@@ -80,7 +80,7 @@ class PoseWalk:
         self.go_to(MeasurementPose(start, APPROACH_SPEED, None))
         self.ask(
             f"The arm will move by itself through {number} poses, about "
-            f"{(way_seconds(start, halts) + stops) / 60:.1f} min. Let go of it and "
+            f"{(travel_time(start, halts) + stops) / 60:.1f} min. Let go of it and "
             "clear the space. [g]o when it is clear.",
             Prompt.MOVE,
         )

@@ -28,9 +28,9 @@ from experiments.settings.calibrations import PREFIX
 from ft_sensor.calibration.sensor_file import SensorCalibration, sensor_from_toml
 from ft_sensor.payload import Payload
 from ft_sensor.tare import TareError, TareResult, take_mean
-from ft_sensor.weighing import WeightChange, weight_change, weight_seen
+from ft_sensor.weighing import WeightChange, measured_weight, weight_change
 from wam.calibration.free_space import FreeSpace
-from wam.calibration.poses import MeasurementPose, plan_halts, tilted_pair
+from wam.calibration.poses import MeasurementPose, plan_waypoints, tilted_pair
 from wam.model.constants import Array
 
 TARE_SECONDS = 1.0
@@ -95,7 +95,7 @@ def prove_mounting(services: RunServices) -> None:
 
     def plan(start: Array, space: FreeSpace) -> list[MeasurementPose]:
         pair = tilted_pair(rig.model, space)
-        return plan_halts(rig.model, start, pair, space, is_two_sided=False)
+        return plan_waypoints(rig.model, start, pair, space, is_two_sided=False)
 
     rotations: list[Array] = []
     readings: list[Array] = []
@@ -241,7 +241,7 @@ def _check_residual(rig: Rig, tared: Payload, rotation: Array) -> None:
     residual = residual_force(tared, known) if known is not None else 0.0
     if known is not None and residual > limit:
         fields = {"residual": residual, "limit": limit}
-        change = weight_seen(tared, rotation, known)
+        change = measured_weight(tared, rotation, known)
         raise preflight_error("residual", **fields, **_likely(rig, change))
 
 

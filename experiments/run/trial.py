@@ -8,7 +8,7 @@ from pathlib import Path
 
 from acquisition.clock import utc_offset_ns
 from acquisition.errors import TrialFileError
-from acquisition.ipc.frame_tape import last_frames
+from acquisition.ipc.frame_ring import last_frames
 from acquisition.recording.recorder import seal
 from acquisition.trial_file.header import TrialHeader
 from acquisition.trial_file.verify import VerifiedFile

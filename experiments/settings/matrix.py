@@ -8,28 +8,30 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
-from acquisition.settings import File, Number, SettingsSection, Usual, Whole
+from acquisition.settings import File, Number, SettingsSection, UsualRange, Whole
 from analysis.data.terrain_kinds import Value, terrain_kind
 
 MOST_FACTORS = 12
 LONGEST_WORD = 40
-_Across = Annotated[Number, Field(ge=-1.2, le=1.2), Usual(-1.0, 1.0, "m")]
-_Up = Annotated[Number, Field(ge=-0.5, le=1.0), Usual(-0.4, 0.6, "m")]
+_Across = Annotated[Number, Field(ge=-1.2, le=1.2), UsualRange(-1.0, 1.0, "m")]
+_Up = Annotated[Number, Field(ge=-0.5, le=1.0), UsualRange(-0.4, 0.6, "m")]
 FarEnd = tuple[_Across, _Across, _Up]  # what the arm reaches
 # The stops of the joints, as in wam7.toml.
 Angles = tuple[
-    Annotated[Number, Field(ge=-2.6, le=2.6), Usual(-2.5, 2.5, "rad")],
-    Annotated[Number, Field(ge=-2.0, le=2.0), Usual(-1.9, 1.9, "rad")],
-    Annotated[Number, Field(ge=-2.8, le=2.8), Usual(-2.7, 2.7, "rad")],
-    Annotated[Number, Field(ge=-0.9, le=3.1), Usual(-0.8, 3.0, "rad")],
-    Annotated[Number, Field(ge=-4.76, le=1.24), Usual(-4.66, 1.14, "rad")],
-    Annotated[Number, Field(ge=-1.6, le=1.6), Usual(-1.5, 1.5, "rad")],
-    Annotated[Number, Field(ge=-3.0, le=3.0), Usual(-2.9, 2.9, "rad")],
+    Annotated[Number, Field(ge=-2.6, le=2.6), UsualRange(-2.5, 2.5, "rad")],
+    Annotated[Number, Field(ge=-2.0, le=2.0), UsualRange(-1.9, 1.9, "rad")],
+    Annotated[Number, Field(ge=-2.8, le=2.8), UsualRange(-2.7, 2.7, "rad")],
+    Annotated[Number, Field(ge=-0.9, le=3.1), UsualRange(-0.8, 3.0, "rad")],
+    Annotated[Number, Field(ge=-4.76, le=1.24), UsualRange(-4.66, 1.14, "rad")],
+    Annotated[Number, Field(ge=-1.6, le=1.6), UsualRange(-1.5, 1.5, "rad")],
+    Annotated[Number, Field(ge=-3.0, le=3.0), UsualRange(-2.9, 2.9, "rad")],
 ]
-Heading = Annotated[Number, Field(ge=-180, le=180), Usual(-180.0, 180.0, "degrees")]
-Travel = Annotated[Number, Field(gt=0.05, le=1.0), Usual(0.05, 0.7, "m")]
-Incline = Annotated[Number, Field(ge=-30, le=30), Usual(-20.0, 20.0, "degrees")]
-Trials = Annotated[Whole, Field(ge=1, le=99), Usual(1, 30)]
+Heading = Annotated[
+    Number, Field(ge=-180, le=180), UsualRange(-180.0, 180.0, "degrees")
+]
+Travel = Annotated[Number, Field(gt=0.05, le=1.0), UsualRange(0.05, 0.7, "m")]
+Incline = Annotated[Number, Field(ge=-30, le=30), UsualRange(-20.0, 20.0, "degrees")]
+Trials = Annotated[Whole, Field(ge=1, le=99), UsualRange(1, 30)]
 PlaceName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]{0,23}$")]
 FootName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,15}$")]
 CellName = Annotated[  # a point stands before a digit only

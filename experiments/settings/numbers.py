@@ -10,7 +10,7 @@ from typing import Any, cast, get_args
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from acquisition.settings import Usual
+from acquisition.settings import UsualRange
 
 _NUMBERS: dict[object, str] = {int: "a whole number", float: "a number"}
 _BOUNDS = (("gt", ">"), ("ge", ">="), ("lt", "<"), ("le", "<="))
@@ -58,8 +58,10 @@ def number_words(number: FieldInfo, got: object) -> tuple[str, str]:
     return words, _meant(number, got)
 
 
-def _usual(number: FieldInfo) -> Usual | None:
-    return next((each for each in number.metadata if isinstance(each, Usual)), None)
+def _usual(number: FieldInfo) -> UsualRange | None:
+    return next(
+        (each for each in number.metadata if isinstance(each, UsualRange)), None
+    )
 
 
 def _meant(number: FieldInfo, got: object) -> str:
@@ -101,7 +103,7 @@ def beyond_real(section: BaseModel) -> str:
 
 def _usual_numbers(
     section: BaseModel, place: str
-) -> Iterator[tuple[str, FieldInfo, Usual, float]]:
+) -> Iterator[tuple[str, FieldInfo, UsualRange, float]]:
     """Yield (dotted name, field, usual values, value) of every number that has them."""
     for name, field in type(section).model_fields.items():
         here = f"{place}.{name}".lstrip(".")

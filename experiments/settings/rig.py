@@ -10,7 +10,7 @@ from acquisition.settings import (
     File,
     Number,
     SettingsSection,
-    Usual,
+    UsualRange,
     Whole,
 )
 from experiments.settings.matrix import FootName, PlaceName
@@ -29,17 +29,17 @@ CONTACT_LIMITS = (
 )
 LOCK_DAMPING = 0.0075  # s, least lock_kd over lock_kp: see `ControlSection`
 _Turn = Annotated[Whole, Field(ge=0, lt=65536)]  # counts of one motor turn
-_Angle = Annotated[Number, Field(ge=-6.3, le=6.3), Usual(-4.0, 4.0, "rad")]
-_Aside = Annotated[Number, Field(ge=-0.1, le=0.1), Usual(-0.05, 0.05, "m")]
-_Below = Annotated[Number, Field(ge=0.02, le=0.25), Usual(0.03, 0.2, "m")]
+_Angle = Annotated[Number, Field(ge=-6.3, le=6.3), UsualRange(-4.0, 4.0, "rad")]
+_Aside = Annotated[Number, Field(ge=-0.1, le=0.1), UsualRange(-0.05, 0.05, "m")]
+_Below = Annotated[Number, Field(ge=0.02, le=0.25), UsualRange(0.03, 0.2, "m")]
 _OnPlate = tuple[_Aside, _Aside, _Below]  # in frame 7
-_Inertia = Annotated[Number, Field(ge=1e-6, le=0.05), Usual(1e-5, 2e-3, "kg m^2")]
+_Inertia = Annotated[Number, Field(ge=1e-6, le=0.05), UsualRange(1e-5, 2e-3, "kg m^2")]
 # Speeds up to twice the shipped limits, torques up to the shipped ones: more the motors
 # give, but no trial needs, and less than its weight lets the arm sink.
-_ShoulderSpeed = Annotated[Number, Field(gt=0, le=3.0), Usual(0.3, 2.2, "rad/s")]
-_UpperArmSpeed = Annotated[Number, Field(gt=0, le=4.0), Usual(0.4, 3.0, "rad/s")]
-_ElbowSpeed = Annotated[Number, Field(gt=0, le=5.0), Usual(0.5, 3.7, "rad/s")]
-_WristSpeed = Annotated[Number, Field(gt=0, le=8.0), Usual(0.8, 6.0, "rad/s")]
+_ShoulderSpeed = Annotated[Number, Field(gt=0, le=3.0), UsualRange(0.3, 2.2, "rad/s")]
+_UpperArmSpeed = Annotated[Number, Field(gt=0, le=4.0), UsualRange(0.4, 3.0, "rad/s")]
+_ElbowSpeed = Annotated[Number, Field(gt=0, le=5.0), UsualRange(0.5, 3.7, "rad/s")]
+_WristSpeed = Annotated[Number, Field(gt=0, le=8.0), UsualRange(0.8, 6.0, "rad/s")]
 _Speeds = tuple[
     _ShoulderSpeed,
     _ShoulderSpeed,
@@ -49,16 +49,16 @@ _Speeds = tuple[
     _WristSpeed,
     _WristSpeed,
 ]
-_ElbowTorque = Annotated[Number, Field(gt=0, le=15.0), Usual(7.5, 15.0, "N m")]
-_WristTorque = Annotated[Number, Field(gt=0, le=2.5), Usual(1.2, 2.5, "N m")]
+_ElbowTorque = Annotated[Number, Field(gt=0, le=15.0), UsualRange(7.5, 15.0, "N m")]
+_WristTorque = Annotated[Number, Field(gt=0, le=2.5), UsualRange(1.2, 2.5, "N m")]
 _Torques = tuple[
-    Annotated[Number, Field(gt=0, le=20.0), Usual(10.0, 20.0, "N m")],
-    Annotated[Number, Field(gt=0, le=45.0), Usual(25.0, 45.0, "N m")],
+    Annotated[Number, Field(gt=0, le=20.0), UsualRange(10.0, 20.0, "N m")],
+    Annotated[Number, Field(gt=0, le=45.0), UsualRange(25.0, 45.0, "N m")],
     _ElbowTorque,
     _ElbowTorque,
     _WristTorque,
     _WristTorque,
-    Annotated[Number, Field(gt=0, le=1.3), Usual(0.6, 1.3, "N m")],
+    Annotated[Number, Field(gt=0, le=1.3), UsualRange(0.6, 1.3, "N m")],
 ]
 
 
@@ -67,7 +67,7 @@ class CanSettings(SettingsSection):
 
     interface: str = Field(examples=["socketcan"])
     channel: str = Field(examples=["can0"])
-    bitrate: Annotated[Whole, Usual(1_000_000, 1_000_000, "bit/s")] = Field(
+    bitrate: Annotated[Whole, UsualRange(1_000_000, 1_000_000, "bit/s")] = Field(
         ge=10_000, le=1_000_000, examples=[1000000]
     )
 
@@ -129,7 +129,7 @@ class FootSection(SettingsSection):
             foot with tread.
     """
 
-    mass: Annotated[Number, Usual(0.1, 1.5, "kg")] = Field(
+    mass: Annotated[Number, UsualRange(0.1, 1.5, "kg")] = Field(
         ge=0.05, le=2.0, examples=[0.45]
     )
     com: _OnPlate = Field(examples=[[0.01, 0.0, 0.062]])
@@ -139,7 +139,9 @@ class FootSection(SettingsSection):
     sole: _OnPlate = Field(examples=[[0.01, 0.0, 0.112]])
     calibration: File | None = Field(default=None, examples=["foot_tread.toml"])
     shape: Literal["flat", "round", "point"] | None = None
-    area: Annotated[Number, Field(gt=0, le=0.1), Usual(1e-4, 0.02, "m^2")] | None = None
+    area: (
+        Annotated[Number, Field(gt=0, le=0.1), UsualRange(1e-4, 0.02, "m^2")] | None
+    ) = None
     simulate: SimulatedSole | None = None
 
     def plain(self) -> dict[str, Any]:
@@ -156,13 +158,13 @@ class ControlSection(SettingsSection):
     whole cycle after the positions that they follow from, in every pose.
     """
 
-    virtual_mass: Annotated[Number, Usual(0.0, 1.0, "kg")] = Field(
+    virtual_mass: Annotated[Number, UsualRange(0.0, 1.0, "kg")] = Field(
         ge=0, le=2, examples=[0.30]
     )
-    lock_kp: Annotated[Number, Usual(10.0, 22.0, "N m/rad")] = Field(
+    lock_kp: Annotated[Number, UsualRange(10.0, 22.0, "N m/rad")] = Field(
         ge=0, le=22, examples=[20.0]
     )
-    lock_kd: Annotated[Number, Usual(0.1, 0.23, "N m s/rad")] = Field(
+    lock_kd: Annotated[Number, UsualRange(0.1, 0.23, "N m s/rad")] = Field(
         ge=0, le=0.25, examples=[0.2]
     )
 
@@ -199,7 +201,7 @@ class FrictionSettings(SettingsSection):
 
     model: Literal["none", "calibrated"] = Field(default="none", examples=["none"])
     file: File = Field(default="friction.toml", examples=["friction.toml"])
-    compensation: Annotated[Number, Usual(0.0, 0.75)] = Field(
+    compensation: Annotated[Number, UsualRange(0.0, 0.75)] = Field(
         default=0.7, ge=0, le=0.8, examples=[0.7]
     )
 
@@ -221,46 +223,46 @@ class LimitSection(SettingsSection):
 
     speed: _Speeds = Field(examples=[[1.5, 1.5, 2.0, 2.5, 4.0, 4.0, 4.0]])
     torque: _Torques = Field(examples=[[20, 45, 15, 15, 2.5, 2.5, 1.3]])
-    foot_speed: Annotated[Number, Usual(0.3, 0.9, "m/s")] = Field(
+    foot_speed: Annotated[Number, UsualRange(0.3, 0.9, "m/s")] = Field(
         ge=0.05, le=1.0, examples=[0.8]
     )
-    joint7_mrad: Annotated[Number, Usual(10.0, 80.0, "mrad")] = Field(
+    joint7_mrad: Annotated[Number, UsualRange(10.0, 80.0, "mrad")] = Field(
         ge=2, le=100, examples=[50.0]
     )
-    ft_stale_ms: Annotated[Number, Usual(3.0, 12.0, "ms")] = Field(
+    ft_stale_ms: Annotated[Number, UsualRange(3.0, 12.0, "ms")] = Field(
         ge=2, le=20, examples=[6.0]
     )
-    ft_stop_ms: Annotated[Number, Usual(10.0, 40.0, "ms")] = Field(
+    ft_stop_ms: Annotated[Number, UsualRange(10.0, 40.0, "ms")] = Field(
         ge=5, le=50, examples=[20.0]
     )
-    ft_saturated_ms: Annotated[Number, Usual(10.0, 200.0, "ms")] = Field(
+    ft_saturated_ms: Annotated[Number, UsualRange(10.0, 200.0, "ms")] = Field(
         default=100.0, ge=2, le=500, examples=[100.0]
     )
-    contact_force: Annotated[Number, Usual(30.0, 120.0, "N")] = Field(
+    contact_force: Annotated[Number, UsualRange(30.0, 120.0, "N")] = Field(
         default=100.0, ge=5, le=200, examples=[100.0]
     )
-    contact_force_hold: Annotated[Number, Usual(40.0, 180.0, "N")] = Field(
+    contact_force_hold: Annotated[Number, UsualRange(40.0, 180.0, "N")] = Field(
         default=150.0, ge=5, le=250, examples=[150.0]
     )
-    contact_moment: Annotated[Number, Usual(1.0, 12.0, "N m")] = Field(
+    contact_moment: Annotated[Number, UsualRange(1.0, 12.0, "N m")] = Field(
         default=10.0, ge=0.5, le=20, examples=[10.0]
     )
-    contact_moment_hold: Annotated[Number, Usual(1.5, 18.0, "N m")] = Field(
+    contact_moment_hold: Annotated[Number, UsualRange(1.5, 18.0, "N m")] = Field(
         default=15.0, ge=0.5, le=25, examples=[15.0]
     )
-    contact_growth: Annotated[Number, Usual(15.0, 80.0, "N")] = Field(
+    contact_growth: Annotated[Number, UsualRange(15.0, 80.0, "N")] = Field(
         default=40.0, ge=5, le=150, examples=[40.0]
     )
-    late_per_second: Annotated[Whole, Usual(1, 20, "cycles/s", real=20)] = Field(
+    late_per_second: Annotated[Whole, UsualRange(1, 20, "cycles/s", real=20)] = Field(
         ge=1, le=RATE_HZ, examples=[10]
     )
-    tare_spread: Annotated[Number, Usual(0.1, 1.5, "N")] = Field(
+    tare_spread: Annotated[Number, UsualRange(0.1, 1.5, "N")] = Field(
         ge=0.05, le=3, examples=[0.5]
     )
-    residual: Annotated[Number, Usual(0.3, 2.0, "N")] = Field(
+    residual: Annotated[Number, UsualRange(0.3, 2.0, "N")] = Field(
         default=1.0, ge=0.1, le=5, examples=[1.0]
     )
-    free_disk_gb: Annotated[Number, Usual(1.0, 30.0, "GB")] = Field(
+    free_disk_gb: Annotated[Number, UsualRange(1.0, 30.0, "GB")] = Field(
         ge=0, le=100000, examples=[5.0]
     )
 
@@ -280,8 +282,10 @@ class LimitSection(SettingsSection):
         return {name: getattr(self, name) for name in names}
 
 
-_ModuleSpeed = Annotated[Number, Field(gt=0, le=1.5), Usual(0.1, 1.2, "m/s")]
-_ModuleTorque = Annotated[Whole, Field(gt=0, le=8100), Usual(500, 7000, "puck units")]
+_ModuleSpeed = Annotated[Number, Field(gt=0, le=1.5), UsualRange(0.1, 1.2, "m/s")]
+_ModuleTorque = Annotated[
+    Whole, Field(gt=0, le=8100), UsualRange(500, 7000, "puck units")
+]
 
 
 class SafetySection(SettingsSection):
@@ -311,10 +315,10 @@ class LoopSection(SettingsSection):
         test_time: the preflight measures the loop for so long.
     """
 
-    spin_us: Annotated[Number, Usual(0.0, 300.0, "us")] = Field(
+    spin_us: Annotated[Number, UsualRange(0.0, 300.0, "us")] = Field(
         default=0.0, ge=0, le=500, examples=[0]
     )
-    test_time: Annotated[Number, Usual(1.0, 30.0, "s")] = Field(
+    test_time: Annotated[Number, UsualRange(1.0, 30.0, "s")] = Field(
         default=5.0, ge=0.5, le=3600, examples=[5]
     )
 

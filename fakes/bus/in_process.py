@@ -10,7 +10,7 @@ from acquisition.clock import NS_PER_S, Clock
 from fakes.pucks.event_queue import OutFrame
 from fakes.pucks.network import PuckNetwork
 from fakes.pucks.wire import WiredNetwork
-from wam.bus.link import DRAIN_AT_MOST, as_frame
+from wam.bus.link import MAX_DRAINED_FRAMES, as_frame
 from wam.bus.link import Frame as TransportFrame
 from wam.bus.transports import PythonCanTransport
 
@@ -52,7 +52,7 @@ class FakeCanBus(can.BusABC):
         if faults.is_off:
             self._wired.drop_waiting()
             return
-        if faults.is_unheard:
+        if faults.is_unacknowledged:
             if len(self._stuck) == _QUEUE:
                 raise can.CanOperationError("No buffer space available", errno.ENOBUFS)
             self._stuck.append(msg)
@@ -71,7 +71,7 @@ class FakeCanBus(can.BusABC):
         return not (
             faults.is_down
             or faults.is_off
-            or faults.is_unheard
+            or faults.is_unacknowledged
             or faults.error_frames
             or self._stuck
             or self._is_shutdown
@@ -200,7 +200,7 @@ class InProcessTransport(PythonCanTransport):
         inbox = fake.arrived()
         if not inbox:
             return []
-        if len(inbox) >= DRAIN_AT_MOST or self._now_ns() - inbox[0][0] > NS_PER_S:
+        if len(inbox) >= MAX_DRAINED_FRAMES or self._now_ns() - inbox[0][0] > NS_PER_S:
             return super().receive()
         frames = [as_frame((can_id, data, t_ns)) for t_ns, can_id, data in inbox]
         inbox.clear()

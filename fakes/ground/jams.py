@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fakes.ground.stone_sizes import StoneParameters
-from fakes.randomness import DrawnAhead, NormalStream
+from fakes.randomness import NormalStream, UniformStream
 
 _PHI = math.radians(35.0)  # friction angle of the bed
 _THETA = (math.radians(30.0), math.radians(52.0))  # range of the flank angle
@@ -60,7 +60,7 @@ class JamSequence:
         self._strength = strength
         self._generator = rng
         self._normals = NormalStream(rng)
-        self._chances = DrawnAhead(rng)
+        self._chances = UniformStream(rng)
         # Damping of a pushed and of a rolling contact [N s/m].
         self._c_t, self._b_g = _C_T / parameters.N, _B_G / parameters.N
         self.releases = 0

@@ -121,7 +121,7 @@ class ArmBody:
         """Apply torques [puck units] to motors 1 to 7 from now on."""
         self.drives.drive(units)
 
-    def burden(self) -> Vector3:
+    def carried_force(self) -> Vector3:
         """Return the force at the hand that supports the arm's weight [N].
 
         In the plane of joints 2 and 4; gravity torques of the other joints are small.
@@ -144,7 +144,7 @@ class ArmBody:
             supported = supported + self._loads.A[:3].T.dot(sole)
         return weight - supported
 
-    def keep_turn(self) -> None:
+    def hold_orientation(self) -> None:
         """Let the hand keep the present orientation of the forearm."""
         hand = pin.updateFramePlacement(self._model, self._data, self._hand)
         self._target_rotation = hand.rotation.copy()

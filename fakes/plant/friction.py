@@ -16,8 +16,8 @@ from wam.model.constants import ArmConstants, Array
 from wam.model.friction import (
     ELASTIC,
     MotorFriction,
+    largest_motor_ratios,
     motor_shares,
-    motor_turns,
     plastic_share,
 )
 
@@ -91,7 +91,7 @@ def draw_friction(
     viscous = share * motor_shares(constants, constants.viscous, 2)
     coulomb = nominal * drawn["coulomb"]
     largest_factor = drawn["coulomb"] * (1.0 + np.abs(drawn["asymmetry"]))
-    turns = motor_turns(constants)
+    turns = largest_motor_ratios(constants)
     presliding = np.append(drawn["presliding_arm"][:4], drawn["presliding_wrist"][4:])
     ripple, phase = drawn["ripple"], drawn["phase"]
     return MotorFriction(
@@ -108,7 +108,7 @@ def draw_friction(
     )
 
 
-class MotorBristles:
+class BristleFriction:
     """Friction of the seven motors: one elasto-plastic bristle each.
 
     Implicit in the speed: over a step dt the torque against the motion is c z + D w,
@@ -138,7 +138,7 @@ class MotorBristles:
         self._columns = columns = bristle_columns(friction, inertia, dt)
         self._bent_springs = [s0 for _, _, s0, _, _, _, _ in columns]
         self._bent_damping = [bent + b for _, _, _, bent, _, _, b in columns]
-        self._lively: list[float] = lively_speeds(friction).tolist()
+        self._lively: list[float] = fine_step_speeds(friction).tolist()
         load_and_ripple = np.stack(
             (
                 friction.coulomb - friction.load * friction.load_at,
@@ -180,7 +180,7 @@ class MotorBristles:
         state = zip(self._keep, self._z, speeds, strict=True)
         self._z = [keep * (z + dt * w) for keep, z, w in state]
 
-    def is_lively(self, speeds: Sequence[float]) -> bool:
+    def needs_fine_steps(self, speeds: Sequence[float]) -> bool:
         """Return whether a motor is fast enough for updates in every step."""
         state = zip(speeds, self._lively, strict=True)
         return any(abs(speed) > limit for speed, limit in state)
@@ -213,7 +213,7 @@ class MotorBristles:
         return [-c * z - d * w for c, z, d, w in state]
 
 
-def lively_speeds(friction: MotorFriction) -> Array:
+def fine_step_speeds(friction: MotorFriction) -> Array:
     """Return the speed limits for updates once per cycle [rad/s], shape (7,)."""
     return _LIVELY / _PERIOD * friction.presliding
 
@@ -221,7 +221,7 @@ def lively_speeds(friction: MotorFriction) -> Array:
 def bristle_columns(
     friction: MotorFriction, inertia: Array, dt: float
 ) -> list[list[float]]:
-    """Return the coefficients of `MotorBristles.take`, seven per motor.
+    """Return the coefficients of `BristleFriction.take`, seven per motor.
 
     s - 1, 1 / w_s, s0, s0 dt + s1, s0 + s1 / dt, s1 / dt, b.
     """

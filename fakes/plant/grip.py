@@ -33,7 +33,7 @@ class Ends(NamedTuple):
     upper: Array
 
 
-class Way(Protocol):
+class JointPath(Protocol):
     """Reference path of the hands, cycle by cycle."""
 
     @property
@@ -50,7 +50,7 @@ class Way(Protocol):
         ...
 
 
-class PoseWay:
+class PosePath:
     """A minimum-jerk path of all joints to a goal."""
 
     def __init__(self, goal: Sequence[float], seconds: float, ends: Ends) -> None:
@@ -79,7 +79,7 @@ class PoseWay:
         return self._start + share * difference, rate * difference
 
 
-class StopWay:
+class StopPath:
     """One joint turned until its stop is felt; the others are held in place."""
 
     def __init__(self, joint: int, side: Side, ends: Ends) -> None:
@@ -117,7 +117,7 @@ class StopWay:
 class JointGrip:
     """Hands on the links that follow a path."""
 
-    def __init__(self, way: Way) -> None:
+    def __init__(self, way: JointPath) -> None:
         self._way = way
         self._has_begun = False
 

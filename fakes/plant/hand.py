@@ -31,7 +31,7 @@ _REST_B = 18.0  # damping of a resting hand along z [N s/m]
 _ASIDE = 0.035  # lateral distance of a touched corner from the centre line [m]
 
 
-def touched_place(number: int, travel: float) -> tuple[float, float]:
+def touched_point(number: int, travel: float) -> tuple[float, float]:
     """Return the position (x, y) of touch `number` on the container [m].
 
     1 to 4: its corners; above `ENDS`: the middle of its ends, the near one first.

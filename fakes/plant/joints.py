@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from acquisition.clock import PERIOD_NS
-from fakes.plant.friction import MotorBristles
+from fakes.plant.friction import BristleFriction
 from wam.model.arm_model import drive_inertia_matrix
 from wam.model.constants import ArmConstants, Array
 from wam.model.friction import MotorFriction
@@ -130,7 +130,7 @@ class JointDrives:
         self._from_units = constants.j2mp.T / np.array(constants.ipnm, dtype=float)
         self._dampings = constants.j2mp.T**2  # maps motor to joint damping
         self._inertia = np.diag(drive_inertia_matrix(constants))
-        self._bristles = MotorBristles(friction, inertia, dt)
+        self._bristles = BristleFriction(friction, inertia, dt)
         self._is_lively = False
         self.short([True] * 7)
         self.disturbance = np.zeros(7)
@@ -180,7 +180,7 @@ class JointDrives:
         """
         self._stop(rows)
         self._bear(rows, speeds, t_ns)
-        self._is_lively = self._bristles.is_lively(speeds)
+        self._is_lively = self._bristles.needs_fine_steps(speeds)
         self._resist(speeds)
 
     def torques(self, rows: Array, speeds: Sequence[float]) -> list[float]:

@@ -16,7 +16,7 @@ from fakes.plant.body import GRIP, NO_GRIP, ArmBody, HandLoad
 from fakes.plant.cables import CableDrives
 from fakes.plant.friction import draw_friction
 from fakes.plant.gauges import Wrench, WristGauges
-from fakes.plant.grip import Ends, JointGrip, PoseWay, Side, StopWay
+from fakes.plant.grip import Ends, JointGrip, PosePath, Side, StopPath
 from fakes.plant.hand import Hand
 from fakes.plant.joints import JointDrives
 from fakes.plant.model import (
@@ -169,7 +169,7 @@ class ArmPlant:
     def set_torques(self, units: Sequence[int]) -> None:
         """Apply torques [puck units] to motors 1 to 7 from now on."""
         if self.wiring is not None:
-            units = self.wiring.made_of(units)
+            units = self.wiring.applied_torques(units)
         self._body.drive(units)
         is_pulled = any(units)
         if is_pulled is not self._is_pulled:
@@ -221,11 +221,11 @@ class ArmPlant:
 
     def pose(self, q: Sequence[float], seconds: float) -> None:
         """Bring the joints to `q` [rad] in `seconds` with two hands and hold them."""
-        self._grip_links(JointGrip(PoseWay(q, seconds, self._ends)))
+        self._grip_links(JointGrip(PosePath(q, seconds, self._ends)))
 
     def turn_to_stop(self, joint: int, side: Side) -> None:
         """Turn joint 1-7 against its stop with two hands; hold the others in place."""
-        self._grip_links(JointGrip(StopWay(joint, side, self._ends)))
+        self._grip_links(JointGrip(StopPath(joint, side, self._ends)))
 
     @property
     def is_hand_done(self) -> bool:
@@ -286,7 +286,7 @@ class ArmPlant:
         body, links = self._body, self.hand.grip
         self._push = self.hand.step(body.linearise())
         if self._has_links and links is None:
-            body.keep_turn()
+            body.hold_orientation()
         self._has_links = links is not None
         force, self._pull = self._lift(), self._pull_at_sole()
         twisted = 0.0
@@ -323,7 +323,7 @@ class ArmPlant:
         if self._is_idle and self.hand.is_holding and not is_borne:
             heavy = 1e-9 * (self.t_ns - self._heavy_since_ns)
             share = min(max((heavy - _NOTICED) / (_BORNE - _NOTICED), 0.0), 1.0)
-            bx, by, bz = self._body.burden()
+            bx, by, bz = self._body.carried_force()
             share *= min(1.0, _STRONGEST / max(hypot(bx, by, bz), _STRONGEST))
             ux += share * (bx - ux)
             uy += share * (by - uy)

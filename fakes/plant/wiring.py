@@ -37,7 +37,7 @@ class Wiring:
     torn_at: float = 0.0
     shift: Array = field(default_factory=lambda: np.zeros(7))
 
-    def made_of(self, units: Sequence[int]) -> list[int]:
+    def applied_torques(self, units: Sequence[int]) -> list[int]:
         """Return the motor torques for commanded `units` [puck units], seven."""
         torques = self.torque.dot(np.array(units, dtype=float))
         if self.torn:

@@ -137,7 +137,7 @@ class PuckBank:
         """Handle a torque frame: its first byte and four torques [puck units]."""
         for puck in self._group(group):
             if puck.t_header == header and puck.is_driven:
-                puck.take_torque(units[puck.slot])
+                puck.follow_torque(units[puck.slot])
         self._motors.advance(self._schedule.now_ns)
         self._motors.set_torques([puck.torque for puck in self._pucks])
 
@@ -188,7 +188,7 @@ class PuckBank:
         elif name == "P":
             puck.offset = value - self._encoder_counts()[puck.node - 1]
         elif name == "T":
-            puck.take_torque(value)
+            puck.follow_torque(value)
             self._apply()
         else:
             puck.define(name, value)

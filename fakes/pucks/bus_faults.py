@@ -67,14 +67,15 @@ class BusFaults:
         is_down: the host's interface is down: it refuses to send and to receive.
         is_off: the host's controller is bus-off, as Linux shows it: sent frames are
             lost, nothing arrives, and one error frame has reported it.
-        is_unheard: no device acknowledges the host's frames: they wait in its queue.
+        is_unacknowledged: no device acknowledges the host's frames; they wait in its
+            queue.
         error_frames: (classes, detail) that the host's controller has yet to report.
     """
 
     def __init__(self, schedule: EventQueue, seed: int = 0) -> None:
         self.is_down = False
         self.is_off = False
-        self.is_unheard = False
+        self.is_unacknowledged = False
         self.error_frames: list[tuple[int, bytes]] = []
         self._schedule = schedule
         self._rng = np.random.default_rng(seed)
@@ -90,7 +91,7 @@ class BusFaults:
         """
         self._host_losses.append(is_lost)
 
-    def is_heard(self, can_id: int, data: Payload) -> bool:
+    def is_received(self, can_id: int, data: Payload) -> bool:
         """Return whether devices receive a frame of the host."""
         return not any(is_lost(can_id, data) for is_lost in self._host_losses)
 
@@ -147,12 +148,12 @@ class BusFaults:
         self.error_frames.append((_BUS_OFF, bytes(8)))
         self._intercept_frames()
 
-    def go_unheard(self) -> None:
+    def stop_acknowledging(self) -> None:
         """Leave the host's frames unacknowledged, as with a broken cable.
 
         Its controller turns error-passive and repeats its frame; it never goes bus-off.
         """
-        self.is_unheard = True
+        self.is_unacknowledged = True
         self.error_frames.append((_PASSIVE, _TX_PASSIVE))
         self._intercept_frames()
 
@@ -169,7 +170,7 @@ class BusFaults:
         """Clear all faults; frames already delayed still arrive."""
         if self.is_off:
             self.error_frames.append((_RESTARTED, bytes(8)))
-        self.is_off = self.is_down = self.is_unheard = False
+        self.is_off = self.is_down = self.is_unacknowledged = False
         self._flood += 1
         self._rules.clear()
         self._host_losses.clear()
@@ -220,7 +221,7 @@ class BusFaults:
         self._schedule.after(at_ns - now_ns, lambda: self._put(can_id, data))
 
     def _put(self, can_id: int, data: bytes) -> None:
-        if not (self.is_off or self.is_down or self.is_unheard):
+        if not (self.is_off or self.is_down or self.is_unacknowledged):
             self._schedule.put(can_id, data)
 
     def _send_foreign(self, flood: int, gap_ns: float, ids: Sequence[int]) -> None:

@@ -111,7 +111,7 @@ class MotorPuck:
         }
         return computed.get(name, self._properties.get(name))
 
-    def take_torque(self, units: int) -> None:
+    def follow_torque(self, units: int) -> None:
         """Set the torque [puck units], clipped to MT, if in torque mode."""
         if self.is_driven:
             limit = self.limit

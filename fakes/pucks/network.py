@@ -26,7 +26,7 @@ from wam.bus.frames import (
     decode_request,
     decode_torques,
 )
-from wam.driver.pendant import PendantWord
+from wam.driver.pendant import PendantState
 
 
 class PuckNetwork:
@@ -53,7 +53,7 @@ class PuckNetwork:
         self.other_master = OtherMaster(schedule, self.receive)
         self._safety = FakeSafetyModule(self.options, schedule, self._mode_changed)
         self._bank = PuckBank(
-            motors, self.options, schedule, self._safety.hear_positions
+            motors, self.options, schedule, self._safety.handle_positions
         )
         self._sensor: ForceTorquePuck | None = None
         if self.options.has_sensor:
@@ -65,9 +65,9 @@ class PuckNetwork:
         return self._safety.mode
 
     @property
-    def pendant_word(self) -> PendantWord:
+    def pendant_state(self) -> PendantState:
         """The state that the pendant shows."""
-        return self._safety.pendant_word
+        return self._safety.pendant_state
 
     def advance(self, t_ns: int) -> None:
         """Run all events until `t_ns`, in order of time."""
@@ -93,7 +93,7 @@ class PuckNetwork:
             schedule.advance(t_ns)
         elif schedule.now_ns < t_ns:  # nothing is planned until then
             schedule.now_ns = t_ns
-        if not self.faults.is_heard(can_id, data):
+        if not self.faults.is_received(can_id, data):
             return
         destination = can_id & 0x1F
         try:
@@ -130,13 +130,13 @@ class PuckNetwork:
         """Disable a button of the pendant."""
         self._safety.dead_button = action
 
-    def misset(self, limit: str, factor: float) -> None:
+    def distort_limit(self, limit: str, factor: float) -> None:
         """Make the safety module store `factor` times the value it is set to."""
         self._safety.limit_factors[limit] = factor
 
-    def say_idle(self, *, says_idle: bool = True) -> None:
+    def report_false_idle(self, *, reports_idle: bool = True) -> None:
         """Make the safety module report IDLE in every mode, or its true mode again."""
-        self._safety.says_idle = says_idle
+        self._safety.reports_idle = reports_idle
 
     def set_heartbeat(self, heartbeat_ns: int) -> None:
         """Set the heartbeat timeout of the safety module [ns]."""
@@ -192,7 +192,7 @@ class PuckNetwork:
         if group in TORQUE_GROUPS and len(data) == 8:
             units = decode_torques(data)
             self._bank.receive_torques(group, data[0], units)
-            self._safety.hear_torques(group, units)
+            self._safety.handle_torques(group, units)
         else:
             self._bank.receive_group(group, decode_request(data))
 

@@ -24,7 +24,7 @@ from wam.bus.properties import (
 from wam.driver.pendant import (
     MONITORS,
     PendantButton,
-    PendantWord,
+    PendantState,
     SafetyLevel,
     encode_pendant,
 )
@@ -65,7 +65,7 @@ class FakeSafetyModule:
         mode: the true mode.
         is_mute: its transmit wire is cut.
         is_disobedient: it ignores a host that lowers its mode.
-        says_idle: it reports IDLE whatever its mode.
+        reports_idle: it reports IDLE whatever its mode.
         dead_button: a pendant button without effect; None = none.
         limit_factors: by name, the ratio of the stored limit to the value a host sets.
     """
@@ -79,7 +79,7 @@ class FakeSafetyModule:
         self.mode = options.safety_mode
         self.is_mute = False
         self.is_disobedient = False
-        self.says_idle = False
+        self.reports_idle = False
         self.dead_button: PendantAction | None = None
         self.limit_factors: dict[str, float] = {}
         self._heartbeat_ns = options.heartbeat_ns
@@ -118,10 +118,10 @@ class FakeSafetyModule:
         self._restart_heartbeat()
 
     @property
-    def pendant_word(self) -> PendantWord:
+    def pendant_state(self) -> PendantState:
         """The state that the pendant shows."""
         is_stopped = self.mode is SafetyMode.E_STOP
-        return PendantWord(
+        return PendantState(
             **self._levels,
             segments=_E_CHARACTER if is_stopped else _ZERO_CHARACTER,
             is_idle_lit=self.mode is SafetyMode.IDLE,
@@ -141,7 +141,7 @@ class FakeSafetyModule:
             self._enter(SafetyMode.IDLE)
             self._check_torque()
             self._check_voltage()
-        elif self.mode is SafetyMode.IDLE and not self.pendant_word.faults:
+        elif self.mode is SafetyMode.IDLE and not self.pendant_state.faults:
             self._enter(SafetyMode.ACTIVE)
 
     def forget_positions(self) -> None:
@@ -189,7 +189,7 @@ class FakeSafetyModule:
         self._properties.update(self._saved_limits)
         self._saved_limits.clear()
 
-    def hear_positions(self, positions: Mapping[int, int]) -> None:
+    def handle_positions(self, positions: Mapping[int, int]) -> None:
         """Update heartbeat and speed with positions [counts] by node."""
         if self._is_deaf:
             return
@@ -197,7 +197,7 @@ class FakeSafetyModule:
         self._speeds.on_positions(self._schedule.now_ns, positions)
         self._check_speed()
 
-    def hear_torques(self, group: int, units: Sequence[int]) -> None:
+    def handle_torques(self, group: int, units: Sequence[int]) -> None:
         """Check a torque command as sent on the bus, before a puck clips it."""
         self._largest_torques[group] = max(map(abs, units))
         self._check_torque()
@@ -213,8 +213,8 @@ class FakeSafetyModule:
         self._fault("heartbeat")
 
     def _answer(self, number: int, name: str) -> None:
-        mode = SafetyMode.IDLE if self.says_idle else self.mode
-        computed = {"MODE": int(mode), "PEN": encode_pendant(self.pendant_word)}
+        mode = SafetyMode.IDLE if self.reports_idle else self.mode
+        computed = {"MODE": int(mode), "PEN": encode_pendant(self.pendant_state)}
         value = computed.get(name, self._properties.get(name))
         if value is not None and not self.is_mute:
             self._schedule.reply(SAFETY_NODE, number, name, value)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from fakes.sensor.errors import SensorErrors
-from fakes.sensor.firmware import Measurement, SampleSchedule, Saying
+from fakes.sensor.firmware import Measurement, SampleSchedule, TimedBytes
 from fakes.sensor.stream import SensorStream, Source
 from ft_sensor.reading import Wrench
 from ft_sensor.vendors import ati
@@ -68,14 +68,14 @@ class AtiFirmware:
         if options.is_running:
             self._start_stream(start_ns)
 
-    def power_up(self, t_ns: int) -> list[Saying]:
+    def power_up(self, t_ns: int) -> list[TimedBytes]:
         """Restart; the device sends nothing until a request."""
         self.on_since_ns = t_ns
         self.schedule = None
         self._first = None
         return []
 
-    def receive(self, t_ns: int, data: bytes) -> list[Saying]:
+    def receive(self, t_ns: int, data: bytes) -> list[TimedBytes]:
         """Carry out a request; there is no answer except the stream."""
         request = None if self._options.is_deaf else ati.decode_request(data)
         if request is not None and request[0] == ati.STOP:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import Enum, auto
 
 from fakes.sensor.errors import SensorErrors
-from fakes.sensor.firmware import Measurement, SampleSchedule, Saying
+from fakes.sensor.firmware import Measurement, SampleSchedule, TimedBytes
 from fakes.sensor.stream import SensorStream, Source
 from ft_sensor.vendors import bota
 from ft_sensor.vendors.bota import Acknowledgement, BootText, BotaFrame
@@ -96,11 +96,11 @@ class BotaFirmware:
         if options.is_running:
             self._start_stream(start_ns)
 
-    def power_up(self, t_ns: int) -> list[Saying]:
+    def power_up(self, t_ns: int) -> list[TimedBytes]:
         """Boot; return the lines of the boot text with their times."""
         self._reset_state()
         self.on_since_ns = t_ns
-        outputs: list[Saying] = []
+        outputs: list[TimedBytes] = []
         line_ns = t_ns + _BOOT_NS
         for line in bota.encode_boot_text(self._options.boot_text).splitlines(True):
             outputs.append((line_ns, line))
@@ -109,11 +109,11 @@ class BotaFirmware:
         self._start_stream(self._ready_ns)
         return outputs
 
-    def receive(self, t_ns: int, data: bytes) -> list[Saying]:
+    def receive(self, t_ns: int, data: bytes) -> list[TimedBytes]:
         """Carry out the commands in `data`; return the acknowledgements."""
         if self._options.is_deaf or t_ns < self._ready_ns:
             return []
-        outputs: list[Saying] = []
+        outputs: list[TimedBytes] = []
         self._input = (self._input + data)[-bota.MAX_COMMAND_SIZE :]
         while self._input:
             command = _COMMAND.match(self._input)
@@ -160,7 +160,7 @@ class BotaFirmware:
         self._mode = BotaMode.CONFIGURATION
         self.schedule = None
 
-    def _handle(self, t_ns: int, command: re.Match[bytes]) -> list[Saying]:
+    def _handle(self, t_ns: int, command: re.Match[bytes]) -> list[TimedBytes]:
         letter = chr(command[0][0])
         if letter == "#":
             return self.power_up(t_ns)

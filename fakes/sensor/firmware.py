@@ -6,7 +6,7 @@ from typing import Protocol
 
 from ft_sensor.reading import Wrench
 
-Saying = tuple[int, bytes]  # time of sending [ns], bytes
+TimedBytes = tuple[int, bytes]  # time of sending [ns], bytes
 FULL_COUNT = 32767  # of a sensor with 16-bit counts
 
 
@@ -59,11 +59,11 @@ class Firmware(Protocol):
     clock_rate: float
     frame_size: int
 
-    def power_up(self, t_ns: int) -> list[Saying]:
+    def power_up(self, t_ns: int) -> list[TimedBytes]:
         """Restart; return the unsolicited output."""
         ...
 
-    def receive(self, t_ns: int, data: bytes) -> list[Saying]:
+    def receive(self, t_ns: int, data: bytes) -> list[TimedBytes]:
         """Handle bytes from the client; return the answers."""
         ...
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from fakes.sensor.errors import SensorErrors
-from fakes.sensor.firmware import Measurement, SampleSchedule, Saying, count_of
+from fakes.sensor.firmware import Measurement, SampleSchedule, TimedBytes, count_of
 from fakes.sensor.stream import SensorStream, Source
 from ft_sensor.reading import Wrench
 from ft_sensor.vendors import optoforce
@@ -69,18 +69,18 @@ class OptoForceFirmware:
         self._input = b""
         self._start_stream(start_ns, 1 if options.is_running else 10)
 
-    def power_up(self, t_ns: int) -> list[Saying]:
+    def power_up(self, t_ns: int) -> list[TimedBytes]:
         """Restart with a stream of 100 Hz."""
         self._input = b""
         self.on_since_ns = t_ns
         self._start_stream(t_ns, 10)
         return []
 
-    def receive(self, t_ns: int, data: bytes) -> list[Saying]:
+    def receive(self, t_ns: int, data: bytes) -> list[TimedBytes]:
         """Carry out the commands in `data`; return the answers."""
         if self._options.is_deaf:
             return []
-        outputs: list[Saying] = []
+        outputs: list[TimedBytes] = []
         self._input = (self._input + data)[-_MAX_INPUT:]
         while self._input:
             size = _SIZES.get(self._input[0], 1)

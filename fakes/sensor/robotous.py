@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from fakes.sensor.errors import SensorErrors
-from fakes.sensor.firmware import Measurement, SampleSchedule, Saying, count_of
+from fakes.sensor.firmware import Measurement, SampleSchedule, TimedBytes, count_of
 from fakes.sensor.stream import SensorStream, Source
 from ft_sensor.reading import Wrench
 from ft_sensor.vendors import robotous
@@ -77,18 +77,18 @@ class RobotousFirmware:
             self._rate_code = robotous.RATE_CODES[1000]
             self._start_stream(start_ns)
 
-    def power_up(self, t_ns: int) -> list[Saying]:
+    def power_up(self, t_ns: int) -> list[TimedBytes]:
         """Restart idle, without a stream."""
         self.on_since_ns = t_ns
         self._input = b""
         self.schedule = None
         return []
 
-    def receive(self, t_ns: int, data: bytes) -> list[Saying]:
+    def receive(self, t_ns: int, data: bytes) -> list[TimedBytes]:
         """Carry out the commands in `data`; return the answers."""
         if self._options.is_deaf:
             return []
-        outputs: list[Saying] = []
+        outputs: list[TimedBytes] = []
         self._input = (self._input + data)[-8 * robotous.COMMAND_SIZE :]
         while len(self._input) >= robotous.COMMAND_SIZE:
             command = robotous.decode_command(self._input[: robotous.COMMAND_SIZE])

@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 
 from fakes.sensor.errors import PER_DEGREE, SensorErrors
-from fakes.sensor.firmware import Firmware, Measurement, SampleSchedule, Saying
+from fakes.sensor.firmware import Firmware, Measurement, SampleSchedule, TimedBytes
 from fakes.sensor.stream_faults import ByteFault, StreamFaults, damage
 from ft_sensor.reading import ALL_AXES, Wrench
 from ft_sensor.serial_line.framing import wire_time_ns
@@ -55,7 +55,7 @@ class SensorStream:
         self.warming = 0.0
         self.firmware = firmware
         self._source = source
-        self._pending: deque[Saying] = deque()
+        self._pending: deque[TimedBytes] = deque()
         self._wire_free_ns = self._paused_until_ns = start_ns
         self._is_silent = self._is_skipping = self._is_saturated = False
         self._fault: tuple[ByteFault, int] | None = None
@@ -86,12 +86,12 @@ class SensorStream:
             self._restart_line()
         self._send_outputs(outputs)
 
-    def due(self, t_ns: int) -> list[Saying]:
+    def due(self, t_ns: int) -> list[TimedBytes]:
         """Return (time [ns], bytes) of all output sent by `t_ns`, in order."""
         if self._schedule is not None and self._sample_ns <= t_ns:
             self._sample_until(t_ns)
         pending = self._pending
-        sent: list[Saying] = []
+        sent: list[TimedBytes] = []
         while pending and pending[0][0] <= t_ns:
             sent.append(pending.popleft())
         return sent
@@ -146,7 +146,7 @@ class SensorStream:
         self._is_skipping = False
         self._number = 0
 
-    def _send_outputs(self, outputs: list[Saying]) -> None:
+    def _send_outputs(self, outputs: list[TimedBytes]) -> None:
         for send_ns, data in outputs:
             self._send(send_ns, data)
         self._follow_schedule()

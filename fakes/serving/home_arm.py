@@ -15,10 +15,10 @@ from fakes.randomness import trial_generator
 from fakes.sensor.errors import SensorErrors
 from fakes.serving.puck_server import Port, PuckServer
 from fakes.serving.sensor_server import SensorLine, SensorServer
-from fakes.world.departure import Departure
+from fakes.world.departure import RigDeviation
 from fakes.world.true_rig import (
-    depart,
-    shown_load,
+    apply_deviation,
+    sensor_reading,
     true_constants,
     true_network,
     true_options,
@@ -64,7 +64,7 @@ class HomePose:
     is_at_rest: bool = False
     friction: float | None = None
     seed: int | None = None
-    departure: Departure | None = None
+    departure: RigDeviation | None = None
 
 
 def build_home_server(port: Port, pose: HomePose, clock: Clock) -> PuckServer:
@@ -75,7 +75,7 @@ def build_home_server(port: Port, pose: HomePose, clock: Clock) -> PuckServer:
     Raises:
         SettingsError: the serial line's path is in use or cannot be one.
     """
-    departure = pose.departure or Departure()
+    departure = pose.departure or RigDeviation()
     believed, now_ns = load_constants(), clock.now_ns()
     constants = true_constants(believed, departure)
     options = replace(_AIDED if pose.has_hand else _UNAIDED, seed=pose.seed)
@@ -97,12 +97,12 @@ def build_home_server(port: Port, pose: HomePose, clock: Clock) -> PuckServer:
         safety_vers=pose.firmware[1],
         mt=constants.mt,
     )
-    source = shown_load(plant.sensor_load, departure)
+    source = sensor_reading(plant.sensor_load, departure)
     network = PuckNetwork(
         plant, true_network(network_options, departure), now_ns, Load(source, errors)
     )
     # The zero errors are in the pose in which it is zeroed, so not in the wiring.
-    depart(plant, network, replace(departure, zeros=np.zeros(7)), believed)
+    apply_deviation(plant, network, replace(departure, zeros=np.zeros(7)), believed)
     sensor = None
     if pose.line is not None:
         sensor = SensorServer(pose.line, source, clock)
@@ -110,7 +110,7 @@ def build_home_server(port: Port, pose: HomePose, clock: Clock) -> PuckServer:
 
 
 def _zeroing_pose(
-    constants: ArmConstants, departure: Departure, *, is_at_rest: bool
+    constants: ArmConstants, departure: RigDeviation, *, is_at_rest: bool
 ) -> Array:
     """Return the pose in which a person zeroes the arm [rad], shape (7,).
 

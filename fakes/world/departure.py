@@ -42,7 +42,7 @@ class Place:
 
 
 @dataclass(frozen=True, slots=True)
-class BusTrouble:
+class BusDefects:
     """Faults of the bus and foreign devices on it.
 
     Attributes:
@@ -61,7 +61,7 @@ class BusTrouble:
 
 
 @dataclass(frozen=True, slots=True)
-class ModuleTrouble:
+class ModuleDefects:
     """Faults of the safety module and its pendant.
 
     Attributes:
@@ -78,7 +78,7 @@ class ModuleTrouble:
 
 
 @dataclass(frozen=True, slots=True)
-class Departure:
+class RigDeviation:
     """Deviation of the true rig from its settings and drawings; none by default.
 
     Attributes:
@@ -102,7 +102,7 @@ class Departure:
         module: faults of the safety module.
         bus: faults of the bus.
         place: error of the container's location.
-        foot_typed: mass of the foot as typed in rig.toml [kg]; None = correct.
+        typed_foot_mass: mass of the foot as typed in rig.toml [kg]; None = correct.
     """
 
     zeros: Array = field(default_factory=_no_angles)
@@ -122,12 +122,12 @@ class Departure:
     friction: float = 1.0
     properties: tuple[tuple[int, str, int], ...] = ()
     versions: tuple[tuple[int, int], ...] = ()
-    module: ModuleTrouble = ModuleTrouble()
-    bus: BusTrouble = BusTrouble()
+    module: ModuleDefects = ModuleDefects()
+    bus: BusDefects = BusDefects()
     place: Place = Place()
-    foot_typed: float | None = None
+    typed_foot_mass: float | None = None
 
-    def on(self, sound: "Departure") -> "Departure":
+    def on(self, sound: "RigDeviation") -> "RigDeviation":
         """Return the combination of the deviation `sound` and this one."""
         return replace(
             self,
@@ -155,14 +155,14 @@ def rotation(angles: Sequence[float]) -> Array:
     return about_z @ about_y @ about_x
 
 
-def turned_axes(angles: Sequence[float]) -> Array:
+def rotated_axes(angles: Sequence[float]) -> Array:
     """Return the reading matrix of a sensor rotated by `angles` [rad], shape (6, 6)."""
     matrix, to_sensor = np.zeros((6, 6)), rotation(angles).T
     matrix[:3, :3] = matrix[3:, 3:] = to_sensor
     return matrix
 
 
-def draw_sound(seed: int) -> Departure:
+def draw_sound_rig(seed: int) -> RigDeviation:
     """Return the deviation of the sound rig of `seed` from its drawings.
 
     It has its own generator: no other random quantity of the rig changes.
@@ -176,11 +176,11 @@ def draw_sound(seed: int) -> Departure:
     tilt, axes = drawn(TILT, 2), drawn(AXES, 3)
     gains, mass = 1.0 + drawn(GAINS, 6), 1.0 + float(drawn(MASS, 1)[0])
     centre, cable = drawn(CENTRE, 3), drawn(CABLE, 3)
-    return Departure(
+    return RigDeviation(
         zeros=zeros,
         stops=stops,
         mount=np.append(tilt, 0.0),
-        shown=gains[:, None] * turned_axes(axes.tolist()),
+        shown=gains[:, None] * rotated_axes(axes.tolist()),
         foot_mass=mass,
         foot_centre=centre,
         cable=cable,

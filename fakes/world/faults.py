@@ -64,7 +64,7 @@ def network_faults(network: PuckNetwork) -> dict[str, Callable[[], None]]:
         "can-silence": lambda: _silence_all(network),
         "bus-off": faults.go_off,
         "interface-down": faults.go_down,
-        "unacknowledged": faults.go_unheard,
+        "unacknowledged": faults.stop_acknowledging,
         "can-down": faults.go_down,
         "not-zeroed": network.forget_positions,
         "bus-shared": network.other_master.join,
@@ -97,7 +97,7 @@ def clear_network_faults(network: PuckNetwork) -> None:
     for node in (SAFETY_NODE, SENSOR_NODE):
         network.silence(node, is_mute=False)
     network.disobey(is_disobedient=False)
-    network.say_idle(says_idle=False)
+    network.report_false_idle(reports_idle=False)
     network.set_bus_voltage(NOMINAL_VOLTAGE)
     network.set_property(PUCK, "IPNM", network.options.ipnm[PUCK - 1])
     for node in MOTOR_NODES:
@@ -144,7 +144,7 @@ def _lose_a_share(faults: BusFaults) -> None:
 def _report_false_idle(network: PuckNetwork) -> None:
     """Make the module report IDLE and ignore commands."""
     network.disobey()
-    network.say_idle()
+    network.report_false_idle()
 
 
 def _lose_torques(faults: BusFaults, group: Group) -> None:

@@ -10,7 +10,7 @@ from fakes.ground.terrain import GroundChoice, PlateParameters
 from fakes.plant.model import PlantOptions
 from fakes.plant.push import PACES
 from fakes.sensor.kinds import SensorChoice
-from fakes.world.departure import Departure, draw_sound
+from fakes.world.departure import RigDeviation, draw_sound_rig
 from fakes.world.rig import FakeRig, LocalSimulation, SimulatedScene
 from fakes.world.wrong_rigs import wrong_rig
 from ft_sensor.payload import TerrainFrame
@@ -38,11 +38,11 @@ def _scene_of(fields: Mapping[str, Any]) -> SimulatedScene:
         start_q=np.array(fields["start_q"]),
         seed=fields["seed"],
         sensor=SensorChoice(**fields["sensor"]),
-        departure=departure_of(fields.get("truth"), fields["seed"]),
+        departure=deviation_from(fields.get("truth"), fields["seed"]),
     )
 
 
-def departure_of(truth: Mapping[str, Any] | None, seed: int) -> Departure | None:
+def deviation_from(truth: Mapping[str, Any] | None, seed: int) -> RigDeviation | None:
     """Return the deviation of a rig from its settings; None = none.
 
     Args:
@@ -52,9 +52,9 @@ def departure_of(truth: Mapping[str, Any] | None, seed: int) -> Departure | None
     """
     if truth is None:
         return None
-    sound = draw_sound(seed) if truth["spread"] else Departure()
+    sound = draw_sound_rig(seed) if truth["spread"] else RigDeviation()
     mount = np.radians(np.array(truth["mount"], dtype=np.float64))
-    mounted = Departure(mount=mount).on(sound)
+    mounted = RigDeviation(mount=mount).on(sound)
     name = truth["wrong"]
     return wrong_rig(name).departure.on(mounted) if name else mounted
 

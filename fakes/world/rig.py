@@ -12,7 +12,7 @@ from fakes.bus.in_process import FakeCanBus
 from fakes.clock import SteppedClock
 from fakes.ground.terrain import Container, GroundChoice, Terrain, make_terrain
 from fakes.plant.grip import Side
-from fakes.plant.hand import touched_place
+from fakes.plant.hand import touched_point
 from fakes.plant.model import PlantOptions
 from fakes.plant.plant import ArmPlant
 from fakes.plant.push import Pace
@@ -24,7 +24,7 @@ from fakes.sensor.errors import SensorErrors
 from fakes.sensor.kinds import SensorChoice, make_stream
 from fakes.sensor.port import FakeSerialPort
 from fakes.truth import truth_records
-from fakes.world.departure import Departure
+from fakes.world.departure import RigDeviation
 from fakes.world.faults import (
     BodyFaults,
     Cable,
@@ -35,8 +35,8 @@ from fakes.world.faults import (
     stream_faults,
 )
 from fakes.world.true_rig import (
-    depart,
-    shown_load,
+    apply_deviation,
+    sensor_reading,
     true_constants,
     true_frame,
     true_network,
@@ -75,7 +75,7 @@ class SimulatedScene:
     start_q: Array
     seed: int
     sensor: SensorChoice = _ANY_SENSOR
-    departure: Departure | None = None
+    departure: RigDeviation | None = None
 
 
 def solve_start(model: ArmModel, frame: TerrainFrame, q: Array, height: float) -> Array:
@@ -129,11 +129,11 @@ class FakeRig:
         self.errors = SensorErrors(self.random.sensor, *kind)
         source = self.plant.sensor_load
         if departure is not None:
-            source = shown_load(source, departure)
+            source = sensor_reading(source, departure)
         load = Load(source, self.errors)
         self.network = PuckNetwork(self.plant, network_options, clock.now_ns(), load)
         if departure is not None:
-            depart(self.plant, self.network, departure, believed)
+            apply_deviation(self.plant, self.network, departure, believed)
         self._body = BodyFaults(self.plant, self.network.schedule.after)
         self.bus = FakeCanBus(self.network, clock)
         self.stream = make_stream(scene.sensor, source, self.errors, clock.now_ns())
@@ -290,7 +290,7 @@ class LocalSimulation:
         points between them.
         """
         self._place_container()
-        x, y = touched_place(number, self.rig.scene.frame.travel)
+        x, y = touched_point(number, self.rig.scene.frame.travel)
         self.rig.plant.hand.touch(x, y, self.rig.ground.surface(x))
 
     def _place_container(self) -> None:

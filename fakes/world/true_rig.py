@@ -11,7 +11,7 @@ from fakes.pucks.network import PuckNetwork
 from fakes.pucks.options import NetworkOptions
 from fakes.sensor.mounting import MountedSensor
 from fakes.sensor.stream import Source
-from fakes.world.departure import BusTrouble, Departure, rotation
+from fakes.world.departure import BusDefects, RigDeviation, rotation
 from ft_sensor.payload import TerrainFrame
 from wam.bus.frames import MOTOR_NODES, Payload, position_reply_id, property_reply_id
 from wam.model.constants import ArmConstants, Array, Body
@@ -33,7 +33,7 @@ def constants_around_home(constants: ArmConstants) -> ArmConstants:
     )
 
 
-def true_constants(believed: ArmConstants, departure: Departure) -> ArmConstants:
+def true_constants(believed: ArmConstants, departure: RigDeviation) -> ArmConstants:
     """Return the true arm: stops, gear ratios, masses of its links."""
     arm = constants_around_home(believed)
     pairs = zip(arm.links, departure.links.tolist(), strict=True)
@@ -46,7 +46,7 @@ def true_constants(believed: ArmConstants, departure: Departure) -> ArmConstants
     )
 
 
-def true_tool(believed: Tool, departure: Departure) -> Tool:
+def true_tool(believed: Tool, departure: RigDeviation) -> Tool:
     """Return the true foot."""
     foot, share = believed.foot, departure.foot_mass
     centre = foot.com + departure.foot_centre
@@ -54,7 +54,7 @@ def true_tool(believed: Tool, departure: Departure) -> Tool:
     return replace(believed, foot=body, sole=believed.sole + departure.sole)
 
 
-def true_options(believed: PlantOptions, departure: Departure) -> PlantOptions:
+def true_options(believed: PlantOptions, departure: RigDeviation) -> PlantOptions:
     """Return the true friction and direction of gravity."""
     down: list[float] = (rotation(departure.mount.tolist()).T @ _DOWN).tolist()
     x, y, z = down
@@ -62,7 +62,7 @@ def true_options(believed: PlantOptions, departure: Departure) -> PlantOptions:
     return replace(believed, friction=friction, down=(x, y, z))
 
 
-def true_network(believed: NetworkOptions, departure: Departure) -> NetworkOptions:
+def true_network(believed: NetworkOptions, departure: RigDeviation) -> NetworkOptions:
     """Return the true network: firmware of its pucks."""
     vers = list(believed.vers)
     for node, version in departure.versions:
@@ -70,7 +70,7 @@ def true_network(believed: NetworkOptions, departure: Departure) -> NetworkOptio
     return replace(believed, vers=tuple(vers))
 
 
-def true_frame(believed: TerrainFrame, departure: Departure) -> TerrainFrame:
+def true_frame(believed: TerrainFrame, departure: RigDeviation) -> TerrainFrame:
     """Return the true location of the container in the rotated base frame."""
     place, yaw = departure.place, float(departure.mount[2])
     shifted = np.array(believed.far_end) + place.far_end
@@ -83,14 +83,14 @@ def true_frame(believed: TerrainFrame, departure: Departure) -> TerrainFrame:
     )
 
 
-def true_start(q: Array, departure: Departure) -> Array:
+def true_start(q: Array, departure: RigDeviation) -> Array:
     """Return the true start pose at the container [rad], shape (7,)."""
     rotated = q.copy()
     rotated[0] -= departure.mount[2]
     return rotated
 
 
-def shown_load(source: Source, departure: Departure) -> Source:
+def sensor_reading(source: Source, departure: RigDeviation) -> Source:
     """Return the reading of the wrist sensor under the load `source`."""
     late_ns = round(1e9 * departure.force_late)
     if not late_ns and (departure.shown == np.eye(6)).all():
@@ -98,10 +98,10 @@ def shown_load(source: Source, departure: Departure) -> Source:
     return MountedSensor(source, departure.shown, late_ns)
 
 
-def depart(
+def apply_deviation(
     plant: ArmPlant,
     network: PuckNetwork,
-    departure: Departure,
+    departure: RigDeviation,
     believed: ArmConstants,
 ) -> None:
     """Apply the deviations of cables, pucks, safety module and bus to a rig at rest."""
@@ -115,7 +115,7 @@ def depart(
 
 
 def wiring_of(
-    plant: ArmPlant, departure: Departure, believed: ArmConstants
+    plant: ArmPlant, departure: RigDeviation, believed: ArmConstants
 ) -> Wiring | None:
     """Return the wiring between pucks and motors; None = as assumed."""
     per_radian = np.array(believed.cts) / (2.0 * np.pi)
@@ -134,10 +134,10 @@ def wiring_of(
     return replace(wiring, torn=torn, torn_at=torn_at)
 
 
-def _break_module(network: PuckNetwork, departure: Departure) -> None:
+def _break_module(network: PuckNetwork, departure: RigDeviation) -> None:
     module = departure.module
     for limit, factor in module.limits:
-        network.misset(limit, factor)
+        network.distort_limit(limit, factor)
     if module.dead_button is not None:
         network.break_button(module.dead_button)
     if module.is_disobedient:
@@ -146,7 +146,7 @@ def _break_module(network: PuckNetwork, departure: Departure) -> None:
         network.set_heartbeat(round(module.heartbeat * NetworkOptions().heartbeat_ns))
 
 
-def _break_bus(network: PuckNetwork, bus: BusTrouble) -> None:
+def _break_bus(network: PuckNetwork, bus: BusDefects) -> None:
     faults = network.faults
     for node, late_ns in bus.late_ns:
         faults.delay(position_reply_id(node), late_ns, None)

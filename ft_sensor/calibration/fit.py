@@ -106,7 +106,7 @@ def _cost(fit: tuple[float, float, float, Array, float]) -> float:
     return residual if mass > 0.0 else np.inf
 
 
-def turn_words(angle: float, other: float) -> str:
+def turn_text(angle: float, other: float) -> str:
     """Return a text if a sensor is turned from `angle` to `other` [rad], else ""."""
     turned = float(np.degrees((other - angle + np.pi) % (2.0 * np.pi) - np.pi))
     if abs(turned) <= np.degrees(LARGEST_TURN):
@@ -130,7 +130,7 @@ def check_residual(
     if fit.residual > LARGEST_RESIDUAL and not is_forced:
         turned = ""
         if free is not None and free.residual <= LARGEST_RESIDUAL:
-            turned = turn_words(fit.angle, free.angle)
+            turned = turn_text(fit.angle, free.angle)
         if turned:
             raise SettingsError(
                 f"The forces leave {fit.residual:.2f} N rms unexplained (limit "
@@ -289,7 +289,7 @@ def check_terrain(
     Raises:
         SettingsError: the incline is more than 1 degree off and not forced.
     """
-    if is_inclined_otherwise(fit, expected) and not is_forced:
+    if has_other_incline(fit, expected) and not is_forced:
         raise SettingsError(
             f"The container is inclined by {np.degrees(fit.frame.incline):.1f} "
             f"degrees, the matrix says {np.degrees(expected.incline):.1f} (limit 1.0).",
@@ -297,7 +297,7 @@ def check_terrain(
         )
 
 
-def is_inclined_otherwise(fit: ContainerFit, expected: TerrainFrame) -> bool:
+def has_other_incline(fit: ContainerFit, expected: TerrainFrame) -> bool:
     """Return whether the measured incline differs from the terrain's row."""
     return abs(fit.frame.incline - expected.incline) > LARGEST_TILT
 

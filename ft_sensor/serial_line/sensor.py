@@ -14,7 +14,7 @@ from ft_sensor.serial_line.startup import SerialDialog
 from ft_sensor.serial_line.timestamps import SampleTimestamper
 
 BURST_NS = 5_000_000  # a read of more than this much of the stream is a burst
-BURSTY = 0.1  # share of bursts that shows a buffering adapter
+BURST_SHARE = 0.1  # share of bursts that shows a buffering adapter
 
 
 class SerialDevice(Protocol):
@@ -40,7 +40,7 @@ class SerialDevice(Protocol):
         """Configure the sensor, start its stream, and return its description."""
         ...
 
-    def status_words(self, status: int) -> tuple[str, ...]:
+    def status_texts(self, status: int) -> tuple[str, ...]:
         """Return the meanings of the set bits of `status`."""
         ...
 
@@ -74,7 +74,7 @@ class SensorCounters:
     @property
     def is_bursty(self) -> bool:
         """Whether the adapter buffers data before delivery."""
-        return self.bursts > BURSTY * self.reads
+        return self.bursts > BURST_SHARE * self.reads
 
     def metadata(self) -> dict[str, str]:
         """Return the counters as text for the recording."""

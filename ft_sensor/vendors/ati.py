@@ -74,7 +74,7 @@ def decode_record(data: bytes, start: int = 0) -> RdtRecord:
     return RdtRecord(number, measurement, status, (fx, fy, fz, tx, ty, tz))
 
 
-def status_words(status: int) -> tuple[str, ...]:
+def status_texts(status: int) -> tuple[str, ...]:
     """Return the meanings of the set status bits; by number if not documented."""
     bits = (bit for bit in range(31, -1, -1) if status >> bit & 1)
     return tuple(_WORDS.get(bit, f"failure, bit {bit}") for bit in bits)

@@ -11,7 +11,7 @@ from acquisition.errors import (
     LinkTimeoutError,
     SettingsError,
 )
-from acquisition.settings import Number, Usual, Whole
+from acquisition.settings import Number, UsualRange, Whole
 from ft_sensor.network.datagrams import DatagramPort, parse_address
 from ft_sensor.reading import Reading, StreamTiming, Wrench
 from ft_sensor.section import SensorSection
@@ -80,9 +80,9 @@ class AtiDevice:
         """Return a scanner for the records of the stream."""
         return ati.RdtScanner(self._settings.counts, self.ranges)
 
-    def status_words(self, status: int) -> tuple[str, ...]:
+    def status_texts(self, status: int) -> tuple[str, ...]:
         """Return the meanings of the set bits of `status`."""
-        return ati.status_words(status)
+        return ati.status_texts(status)
 
     def start(self, dialog: SerialDialog) -> dict[str, str]:
         """Stop a running stream, if any, and start a new one.
@@ -127,15 +127,17 @@ class AtiDevice:
     def _refuse_failure(self, readings: list[Reading]) -> None:
         faulty = next((r for r in reversed(readings) if not r.is_trusted), None)
         if faulty is not None:
-            words = ", ".join(self.status_words(faulty.status))
+            words = ", ".join(self.status_texts(faulty.status))
             raise DeviceFaultError(
                 f"The F/T sensor reports: {words} (status 0x{faulty.status:08x}).",
                 hint="Its web page tells more; check the cable of the transducer.",
             )
 
 
-_Force = Annotated[Number, Field(ge=1, le=100_000), Usual(0.05, 50_000.0, "N")]
-_Torque = Annotated[Number, Field(ge=0.01, le=10_000), Usual(0.005, 5_000.0, "N m")]
+_Force = Annotated[Number, Field(ge=1, le=100_000), UsualRange(0.05, 50_000.0, "N")]
+_Torque = Annotated[
+    Number, Field(ge=0.01, le=10_000), UsualRange(0.005, 5_000.0, "N m")
+]
 _Counts = Annotated[Number, Field(gt=0, le=1e9)]
 
 

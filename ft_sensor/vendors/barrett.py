@@ -16,7 +16,7 @@ from ft_sensor.vendors.barrett_frames import (
     RANGES,
     BarrettCounters,
     WrenchPairing,
-    status_words,
+    status_texts,
 )
 from wam.bus.frames import SENSOR_NODE, Payload, encode_get
 from wam.bus.link import Link
@@ -85,7 +85,7 @@ class BarrettSensor:
             )
         if first.status:
             raise DeviceFaultError(
-                f"The F/T sensor reports: {', '.join(status_words(first.status))}.",
+                f"The F/T sensor reports: {', '.join(status_texts(first.status))}.",
                 hint="Take the load off the foot, then switch the arm off and on.",
             )
         answered = 1 + sum(self._exchange() is not None for _ in range(1, _QUESTIONS))

@@ -29,7 +29,7 @@ SAMPLING_DELAY_NS = 191_000
 _RETARE, _BAD = 0x80, 0x40
 
 
-def status_words(status: int) -> tuple[str, ...]:
+def status_texts(status: int) -> tuple[str, ...]:
     """Return the meanings of the status byte of a torque frame.
 
     The order of the gauge bits is undocumented; bit 0 is taken for gauge 1.

@@ -59,7 +59,7 @@ _WORDS = {
 }
 
 
-def status_words(status: int) -> tuple[str, ...]:
+def status_texts(status: int) -> tuple[str, ...]:
     """Return the meanings of the set bits of `status`, lowest bit first."""
     words = [text for bit, text in _WORDS.items() if status & bit]
     reserved = status & ~sum(_WORDS)

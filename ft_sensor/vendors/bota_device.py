@@ -7,7 +7,7 @@ from pydantic import Field
 
 from acquisition.clock import NS_PER_S
 from acquisition.errors import DeviceFaultError, LinkTimeoutError, SettingsError
-from acquisition.settings import Number, Usual, Whole
+from acquisition.settings import Number, UsualRange, Whole
 from ft_sensor.reading import Reading, StreamTiming, Wrench
 from ft_sensor.section import SensorSection
 from ft_sensor.serial_line.framing import FrameScanner, wire_time_ns
@@ -92,9 +92,9 @@ class BotaDevice:
         """Return a scanner for the frames of the stream."""
         return bota.scanner(self.ranges)
 
-    def status_words(self, status: int) -> tuple[str, ...]:
+    def status_texts(self, status: int) -> tuple[str, ...]:
         """Return the meanings of the set bits of `status`."""
-        return bota.status_words(status)
+        return bota.status_texts(status)
 
     def start(self, dialog: SerialDialog) -> dict[str, str]:
         """Configure the sensor, start its stream, and return its description.
@@ -207,8 +207,8 @@ def _is_plausible(readings: list[Reading]) -> bool:
     return sum(good) >= _PLAUSIBLE_OF_TEN
 
 
-_Force = Annotated[Number, Field(ge=10, le=5000), Usual(50.0, 2500.0, "N")]
-_Moment = Annotated[Number, Field(ge=0.5, le=200), Usual(1.0, 50.0, "N m")]
+_Force = Annotated[Number, Field(ge=10, le=5000), UsualRange(50.0, 2500.0, "N")]
+_Moment = Annotated[Number, Field(ge=0.5, le=200), UsualRange(1.0, 50.0, "N m")]
 _Ranges = tuple[_Force, _Force, _Force, _Moment, _Moment, _Moment]
 
 

@@ -38,7 +38,7 @@ class OptoForceFrame:
 
     Attributes:
         counter: frame counter, wraps at 65536.
-        status: see `status_words`.
+        status: see `status_texts`.
         counts: fx fy fz tx ty tz as sent, 16 bits each.
     """
 
@@ -134,7 +134,7 @@ def overloaded_axes(status: int) -> int:
     return sum(1 << axis for axis in range(6) if status >> (9 - axis) & 1)
 
 
-def status_words(status: int) -> tuple[str, ...]:
+def status_texts(status: int) -> tuple[str, ...]:
     """Return the meaning of a status: state of DAQ and sensor, overloaded axes."""
     daq, sensor = status >> 13 & 0x7, status >> 10 & 0x7
     words: list[str] = []

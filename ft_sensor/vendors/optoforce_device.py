@@ -8,7 +8,7 @@ from pydantic import Field
 
 from acquisition.clock import NS_PER_S
 from acquisition.errors import DeviceFaultError, LinkTimeoutError, SettingsError
-from acquisition.settings import Number, Usual, Whole
+from acquisition.settings import Number, UsualRange, Whole
 from ft_sensor.reading import Reading, StreamTiming, Wrench
 from ft_sensor.section import SensorSection
 from ft_sensor.serial_line.framing import FrameScanner, wire_time_ns
@@ -96,9 +96,9 @@ class OptoForceDevice:
         """Return a scanner for the frames of the stream."""
         return optoforce.scanner(self._settings.sensitivity)
 
-    def status_words(self, status: int) -> tuple[str, ...]:
+    def status_texts(self, status: int) -> tuple[str, ...]:
         """Return the meaning of a status."""
-        return optoforce.status_words(status)
+        return optoforce.status_texts(status)
 
     def start(self, dialog: SerialDialog) -> dict[str, str]:
         """Check the serial number, configure the sensor and start its stream.
@@ -175,7 +175,7 @@ class OptoForceDevice:
     def _refuse_failure(self, readings: list[Reading]) -> None:
         faulty = next((r for r in reversed(readings) if not r.is_trusted), None)
         if faulty is not None:
-            words = ", ".join(self.status_words(faulty.status))
+            words = ", ".join(self.status_texts(faulty.status))
             raise DeviceFaultError(
                 f"The F/T sensor reports: {words}.",
                 hint="Check the cable between sensor and DAQ; cycle its power.",
@@ -183,7 +183,7 @@ class OptoForceDevice:
 
 
 _Count = Annotated[
-    Number, Field(ge=-5000, le=5000), Usual(-1500.0, 1500.0, "counts per N or N m")
+    Number, Field(ge=-5000, le=5000), UsualRange(-1500.0, 1500.0, "counts per N or N m")
 ]
 
 

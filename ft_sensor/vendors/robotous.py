@@ -145,7 +145,7 @@ def overloaded_axes(overload: int) -> int:
     return sum(1 << axis for axis in range(6) if overload >> (5 - axis) & 1)
 
 
-def status_words(status: int) -> tuple[str, ...]:
+def status_texts(status: int) -> tuple[str, ...]:
     """Return the meanings of the overload bits of a sample."""
     axes = axis_names(overloaded_axes(status))
     return tuple(f"{axis} more than 20 % above rated load" for axis in axes)

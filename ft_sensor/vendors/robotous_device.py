@@ -99,9 +99,9 @@ class RobotousDevice:
         """Return a scanner for the frames of the stream."""
         return robotous.scanner(lambda: self._model.torque_counts)
 
-    def status_words(self, status: int) -> tuple[str, ...]:
+    def status_texts(self, status: int) -> tuple[str, ...]:
         """Return the meanings of the overload bits."""
-        return robotous.status_words(status)
+        return robotous.status_texts(status)
 
     def start(self, dialog: SerialDialog) -> dict[str, str]:
         """Stop and identify the sensor, configure it, verify, and start its stream.

@@ -11,11 +11,11 @@ from lab.guest.machine_room import LAB_FOLDER, MachineRoom
 from lab.guest.scenarios.registry import Scenario, chosen
 from lab.guest.warm_start import start_warm
 from lab.results import (
-    Begun,
-    Finished,
+    AllFinished,
     Message,
     ScenarioResult,
-    TimerFound,
+    ScenarioStarted,
+    TimerLocation,
     Verdict,
     to_line,
 )
@@ -67,17 +67,17 @@ def main(names: list[str]) -> None:
     start_warm()
     booted = seconds()
     for scenario in chosen([name for name in names if name != "--echo"]):
-        _send(Begun(scenario.name))
+        _send(ScenarioStarted(scenario.name))
         _send(_result(scenario, is_echoed="--echo" in names))
-    _send(Finished(round(booted, 2)))
+    _send(AllFinished(round(booted, 2)))
 
 
-def _timer() -> TimerFound:
+def _timer() -> TimerLocation:
     """Return the symbols that locate the kernel's local timer."""
     lines = Path("/proc/kallsyms").read_text(encoding="ascii").splitlines()
     symbols = {line.split()[2]: line for line in lines if line.endswith(_TIMER)}
     events, offsets = (int(symbols[name.strip()].split()[0], 16) for name in _TIMER)
-    return TimerFound(events, offsets)
+    return TimerLocation(events, offsets)
 
 
 def _result(scenario: Scenario, *, is_echoed: bool) -> ScenarioResult:

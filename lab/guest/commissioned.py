@@ -19,7 +19,7 @@ from experiments.settings.load import load_settings
 from wam.driver.startup import ArmInfo
 
 
-def take_as_commissioned(config: Path, steps: Sequence[StepId] = GATED) -> None:
+def write_passed_commissioning(config: Path, steps: Sequence[StepId] = GATED) -> None:
     """Write a record of passed `steps` next to `config` for the configured arm.
 
     The arm is queried for its identity, as by a command; an existing record is kept.

@@ -9,7 +9,7 @@ import errno
 import os
 import socket
 
-from lab.calls import FRAME, FRAMES_IN_AT, FRAMES_OUT_AT, MOST_FRAMES
+from lab.calls import FRAME, FRAMES_IN_AT, FRAMES_OUT_AT, MAX_FRAMES
 
 _NOT_NOW = {errno.EAGAIN, errno.ENOBUFS}
 
@@ -73,7 +73,7 @@ class FrameBatch:
     def receive(self) -> int:
         """Receive the waiting frames; return their number; raises OSError."""
         count: int = self._receive(
-            self.fileno(), self._arriving, MOST_FRAMES, socket.MSG_DONTWAIT, None
+            self.fileno(), self._arriving, MAX_FRAMES, socket.MSG_DONTWAIT, None
         )
         return self._checked(count)
 
@@ -93,7 +93,7 @@ class FrameBatch:
 
 def _messages(address: int) -> ctypes.Array[_Message]:
     """Return messages of one frame each, contiguous from an address."""
-    messages = (_Message * MOST_FRAMES)()
+    messages = (_Message * MAX_FRAMES)()
     for number, message in enumerate(messages):
         part = _Part(address + number * FRAME.size, FRAME.size)
         message.parts = ctypes.pointer(part)  # which keeps the part alive

@@ -9,7 +9,7 @@ from tests.faults.phases import PHASES
 _CODES: Mapping[End, int] = {End.COMPLETE: 0, End.ENDED: 4}
 
 
-def hold_to(fault: str, phase: str, code: int) -> None:
+def require_promised(fault: str, phase: str, code: int) -> None:
     """Raise ScenarioError unless the exit code is the one promised by the matrix.
 
     Args:

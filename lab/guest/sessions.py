@@ -7,7 +7,7 @@ from pathlib import Path
 from acquisition.clock import PERIOD_NS
 from acquisition.trial_file.reader import TrialReader
 from lab.guest.commands import Program, ScenarioError, require, seconds
-from lab.guest.commissioned import take_as_commissioned
+from lab.guest.commissioned import write_passed_commissioning
 from lab.guest.machine_room import MachineRoom
 
 _START = 60.0  # s of guest time until the prompt to activate the arm
@@ -20,7 +20,7 @@ _REST = 0.7  # s in which the foot comes to rest on the ground
 # key that ends it would count as held down.
 _PUSH = 0.8
 TERRAIN = "TF"
-MOST_MISSED_PPM = 10
+MAX_MISSED_PPM = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +125,7 @@ class LedSession:
 
 def begin(room: MachineRoom, arm: Program, trials: int, *options: str) -> LedSession:
     """Start a session of `trials` trials."""
-    take_as_commissioned(room.config)
+    write_passed_commissioning(room.config)
     program = room.traction("run", TERRAIN, "--trials", str(trials), *options)
     return LedSession(room, program, arm)
 
@@ -183,7 +183,7 @@ def cycle_figures(room: MachineRoom) -> dict[str, str]:
         cycles += len(times)
         missed += sum(round(step / PERIOD_NS) - 1 for step in steps)
         worst = max(worst, *steps)
-    require(missed * 1_000_000 <= MOST_MISSED_PPM * cycles, f"{missed} cycles missed")
+    require(missed * 1_000_000 <= MAX_MISSED_PPM * cycles, f"{missed} cycles missed")
     return {
         "cycles": str(cycles),
         "missed": str(missed),

@@ -3,7 +3,7 @@ import pytest
 
 from acquisition.control_loop.timing import TIMING_DTYPE
 from acquisition.ipc.commands import COMMAND_DTYPE
-from acquisition.ipc.frame_tape import FRAME_DTYPE
+from acquisition.ipc.frame_ring import FRAME_DTYPE
 from acquisition.ipc.shared_sensor import WRENCH_DTYPE
 from acquisition.record_layout import struct_of
 

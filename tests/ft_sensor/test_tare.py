@@ -10,8 +10,8 @@ from ft_sensor.weighing import (
     WeightCause,
     WeightChange,
     compare_weights,
+    measured_weight,
     weight_change,
-    weight_seen,
 )
 from tests.ft_sensor.test_payload import attitude, mounted
 
@@ -353,6 +353,6 @@ def test_a_single_tare_tells_sign_from_mass_too(example_tool):
     known = np.full(6, 0.7)
     for factor, cause in ((-1.0, WeightCause.SIGN), (1.4, WeightCause.MASS)):
         reading = known + factor * payload.sign * payload.weight(pose)
-        change = weight_seen(payload.tared(reading, pose), pose, known)
+        change = measured_weight(payload.tared(reading, pose), pose, known)
         assert change.cause is cause
         assert change.scale == pytest.approx(factor)

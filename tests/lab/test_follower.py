@@ -6,17 +6,17 @@ import pytest
 
 from lab.follower import LIMIT, PANICKED, Follower
 from lab.results import (
-    Begun,
-    Finished,
+    AllFinished,
     ScenarioResult,
-    TimerFound,
+    ScenarioStarted,
+    TimerLocation,
     Verdict,
     to_line,
 )
 
 SENT = ScenarioResult("bench", Verdict.PASSED, 1.0)
 PASSED = replace(SENT, processor=1.0)  # as the host completes it
-FINISHED = to_line(Finished(2.0))
+FINISHED = to_line(AllFinished(2.0))
 
 
 class Tape:
@@ -49,20 +49,26 @@ def follow(tape, *names):
 
 
 def test_results_come_out_in_the_order_in_which_they_came():
-    lines = [to_line(Begun("bench")), "[ 1.0] usb", to_line(SENT), FINISHED]
+    lines = [to_line(ScenarioStarted("bench")), "[ 1.0] usb", to_line(SENT), FINISHED]
     assert follow(Tape(*lines), "bench") == [PASSED]
 
 
 def test_a_timer_that_the_machine_found_is_corrected():
-    found = TimerFound(0x1FDC0, 0xFFFF_FFFF_8241_CB60)
-    tape = Tape(to_line(found), to_line(Begun("bench")), to_line(SENT), FINISHED)
+    found = TimerLocation(0x1FDC0, 0xFFFF_FFFF_8241_CB60)
+    tape = Tape(
+        to_line(found), to_line(ScenarioStarted("bench")), to_line(SENT), FINISHED
+    )
     assert follow(tape, "bench") == [PASSED]
     assert tape.found == found
 
 
 @pytest.mark.parametrize("is_hanging", [True, False])
 def test_the_scenario_in_which_a_machine_is_lost_is_named(is_hanging):
-    lines = [to_line(Begun("bench")), to_line(SENT), to_line(Begun("session"))]
+    lines = [
+        to_line(ScenarioStarted("bench")),
+        to_line(SENT),
+        to_line(ScenarioStarted("session")),
+    ]
     tape = Tape(*lines, "Oops: 0002", is_hanging=is_hanging)
     passed, lost = follow(tape, "bench", "session", "never begun")
     assert passed == PASSED
@@ -77,7 +83,7 @@ def test_a_machine_that_never_boots_is_lost_in_its_boot():
 
 
 def test_a_machine_that_leaves_scenarios_out_is_not_taken_for_complete():
-    lines = [to_line(Begun("bench")), to_line(SENT), FINISHED]
+    lines = [to_line(ScenarioStarted("bench")), to_line(SENT), FINISHED]
     results = follow(Tape(*lines), "bench", "session")
     assert results[-1].verdict is Verdict.HUNG
 
@@ -102,7 +108,7 @@ class Starved(Tape):
 
 
 def starved(**how):
-    tape = Starved(to_line(Begun("bench")), to_line(SENT), FINISHED, **how)
+    tape = Starved(to_line(ScenarioStarted("bench")), to_line(SENT), FINISHED, **how)
     return follow(tape, "bench")[0].verdict
 
 

@@ -5,7 +5,7 @@ import socket
 
 import pytest
 
-from lab.calls import FRAME, FRAMES_OUT_AT, MEMORY_SIZE, MOST_FRAMES, Exchange
+from lab.calls import FRAME, FRAMES_OUT_AT, MAX_FRAMES, MEMORY_SIZE, Exchange
 from lab.guest.frame_batch import FrameBatch
 
 FRAMES = [(0x0A0 + number, bytes(range(number))) for number in range(9)]
@@ -51,7 +51,7 @@ def test_frames_that_the_bus_does_not_take_are_counted(ends, memory, batch):
     memory[FRAMES_OUT_AT : FRAMES_OUT_AT + FRAME.size] = FRAME.pack(1, 0, b"")
     ends[0].setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1)
     for _ in range(20):
-        batch.send(MOST_FRAMES)
+        batch.send(MAX_FRAMES)
     assert batch.lost > 0
 
 

@@ -10,8 +10,8 @@ from lab.calls import (
     FRAME,
     FRAMES_IN_AT,
     FRAMES_OUT_AT,
+    MAX_FRAMES,
     MEMORY_SIZE,
-    MOST_FRAMES,
     Call,
     Exchange,
 )
@@ -144,9 +144,9 @@ def test_a_call_of_an_offset_that_means_nothing_is_refused(caller):
 
 
 def test_a_call_with_more_frames_than_there_is_room_for_is_refused(caller):
-    caller.exchange.ask(caller.t_ns, MOST_FRAMES + 1, b"")
+    caller.exchange.ask(caller.t_ns, MAX_FRAMES + 1, b"")
     assert caller.far.call(Call.ADVANCE) != DONE
-    assert f"{MOST_FRAMES + 1} frames" in caller.exchange.message()
+    assert f"{MAX_FRAMES + 1} frames" in caller.exchange.message()
 
 
 def test_a_call_before_anything_is_served_is_refused():

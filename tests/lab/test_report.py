@@ -1,6 +1,6 @@
 """The lines of verdicts on the terminal."""
 
-from lab.report import cycle_words, result_line, summary
+from lab.report import missed_cycles_line, result_line, summary
 from lab.results import ScenarioResult, Verdict
 
 PASSED = ScenarioResult(
@@ -37,15 +37,15 @@ def kept(cycles, missed):
 
 
 def test_cycles_of_all_scenarios_count_together():
-    words = cycle_words([kept(60_000, 0), PASSED, kept(40_000, 2)])
+    words = missed_cycles_line([kept(60_000, 0), PASSED, kept(40_000, 2)])
     assert "2 of 100000" in words
     assert "20 ppm" in words
 
 
 def test_none_missed_is_only_as_good_as_their_number():
     # Of 3 / n misses a cycle, 95 % of all runs of n cycles would show one.
-    assert "below 30 ppm" in cycle_words([kept(100_000, 0)])
+    assert "below 30 ppm" in missed_cycles_line([kept(100_000, 0)])
 
 
 def test_without_trials_nothing_is_said_of_cycles():
-    assert "ppm" not in cycle_words([PASSED])
+    assert "ppm" not in missed_cycles_line([PASSED])

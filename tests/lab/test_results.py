@@ -4,9 +4,9 @@ import pytest
 
 from lab.results import (
     MARK,
-    Begun,
-    Finished,
+    AllFinished,
     ScenarioResult,
+    ScenarioStarted,
     Verdict,
     from_line,
     to_line,
@@ -17,7 +17,9 @@ RESULT = ScenarioResult(
 )
 
 
-@pytest.mark.parametrize("message", [RESULT, Begun("session"), Finished(2.5)])
+@pytest.mark.parametrize(
+    "message", [RESULT, ScenarioStarted("session"), AllFinished(2.5)]
+)
 def test_a_message_survives_the_console(message):
     line = to_line(message)
     assert "\n" not in line
@@ -36,7 +38,7 @@ def test_a_kernel_message_before_the_mark_is_passed_over():
         MARK + "{",
         MARK + "[1]",
         MARK + '{"kind": "Nothing"}',
-        MARK + '{"kind": "Begun"}',
+        MARK + '{"kind": "ScenarioStarted"}',
         MARK + '{"kind": "ScenarioResult", "name": "a", "verdict": "fine"}',
         to_line(RESULT)[:-20],
     ],

@@ -12,7 +12,7 @@ import socket
 import struct
 from collections.abc import Callable, Iterator
 
-AT_ONCE = 32  # datagrams per call
+MAX_DATAGRAMS = 32  # datagrams per call
 _NO_WAIT = int(socket.MSG_DONTWAIT)
 _CONTROL_BYTES = 128  # ancillary data of one datagram
 _HEADER = struct.Struct("@PIPNPNi0PI0P")  # struct mmsghdr
@@ -39,7 +39,7 @@ def system_call() -> ReceiveMany:
 
 
 class DatagramBatch:
-    """Memory for `AT_ONCE` datagrams of up to `room` bytes, filled by one call.
+    """Memory for `MAX_DATAGRAMS` datagrams of up to `room` bytes, filled by one call.
 
     Attributes:
         payload: datagrams; datagram i starts at byte i * room.
@@ -57,14 +57,14 @@ class DatagramBatch:
             receive_many: recvmmsg(2), as `system_call` returns it.
         """
         self._call = receive_many
-        self.payload = bytearray(AT_ONCE * room)
-        self.control = bytearray(AT_ONCE * _CONTROL_BYTES)
-        self._iovecs = bytearray(AT_ONCE * _IOVEC.size)
-        self._headers = bytearray(AT_ONCE * _HEADER.size)
+        self.payload = bytearray(MAX_DATAGRAMS * room)
+        self.control = bytearray(MAX_DATAGRAMS * _CONTROL_BYTES)
+        self._iovecs = bytearray(MAX_DATAGRAMS * _IOVEC.size)
+        self._headers = bytearray(MAX_DATAGRAMS * _HEADER.size)
         payload, control, iovecs = map(
             _address, (self.payload, self.control, self._iovecs)
         )
-        for i in range(AT_ONCE):
+        for i in range(MAX_DATAGRAMS):
             at = _IOVEC.size * i
             _IOVEC.pack_into(self._iovecs, at, payload + room * i, room)
             header = (0, 0, iovecs + at, 1, control + _CONTROL_BYTES * i)
@@ -76,7 +76,7 @@ class DatagramBatch:
         self._view = memoryview(self._headers)
 
     def receive(self, descriptor: int) -> list[tuple[int, ...]]:
-        """Read up to `AT_ONCE` queued datagrams, oldest first, without blocking.
+        """Read up to `MAX_DATAGRAMS` queued datagrams, oldest first, without blocking.
 
         Returns:
             (size of the ancillary data, size of the payload) [bytes] per datagram.
@@ -85,7 +85,7 @@ class DatagramBatch:
             OSError: the socket has an error and no datagram is queued before it.
         """
         call = self._call
-        count = call(descriptor, self._pointer, AT_ONCE, _NO_WAIT, None)
+        count = call(descriptor, self._pointer, MAX_DATAGRAMS, _NO_WAIT, None)
         if count <= 0:
             number = ctypes.get_errno()
             if count == 0 or number in (errno.EAGAIN, errno.EINTR):

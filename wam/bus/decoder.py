@@ -32,7 +32,7 @@ from wam.bus.frames import (
 from wam.bus.log import JUMP_NS, BusSummary, DecodedLine, LoggedFrame
 from wam.bus.properties import FIRST_RELEASED, Device, PuckMode, PuckStatus, names
 
-LIMIT_NS = 1_000_000  # replies after this are late
+REPLY_LIMIT_NS = 1_000_000  # replies after this are late
 _GIVE_UP_NS = 1_000_000_000
 _DEFAULT_VERS = 200  # assumed firmware where none was reported
 _MEMBERS = {
@@ -132,7 +132,7 @@ class BusReader:
         A request still within its limit at the end is not counted: its reply may have
         come afterwards.
         """
-        lines = self._expire(self._newest_ns - LIMIT_NS)
+        lines = self._expire(self._newest_ns - REPLY_LIMIT_NS)
         self.tally.questions -= sum(map(len, self._open.values()))
         return lines
 
@@ -250,7 +250,7 @@ class BusReader:
         """Register a request; return lines for an expired one that it replaces."""
         self.tally.questions += 1
         request_times = self._open.get(key)
-        if request_times is not None and utc_ns - request_times[-1] <= LIMIT_NS:
+        if request_times is not None and utc_ns - request_times[-1] <= REPLY_LIMIT_NS:
             request_times.append(utc_ns)
             return []
         replaced = self._drop(key)
@@ -267,7 +267,7 @@ class BusReader:
             del self._open[key]
         self.tally.answers += 1
         self.tally.slowest_ns = max(self.tally.slowest_ns, delay_ns)
-        is_late = delay_ns > LIMIT_NS
+        is_late = delay_ns > REPLY_LIMIT_NS
         self.tally.late += is_late
         return (
             f", {'LATE: ' if is_late else ''}{delay_ns // 1000} us after the question"

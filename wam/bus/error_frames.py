@@ -112,7 +112,7 @@ class BusErrors:
         elif self._condition is not BusCondition.OFF:
             # A node alone on the bus becomes error passive but never goes bus-off.
             if names & {"no-acknowledgement", "passive"}:
-                self._condition = BusCondition.UNHEARD
+                self._condition = BusCondition.UNACKNOWLEDGED
             elif "active" in names:
                 self._condition = BusCondition.SOUND
 

@@ -12,7 +12,7 @@ from wam.bus.error_frames import ERROR_FLAG, BusErrors
 from wam.bus.frames import MODE_BROADCAST_ID, is_of_host
 
 _FULL = frozenset({errno.ENOBUFS, errno.EAGAIN})  # a queue, a socket's buffer
-DRAIN_AT_MOST = 512  # frames; bounds the time of a cycle when the bus is flooded
+MAX_DRAINED_FRAMES = 512  # frames; bounds the time of a cycle when the bus is flooded
 _PLAUSIBLE_NS = 10 * NS_PER_S  # an older timestamp is of another clock
 _AHEAD_NS = 5_000_000  # frames keep arriving while the bus is drained
 _LARGEST_ID = 0x7FF  # 11-bit identifiers; the WAM uses no others
@@ -261,7 +261,7 @@ def plausible_times(now_ns: int) -> tuple[int, int]:
     return now_ns - _PLAUSIBLE_NS, now_ns + _AHEAD_NS
 
 
-def broken_link(channel: str, error: Exception) -> LinkError:
+def link_error(channel: str, error: Exception) -> LinkError:
     """Return the LinkError for a failed send or receive."""
     number = error_number(error)
     is_full = number in _FULL or (number is None and "full" in str(error).lower())

@@ -12,9 +12,15 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from acquisition.clock import NS_PER_S, Clock
-from wam.bus.datagrams import AT_ONCE, DatagramBatch, ReceiveMany
+from wam.bus.datagrams import MAX_DATAGRAMS, DatagramBatch, ReceiveMany
 from wam.bus.error_frames import ERROR_MASK
-from wam.bus.link import DRAIN_AT_MOST, Frame, as_frame, broken_link, plausible_times
+from wam.bus.link import (
+    MAX_DRAINED_FRAMES,
+    Frame,
+    as_frame,
+    link_error,
+    plausible_times,
+)
 
 LONGEST_QUEUE = 16  # frames, about one cycle: torques that wait longer are stale
 _RESTART_MS = 100
@@ -158,20 +164,22 @@ class SocketcanTransport:
         try:
             self._send(_pack(can_id, len(data), data))
         except OSError as error:
-            raise broken_link(self._channel, error) from error
+            raise link_error(self._channel, error) from error
 
     def receive(self) -> list[Frame]:
         """Return the queued frames, oldest first; raises LinkError."""
         if self._error is not None:
             error, self._error = self._error, None
-            raise broken_link(self._channel, error) from error
+            raise link_error(self._channel, error) from error
         frames: list[Frame] = []
         try:
-            while len(frames) < DRAIN_AT_MOST and self._take(frames) == AT_ONCE:
+            while (
+                len(frames) < MAX_DRAINED_FRAMES and self._take(frames) == MAX_DATAGRAMS
+            ):
                 pass
         except OSError as error:
             if not frames:
-                raise broken_link(self._channel, error) from error
+                raise link_error(self._channel, error) from error
             self._error = error
         return frames
 
@@ -189,7 +197,7 @@ class SocketcanTransport:
         offset_ns = self._clock.utc_ns() - now_ns
         earliest_ns, latest_ns = plausible_times(now_ns)
         for number, (control_size, size), (can_id, length, room), stamped in zip(
-            range(AT_ONCE),
+            range(MAX_DATAGRAMS),
             arrived,
             _FRAME.iter_unpack(batch.payload),
             _SLOT.iter_unpack(batch.control),

@@ -14,11 +14,11 @@ from acquisition.errors import LinkError
 from wam.bus.datagrams import system_call
 from wam.bus.error_frames import ERROR_FLAG, EXTENDED_FLAG, REMOTE_FLAG
 from wam.bus.link import (
-    DRAIN_AT_MOST,
+    MAX_DRAINED_FRAMES,
     Frame,
     Transport,
-    broken_link,
     error_number,
+    link_error,
     plausible_times,
 )
 from wam.bus.socketcan import (
@@ -112,7 +112,7 @@ class PythonCanTransport:
         try:
             self._bus.send(message)
         except (can.CanError, OSError) as error:
-            raise broken_link(self._bus.channel_info, error) from error
+            raise link_error(self._bus.channel_info, error) from error
 
     def receive(self) -> list[Frame]:
         """Return the queued frames, oldest first; raises LinkError."""
@@ -122,14 +122,14 @@ class PythonCanTransport:
             if self._error is not None:
                 error, self._error = self._error, None
                 raise error
-            while len(arrived) < DRAIN_AT_MOST:
+            while len(arrived) < MAX_DRAINED_FRAMES:
                 message = receive(0)
                 if message is None:
                     break
                 arrived.append(message)
         except (can.CanError, OSError) as error:
             if not arrived:
-                raise broken_link(self._bus.channel_info, error) from error
+                raise link_error(self._bus.channel_info, error) from error
             self._error = error
         if not arrived:
             return []

@@ -32,7 +32,7 @@ _SLOW = ((0.012, 0.004), (0.03, 0.015), (0.07, 0.04), (0.12, 0.12))
 _FAST = ((0.25, 0.4),)
 
 
-class LegUse(Enum):
+class LegPurpose(Enum):
     """Purpose of a leg of the path."""
 
     TRANSIT = "transit"
@@ -50,7 +50,7 @@ class FrictionLeg:
     """
 
     halt: MeasurementPose
-    use: LegUse
+    use: LegPurpose
 
 
 def plan_friction(model: ArmModel, start: Array, space: FreeSpace) -> list[FrictionLeg]:
@@ -65,18 +65,23 @@ def plan_friction(model: ArmModel, start: Array, space: FreeSpace) -> list[Frict
     """
     check_rise(model, start, space)
     centres = _centres(model, space)
-    path: list[tuple[Array, float, LegUse]] = [(np.array(UPRIGHT), 0.5, LegUse.TRANSIT)]
+    path: list[tuple[Array, float, LegPurpose]] = [
+        (np.array(UPRIGHT), 0.5, LegPurpose.TRANSIT)
+    ]
     for number, centre in enumerate(centres):
         path += _approach(model, path[-1][0], centre, space)
         path += _sweeps(centre, number)
     path += _approach(model, path[-1][0], centres[0], space)
     path += _held_out_path(centres[0])
-    path += [(np.array(UPRIGHT), 0.5, LegUse.TRANSIT), (start, 0.5, LegUse.TRANSIT)]
+    path += [
+        (np.array(UPRIGHT), 0.5, LegPurpose.TRANSIT),
+        (start, 0.5, LegPurpose.TRANSIT),
+    ]
     legs: list[FrictionLeg] = []
     position, pose = start, -1
     for goal, speed, use in path:
-        was_transit = not legs or legs[-1].use is LegUse.TRANSIT
-        is_transit = use is LegUse.TRANSIT
+        was_transit = not legs or legs[-1].use is LegPurpose.TRANSIT
+        is_transit = use is LegPurpose.TRANSIT
         pose += was_transit and not is_transit
         top_speed = min(speed, leg_speed(model, position, goal))
         halt = MeasurementPose(goal, top_speed, None if is_transit else pose)
@@ -87,20 +92,20 @@ def plan_friction(model: ArmModel, start: Array, space: FreeSpace) -> list[Frict
 
 def _approach(
     model: ArmModel, start: Array, centre: Array, space: FreeSpace
-) -> list[tuple[Array, float, LegUse]]:
+) -> list[tuple[Array, float, LegPurpose]]:
     """Return the path to `centre`: straight if clear, else by the upright pose."""
     upright = np.array(UPRIGHT)
     goals = [centre] if space.is_clear(model, start, centre) else [upright, centre]
-    return [(goal, 0.5, LegUse.TRANSIT) for goal in goals]
+    return [(goal, 0.5, LegPurpose.TRANSIT) for goal in goals]
 
 
-def _sweeps(centre: Array, number: int) -> Iterator[tuple[Array, float, LegUse]]:
+def _sweeps(centre: Array, number: int) -> Iterator[tuple[Array, float, LegPurpose]]:
     """Yield (goal [rad], speed [rad/s], use) of the oscillations around pose `number`.
 
     The pattern alternates between poses: each motor of a differential is the faster one
     in one of them.
     """
-    use, pattern = LegUse.FIT, _COMBINED[number % 2]
+    use, pattern = LegPurpose.FIT, _COMBINED[number % 2]
     for amplitude, speed in _SLOW:
         for side in (1.0, -1.0, 1.0):
             yield centre + side * amplitude * pattern, speed, use
@@ -112,13 +117,13 @@ def _sweeps(centre: Array, number: int) -> Iterator[tuple[Array, float, LegUse]]
         yield centre, 0.4, use
 
 
-def _held_out_path(centre: Array) -> Iterator[tuple[Array, float, LegUse]]:
+def _held_out_path(centre: Array) -> Iterator[tuple[Array, float, LegPurpose]]:
     """Yield the held-out path: other directions and speeds than those fitted."""
     pattern = np.array([0.7, 0.9, 0.7, -0.8, 1.0, 0.3, 1.0])
     for amplitude, speed in ((0.02, 0.01), (0.06, 0.06), (0.18, 0.25)):
         for side in (1.0, -1.0):
-            yield centre + side * amplitude * pattern, speed, LegUse.HELD_OUT
-    yield centre, 0.2, LegUse.HELD_OUT
+            yield centre + side * amplitude * pattern, speed, LegPurpose.HELD_OUT
+    yield centre, 0.2, LegPurpose.HELD_OUT
 
 
 def _centres(model: ArmModel, space: FreeSpace) -> list[Array]:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from acquisition.errors import SettingsError
 from wam.model.arm_model import ArmModel
-from wam.model.clearance import CLEARANCE_MARGIN, ArmClearance, straight_way
+from wam.model.clearance import CLEARANCE_MARGIN, ArmClearance, straight_path
 from wam.model.constants import ArmConstants, Array
 
 OFFSET = 0.03  # rad; a pose is approached from this far on both sides
@@ -41,7 +41,10 @@ class FreeSpace:
         """Return whether the straight path `start` to `goal` [rad], (7,), is clear."""
         if not is_clear(model, start, goal, self.floor):
             return False
-        return self.clearance is None or self.clearance.first_hit(start, goal) is None
+        return (
+            self.clearance is None
+            or self.clearance.first_collision(start, goal) is None
+        )
 
 
 def check_poses(model: ArmModel, poses: Sequence[Array], space: FreeSpace) -> None:
@@ -74,7 +77,7 @@ def _check_gaps(number: int, pose: Array, clearance: ArmClearance) -> None:
     closest = min(gaps, key=lambda gap: gap.distance)
     if closest.distance <= CLEARANCE_MARGIN:
         raise _pose_error(number, closest.text())
-    hit = clearance.first_hit(np.array(UPRIGHT), pose)
+    hit = clearance.first_collision(np.array(UPRIGHT), pose)
     if hit is not None:
         raise _pose_error(number, f"on the way to it {hit.text()}")
 
@@ -99,7 +102,7 @@ def check_rise(model: ArmModel, start: Array, space: FreeSpace) -> None:
         raise SettingsError(
             "The arm cannot rise from where it is without going down first.", hint=hint
         )
-    hit = space.clearance.first_hit(start, upright) if space.clearance else None
+    hit = space.clearance.first_collision(start, upright) if space.clearance else None
     if hit is not None:
         raise SettingsError(
             f"The arm cannot rise from where it is: on the way {hit.text()} "
@@ -120,7 +123,7 @@ def lowest(model: ArmModel, q: NDArray[np.float64]) -> Array:
     """
     plate = np.array([model.plate_pose(row)[0][2] for row in q])
     sole = model.sole_path(q).position[:, 2]
-    return np.minimum(np.minimum(plate, sole), elbow_of(model.constants, q)[:, 2])
+    return np.minimum(np.minimum(plate, sole), elbow_position(model.constants, q)[:, 2])
 
 
 def is_clear(model: ArmModel, start: Array, goal: Array, floor: float) -> bool:
@@ -129,11 +132,13 @@ def is_clear(model: ArmModel, start: Array, goal: Array, floor: float) -> bool:
     An end below `floor`, such as the foot in its container, is allowed if no point of
     the path is lower than the lower end.
     """
-    heights = lowest(model, straight_way(start, goal, STEP))
+    heights = lowest(model, straight_path(start, goal, STEP))
     return bool(heights.min() >= min(floor, heights[0], heights[-1]) - _SLACK)
 
 
-def elbow_of(constants: ArmConstants, q: NDArray[np.float64]) -> NDArray[np.float64]:
+def elbow_position(
+    constants: ArmConstants, q: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Return the elbow axis lowered by the link's width [m], shape (n, 3)."""
     reach, width = constants.d[2], abs(constants.a[2])
     radius = reach * np.sin(q[:, 1])

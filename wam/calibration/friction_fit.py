@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.errors import SettingsError
-from wam.calibration.sliding import SlidingRows, check_enough
+from wam.calibration.sliding import SlidingRows, check_row_count
 from wam.model.constants import ArmConstants, Array
-from wam.model.friction import MotorFriction, motor_turns
+from wam.model.friction import MotorFriction, largest_motor_ratios
 
 LARGEST_RESIDUAL = 0.2  # of Coulomb friction, rms on the held-out path
 LEAST_BOUND = 0.7  # lower bound as a share of the estimate
@@ -64,7 +64,7 @@ class FrictionFit:
         """Lower 95 % bound of the motors' Coulomb torques [N m], shape (7,)."""
         return self.friction.coulomb - _SIGMAS * self.deviation
 
-    def sliding_left(self, share: float) -> Array:
+    def residual_friction(self, share: float) -> Array:
         """Return an upper bound of sliding friction after compensation [N m], (7,).
 
         The upper 95 % bound of friction less the compensated torque.
@@ -106,8 +106,8 @@ def fit_friction(
         SettingsError: a motor did not slide enough either way.
     """
     for motor, motor_rows in enumerate(rows, 1):
-        check_enough(motor, motor_rows)
-    ratios = motor_turns(constants)
+        check_row_count(motor, motor_rows)
+    ratios = largest_motor_ratios(constants)
     fits = [
         _fit_motor(motor_rows, float(scale), gravity_deviation)
         for motor_rows, scale in zip(rows, ratios, strict=True)

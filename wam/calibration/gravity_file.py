@@ -17,7 +17,7 @@ from wam.model.moments import (
     check_drawings,
     check_fit,
     check_zeros,
-    fit_of,
+    evaluate_moments,
     zero_errors,
 )
 from wam.model.tool import Tool, tool_metadata, tool_of
@@ -154,7 +154,7 @@ def check_gravity(constants: ArmConstants, calibration: GravityCalibration) -> N
             moments far from the drawings.
     """
     q, tool = calibration.poses, calibration.tool
-    fit = fit_of(constants, calibration.mus, q, calibration.torques)
+    fit = evaluate_moments(constants, calibration.mus, q, calibration.torques)
     check_fit(replace(fit, rank=min(fit.rank, calibration.rank)))
     if not calibration.residual <= LARGEST_RESIDUAL:
         raise SettingsError(

@@ -12,12 +12,12 @@ from wam.calibration.free_space import (
     UPRIGHT,
     FreeSpace,
     check_rise,
-    elbow_of,
+    elbow_position,
     lowest,
 )
 from wam.control.position_control import TOP_SPEED, JointMove
 from wam.model.arm_model import ArmModel
-from wam.model.clearance import straight_way
+from wam.model.clearance import straight_path
 from wam.model.constants import Array
 from wam.model.moments import regressor
 
@@ -121,7 +121,7 @@ def _most_informative(blocks: Sequence[Array], count: int) -> list[int]:
     return chosen
 
 
-def plan_halts(
+def plan_waypoints(
     model: ArmModel,
     start: Array,
     poses: Sequence[Array],
@@ -167,15 +167,15 @@ def plan_halts(
 
 def leg_speed(model: ArmModel, start: Array, goal: Array) -> float:
     """Return the joint speed [rad/s] at which sole and elbow stay below 0.3 m/s."""
-    path = straight_way(start, goal, STEP)
-    points = (model.sole_path(path).position, elbow_of(model.constants, path))
+    path = straight_path(start, goal, STEP)
+    points = (model.sole_path(path).position, elbow_position(model.constants, path))
     steps = [np.linalg.norm(np.diff(p, axis=0), axis=1).max() for p in points]
     turned = float(np.abs(goal - start).max()) / (len(path) - 1)  # rad per step
     fastest = POINT_SPEED * turned / max(*steps, 1e-9)
     return float(min(TOP_SPEED, max(fastest, APPROACH_SPEED)))
 
 
-def way_seconds(start: Array, halts: Sequence[MeasurementPose]) -> float:
+def travel_time(start: Array, halts: Sequence[MeasurementPose]) -> float:
     """Return the travel time without the stops [s]."""
     total, position = 0.0, start
     for halt in halts:

@@ -10,7 +10,7 @@ from acquisition.clock import PERIOD_NS
 from acquisition.errors import SettingsError
 from wam.model.arm_model import ArmModel
 from wam.model.constants import Array
-from wam.model.friction import ELASTIC, motor_turns
+from wam.model.friction import ELASTIC, largest_motor_ratios
 from wam.model.moments import regressor
 
 HALF = 10  # samples on each side of a centred line fit: 42 ms in all
@@ -109,7 +109,7 @@ def sliding_rows(
     return [_concatenated(part) for part in parts]
 
 
-def check_enough(motor: int, rows: SlidingRows) -> None:
+def check_row_count(motor: int, rows: SlidingRows) -> None:
     """Refuse the data of a motor with too few rows in total or in either sense.
 
     Raises:
@@ -175,7 +175,7 @@ def _motor_rows(
     first: int,
 ) -> SlidingRows:
     """Return the rows of one motor on one leg; block numbers begin at `first`."""
-    ratio = float(motor_turns(model.constants)[motor])
+    ratio = float(largest_motor_ratios(model.constants)[motor])
     angle, speed = motion.angle[:, motor], motion.speed[:, motor]
     rows = _row_indices(len(angle))
     rows = rows[_is_sliding(angle, speed, rows, ratio, float(_WINDING[motor]))]

@@ -6,7 +6,7 @@ import numpy as np
 
 from acquisition.control_loop.details import MotionExcess
 from acquisition.control_loop.law import ControlLaw
-from acquisition.control_loop.proof import ProofGoal
+from acquisition.control_loop.powered_test import PoweredTestGoal
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import ArmReading, Vector
 from wam.control.friction_compensation import FrictionCompensation
@@ -14,12 +14,12 @@ from wam.control.joint_lock import LOCKED_JOINT, JointLock, LockGains
 from wam.control.position_control import (
     TOP_SPEED,
     JointMove,
-    MotorWatch,
     PositionHold,
+    StallDetector,
     joint_pd,
     move_reference,
 )
-from wam.control.proof import Proof
+from wam.control.powered_test import PoweredTest
 from wam.control.soft_walls import SoftWalls
 from wam.model.arm_model import ArmModel
 from wam.model.gravity import VirtualMass, compensation
@@ -30,7 +30,7 @@ _POWERED = frozenset({ArmState.FLOAT, *_SPRING_STATES})
 
 
 @dataclass(slots=True, eq=False)
-class Moving:
+class MoveMode:
     """Mode of an arm in hold that makes a move or keeps its goal.
 
     Attributes:
@@ -49,7 +49,7 @@ class Moving:
 
 
 # In hold an arm may make a move or be in a proof; the other modes are plain states.
-Mode = ArmState | Moving | Proof
+Mode = ArmState | MoveMode | PoweredTest
 
 
 class FootController(ControlLaw):
@@ -82,7 +82,7 @@ class FootController(ControlLaw):
         limits = np.array(walls.limits) if walls else np.full(7, np.inf)
         self._largest = TORQUE_SHARE * limits
         self._mode: Mode = ArmState.IDLE
-        self._watch = MotorWatch(model.constants)
+        self._watch = StallDetector(model.constants)
 
     def enter(self, state: ArmState, reading: ArmReading) -> None:
         """Enter `state`; torques are continuous except for the damping.
@@ -116,7 +116,7 @@ class FootController(ControlLaw):
                 or `speed` is not within 0..0.5 rad/s.
         """
         constants, mode = self._model.constants, self._mode
-        if self.is_proving() or (
+        if self.is_testing() or (
             isinstance(mode, ArmState) and mode is not ArmState.HOLD
         ):
             raise ValueError("the arm moves in hold only")
@@ -129,38 +129,38 @@ class FootController(ControlLaw):
             raise ValueError(f"{speed} rad/s is not within 0..{TOP_SPEED}")
         now = reading.host_ns
         # Start at the reference of the spring, not at q: the torque stays continuous.
-        if isinstance(mode, Moving):
+        if isinstance(mode, MoveMode):
             start, _ = mode.reference(now)
         else:
             start = reading.q + self._hold.spring(reading) / constants.kp
         self._hold.release()
         self._lock.release(now)
         path = JointMove(start, goal.copy(), speed)
-        self._mode = Moving(path, now)
+        self._mode = MoveMode(path, now)
         self._watch.begin()
         return path.duration
 
-    def prove(self, goal: ProofGoal, reading: ArmReading) -> None:
+    def prove(self, goal: PoweredTestGoal, reading: ArmReading) -> None:
         """Start the proof `goal`: its torques replace the control law; only in hold.
 
         Raises:
             ValueError: the arm is not in hold or moves, or `goal` is invalid.
         """
-        if self._mode is not ArmState.HOLD and not self.is_proving():
+        if self._mode is not ArmState.HOLD and not self.is_testing():
             raise ValueError("a proof begins in hold only")
-        self._mode = Proof(goal, self._model.constants, reading)
+        self._mode = PoweredTest(goal, self._model.constants, reading)
         self._hold.release()
         self._lock.release(reading.host_ns)
 
-    def is_proving(self) -> bool:
+    def is_testing(self) -> bool:
         """Return whether the arm is in a proof: any fault then leads to idle."""
-        return isinstance(self._mode, Proof)
+        return isinstance(self._mode, PoweredTest)
 
-    def proof_excess(
+    def powered_test_excess(
         self, reading: ArmReading, energy: float, *, is_powered: bool
     ) -> MotionExcess | None:
         """Return the limit of motion that an arm in a proof exceeds, or None."""
-        if not isinstance(self._mode, Proof):
+        if not isinstance(self._mode, PoweredTest):
             return None
         return self._mode.excess(reading, energy, is_powered=is_powered)
 
@@ -172,14 +172,14 @@ class FootController(ControlLaw):
         """
         now = reading.host_ns
         gravity = compensation(self._model, reading.q, self._mass.at(now))
-        if isinstance(self._mode, Proof):
+        if isinstance(self._mode, PoweredTest):
             tau = self._mode.torque(reading, gravity)
             return tau, tau.copy()
         if reading.jump is not None:
             return gravity.copy(), gravity
         lock = self._lock_torque(reading)
         match self._mode:
-            case Moving() as move:
+            case MoveMode() as move:
                 tau = self._move_torque(move, reading, gravity, lock)
             case ArmState.FLOAT:
                 tau = gravity.copy()
@@ -196,11 +196,11 @@ class FootController(ControlLaw):
 
     def is_moving(self) -> bool:
         """Return whether a move is under way or its goal is kept."""
-        return isinstance(self._mode, Moving)
+        return isinstance(self._mode, MoveMode)
 
     def stuck_motor(self) -> int:
         """Return the motor that a move drives without moving it, 1-7; 0 = none."""
-        return self._mode.stuck_motor if isinstance(self._mode, Moving) else 0
+        return self._mode.stuck_motor if isinstance(self._mode, MoveMode) else 0
 
     def kinetic_energy(self, reading: ArmReading) -> float:
         """Return the kinetic energy of the arm with its foot [J]."""
@@ -213,12 +213,12 @@ class FootController(ControlLaw):
     def _lock_torque(self, reading: ArmReading) -> float:
         """Return the torque of joint 7's lock [N m]; 0 after it has faded."""
         q7 = float(reading.q[LOCKED_JOINT])
-        if isinstance(self._mode, Moving) or self._mode in _SPRING_STATES:
+        if isinstance(self._mode, MoveMode) or self._mode in _SPRING_STATES:
             self._lock.follow(q7, reading.host_ns)
         return self._lock.torque(q7, reading.qd7_raw, reading.host_ns)
 
     def _move_torque(
-        self, move: Moving, reading: ArmReading, gravity: Vector, lock: float
+        self, move: MoveMode, reading: ArmReading, gravity: Vector, lock: float
     ) -> Vector:
         """Return `gravity` plus the PD torque of a move [N m], shape (7,).
 
@@ -270,7 +270,7 @@ class FootController(ControlLaw):
 
         The springs of hold take over with this torque.
         """
-        if not isinstance(self._mode, Moving):
+        if not isinstance(self._mode, MoveMode):
             return None
         q, _ = self._mode.reference(reading.host_ns)
         constants = self._model.constants

@@ -18,7 +18,12 @@ import numpy as np
 
 from acquisition.devices import ArmReading
 from wam.model.constants import ArmConstants, Array
-from wam.model.friction import ELASTIC, MotorFriction, motor_turns, plastic_share
+from wam.model.friction import (
+    ELASTIC,
+    MotorFriction,
+    largest_motor_ratios,
+    plastic_share,
+)
 
 LARGEST_SHARE = 0.8
 SWUNG_MOTOR = "friction:swung_motor"  # metadata key of the recording
@@ -34,7 +39,7 @@ _BENT = 0.7  # |z| that counts for a sign change
 
 
 @dataclass(frozen=True, slots=True)
-class KnownFriction:
+class FrictionLowerBound:
     """Lower bound of the motors' dry friction.
 
     Attributes:
@@ -52,9 +57,9 @@ class KnownFriction:
     load_at: Array
 
 
-def known_friction(
+def friction_lower_bound(
     friction: MotorFriction, deviation: Array, asymmetry_deviation: Array
-) -> KnownFriction:
+) -> FrictionLowerBound:
     """Return the lower 95 % bound of identified friction at the minimum of its ripple.
 
     Args:
@@ -65,7 +70,7 @@ def known_friction(
     margin = _SIGMAS * np.hypot(deviation, asymmetry_deviation)
     ripple_minimum = 1.0 - np.hypot(friction.ripple_sin, friction.ripple_cos)
     coulomb = friction.coulomb - margin
-    return KnownFriction(
+    return FrictionLowerBound(
         forward=np.maximum((coulomb + friction.asymmetry) * ripple_minimum, 0.0),
         backward=np.maximum((coulomb - friction.asymmetry) * ripple_minimum, 0.0),
         error=_SIGMAS * deviation / friction.coulomb,
@@ -83,7 +88,7 @@ class FrictionCompensation:
     """
 
     def __init__(
-        self, constants: ArmConstants, known: KnownFriction, share: float
+        self, constants: ArmConstants, known: FrictionLowerBound, share: float
     ) -> None:
         """Compensate `share` of the known friction of each motor.
 
@@ -94,7 +99,7 @@ class FrictionCompensation:
             raise ValueError(f"share {share} is outside 0..{LARGEST_SHARE}")
         shares = np.minimum(share, _MARGIN / (1.0 + known.error))
         reach = (
-            motor_turns(constants)
+            largest_motor_ratios(constants)
             * _PRESLIDING
             * np.array(constants.cts)
             / (2.0 * np.pi)

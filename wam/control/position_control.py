@@ -182,7 +182,7 @@ _STUCK_ADVANCE = np.array([1.0, 0.5, 0.5, 0.5, 2.0, 2.0, 3.0]) * 1e-3
 _FLICKER = 1  # counts of encoder flicker at rest
 
 
-class MotorWatch:
+class StallDetector:
     """Detects a motor that does not move although a move drives it.
 
     Its counts stay constant while the reference advances, at a torque above break-away:

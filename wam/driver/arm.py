@@ -27,7 +27,7 @@ from wam.bus.link import Link
 from wam.bus.properties import COMMON, PuckMode
 from wam.bus.property_client import PropertyClient
 from wam.driver.cyclic_io import BusDevice, CycleTraffic
-from wam.driver.discovery import pucks_verb
+from wam.driver.discovery import pucks_do
 from wam.driver.health import PuckHealth
 from wam.driver.home import HOME_LIMIT
 from wam.driver.joint_estimator import JointEstimator
@@ -84,7 +84,7 @@ class WamArm:
         self._safety = SafetyModule(self._properties, clock, vers=0)
         self._motion: JointEstimator | None = None
         self._missing_cycles = 0
-        self._until_unasked = self._settings.unasked_every
+        self._until_unasked = self._settings.request_free_every
         self._late_in_a_row = 0
         self._is_commanded = True
         self._is_closed = False
@@ -164,7 +164,7 @@ class WamArm:
 
         Waits until `give_up_ns` at most; missing replies raise nothing. Joints without
         a reply are extrapolated with their last velocity for 50 ms, then held. One in
-        `unasked_every` cycles sends no request (see `skip`), unless positions are
+        `request_free_every` cycles sends no request (see `skip`), unless positions are
         missing or implausible.
         """
         self._until_unasked -= 1
@@ -181,9 +181,9 @@ class WamArm:
         """
         motors, age_ns = self._traffic.skip(now_ns)
         # Lock and damper must not run on stale positions: confirm a late reply soon.
-        self._until_unasked = _DOUBTED if motors else self._settings.unasked_every
+        self._until_unasked = _DOUBTED if motors else self._settings.request_free_every
         self._late_in_a_row = self._late_in_a_row + 1 if motors else 0
-        reading = self._reading(now_ns, is_unasked=True)
+        reading = self._reading(now_ns, is_without_request=True)
         if motors:
             reading.late = LatePositions(motors, age_ns, self._late_in_a_row)
         return reading
@@ -215,10 +215,10 @@ class WamArm:
         self._traffic.listen(now_ns)
         return self._reading(now_ns)
 
-    def _reading(self, now_ns: int, *, is_unasked: bool = False) -> ArmReading:
+    def _reading(self, now_ns: int, *, is_without_request: bool = False) -> ArmReading:
         motion, traffic = self._started(), self._traffic
         fresh = motion.update(now_ns, traffic.received)
-        if is_unasked:
+        if is_without_request:
             fresh = _ALL_FRESH
         else:
             lost = traffic.received.count(None)
@@ -243,9 +243,9 @@ class WamArm:
             jump=motion.jump,
             foreign_id=self._link.foreign_id,
             has_bus_error=traffic.take_bus_error(),
-            is_unasked=is_unasked,
+            is_without_request=is_without_request,
             change=self._poller.watch.change,
-            disobeys=self._poller.take_disobedience(),
+            disobeys=self._poller.take_mode_refusal(),
             doubled=traffic.balance.doubled(),
         )
 
@@ -378,7 +378,7 @@ class WamArm:
         for _ in range(_IGNORED_SPEED_FAULTS):
             self._properties.pause(_MS)
             self._traffic.exchange(self._clock.now_ns())
-        self._safety.heed_speed_faults()
+        self._safety.monitor_speed_faults()
         motor = self._traffic.balance.doubled()
         if motor and self._link.foreign_id is None:  # another master: the loop reports
             raise PreflightError(
@@ -420,12 +420,12 @@ class WamArm:
         silent = [n for n in MOTOR_NODES if self._traffic.received[n - 1] is None]
         if late_replies := self.counters.stale - stale:
             raise LinkTimeoutError(
-                f"{pucks_verb(silent)} not report a position in time: {late_replies} "
+                f"{pucks_do(silent)} not report a position in time: {late_replies} "
                 "replies came after the next question.",
                 hint="Is the CAN adapter slow (USB), or the bus busy? See: ip -s link.",
             )
         raise LinkTimeoutError(
-            f"{pucks_verb(silent)} not report a position.",
+            f"{pucks_do(silent)} not report a position.",
             hint="Check the cable, or a puck in reset.",
         )
 

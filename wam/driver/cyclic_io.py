@@ -190,9 +190,9 @@ class CycleTraffic:
             self.received = [None] * MOTORS
             self._ask_bus_device()
             settings, clock = self._settings, self._clock
-            expected_ns = max(settings.first_look_ns, self.took_ns + _MARGIN_NS)
+            expected_ns = max(settings.first_read_ns, self.took_ns + _MARGIN_NS)
             deadline_ns = now_ns + min(expected_ns, settings.give_up_ns)
-            clock.sleep_until(min(now_ns + settings.first_look_ns, deadline_ns))
+            clock.sleep_until(min(now_ns + settings.first_read_ns, deadline_ns))
             reply_count = self._collect()
             while clock.now_ns() < deadline_ns and clock.wait(self._link, deadline_ns):
                 reply_count += self._collect()
@@ -264,7 +264,7 @@ class CycleTraffic:
 
     def _await_replies(self, now_ns: int) -> None:
         clock, deadline_ns = self._clock, now_ns + self._settings.give_up_ns
-        clock.sleep_until(now_ns + self._settings.first_look_ns)
+        clock.sleep_until(now_ns + self._settings.first_read_ns)
         arrived = self._collect()
         if arrived:
             self.arm_ns = clock.now_ns()

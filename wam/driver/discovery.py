@@ -52,7 +52,7 @@ def discover_pucks(
     return dict(sorted(stats.items()))
 
 
-def pucks_verb(nodes: Sequence[int]) -> str:
+def pucks_do(nodes: Sequence[int]) -> str:
     """Return "Puck 5 does" or "Pucks 5,6 do"."""
     names = ",".join(map(str, nodes))
     return f"Puck {names} does" if len(nodes) == 1 else f"Pucks {names} do"
@@ -91,7 +91,7 @@ def _check_bus(condition: BusCondition) -> None:
             hint="Check cable and bit rate. Set up with restart-ms it comes back by "
             "itself, otherwise: ip link set can0 down, then up.",
         )
-    if condition is BusCondition.UNHEARD:
+    if condition is BusCondition.UNACKNOWLEDGED:
         raise UnfitDeviceError(
             "No device on the CAN bus acknowledges.",
             hint="Is the arm powered, is the bus terminated, is the cable in?",
@@ -117,15 +117,13 @@ def _check_present(stats: dict[int, int], mode: SafetyMode) -> None:
                 "Is this a four-joint WAM? Traction needs the wrist. Otherwise check "
                 "the cable behind puck 4."
             )
-        raise UnfitDeviceError(
-            f"{pucks_verb(missing)} not answer ({others}).", hint=hint
-        )
+        raise UnfitDeviceError(f"{pucks_do(missing)} not answer ({others}).", hint=hint)
     faulty = [
         n for n in present if stats[n] not in (PuckStatus.RESET, PuckStatus.READY)
     ]
     if faulty:
         raise DeviceFaultError(
-            f"{pucks_verb(faulty)} not work: STAT {stats[faulty[0]]}.",
+            f"{pucks_do(faulty)} not work: STAT {stats[faulty[0]]}.",
             hint="Switch the arm off and on, then start again.",
         )
 

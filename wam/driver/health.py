@@ -10,7 +10,7 @@ from wam.bus.frames import MOTOR_NODES, Property
 from wam.bus.properties import MODERN, Device, nearest_documented, property_number
 
 # Each puck is polled every 0.7 s; a report is stale after four requests without reply.
-NEWS_NS = 3 * NS_PER_S
+STALE_NS = 3 * NS_PER_S
 HOT = 60  # over-temperature limit of a puck, default of OTEMP [degrees Celsius]
 
 
@@ -34,7 +34,7 @@ class PuckHealth:
 
     def is_news(self, now_ns: int) -> bool:
         """Return whether the last report is recent."""
-        return self.heard_ns is not None and now_ns - self.heard_ns <= NEWS_NS
+        return self.heard_ns is not None and now_ns - self.heard_ns <= STALE_NS
 
 
 _FIELDS: Final = {
@@ -134,7 +134,7 @@ def temperature_range(pucks: Sequence[PuckHealth], now_ns: int) -> str:
     return ", ".join([range_text, *silent])
 
 
-def complaints(pucks: Sequence[PuckHealth], now_ns: int) -> list[str]:
+def health_warnings(pucks: Sequence[PuckHealth], now_ns: int) -> list[str]:
     """Return warnings of pucks 1 to 7, such as "puck 3 at 72 °C (limit 60)"."""
     texts: list[str] = []
     for node, puck in enumerate(pucks, 1):

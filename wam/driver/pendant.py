@@ -26,7 +26,7 @@ class PendantButton(IntEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class PendantWord:
+class PendantState:
     """Decoded property PEN.
 
     Attributes:
@@ -72,7 +72,7 @@ class PendantWord:
 MONITORS = ("velocity", "torque", "voltage", "heartbeat", "other")
 
 
-def decode_pendant(word: int, excused: Collection[str] = ()) -> PendantWord:
+def decode_pendant(word: int, excused: Collection[str] = ()) -> PendantState:
     """Decode PEN, a 32-bit word (libbarrett, safety_module.cpp).
 
     Args:
@@ -83,7 +83,7 @@ def decode_pendant(word: int, excused: Collection[str] = ()) -> PendantWord:
         DeviceFaultError: another monitor is in no state or several.
     """
     levels = [_level(word, i, excused) for i in range(len(MONITORS))]
-    return PendantWord(
+    return PendantState(
         *levels,
         segments=word >> 16 & 0xFF,
         is_idle_lit=bool(word >> 24 & 1),
@@ -92,7 +92,7 @@ def decode_pendant(word: int, excused: Collection[str] = ()) -> PendantWord:
     )
 
 
-def encode_pendant(pendant: PendantWord) -> int:
+def encode_pendant(pendant: PendantState) -> int:
     """Encode PEN as the module reports it."""
     word = pendant.segments << 16 | pendant.button << 26
     word |= pendant.is_idle_lit << 24 | pendant.is_active_lit << 25
@@ -101,7 +101,7 @@ def encode_pendant(pendant: PendantWord) -> int:
     return word
 
 
-NO_PENDANT = PendantWord(
+NO_PENDANT = PendantState(
     *([SafetyLevel.UNKNOWN] * len(MONITORS)),
     segments=0,
     is_idle_lit=False,

@@ -17,7 +17,7 @@ from wam.bus.properties import (
     property_number,
 )
 from wam.bus.property_client import PropertyClient
-from wam.driver.pendant import MONITORS, NO_PENDANT, PendantWord, decode_pendant
+from wam.driver.pendant import MONITORS, NO_PENDANT, PendantState, decode_pendant
 
 COUNTS_PER_SPEED = 4096  # VL1 and VL2 are Q4.12: 1 m/s is 4096
 WARNING_SHARE = 0.9  # of the fault limit: default of a warning limit
@@ -175,7 +175,7 @@ class SafetyModule:
         """Let the module ignore `count` samples, before a jump of the positions."""
         self._set("IFAULT", count)
 
-    def heed_speed_faults(self) -> None:
+    def monitor_speed_faults(self) -> None:
         """Let the module monitor the speed again.
 
         Raises:
@@ -215,7 +215,7 @@ class SafetyModule:
             if readback[name] != value
         )
 
-    def pendant(self, excused: Collection[str] = ()) -> PendantWord:
+    def pendant(self, excused: Collection[str] = ()) -> PendantState:
         """Return pendant and monitors; those in `excused` may be UNKNOWN.
 
         Raises:
@@ -224,7 +224,7 @@ class SafetyModule:
         """
         return decode_pendant(self._get("PEN") & 0xFFFFFFFF, excused)
 
-    def doubted_pendant(self) -> tuple[PendantWord, str]:
+    def pendant_with_warning(self) -> tuple[PendantState, str]:
         """Return pendant and monitors, and a warning if PEN is not as documented.
 
         A missing or invalid reply is not an error: libbarrett does not read PEN.

@@ -22,12 +22,12 @@ class ArmSettings:
         j2mp: motor angles from joint angles, shape (7, 7).
         torque_limits: largest torque the host sends to each motor [puck units].
         velocity_pole: corner frequency of the velocity filter [rad/s].
-        first_look_ns: delay from the request to the first read of the bus [ns].
+        first_read_ns: delay from the request to the first read of the bus [ns].
         give_up_ns: delay from the request to the end of waiting for replies [ns].
         speed_limits: joint speed limits of the guard [rad/s].
         jump_margin: positions are accepted up to this multiple of the speed limits.
-        unasked_every: period of cycles without a position request [cycles]; a reply in
-            such a cycle answers an earlier request.
+        request_free_every: period of cycles without a position request [cycles]; a
+            reply in such a cycle answers an earlier request.
         safety_poll_cycles: period of requests for the safety mode, and for PEN.
         health_poll_cycles: period of requests for puck telemetry.
         watch_poll_cycles: period of requests for properties read at the start.
@@ -42,11 +42,11 @@ class ArmSettings:
     j2mp: Matrix = field(default_factory=_shipped_j2mp)
     torque_limits: tuple[int, ...] = HOST_TORQUE_LIMITS
     velocity_pole: float = 180.0
-    first_look_ns: int = 700_000
+    first_read_ns: int = 700_000
     give_up_ns: int = 1_500_000
     speed_limits: tuple[float, ...] = (1.5, 1.5, 2.0, 2.5, 4.0, 4.0, 4.0)
     jump_margin: float = 2.0
-    unasked_every: int = 47  # prime: never in step with the polls
+    request_free_every: int = 47  # prime: never in step with the polls
     safety_poll_cycles: int = 25
     health_poll_cycles: int = 50
     watch_poll_cycles: int = 50

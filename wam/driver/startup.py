@@ -21,10 +21,10 @@ from wam.bus.properties import (
     property_number,
 )
 from wam.bus.property_client import PropertyClient
-from wam.driver.discovery import discover_pucks, pucks_verb
+from wam.driver.discovery import discover_pucks, pucks_do
 from wam.driver.health import PuckHealth, ask_health
 from wam.driver.lost_positions import LostPositions
-from wam.driver.pendant import PendantWord
+from wam.driver.pendant import PendantState
 from wam.driver.puck_properties import Values, ask_properties, compare, refuse
 from wam.driver.safety_module import SafetyModule
 from wam.driver.settings import ArmSettings
@@ -85,7 +85,7 @@ class ArmInfo:
     nodes: tuple[int, ...]
     safety_vers: int
     safety_mode: SafetyMode
-    pendant: PendantWord
+    pendant: PendantState
     is_zeroed: bool
     late_replies: int
     transport: str = ""
@@ -160,7 +160,7 @@ class StartUp:
         self._check_properties(pucks)
         if mode is not SafetyMode.ACTIVE:
             self._idle_pucks(safety)
-        pendant, warning = safety.doubted_pendant()
+        pendant, warning = safety.pendant_with_warning()
         self._warnings += [warning] if warning else []
         return ArmInfo(
             pucks=pucks,
@@ -223,7 +223,7 @@ class StartUp:
         ]
         if not_ready:
             raise UnfitDeviceError(
-                f"{pucks_verb(not_ready)} not wake up within "
+                f"{pucks_do(not_ready)} not wake up within "
                 f"{self._boot_ns / 1e9:.1f} s.",
                 hint="Switch the arm off and on, then start again.",
             )
@@ -314,7 +314,7 @@ class StartUp:
             silent = [i for i, a in enumerate(answers, 1) if a.get(name, 0) is None]
             if silent:
                 self._warnings.append(
-                    f"{pucks_verb(silent)} not answer GET {name}: it is not compared."
+                    f"{pucks_do(silent)} not answer GET {name}: it is not compared."
                 )
         firmware = [puck.vers for puck in pucks]
         if self._expected.VERS is None and len(set(firmware)) > 1:

@@ -27,7 +27,7 @@ from wam.bus.properties import (
 )
 from wam.driver.command_watch import CommandWatch
 from wam.driver.health import HealthTable
-from wam.driver.pendant import PendantWord, decode_pendant
+from wam.driver.pendant import PendantState, decode_pendant
 from wam.driver.property_watch import PropertyWatch
 from wam.driver.safety_module import decode_mode
 from wam.driver.settings import ArmSettings
@@ -185,7 +185,7 @@ class StatusPoller:
         if mode is SafetyMode.E_STOP:
             self.contradicted_by.clear()  # the pucks have no power
 
-    def begin(self, pendant: PendantWord) -> None:
+    def begin(self, pendant: PendantState) -> None:
         """Reset after a start; ignore monitors with an invalid state from now on."""
         self.is_lowering = False
         self.contradicted_by.clear()
@@ -193,7 +193,7 @@ class StatusPoller:
         self.excused = pendant.unclear
         self.note_pendant(pendant)
 
-    def note_pendant(self, pendant: PendantWord) -> None:
+    def note_pendant(self, pendant: PendantState) -> None:
         """Set the monitors reported by the module."""
         self.warnings = pendant.warnings
         self.faults = pendant.faults
@@ -203,7 +203,7 @@ class StatusPoller:
         self.contradicted_by = set(nodes)
         self._contradictions = 0
 
-    def take_disobedience(self) -> MotorChange | None:
+    def take_mode_refusal(self) -> MotorChange | None:
         """Return and clear the newest mismatch of a puck with its command, or None."""
         disobeys, self.disobeys = self.disobeys, None
         return disobeys

@@ -18,7 +18,7 @@ _WINDOW_NS = 5_000_000  # all replies to a request arrive within it
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class RestTraffic:
     """Traffic on the bus without requests.
 
     Attributes:
@@ -54,7 +54,7 @@ class BusSurvey:
         self._link = link
         self._clock = clock
 
-    def listen(self, duration_ns: int) -> Heard:
+    def listen(self, duration_ns: int) -> RestTraffic:
         """Listen for `duration_ns` without requests and return the traffic.
 
         Raises:
@@ -66,7 +66,7 @@ class BusSurvey:
         while clock.now_ns() < deadline_ns:
             clock.wait(link, deadline_ns)
             frames += len(link.receive())
-        return Heard(frames, link.foreign_id, link.errors.frames)
+        return RestTraffic(frames, link.foreign_id, link.errors.frames)
 
     def count_answers(self, times: int) -> Answers:
         """Request STAT of every device of the arm `times` times; count the replies.

@@ -113,7 +113,7 @@ class ArmClearance:
         """Return the closest pair at `q` [rad], shape (7,)."""
         return self._gap(self.distances(q))
 
-    def first_hit(self, start: Array, goal: Array) -> BodyGap | None:
+    def first_collision(self, start: Array, goal: Array) -> BodyGap | None:
         """Return the first pair closer than the margin on the straight path, or None.
 
         A pair already closer at an end of the path, such as foot and container, is
@@ -123,7 +123,7 @@ class ArmClearance:
             start: joint positions [rad], shape (7,).
             goal: joint positions [rad], shape (7,).
         """
-        path = straight_way(start, goal)
+        path = straight_path(start, goal)
         ends = np.minimum(self.distances(path[0]), self.distances(path[-1]))
         limits = np.minimum(CLEARANCE_MARGIN, ends - _SLACK)
         for q in path[1:-1]:
@@ -146,7 +146,7 @@ class ArmClearance:
         return self._shapes.geometryObjects[index].name
 
 
-def straight_way(start: Array, goal: Array, step: float = STEP) -> NDArray[np.float64]:
+def straight_path(start: Array, goal: Array, step: float = STEP) -> NDArray[np.float64]:
     """Return joint positions on the straight path, shape (n, 7), n >= 2.
 
     No joint turns by more than `step` [rad] between two rows.

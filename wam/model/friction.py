@@ -149,6 +149,6 @@ def motor_shares(constants: ArmConstants, of_joints: Array, power: int) -> Array
     return (is_coupled * per_joint).sum(axis=1) / is_coupled.sum(axis=1)
 
 
-def motor_turns(constants: ArmConstants) -> Array:
+def largest_motor_ratios(constants: ArmConstants) -> Array:
     """Return the largest |d motor / d joint| of each motor, shape (7,)."""
     return np.abs(constants.j2mp).max(axis=1)

@@ -21,7 +21,12 @@ LARGEST_RESIDUAL = 0.5  # N m rms over all joints and poses
 LARGEST_CONDITION = 30.0  # of the identifiable part; the shipped poses have 7
 LARGEST_ZERO_ERROR = 3.0  # degrees
 FARTHEST = 5.0  # N m from the drawings; another arm's moments differ by at most 2.3
-SEEN_ZEROS = (2, 3, 4, 5)  # joints whose zero error is identifiable from torques
+IDENTIFIABLE_ZEROS = (
+    2,
+    3,
+    4,
+    5,
+)  # joints whose zero error is identifiable from torques
 _TURN = 1e-5  # step of the finite difference [rad]
 _LEAST_NOISE = 0.01  # lower bound of the torque noise [N m]
 _SINGULAR = 1e-3  # of the largest singular value; smaller ones count as zero
@@ -120,10 +125,12 @@ def fit_moments(
         raise ValueError(f"q and tau must be (n, 7), got {q.shape} and {tau.shape}")
     Y = np.vstack([regressor(constants, row) for row in q])
     mus = np.linalg.lstsq(Y, tau.ravel(), rcond=_SINGULAR)[0]
-    return fit_of(constants, np.asarray(mus, np.float64).reshape(7, 3), q, tau)
+    return evaluate_moments(
+        constants, np.asarray(mus, np.float64).reshape(7, 3), q, tau
+    )
 
 
-def fit_of(
+def evaluate_moments(
     constants: ArmConstants,
     mus: Array,
     q: NDArray[np.float64],
@@ -180,8 +187,8 @@ def zero_errors(
     """
     Y = np.vstack([regressor(constants, row) for row in q])
     basis = np.linalg.svd(Y, full_matrices=False)[0][:, : fit.rank]
-    slopes = np.empty((len(Y), len(SEEN_ZEROS)))
-    for column, joint in enumerate(SEEN_ZEROS):
+    slopes = np.empty((len(Y), len(IDENTIFIABLE_ZEROS)))
+    for column, joint in enumerate(IDENTIFIABLE_ZEROS):
         displaced = q.copy()
         displaced[:, joint - 1] += _TURN
         Y_displaced = np.vstack([regressor(constants, row) for row in displaced])
@@ -190,12 +197,14 @@ def zero_errors(
     residuals = fit.residuals.ravel()
     errors = np.linalg.lstsq(slopes, residuals)[0]
     remaining = residuals - slopes @ errors
-    freedom = max(len(remaining) - fit.rank - len(SEEN_ZEROS), 1)
+    freedom = max(len(remaining) - fit.rank - len(IDENTIFIABLE_ZEROS), 1)
     noise = max(float(remaining @ remaining) / freedom, _LEAST_NOISE**2)
     covariance = noise * np.linalg.pinv(slopes.T @ slopes)
     deviations = np.sqrt(np.diag(covariance))
     return ZeroErrors(
-        SEEN_ZEROS, np.asarray(errors, np.float64), np.asarray(deviations, np.float64)
+        IDENTIFIABLE_ZEROS,
+        np.asarray(errors, np.float64),
+        np.asarray(deviations, np.float64),
     )
 
 

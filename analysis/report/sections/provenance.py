@@ -25,9 +25,9 @@ def choices(study: Study, *, is_foreign: bool) -> ReportTable:
         ["Tustin fit", f"least squares on all kept samples; bounds {box}"],
         [
             "GP fit",
-            f"squared exponential, one length per input, at most {fit.gp_points} "
-            f"samples chosen at random (seed {fit.seed}), marginal likelihood, three "
-            "starts",
+            f"one length per input, at most {fit.gp_points} samples chosen at random "
+            f"(seed {fit.seed}); marginal likelihood, climbed from a designed start and "
+            "from further proposed points",
         ],
         [
             "noise of the GP",

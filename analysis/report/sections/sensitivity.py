@@ -56,7 +56,7 @@ class StudyVariant:
         lag: lag of the forces to compensate [s].
         change: function from the options of the study to those of the repeated one.
         is_interpolated: the sensor's zero is interpolated between two tares.
-        is_massless: the inertial force of the foot is removed.
+        is_inertia_removed: the inertial force of the foot is removed.
         remark: effect on the trials in words.
     """
 
@@ -67,7 +67,7 @@ class StudyVariant:
     frame: Frame = "terrain"
     lag: float = 0.0
     is_interpolated: bool = False
-    is_massless: bool = False
+    is_inertia_removed: bool = False
     remark: str = ""
 
     @property
@@ -83,22 +83,24 @@ class StudyVariant:
         """
         if isinstance(trial, RecordedTrial):
             chosen = trial.interpolated() if self.is_interpolated else trial
-            chosen = chosen.without_inertia() if self.is_massless else chosen
+            chosen = chosen.without_inertia() if self.is_inertia_removed else chosen
             series = chosen.series(self.frame)
-        elif self.frame == "terrain" and not (self.is_interpolated or self.is_massless):
+        elif self.frame == "terrain" and not (
+            self.is_interpolated or self.is_inertia_removed
+        ):
             series = trial
         else:
             raise SettingsError(
                 f"--what-if {self.text}: tables have no frame, tares or mass.",
                 hint="It is a choice of recorded trials: traction report.",
             )
-        return series.with_forces_from(self.lag) if self.lag else series
+        return series.with_lag_removed(self.lag) if self.lag else series
 
-    def remarked(
+    def with_remark(
         self, trials: Iterable[RecordedTrial | TractionSeries]
     ) -> StudyVariant:
         """Add a remark on the effect of the choice on the trials."""
-        if not self.is_massless:
+        if not self.is_inertia_removed:
             return self
         forces = [t.inertial_force() for t in trials if isinstance(t, RecordedTrial)]
         largest = np.median([np.linalg.norm(f.force, axis=1).max() for f in forces])
@@ -205,8 +207,10 @@ def _drift(value: str) -> StudyVariant:
 
 
 def _inertia(value: str) -> StudyVariant:
-    is_massless = _one_of(value, "removed", "kept")
-    return StudyVariant("inertia", value, PAPER_MODELS, is_massless=is_massless)
+    is_inertia_removed = _one_of(value, "removed", "kept")
+    return StudyVariant(
+        "inertia", value, PAPER_MODELS, is_inertia_removed=is_inertia_removed
+    )
 
 
 def _kernel(value: str) -> StudyVariant:
@@ -251,7 +255,7 @@ _PARSERS: Mapping[str, Callable[[str], StudyVariant]] = {
 }
 
 
-def side_by_side(choice: StudyVariant, before: Study, after: Study) -> ReportTable:
+def comparison_table(choice: StudyVariant, before: Study, after: Study) -> ReportTable:
     """Compare the errors of both studies per terrain and model, trial by trial."""
     rows = [
         [

@@ -11,7 +11,7 @@ from experiments.commissioning.rest_pose import rest_pose
 from experiments.rig.build import build_tool
 from experiments.settings.load import load_settings
 from lab.guest.commands import Program, ScenarioError, require
-from lab.guest.commissioned import take_as_commissioned
+from lab.guest.commissioned import write_passed_commissioning
 from lab.guest.machine_room import MachineRoom
 from lab.guest.scenarios.bus import Figures
 from lab.guest.scenarios.losses import served_arm
@@ -77,7 +77,7 @@ def _laid_down(room: MachineRoom, arm: Program, *sound: StepId) -> LedSession:
     angles = " ".join(f"{angle:.4f}" for angle in rest_pose(load_constants()))
     arm.press(f"pose {angles} {_POSE_TIME:g}\n")
     arm.run_on(_POSE_TIME + _SETTLING)
-    take_as_commissioned(room.config, sound)
+    write_passed_commissioning(room.config, sound)
     day = LedSession(room, room.traction("commission", "--until", GATED[-1]), arm)
     day.program.expect("Lay the arm into its rest pose", _STEP)
     day.hand("release")

@@ -3,7 +3,7 @@
 from lab.guest.commands import Program
 from lab.guest.machine_room import CAN, FAR_CAN, MachineRoom
 from lab.guest.network import clear, disturb, set_up_both
-from lab.guest.promises import hold_to
+from lab.guest.promises import require_promised
 from lab.guest.scenarios.bus import Figures, figure
 from lab.guest.sessions import (
     begin,
@@ -37,7 +37,7 @@ def lossy_and_down(room: MachineRoom) -> Figures:
     session.record(2)
     room.shell.run(f"ip link set {CAN} down")
     code = session.cut_off()
-    hold_to("interface-down", "recording", code)
+    require_promised("interface-down", "recording", code)
     message = figure(session.program.output, r"(?m)^((?!.*floating).*ARM: .*)$")
     verify_kept(room, 1)
     require_rejected(room, 1)

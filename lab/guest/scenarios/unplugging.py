@@ -3,7 +3,7 @@
 from lab.guest.machine_room import CAN, MachineRoom, line_port
 from lab.guest.monitor import ADAPTER, CARD, Monitor
 from lab.guest.network import NET, set_up, set_up_both
-from lab.guest.promises import hold_to
+from lab.guest.promises import require_promised
 from lab.guest.scenarios.bus import Figures, figure
 from lab.guest.scenarios.serial_line import MAKES, PORT, write_make
 from lab.guest.sessions import (
@@ -38,7 +38,7 @@ def in_a_trial(room: MachineRoom) -> Figures:
         session.record()
         monitor.pull_out(CARD, NET / CAN)
         code = session.cut_off()
-        hold_to("interface-down", "recording", code)
+        require_promised("interface-down", "recording", code)
         message = figure(session.program.output, r"(?m)^((?!.*floating).*ARM: .*)$")
         monitor.put_in(CARD, NET / CAN)
         set_up(room.shell, CAN)

@@ -14,7 +14,7 @@ from acquisition.control_loop.faults import (
     verdict_for,
 )
 from acquisition.control_loop.loop import Tick
-from acquisition.control_loop.proof import ProofGoal, ProofKind
+from acquisition.control_loop.powered_test import PoweredTestGoal, PoweredTestKind
 from acquisition.control_loop.states import ArmState, ControlStatus
 from acquisition.devices import ArmReading, SafetyMode, WrenchSample
 from acquisition.errors import LinkError
@@ -144,7 +144,7 @@ class Law:
     def is_moving(self):
         return self.moves
 
-    def is_proving(self):
+    def is_testing(self):
         return False
 
     def stuck_motor(self):
@@ -866,8 +866,8 @@ def test_an_unknown_arm_is_asked_for_no_position_until_torques_are_wanted(bench)
 def proved(bench):
     """Return a held arm that takes any proof and does nothing."""
     bench.law.prove = lambda proof, reading: None
-    bench.law.is_proving = lambda: True
-    bench.law.proof_excess = lambda reading, energy, is_powered: None
+    bench.law.is_testing = lambda: True
+    bench.law.powered_test_excess = lambda reading, energy, is_powered: None
     bench.enter(ArmState.HOLD)
     return bench
 
@@ -880,7 +880,7 @@ def silent(bench, cycles):
 
 
 def test_a_proof_of_the_heartbeat_asks_for_nothing_until_it_is_over(proved):
-    proved.cycle.prove(ProofGoal(ProofKind.SILENCE, seconds=0.1))
+    proved.cycle.prove(PoweredTestGoal(PoweredTestKind.SILENCE, seconds=0.1))
     proved.run()
     asked_ns = proved.arm.asked_ns
     silent(proved, 49)
@@ -894,7 +894,7 @@ def test_a_proof_of_the_heartbeat_asks_for_nothing_until_it_is_over(proved):
 
 
 def test_a_silence_that_was_wanted_hides_no_other_fault(proved):
-    proved.cycle.prove(ProofGoal(ProofKind.SILENCE, seconds=0.1))
+    proved.cycle.prove(PoweredTestGoal(PoweredTestKind.SILENCE, seconds=0.1))
     proved.run()
     silent(proved, 10)
     proved.arm.mode = SafetyMode.E_STOP
@@ -903,7 +903,7 @@ def test_a_silence_that_was_wanted_hides_no_other_fault(proved):
 
 
 def test_a_request_ends_a_silence_that_was_wanted(proved):
-    proved.cycle.prove(ProofGoal(ProofKind.SILENCE, seconds=0.1))
+    proved.cycle.prove(PoweredTestGoal(PoweredTestKind.SILENCE, seconds=0.1))
     proved.run()
     asked_ns = proved.arm.asked_ns
     proved.enter(ArmState.HOLD)
@@ -991,10 +991,10 @@ class ProvingLaw(Law):
         self.excess = None
         self.powered = []
 
-    def is_proving(self):
+    def is_testing(self):
         return True
 
-    def proof_excess(self, reading, energy, *, is_powered):
+    def powered_test_excess(self, reading, energy, *, is_powered):
         self.powered.append(is_powered)
         return self.excess
 

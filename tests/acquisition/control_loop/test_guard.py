@@ -94,7 +94,10 @@ def missing(cycles):
 
 
 def late(in_a_row):
-    return {"late": LatePositions(0x40, 2_200_000, in_a_row), "is_unasked": True}
+    return {
+        "late": LatePositions(0x40, 2_200_000, in_a_row),
+        "is_without_request": True,
+    }
 
 
 CHANGE = MotorChange(3, "PIDX", 3, 2)
@@ -392,7 +395,7 @@ def led(steps, **changes):
     return state, verdict
 
 
-ONE_MOTOR = replace(LIMITS, still_ways=(9.0, 9.0, 9.0, 0.02, 9.0, 9.0, 9.0))
+ONE_MOTOR = replace(LIMITS, still_travel=(9.0, 9.0, 9.0, 0.02, 9.0, 9.0, 9.0))
 
 
 def test_a_motor_that_stands_still_while_the_sole_goes_on_ends_the_session():
@@ -467,13 +470,13 @@ STICKING = (0.0354, 0.017, 0.0123, 0.0213, 0.0325)
 
 def test_a_motor_of_a_sound_arm_may_stick():
     shares = [
-        most / way for most, way in zip(LIMITS.still_ways[1:6], STICKING, strict=True)
+        most / way for most, way in zip(LIMITS.still_travel[1:6], STICKING, strict=True)
     ]
     assert min(shares) > 1.5
 
 
 def test_motors_1_and_7_may_stand_for_a_whole_trial():
-    assert [way < 0.1 for way in LIMITS.still_ways] == [False, *[True] * 5, False]
+    assert [way < 0.1 for way in LIMITS.still_travel] == [False, *[True] * 5, False]
 
 
 @pytest.mark.parametrize("motor", [1, 7])
@@ -578,7 +581,7 @@ def test_positions_that_are_never_believed_are_a_fault_of_their_own(cycles, acti
 
 
 @pytest.mark.parametrize(
-    "name", ["q_lower", "q_upper", "speed", "torque", "still_ways"]
+    "name", ["q_lower", "q_upper", "speed", "torque", "still_travel"]
 )
 def test_limits_of_fewer_joints_than_the_arm_has_are_refused(name):
     with pytest.raises(ValueError, match="limits of 7 joints"):

@@ -10,7 +10,7 @@ from acquisition.control_loop.faults import (
     Fault,
     GuardVerdict,
 )
-from acquisition.control_loop.proof import ProofGoal, ProofKind
+from acquisition.control_loop.powered_test import PoweredTestGoal, PoweredTestKind
 from acquisition.control_loop.states import ArmState, ControlStatus
 from acquisition.devices import SafetyMode
 from acquisition.ipc.commands import (
@@ -18,11 +18,11 @@ from acquisition.ipc.commands import (
     Command,
     CommandQueue,
     EnterState,
-    GiveProof,
     LeaveLoop,
     LoopStatus,
     MoveJoints,
     SetBias,
+    StartPoweredTest,
     StatusSlot,
     WatchTrial,
 )
@@ -41,7 +41,7 @@ COMMANDS = [
     WatchTrial(False),
     SetBias((1.0, -2.0, 3.5, 0.0, 0.25, 6.0)),
     MoveJoints((0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7), 0.25),
-    GiveProof(ProofGoal(ProofKind.RAMP, 4, -1.5, 2.0)),
+    StartPoweredTest(PoweredTestGoal(PoweredTestKind.RAMP, 4, -1.5, 2.0)),
     LeaveLoop(),
 ]
 

@@ -5,17 +5,17 @@ import pytest
 from acquisition.clock import PERIOD_NS
 from acquisition.control_loop.faults import Action
 from acquisition.control_loop.loop import Tick
-from acquisition.control_loop.proof import ProofGoal, ProofKind
+from acquisition.control_loop.powered_test import PoweredTestGoal, PoweredTestKind
 from acquisition.control_loop.states import ArmState, ControlStatus
 from acquisition.devices import BusCondition
 from acquisition.ipc.commands import (
     AwaitActivation,
     CommandQueue,
     EnterState,
-    GiveProof,
     LeaveLoop,
     MoveJoints,
     SetBias,
+    StartPoweredTest,
     StatusSlot,
     WatchTrial,
 )
@@ -113,8 +113,8 @@ def test_commands_reach_the_cycle_and_are_confirmed(loop):
 
 
 def test_proofs_reach_the_cycle(loop):
-    ramp = ProofGoal(ProofKind.RAMP, 3, 0.5, 2.0)
-    loop.console.post(GiveProof(ramp))
+    ramp = PoweredTestGoal(PoweredTestKind.RAMP, 3, 0.5, 2.0)
+    loop.console.post(StartPoweredTest(ramp))
     loop.run(0.002)
     assert loop.cycle.goals == [ramp]
 

@@ -1,6 +1,6 @@
 from pathlib import Path
 
-from acquisition.ipc.heap import give_back_heap
+from acquisition.ipc.heap import trim_heap
 from acquisition.ipc.shared_memory import SharedMemory
 
 MB = 1_000_000
@@ -15,7 +15,7 @@ def test_memory_of_what_is_gone_goes_back_to_the_kernel():
     blocks = [bytes(1000) for _ in range(40_000)]
     blocks, pins = [], blocks[::40]  # what is left keeps the heap from shrinking
     held = resident()
-    give_back_heap()
+    trim_heap()
     assert held - resident() > 20 * MB
     assert len(pins) == 1000
     assert not blocks

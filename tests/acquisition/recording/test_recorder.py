@@ -5,7 +5,7 @@ import pytest
 
 from acquisition.devices import WrenchSample
 from acquisition.errors import TrialFileError
-from acquisition.ipc.frame_tape import FrameTape
+from acquisition.ipc.frame_ring import FrameRing
 from acquisition.ipc.layout import ProcessRole, SharedLayout
 from acquisition.ipc.shared_sensor import publish
 from acquisition.recording.recorder import Recorder
@@ -185,7 +185,7 @@ def test_a_long_wait_before_the_trigger_is_not_a_loss(loop_client):
 
 
 def test_raw_frames_are_recorded_when_the_header_asks(loop_client):
-    tape = FrameTape(loop_client.shared.frames, loop_client.clock)
+    tape = FrameRing(loop_client.shared.frames, loop_client.clock)
     now_ns = loop_client.clock.now_ns()
     tape.add([(1, b"", now_ns - 1001 * MS)])
     loop_client.recorder.start(

@@ -11,7 +11,7 @@ import pytest
 from mcap.writer import Writer
 
 from acquisition.errors import TrialFileError
-from acquisition.ipc.frame_tape import FRAME_DTYPE
+from acquisition.ipc.frame_ring import FRAME_DTYPE
 from acquisition.ipc.shared_sensor import WRENCH_DTYPE
 from acquisition.recording.recorder import seal
 from acquisition.sample import CHANNELS, Flag

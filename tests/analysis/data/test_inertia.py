@@ -94,11 +94,11 @@ def test_the_choice_says_how_much_it_took_and_how_sure_it_is(shaken):
     choice = parse_choice("inertia=removed")
     F_t = choice.series(shaken).F_t
     assert F_t[100] == pytest.approx(shaken.without_inertia().traction[100, 1])
-    remark = choice.remarked([shaken]).remark
+    remark = choice.with_remark([shaken]).remark
     assert f"{WINDOW * 1e3:.0f} ms" in remark
     kept = parse_choice("inertia=kept")
     assert kept.series(shaken).F_t == pytest.approx(shaken.series().F_t)
-    assert kept.remarked([shaken]).remark == ""
+    assert kept.with_remark([shaken]).remark == ""
 
 
 def test_a_table_has_no_mass(shaken):

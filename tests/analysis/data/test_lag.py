@@ -211,14 +211,14 @@ def test_a_step_that_the_median_misses_a_little_is_no_reason_for_silence():
 
 
 def test_forces_taken_later_undo_the_offset():
-    lag = lag_of(jamming(0.020).with_forces_from(0.020))
+    lag = lag_of(jamming(0.020).with_lag_removed(0.020))
     assert lag is not None
     assert abs(lag.seconds) < 0.5e-3
 
 
 def test_forces_taken_later_keep_velocity_and_its_time():
     series = jamming()
-    later = series.with_forces_from(0.1)
+    later = series.with_lag_removed(0.1)
     count = later.t.size
     np.testing.assert_array_equal(later.v_t, series.v_t[:count])
     assert series.t[-1] - later.t[-1] == pytest.approx(0.1, abs=1e-9)
@@ -227,14 +227,14 @@ def test_forces_taken_later_keep_velocity_and_its_time():
 
 def test_forces_taken_later_are_as_much_younger_by_their_stamps():
     stamped = replace(jamming(0.006), stamped_lag=0.006)
-    assert stamped.with_forces_from(0.006).stamped_lag == pytest.approx(0.0)
+    assert stamped.with_lag_removed(0.006).stamped_lag == pytest.approx(0.0)
 
 
 def test_forces_of_kept_samples_are_not_taken_across_their_gaps():
     with pytest.raises(SettingsError, match="kept samples"):
-        replace(jamming(), is_prepared=True).with_forces_from(0.02)
+        replace(jamming(), is_prepared=True).with_lag_removed(0.02)
 
 
 def test_forces_beyond_the_trial_are_refused():
     with pytest.raises(SettingsError):
-        jamming(seconds=1.0).with_forces_from(60.0)
+        jamming(seconds=1.0).with_lag_removed(60.0)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from analysis.data.load import load_trial
-from analysis.data.plausibility import doubts_of, doubts_of_record, summed_up
+from analysis.data.plausibility import doubt_summary, doubts_of, doubts_of_record
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.series import TractionSeries
 from analysis.data.tare_bracket import TareBracket
@@ -87,7 +87,7 @@ def test_a_unit_that_looks_wrong_is_named_with_the_option_that_mends_it():
 def test_doubts_of_one_kind_are_one_line_with_their_trials():
     series = TractionSeries("S0", "T01", *times(ALONG, 1e3)(pushed()).T)
     doubts = doubts_of(prepare_trial(series, PrepareOptions()))
-    (line,) = summed_up([("T01", doubts), ("T02", doubts)])
+    (line,) = doubt_summary([("T01", doubts), ("T02", doubts)])
     assert line.startswith("T01, T02: ")
 
 

@@ -1,6 +1,11 @@
 import pytest
 
-from analysis.data.terrain_kinds import groups_of, kind_title, surface_of, terrain_kind
+from analysis.data.terrain_kinds import (
+    class_labels,
+    kind_title,
+    surface_of,
+    terrain_kind,
+)
 
 
 @pytest.mark.parametrize(
@@ -30,7 +35,7 @@ def test_unknown_or_contradicting_stones_are_a_kind_of_their_own(stones):
 
 
 def test_terrains_are_grouped_by_name_stones_and_surface():
-    groups = groups_of({"Sand": "flat", "Beach": "small", "B0": "big"})
+    groups = class_labels({"Sand": "flat", "Beach": "small", "B0": "big"})
     assert groups["terrain"]["Beach"] == "Beach"
     assert groups["stones"] == {"Sand": "flat", "Beach": "small", "B0": "big"}
     assert groups["surface"] == {"Sand": "flat", "Beach": "rocky", "B0": "rocky"}

@@ -8,7 +8,7 @@ from analysis.gp.trial_level import (
     LevelSums,
     RestrictedLikelihood,
     TrialResiduals,
-    levels_of,
+    estimate_levels,
 )
 
 
@@ -28,7 +28,7 @@ def drawn(count, between, within=2.5, tau=0.5, noise=0.3, seconds=12.0, seed=0):
 
 
 def test_three_hundred_trials_show_their_spread_by_moments():
-    levels = levels_of(TrialResiduals(drawn(300, 0.6)))
+    levels = estimate_levels(TrialResiduals(drawn(300, 0.6)))
     assert levels.is_by_moments
     assert levels.between == pytest.approx(0.6, rel=0.2)
     assert levels.other == pytest.approx(0.6, rel=0.2)
@@ -38,7 +38,7 @@ def test_three_hundred_trials_show_their_spread_by_moments():
 
 
 def test_the_spread_of_few_trials_is_by_the_restricted_likelihood():
-    levels = levels_of(TrialResiduals(drawn(FEW - 1, 3.0, within=1.0)))
+    levels = estimate_levels(TrialResiduals(drawn(FEW - 1, 3.0, within=1.0)))
     assert not levels.is_by_moments
     assert levels.between == pytest.approx(3.0, rel=0.4)
     assert levels.levels.size == FEW - 1
@@ -46,7 +46,9 @@ def test_the_spread_of_few_trials_is_by_the_restricted_likelihood():
 
 def test_a_residual_with_memory_is_not_taken_for_a_spread_between_trials():
     found = [
-        levels_of(TrialResiduals(drawn(40, 0.0, within=2.0, tau=0.5, seed=s))).between
+        estimate_levels(
+            TrialResiduals(drawn(40, 0.0, within=2.0, tau=0.5, seed=s))
+        ).between
         for s in range(4)
     ]
     # the means of such trials vary by 0.58 N
@@ -80,4 +82,4 @@ def test_the_likelihood_is_that_of_the_dense_covariance():
 
 def test_a_single_trial_has_no_spread():
     with pytest.raises(ValueError, match="two of them"):
-        levels_of(TrialResiduals(drawn(1, 1.0)))
+        estimate_levels(TrialResiduals(drawn(1, 1.0)))

@@ -5,8 +5,8 @@ import pytest
 from analysis.report import drawing
 from analysis.report.drawing import (
     FigureTask,
+    cached_figures,
     draw_figures,
-    kept_figures,
 )
 from analysis.report.page_model import ReportFigure, ShownNumbers
 from analysis.report.pictures import Picture
@@ -41,33 +41,33 @@ def drawings(monkeypatch):
 
 def test_the_same_numbers_are_drawn_once_and_come_back_byte_by_byte(store, drawings):
     shown = (1.0, 2.0)
-    assert kept_figures(shown, store) == kept_figures(shown, store) == [FIGURE]
+    assert cached_figures(shown, store) == cached_figures(shown, store) == [FIGURE]
     assert len(drawings) == 1
 
 
 def test_without_a_store_figures_are_drawn_every_time(drawings):
-    assert kept_figures(1.0, None) == kept_figures(1.0, None) == [FIGURE]
+    assert cached_figures(1.0, None) == cached_figures(1.0, None) == [FIGURE]
     assert len(drawings) == 2
 
 
 def test_other_numbers_are_drawn_anew(store, drawings):
-    kept_figures((1.0, 2.0), store)
-    kept_figures((1.0, 2.5), store)
+    cached_figures((1.0, 2.0), store)
+    cached_figures((1.0, 2.5), store)
     assert drawings == [(1.0, 2.0), (1.0, 2.5)]
 
 
 @pytest.mark.parametrize("kept", [b"", b"{}"], ids=len)
 def test_damaged_figures_are_drawn_anew(tmp_path, store, drawings, kept):
-    kept_figures(1.0, store)
+    cached_figures(1.0, store)
     (path,) = tmp_path.iterdir()
     path.write_bytes(kept)
-    assert kept_figures(1.0, store) == [FIGURE]
+    assert cached_figures(1.0, store) == [FIGURE]
     assert len(drawings) == 2
 
 
 def test_what_is_no_figure_is_drawn_anew(store, drawings):
     store.put(drawing.report_figures, 1.0, ["figure"])
-    assert kept_figures(1.0, store) == [FIGURE]
+    assert cached_figures(1.0, store) == [FIGURE]
     assert len(drawings) == 1
 
 

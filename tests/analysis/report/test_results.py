@@ -12,7 +12,7 @@ from analysis.report.results import compute_results
 from analysis.report.sections.beyond_paper.classification import shares_of
 from analysis.report.sections.beyond_paper.noise import noise_summaries
 from analysis.report.sections.beyond_paper.residuals import residual_band
-from analysis.report.sections.beyond_paper.stick_slip import way_of
+from analysis.report.sections.beyond_paper.stick_slip import travel_of
 from analysis.report.sections.beyond_paper.trends import fit_trend, trends_of
 from analysis.report.surfaces import cell_edges, coverages
 from analysis.study.fits import to_csv, to_plain
@@ -88,7 +88,7 @@ def test_surfaces_are_what_the_model_predicts(results, small_study):
 def test_the_way_is_the_integral_of_velocity(small_study):
     smooth = small_study.terrains["TF"].trials[0].smooth
     expected = np.trapezoid(smooth.v_t, smooth.t)
-    assert way_of(smooth)[-1] == pytest.approx(expected)
+    assert travel_of(smooth)[-1] == pytest.approx(expected)
 
 
 def test_shares_of_a_row_without_windows_are_unknown():

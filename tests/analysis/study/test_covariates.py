@@ -14,7 +14,7 @@ from analysis.study.covariates import (
     CovariateResult,
     CovariateRows,
     covariate_results,
-    way_since_drop,
+    travel_since_drop,
 )
 from analysis.study.models import FitOptions
 from analysis.study.store import ResultStore
@@ -137,7 +137,7 @@ def test_the_way_since_a_drop_begins_where_the_fall_is_known():
     F_t[70:] += np.linspace(0, 0.5, 30)  # no drop follows
     series = TractionSeries("X", "x", t, np.full(100, 0.1), np.ones(100), F_t)
     trial = prepare_trial(series, replace(AS_THEY_ARE, downsample=1))
-    way = way_since_drop(trial, 1.5)
+    way = travel_since_drop(trial, 1.5)
     known = int(np.argmax((np.arange(100) > 49) & (F_t <= 2.5)))
     assert way[known] == pytest.approx(0.0, abs=1e-12)
     assert way[known - 1] == pytest.approx(0.001 * (known - 1))

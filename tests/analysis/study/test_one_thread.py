@@ -58,9 +58,9 @@ def test_a_limit_reaches_all_that_a_process_solves_with():
 
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="another C library")
 def test_memory_of_a_matrix_is_kept_for_the_next():
-    from acquisition.linear_algebra import keep_memory
+    from acquisition.linear_algebra import keep_heap
 
-    assert keep_memory()
+    assert keep_heap()
     np.ones(_MATRIX // 8)
     before = faults()
     for _ in range(100):

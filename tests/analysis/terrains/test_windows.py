@@ -29,7 +29,7 @@ from analysis.terrains.recognition import TerrainScores
 from analysis.terrains.verdict import WindowLimits
 from analysis.terrains.windows import (
     FEATURES,
-    RESID,
+    ROUGHNESS,
     WINDOWS,
     stretch_of,
     window_features,
@@ -73,7 +73,7 @@ def test_roughness_is_the_spread_about_a_line_in_the_load():
     line = np.polyfit(trial.F_n[rows], trial.F_t[rows], 1)
     off = trial.F_t[rows] - np.polyval(line, trial.F_n[rows])
     (features,) = window_features(trial, [rows])
-    assert features[RESID] == pytest.approx(math.log(off.std()))
+    assert features[ROUGHNESS] == pytest.approx(math.log(off.std()))
     assert features[FEATURES.index("slope of F_t on F_n")] == pytest.approx(line[0])
 
 
@@ -297,7 +297,7 @@ def made_up(name, number, rng):
 
     def features(count):
         rows = np.zeros((count, len(FEATURES)))
-        rows[:, RESID] = rough + rng.normal(0.0, 0.3, count)
+        rows[:, ROUGHNESS] = rough + rng.normal(0.0, 0.3, count)
         return rows
 
     return TrialEvidence(
@@ -324,7 +324,7 @@ def test_a_single_trial_refuses_some_of_its_own_windows():
     rng = np.random.default_rng(3)
     trial = made_up("S0", 0, rng)
     limits = StudyEvidence({"S0": [trial]}, {"S0": FLAT_GROUND}).limits("S0", 50)
-    roughness = trial.overlapping[50][:, RESID]
+    roughness = trial.overlapping[50][:, ROUGHNESS]
     strains = trial.strains("S0", 50, overlap=True)
     refused = [limits.exclude(*pair) for pair in zip(roughness, strains, strict=True)]
     assert 0.0 < np.mean(refused) <= REFUSED + 2 / len(refused)  # two limits, rounded

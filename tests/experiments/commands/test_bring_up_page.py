@@ -148,7 +148,7 @@ def test_a_refusal_is_quoted_as_it_is(what):
 
 def test_a_bus_on_which_nobody_acknowledges_is_quoted():
     rig = Rig()
-    rig.network.faults.go_unheard()
+    rig.network.faults.stop_acknowledging()
     with pytest.raises(PreflightError) as caught:
         WamArm(rig.link, rig.clock).start()
     assert f"`{caught.value.message}`" in PAGE

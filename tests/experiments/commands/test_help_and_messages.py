@@ -14,7 +14,7 @@ import pytest
 
 from acquisition.control_loop import contact
 from acquisition.control_loop.cycle import Cycle
-from acquisition.control_loop.proof import ProofGoal, ProofKind
+from acquisition.control_loop.powered_test import PoweredTestGoal, PoweredTestKind
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import SafetyMode
 from acquisition.ipc.child import ProcessLostError
@@ -314,7 +314,7 @@ def _allow_no(travel):
 def _prove(scene):
     """Give an arm that a hand carries no torque, as if it lay on its stops."""
     scene.built.cycle.request(ArmState.HOLD)
-    scene.built.cycle.prove(ProofGoal(ProofKind.REST))
+    scene.built.cycle.prove(PoweredTestGoal(PoweredTestKind.REST))
 
 
 def _damp_in_vain(scene):
@@ -350,7 +350,7 @@ def _pull_in_vain(scene):
 def _stand_still(scene):
     """Let any way of the sole be too far for motor 1, which leads no foot."""
     cycle = scene.built.cycle
-    cycle.limits = replace(cycle.limits, still_ways=(1e-4, *[1.0] * 6))
+    cycle.limits = replace(cycle.limits, still_travel=(1e-4, *[1.0] * 6))
 
 
 def _narrow(scene):

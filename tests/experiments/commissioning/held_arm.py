@@ -16,7 +16,7 @@ from experiments.commissioning.weights import AVERAGE, HUNG, HUNG_AT, POSES, SET
 from fakes.plant.gauges import WristGauges
 from fakes.randomness import trial_generator
 from fakes.sensor.errors import SensorErrors
-from fakes.world.departure import Departure, draw_sound, rotation
+from fakes.world.departure import RigDeviation, draw_sound_rig, rotation
 from fakes.world.true_rig import constants_around_home, true_constants, true_tool
 from fakes.world.wrong_rigs import wrong_rig
 from ft_sensor.payload import payload_of
@@ -44,13 +44,13 @@ class HeldArm:
             another_day: draws anew what is another one every day: poses, the sensor's
                 bias, drift and noise.
         """
-        sound = draw_sound(seed)
-        self.departure: Departure = (
+        sound = draw_sound_rig(seed)
+        self.departure: RigDeviation = (
             wrong_rig(wrong).departure.on(sound) if wrong else sound
         )
         self._believed = load_constants()
         self._constants = true_constants(self._believed, self.departure)
-        typed = self.departure.foot_typed
+        typed = self.departure.typed_foot_mass
         foot = tool.foot if typed is None else replace(tool.foot, mass=typed)
         self._tool = replace(tool, foot=foot)
         true = true_tool(tool, self.departure)

@@ -8,7 +8,7 @@ from experiments.rig.build import build_tool, terrain_frame
 from experiments.run.surroundings import container_box, free_space
 from experiments.settings.load import load_settings
 from wam.calibration.free_space import FreeSpace, check_poses
-from wam.calibration.poses import choose_orientations, choose_poses, plan_halts
+from wam.calibration.poses import choose_orientations, choose_poses, plan_waypoints
 from wam.model.arm_model import ArmModel
 from wam.model.clearance import BASE_HEIGHT, CLEARANCE_MARGIN, BodyGap
 from wam.model.constants import load_constants
@@ -44,11 +44,11 @@ def test_every_shipped_pose_and_way_is_clear_for_every_foot(name, choose):
     poses = choose(model, 12, space)
     assert min(space.clearance.nearest(q).distance for q in poses) > CLEARANCE_MARGIN
     start = np.array(row.start_q)
-    halts = plan_halts(model, start, poses, space)
+    halts = plan_waypoints(model, start, poses, space)
     assert len({halt.pose for halt in halts} - {None}) == 12
     here = start
     for halt in halts:
-        assert space.clearance.first_hit(here, halt.q) is None
+        assert space.clearance.first_collision(here, halt.q) is None
         here = halt.q
 
 
@@ -57,7 +57,7 @@ def test_an_arm_below_something_is_not_lifted_through_it():
     model, space = model_of(row), free_space(SETTINGS, row)
     beside = np.array([1.2, 1.2, 0.0, 1.6, 0.0, 0.5, 0.0])  # lower than the container
     with pytest.raises(SettingsError, match="cannot rise"):
-        plan_halts(model, np.array([*(-beside[:1]), *beside[1:]]), [], space)
+        plan_waypoints(model, np.array([*(-beside[:1]), *beside[1:]]), [], space)
 
 
 @pytest.mark.parametrize("side", [-1.0, 0.0, 1.0])
@@ -70,7 +70,7 @@ def test_a_pose_is_looked_at_from_both_sides_it_is_approached_from(side):
             is_close = at == side * 0.03
             return BodyGap("the foot", "the post", 0.02 if is_close else 1.0)
 
-        def first_hit(self, start, goal):
+        def first_collision(self, start, goal):
             return None
 
     row = ROWS["TF"]

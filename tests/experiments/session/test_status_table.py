@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from benchmarks.made_sessions import make_sessions
+from benchmarks.generated_sessions import make_sessions
 from experiments.session import summaries
 from experiments.session.status_table import find_deviations, see_sessions
 from experiments.session.store import list_sessions

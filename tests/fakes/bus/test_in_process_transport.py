@@ -62,7 +62,7 @@ def a_controller_that_leaves_the_bus(ends):
 
 
 def a_torn_cable(ends):
-    ends.faults.go_unheard()
+    ends.faults.stop_acknowledging()
     for _ in range(13):
         ends.say()
     ends.hear()

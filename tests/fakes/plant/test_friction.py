@@ -6,7 +6,7 @@ import pytest
 from fakes.plant.friction import (
     ASSUMED,
     FRICTION_TABLE,
-    MotorBristles,
+    BristleFriction,
     draw_friction,
 )
 from fakes.plant.model import Support
@@ -19,11 +19,11 @@ from tests.fakes.scenes import (
     send,
 )
 from wam.model.arm_model import drive_inertia_matrix
-from wam.model.friction import joint_coulomb, motor_turns
+from wam.model.friction import joint_coulomb, largest_motor_ratios
 
 DT = 0.0005
 INERTIA = np.array(CONSTANTS.drive_inertia)
-TURNS = motor_turns(CONSTANTS)
+TURNS = largest_motor_ratios(CONSTANTS)
 
 
 class Motors:
@@ -31,7 +31,7 @@ class Motors:
 
     def __init__(self, friction, dt=DT):
         self.friction, self.dt = friction, dt
-        self.bristles = MotorBristles(friction, INERTIA, dt)
+        self.bristles = BristleFriction(friction, INERTIA, dt)
         self.angle, self.speed = np.zeros(7), np.zeros(7)
         self.work = 0.0  # done against friction [J]
 

@@ -18,15 +18,15 @@ def swapped(a, b):
 
 def test_wiring_as_built_changes_nothing():
     wiring = Wiring()
-    assert wiring.made_of(UNITS) == UNITS
+    assert wiring.applied_torques(UNITS) == UNITS
     counts = np.arange(7.0)
     assert wiring.told_of(counts) == pytest.approx(counts)
 
 
 def test_a_turned_plug_and_swapped_cables():
     reversed_2 = np.diag([1.0, -1.0, 1.0, 1.0, 1.0, 1.0, 1.0])
-    assert Wiring(reversed_2).made_of(UNITS)[1] == 200
-    made = Wiring(swapped(4, 5)).made_of(UNITS)
+    assert Wiring(reversed_2).applied_torques(UNITS)[1] == 200
+    made = Wiring(swapped(4, 5)).applied_torques(UNITS)
     assert made[4:6] == [60, 50]
 
 
@@ -39,7 +39,7 @@ def test_swapped_encoders_tell_of_the_other_motor_from_home_on():
 
 def test_behind_a_torn_cable_the_rotor_stands_and_the_joint_has_no_torque():
     wiring = Wiring(torn=2, torn_at=777.0)
-    assert wiring.made_of(UNITS)[1] == 0
+    assert wiring.applied_torques(UNITS)[1] == 0
     assert wiring.told_of(np.zeros(7))[1] == 777.0
 
 

@@ -151,7 +151,7 @@ def test_a_controller_that_is_off_takes_frames_and_tells_it_once(rig, faults):
 
 
 def test_frames_that_nobody_acknowledges_wait_until_the_queue_is_full(rig, faults):
-    faults.go_unheard()
+    faults.stop_acknowledging()
     for _ in range(11):
         send(rig)
     with pytest.raises(can.CanOperationError) as refused:
@@ -204,7 +204,7 @@ def test_a_monitor_faults_and_can_be_cleared_once_it_is_mended(
     network_faults(rig.network)[name]()
     move()
     assert rig.network.safety_mode is mode
-    assert getattr(rig.network.pendant_word, monitor) is SafetyLevel.FAULT
+    assert getattr(rig.network.pendant_state, monitor) is SafetyLevel.FAULT
     clear_network_faults(rig.network)
     rig.network.pendant("idle")
     rig.network.pendant("activate")

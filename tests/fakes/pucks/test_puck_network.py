@@ -307,7 +307,7 @@ def test_torques_alone_are_no_heartbeat():
 def test_an_idle_arm_needs_no_heartbeat():
     host = Host()
     host.hear(1000 * MS)
-    assert host.network.pendant_word.faults == ()
+    assert host.network.pendant_state.faults == ()
 
 
 def test_a_fault_bars_activation_until_shift_idle():
@@ -334,7 +334,7 @@ def test_the_module_judges_commanded_torque(units, level, mode):
     host = Host()
     host.activate()
     host.say(0x401, encode_torques((0, 0, units, 0)))
-    assert host.network.pendant_word.torque is level
+    assert host.network.pendant_state.torque is level
     assert host.network.safety_mode is mode
 
 
@@ -343,7 +343,7 @@ def test_a_smaller_torque_puts_the_warning_out():
     host.activate()
     host.say(0x401, encode_torques((0, 0, 5000, 0)))
     host.say(0x401, encode_torques((0, 0, 0, 0)))
-    assert host.network.pendant_word.torque is SafetyLevel.SAFE
+    assert host.network.pendant_state.torque is SafetyLevel.SAFE
 
 
 def test_limits_return_to_their_power_up_values():

@@ -62,7 +62,7 @@ class Host:
 
     @property
     def velocity(self):
-        return self.network.pendant_word.velocity
+        return self.network.pendant_state.velocity
 
 
 def joint(number, speed):
@@ -266,7 +266,7 @@ def test_speeds_begin_anew_after_a_stop():
 def test_the_bus_voltage_is_judged(voltage, level, mode):
     host = Host()
     host.network.set_bus_voltage(voltage)
-    assert (host.network.pendant_word.voltage, host.mode) == (level, mode)
+    assert (host.network.pendant_state.voltage, host.mode) == (level, mode)
 
 
 def test_a_voltage_fault_returns_until_the_voltage_does():
@@ -277,7 +277,7 @@ def test_a_voltage_fault_returns_until_the_voltage_does():
     host.network.set_bus_voltage(48.0)
     host.network.pendant("idle")
     assert host.mode is SafetyMode.IDLE
-    assert host.network.pendant_word.faults == ()
+    assert host.network.pendant_state.faults == ()
 
 
 def test_pucks_measure_the_bus_voltage():

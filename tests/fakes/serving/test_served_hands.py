@@ -5,7 +5,7 @@ import pytest
 
 from experiments.operator.pendant import parse_order
 from fakes.plant.model import PlantOptions
-from fakes.world.departure import Departure, draw_sound
+from fakes.world.departure import RigDeviation, draw_sound_rig
 from fakes.world.true_rig import true_options
 from fakes.world.wrong_rigs import wrong_rig
 from tests.fakes.scenes import CONSTANTS, MODEL, TOOL
@@ -68,7 +68,7 @@ def load(arm):
 
 @pytest.mark.parametrize("mount", [(0.0, 0.0, 0.0), (90.0, 0.0, 0.0)])
 def test_a_hung_weight_pulls_truly_down(serve, mount):
-    departure = Departure(mount=np.radians(mount))
+    departure = RigDeviation(mount=np.radians(mount))
     arm = serve(has_hand=True, departure=departure)
     order(arm, "pose 0 -1.8 0 2.9 0 0.8 0 1", 1.4)
     free, _ = load(arm)
@@ -81,7 +81,7 @@ def test_a_hung_weight_pulls_truly_down(serve, mount):
 
 
 def test_a_sound_arm_is_zeroed_where_its_zeros_are_off(serve):
-    sound = draw_sound(2)
+    sound = draw_sound_rig(2)
     arm = serve(has_hand=True, departure=sound)
     wanted = np.array([0.3, -1.8, 0.1, 2.9, 0.2, 0.8, 0.1])
     order(arm, "pose " + " ".join(map(str, wanted)) + " 1", 1.5)

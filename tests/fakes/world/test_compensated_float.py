@@ -9,7 +9,7 @@ import pytest
 from fakes.plant.friction import draw_friction
 from tests.fakes.scenes import CONSTANTS
 from tests.fakes.world.holding import HoldBench
-from wam.control.friction_compensation import FrictionCompensation, KnownFriction
+from wam.control.friction_compensation import FrictionCompensation, FrictionLowerBound
 
 pytestmark = pytest.mark.slow
 NOTHING = np.zeros(7)
@@ -20,7 +20,7 @@ KICK = 0.3  # rad/s
 def over(motors, factor):
     """Return a compensation that takes the friction for so much larger."""
     level = factor * motors.coulomb
-    return KnownFriction(level, level, NOTHING, NOTHING, NOTHING)
+    return FrictionLowerBound(level, level, NOTHING, NOTHING, NOTHING)
 
 
 def settled(motors, known, share=0.8, *, late=0, joint=1, grip="none", cables=None):

@@ -11,10 +11,10 @@ from fakes.plant.hand import HandPhase
 from fakes.plant.push import PACES
 from fakes.pucks.options import NetworkOptions
 from fakes.randomness import (
-    DrawnAhead,
     NormalStream,
     OrnsteinUhlenbeck,
     Tremor,
+    UniformStream,
     trial_generator,
     trial_generators,
 )
@@ -245,7 +245,7 @@ def test_a_stream_hands_out_what_its_generator_draws_across_its_blocks():
 
 def test_numbers_drawn_ahead_leave_the_generator_to_others_where_it_would_be():
     ahead, plain = np.random.default_rng(3), np.random.default_rng(3)
-    uniforms = DrawnAhead(ahead, block=4)
+    uniforms = UniformStream(ahead, block=4)
     for count in (1, 0, 4, 7):  # within a block, none, all of it, across two
         drawn = [uniforms.next() for _ in range(count)]
         assert drawn == [plain.random() for _ in range(count)]

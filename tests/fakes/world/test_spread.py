@@ -17,16 +17,16 @@ from fakes.world.departure import (
     STOPS,
     TILT,
     ZEROS,
-    Departure,
-    draw_sound,
-    turned_axes,
+    RigDeviation,
+    draw_sound_rig,
+    rotated_axes,
 )
 from fakes.world.rig import FakeRig, SimulatedScene
 from fakes.world.true_rig import true_constants, true_options, true_tool
 from tests.fakes.scenes import CONSTANTS, FRAME, START_Q, TOOL, make_rig
 
 RIGS = 300
-DRAWN = [draw_sound(seed) for seed in range(RIGS)]
+DRAWN = [draw_sound_rig(seed) for seed in range(RIGS)]
 
 
 def spread_of(values):
@@ -61,7 +61,7 @@ def test_scales_are_those_of_the_plan():
 
 
 def test_nothing_but_what_is_stated_differs():
-    rig, plain = DRAWN[3], Departure()
+    rig, plain = DRAWN[3], RigDeviation()
     assert rig.mount[2] == 0.0
     for same in ("ratios", "links", "sole", "torque", "counts"):
         assert (np.array(vars_of(rig)[same]) == vars_of(plain)[same]).all()
@@ -74,7 +74,7 @@ def vars_of(departure):
 
 
 def test_the_same_seed_is_the_same_rig():
-    again = draw_sound(7)
+    again = draw_sound_rig(7)
     assert (again.zeros == DRAWN[7].zeros).all()
     assert (again.shown == DRAWN[7].shown).all()
     assert (again.zeros != DRAWN[8].zeros).all()
@@ -98,7 +98,7 @@ def test_a_rig_without_a_departure_is_the_one_of_the_drawings():
 
 def test_ground_hand_and_friction_of_a_seed_stay_when_it_is_spread():
     plain, _ = make_rig(5)
-    spread = spread_rig(draw_sound(5))
+    spread = spread_rig(draw_sound_rig(5))
     assert spread.ground.truth() == plain.ground.truth()
     numbers = [rig.random.hand.random(5).tolist() for rig in (spread, plain)]
     assert numbers[0] == numbers[1]
@@ -110,7 +110,7 @@ def test_ground_hand_and_friction_of_a_seed_stay_when_it_is_spread():
 
 
 def test_positions_are_off_by_the_zeros_and_stops_by_their_own():
-    sound = draw_sound(5)
+    sound = draw_sound_rig(5)
     rig = spread_rig(sound)
     turns = 2.0 * np.pi / np.array(CONSTANTS.cts)
     believed = np.linalg.solve(CONSTANTS.j2mp, turns * np.array(rig.plant.counts()))
@@ -122,27 +122,27 @@ def test_positions_are_off_by_the_zeros_and_stops_by_their_own():
 
 
 def test_what_is_true_of_a_rig_adds_up():
-    one = Departure(zeros=np.full(7, 0.1), foot_mass=1.1, friction=2.0)
-    other = Departure(zeros=np.full(7, 0.2), foot_mass=0.5, torn=2)
+    one = RigDeviation(zeros=np.full(7, 0.1), foot_mass=1.1, friction=2.0)
+    other = RigDeviation(zeros=np.full(7, 0.2), foot_mass=0.5, torn=2)
     both = other.on(one)
     assert both.zeros == pytest.approx(np.full(7, 0.3))
     assert (both.foot_mass, both.friction, both.torn) == (0.55, 2.0, 2)
 
 
 def test_a_base_that_is_turned_about_y_lets_gravity_point_elsewhere():
-    turned = Departure(mount=np.radians([0.0, 90.0, 0.0]))
+    turned = RigDeviation(mount=np.radians([0.0, 90.0, 0.0]))
     down = true_options(PlantOptions(), turned).down
     # Its z axis lies along the true x: what is down is its own -z turned back.
     assert down == pytest.approx((1.0, 0.0, 0.0), abs=1e-12)
 
 
 def test_axes_of_a_sensor_show_a_turned_load():
-    shown = turned_axes([0.0, 0.0, np.pi / 2]) @ [1.0, 0.0, 3.0, 0.0, 2.0, 0.0]
+    shown = rotated_axes([0.0, 0.0, np.pi / 2]) @ [1.0, 0.0, 3.0, 0.0, 2.0, 0.0]
     assert shown == pytest.approx([0.0, -1.0, 3.0, 2.0, 0.0, 0.0], abs=1e-12)
 
 
 def test_foot_and_links_are_as_heavy_as_stated():
-    departure = Departure(foot_mass=2.0, links=np.array([0.0, 0, 1, 0, 0, 0, 0]))
+    departure = RigDeviation(foot_mass=2.0, links=np.array([0.0, 0, 1, 0, 0, 0, 0]))
     assert true_tool(TOOL, departure).foot.mass == 2.0 * TOOL.foot.mass
     links = true_constants(CONSTANTS, departure).links
     more = [a.mass - b.mass for a, b in zip(links, CONSTANTS.links, strict=True)]

@@ -12,9 +12,9 @@ from experiments.settings.load import load_settings
 from fakes.clock import SteppedClock
 from fakes.ground.terrain import GroundChoice
 from fakes.plant.plant import ArmPlant
-from fakes.world.departure import Departure
+from fakes.world.departure import RigDeviation
 from fakes.world.rig import FakeRig, SimulatedScene
-from fakes.world.true_rig import shown_load, true_constants, true_frame, true_tool
+from fakes.world.true_rig import sensor_reading, true_constants, true_frame, true_tool
 from fakes.world.wrong_rigs import catalogue, wrong_rig
 from tests.fakes.scenes import CONSTANTS, FRAME, MODEL, START_Q, TOOL
 from wam.bus.frames import (
@@ -42,7 +42,7 @@ def build():
 
     def start(name):
         scene = SimulatedScene("S0", GroundChoice("small", "tread"), FRAME, START_Q, 1)
-        departure = wrong_rig(name).departure if name else Departure()
+        departure = wrong_rig(name).departure if name else RigDeviation()
         clock = SteppedClock()
         rig = FakeRig(replace(scene, departure=departure), CONSTANTS, TOOL, clock)
         clock.attach(rig)
@@ -148,7 +148,7 @@ def test_motors_make_what_they_are_named_for(build, name, made):
     rig = build(name)
     asked = [100 * node for node in MOTOR_NODES]
     wanted = [100 * made.get(node, node) for node in MOTOR_NODES]
-    assert rig.plant.wiring.made_of(asked) == pytest.approx(wanted, abs=0.5)
+    assert rig.plant.wiring.applied_torques(asked) == pytest.approx(wanted, abs=0.5)
 
 
 def test_a_reversed_encoder_tells_the_way_back(build):
@@ -230,7 +230,7 @@ SHOWN = [
 
 @pytest.mark.parametrize(("name", "shown"), SHOWN)
 def test_the_sensor_shows_another_load_than_it_bears(name, shown):
-    seen = shown_load(lambda _: LOAD, wrong_rig(name).departure)(0)
+    seen = sensor_reading(lambda _: LOAD, wrong_rig(name).departure)(0)
     assert seen == pytest.approx(shown, abs=6e-4)
 
 
@@ -241,7 +241,7 @@ def test_a_foreign_matrix_mixes_the_axes():
 
 
 def test_a_late_sensor_shows_the_load_of_20_ms_ago():
-    source = shown_load(
+    source = sensor_reading(
         lambda t_ns: [float(t_ns)] * 6, wrong_rig("sensor-20ms-late").departure
     )
     seen = [source(k * 2 * MS)[0] for k in range(50)]

@@ -160,7 +160,7 @@ def test_a_sensor_that_began_anew_is_handed_on():
 def test_the_bits_of_the_status_decide_what_is_trusted(status, is_trusted, saturated):
     (reading,) = ati.RdtScanner((1.0,) * 6, (1e9,) * 6).feed(record(1, status))
     assert (reading.is_trusted, reading.saturated) == (is_trusted, saturated)
-    assert bool(ati.status_words(status)) == bool(status)
+    assert bool(ati.status_texts(status)) == bool(status)
 
 
 def lossy_bench(**shares):

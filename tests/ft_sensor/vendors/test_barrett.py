@@ -13,7 +13,7 @@ from ft_sensor.vendors.barrett_frames import (
     SAMPLING_DELAY_NS,
     BarrettCounters,
     WrenchPairing,
-    status_words,
+    status_texts,
 )
 from tests.fakes.stepped import Rig, SteppedClock
 from wam.bus.frames import encode_force, encode_torque
@@ -145,14 +145,14 @@ def test_no_frames_make_more_samples_than_questions(heard):
 
 
 def test_a_status_is_told_in_words():
-    assert status_words(0) == ()
-    assert status_words(0x80) == ("tare suggested",)
-    assert status_words(0xC4) == (
+    assert status_texts(0) == ()
+    assert status_texts(0x80) == ("tare suggested",)
+    assert status_texts(0xC4) == (
         "data bad now",
         "gauge 3 saturated since the tare",
         "tare suggested",
     )
-    assert status_words(0x21) == (
+    assert status_texts(0x21) == (
         "gauge 1 saturated since the tare",
         "gauge 6 saturated since the tare",
     )

@@ -102,12 +102,12 @@ def test_device_time_that_steps_back_stays_a_step_back():
 
 
 def test_status_is_told_in_words():
-    words = bota.status_words(BotaStatus.OVER_RANGE | BotaStatus.RAW_GAUGE | 0x100)
+    words = bota.status_texts(BotaStatus.OVER_RANGE | BotaStatus.RAW_GAUGE | 0x100)
     assert len(words) == 3
     assert "range exceeded" in words[0]
     assert "raw gauge" in words[1]
     assert "0x0100" in words[2]
-    assert bota.status_words(0) == ()
+    assert bota.status_texts(0) == ()
 
 
 def test_commands_are_the_documented_bytes():

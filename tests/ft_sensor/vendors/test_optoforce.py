@@ -35,7 +35,7 @@ def test_golden_frame_decodes_to_its_load():
 def test_golden_overload_names_both_axes():
     (reading,) = optoforce.scanner(SENSITIVITY).feed(OVERLOAD)
     assert reading.saturated == 0b101
-    assert optoforce.status_words(0x0280) == ("Fx overloaded", "Fz overloaded")
+    assert optoforce.status_texts(0x0280) == ("Fx overloaded", "Fz overloaded")
 
 
 @pytest.mark.parametrize(
@@ -52,7 +52,7 @@ def test_golden_overload_names_both_axes():
     ],
 )
 def test_a_status_is_told_in_words(status, words):
-    assert optoforce.status_words(status) == words
+    assert optoforce.status_texts(status) == words
 
 
 @pytest.mark.parametrize("status", [0x2000, 0x0400])

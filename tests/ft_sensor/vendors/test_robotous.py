@@ -40,7 +40,7 @@ def test_golden_overload_names_its_axis():
     (reading,) = robotous.scanner(lambda: 2000.0).feed(OVERLOAD)
     assert reading.wrench[2] == pytest.approx(260.0)
     assert reading.saturated == 0b100
-    assert robotous.status_words(reading.status) == (
+    assert robotous.status_texts(reading.status) == (
         "Fz more than 20 % above rated load",
     )
 

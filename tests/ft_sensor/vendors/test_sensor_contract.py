@@ -295,7 +295,7 @@ def test_saturation_is_told_by_axis(kind, axis):
             ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")[axis],
         )
     assert last.is_valid
-    assert bench.driver.status_words(last.status)
+    assert bench.driver.status_texts(last.status)
 
 
 def test_sample_times_are_known_although_bytes_are_collected(kind):

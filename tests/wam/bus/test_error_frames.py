@@ -70,8 +70,8 @@ WARNING = (0x204, "0004")
     [
         ((), BusCondition.SOUND),
         ((WARNING,), BusCondition.SOUND),
-        ((PASSIVE,), BusCondition.UNHEARD),
-        (((0x088, "00000019"),), BusCondition.UNHEARD),
+        ((PASSIVE,), BusCondition.UNACKNOWLEDGED),
+        (((0x088, "00000019"),), BusCondition.UNACKNOWLEDGED),
         ((PASSIVE, ACTIVE), BusCondition.SOUND),
         ((PASSIVE, OFF), BusCondition.OFF),
         ((OFF, PASSIVE), BusCondition.OFF),

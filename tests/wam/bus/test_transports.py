@@ -12,7 +12,7 @@ from acquisition.errors import LinkError, LinkFullError
 from tests.fakes.stepped import SteppedClock
 from tests.wam.bus.test_link import ScriptedBus, message
 from wam.bus import datagrams, transports
-from wam.bus.datagrams import AT_ONCE, system_call
+from wam.bus.datagrams import MAX_DATAGRAMS, system_call
 from wam.bus.link import CanLink
 from wam.bus.socketcan import (
     AdapterClock,
@@ -324,9 +324,9 @@ def test_more_frames_than_one_call_takes_keep_their_order(pair):
 
 def test_an_error_behind_a_full_call_is_not_lost():
     down = OSError(errno.ENETDOWN, "Network is down")
-    frames = [(can_frame(i), b"") for i in range(AT_ONCE)]
+    frames = [(can_frame(i), b"") for i in range(MAX_DATAGRAMS)]
     transport = scripted(*frames, down, (can_frame(77), b""))
-    assert [frame.can_id for frame in transport.receive()] == list(range(AT_ONCE))
+    assert [frame.can_id for frame in transport.receive()] == list(range(MAX_DATAGRAMS))
     with pytest.raises(LinkError, match="Network is down"):
         transport.receive()
     assert [frame.can_id for frame in transport.receive()] == [77]

@@ -8,7 +8,7 @@ import pytest
 
 from acquisition.errors import SettingsError
 from tests.wam.model.test_friction import example
-from wam.calibration.excitation import LegUse, plan_friction
+from wam.calibration.excitation import LegPurpose, plan_friction
 from wam.calibration.free_space import UPRIGHT, FreeSpace
 from wam.calibration.friction_file import (
     FrictionCalibration,
@@ -27,10 +27,10 @@ from wam.calibration.sliding import RecordedLeg, SlidingRows, sliding_rows
 from wam.control.position_control import JointMove
 from wam.model.arm_model import ArmModel
 from wam.model.constants import load_constants
-from wam.model.friction import MotorFriction, joint_coulomb, motor_turns
+from wam.model.friction import MotorFriction, joint_coulomb, largest_motor_ratios
 
 CONSTANTS = load_constants()
-TURNS = motor_turns(CONSTANTS)
+TURNS = largest_motor_ratios(CONSTANTS)
 SPACE = FreeSpace(0.33)
 IN_CONTAINER = np.array([0.0, 0.7, 0.0, 1.25, 0.0, 1.15, 0.0])
 KNOWN = np.full(21, 0.02)  # kg m
@@ -204,7 +204,7 @@ def test_no_leg_is_too_fast_or_comes_too_low(model, legs):
         sole = model.sole_path(np.array([*steps, goal])).position
         speed = np.linalg.norm(np.diff(sole, axis=0), axis=1) / 0.1
         assert (speed < 1.1 * POINT_SPEED).all()
-        if leg.use is not LegUse.TRANSIT:
+        if leg.use is not LegPurpose.TRANSIT:
             assert SPACE.is_clear(model, here, goal)
             assert sole[:, 2].min() > SPACE.floor
 
@@ -212,7 +212,7 @@ def test_no_leg_is_too_fast_or_comes_too_low(model, legs):
 def test_every_motor_turns_both_ways_slowly_and_fast(legs):
     turned = {}
     for before, leg in pairwise(legs):
-        if leg.use is LegUse.TRANSIT:
+        if leg.use is LegPurpose.TRANSIT:
             continue
         way = CONSTANTS.j2mp @ (leg.halt.q - before.halt.q) / TURNS
         rate = leg.halt.speed * way / np.abs(leg.halt.q - before.halt.q).max()
@@ -226,11 +226,11 @@ def test_every_motor_turns_both_ways_slowly_and_fast(legs):
 
 
 def test_a_held_out_way_is_none_of_those_that_are_fitted(legs):
-    ways = {use: set() for use in LegUse}
+    ways = {use: set() for use in LegPurpose}
     for before, leg in pairwise(legs):
         ways[leg.use].add(tuple(np.round(leg.halt.q - before.halt.q, 6)))
-    assert ways[LegUse.HELD_OUT]
-    assert not ways[LegUse.HELD_OUT] & ways[LegUse.FIT]
+    assert ways[LegPurpose.HELD_OUT]
+    assert not ways[LegPurpose.HELD_OUT] & ways[LegPurpose.FIT]
 
 
 def test_no_room_around_the_arm_is_refused(model):

@@ -11,7 +11,7 @@ from wam.calibration.free_space import (
     UPRIGHT,
     FreeSpace,
     check_poses,
-    elbow_of,
+    elbow_position,
     is_clear,
     lowest,
 )
@@ -22,9 +22,9 @@ from wam.calibration.poses import (
     choose_orientations,
     choose_poses,
     leg_speed,
-    plan_halts,
+    plan_waypoints,
     tilted_pair,
-    way_seconds,
+    travel_time,
 )
 from wam.control.position_control import JointMove
 from wam.model.arm_model import ArmModel
@@ -50,7 +50,7 @@ def poses(model):
 
 @pytest.fixture(scope="module")
 def halts(model, poses):
-    return plan_halts(model, IN_CONTAINER, poses, SPACE)
+    return plan_waypoints(model, IN_CONTAINER, poses, SPACE)
 
 
 @pytest.mark.parametrize("count", [4, 12])
@@ -169,10 +169,10 @@ def test_the_arm_ends_where_it_began(halts):
 
 
 def test_the_time_of_the_way_is_that_of_its_moves(halts):
-    assert way_seconds(IN_CONTAINER, halts) == pytest.approx(
-        way_seconds(IN_CONTAINER, halts[:5]) + way_seconds(halts[4].q, halts[5:])
+    assert travel_time(IN_CONTAINER, halts) == pytest.approx(
+        travel_time(IN_CONTAINER, halts[:5]) + travel_time(halts[4].q, halts[5:])
     )
-    assert way_seconds(IN_CONTAINER, halts[:1]) > 0.0
+    assert travel_time(IN_CONTAINER, halts[:1]) > 0.0
 
 
 def test_a_container_that_is_too_high_is_refused(model):
@@ -182,7 +182,7 @@ def test_a_container_that_is_too_high_is_refused(model):
 
 def test_an_arm_that_cannot_rise_is_refused(model, poses):
     with pytest.raises(SettingsError, match="cannot rise"):
-        plan_halts(model, np.array(TWISTED), poses, SPACE)
+        plan_waypoints(model, np.array(TWISTED), poses, SPACE)
 
 
 def test_the_elbow_is_where_the_upper_arm_ends(model):
@@ -190,7 +190,7 @@ def test_the_elbow_is_where_the_upper_arm_ends(model):
     constants = model.constants
     q = np.zeros((2, 7))
     q[:, 0], q[:, 1] = (0.7, -1.1), (0.4, 1.2)
-    found = elbow_of(constants, q)
+    found = elbow_position(constants, q)
     for row, (q1, q2) in zip(found, q[:, :2], strict=True):
         out = 0.55 * np.sin(q2)
         expected = [out * np.cos(q1), out * np.sin(q1), 0.55 * np.cos(q2) - 0.045]
@@ -232,7 +232,7 @@ def test_a_pose_that_cannot_be_reached_from_the_one_before_is_reached_by_upright
         def is_clear(self, model, start, goal):
             return bool((start == UPRIGHT).all() or (goal == UPRIGHT).all())
 
-    halts = plan_halts(
+    halts = plan_waypoints(
         model, np.array(UPRIGHT), [low, other], Space(-5.0), is_two_sided=False
     )
     labels = ["upright" if (halt.q == UPRIGHT).all() else halt.pose for halt in halts]
@@ -279,7 +279,7 @@ class FarApart:
     def nearest(self, q):
         return BodyGap("the foot", "the base", 1.0)
 
-    def first_hit(self, start, goal):
+    def first_collision(self, start, goal):
         return self.hit
 
 

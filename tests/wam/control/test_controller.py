@@ -4,7 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from acquisition.control_loop.proof import ProofGoal, ProofKind
+from acquisition.control_loop.powered_test import PoweredTestGoal, PoweredTestKind
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import ArmReading, PositionJump
 from wam.control.controller import FootController
@@ -235,21 +235,23 @@ def test_a_false_position_is_given_the_weight_alone(law, foot_model, state):
     assert np.array_equal(tau, gravity)
 
 
-PUSH = ProofGoal(ProofKind.RAMP, 2, 4.0)
+PUSH = PoweredTestGoal(PoweredTestKind.RAMP, 2, 4.0)
 
 
 def test_in_a_proof_the_arm_gets_what_it_says_and_not_its_weight(law):
     law.enter(ArmState.HOLD, reading(0.0))
     law.prove(PUSH, reading(1.0))
-    assert law.is_proving()
+    assert law.is_testing()
     tau, told = law.torque(reading(1.5))
     assert tau.tolist() == told.tolist() == [0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0]
-    law.prove(ProofGoal(ProofKind.REST), reading(2.0))  # one after the other
+    law.prove(
+        PoweredTestGoal(PoweredTestKind.REST), reading(2.0)
+    )  # one after the other
     assert not law.torque(reading(2.5))[0].any()
     with pytest.raises(ValueError, match="moves in hold only"):
         law.move_to(DOWN, 0.5, reading(3.0))
     law.enter(ArmState.IDLE, reading(3.0))
-    assert not law.is_proving()
+    assert not law.is_testing()
 
 
 @pytest.mark.parametrize("state", [s for s in ArmState if s is not ArmState.HOLD])
@@ -257,14 +259,14 @@ def test_no_proof_begins_outside_of_hold(law, state):
     law.enter(state, reading(0.0))
     with pytest.raises(ValueError, match="proof begins in hold only"):
         law.prove(PUSH, reading(1.0))
-    assert not law.is_proving()
+    assert not law.is_testing()
 
 
 def test_no_arm_is_left_unwatched_for_longer_than_a_module_may_take(law):
     law.enter(ArmState.HOLD, reading(0.0))
     with pytest.raises(ValueError, match="unwatched for too long"):
-        law.prove(ProofGoal(ProofKind.SILENCE, seconds=0.4), reading(1.0))
-    law.prove(ProofGoal(ProofKind.SILENCE, seconds=0.3), reading(1.0))
+        law.prove(PoweredTestGoal(PoweredTestKind.SILENCE, seconds=0.4), reading(1.0))
+    law.prove(PoweredTestGoal(PoweredTestKind.SILENCE, seconds=0.3), reading(1.0))
     assert not law.torque(reading(1.1))[0].any()
 
 
@@ -279,14 +281,16 @@ def test_no_proof_begins_in_a_move(law):
 def test_what_goes_too_far_is_told_in_a_proof_only(law):
     astray = DOWN + 0.05 * np.eye(7)[3]
     law.enter(ArmState.HOLD, reading(0.0))
-    assert law.proof_excess(reading(0.5, q=astray), 9.0, is_powered=True) is None
+    assert law.powered_test_excess(reading(0.5, q=astray), 9.0, is_powered=True) is None
     law.prove(PUSH, reading(1.0))
-    assert law.proof_excess(reading(1.1), 0.0, is_powered=True) is None
-    told = law.proof_excess(reading(1.1, q=astray), 0.0, is_powered=True)
+    assert law.powered_test_excess(reading(1.1), 0.0, is_powered=True) is None
+    told = law.powered_test_excess(reading(1.1, q=astray), 0.0, is_powered=True)
     assert told.quantity == "the travel of joint 4"
-    assert law.proof_excess(reading(1.1), 9.0, is_powered=True).unit == "J"
-    assert law.proof_excess(reading(1.2, q=astray), 9.0, is_powered=False) is None
-    assert law.proof_excess(reading(1.3, q=astray), 0.0, is_powered=True) is None
+    assert law.powered_test_excess(reading(1.1), 9.0, is_powered=True).unit == "J"
+    assert (
+        law.powered_test_excess(reading(1.2, q=astray), 9.0, is_powered=False) is None
+    )
+    assert law.powered_test_excess(reading(1.3, q=astray), 0.0, is_powered=True) is None
 
 
 @pytest.mark.parametrize("state", ArmState)

@@ -7,17 +7,17 @@ import pytest
 
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import ArmReading
-from fakes.plant.friction import MotorBristles, draw_friction
+from fakes.plant.friction import BristleFriction, draw_friction
 from wam.control.controller import FootController
 from wam.control.friction_compensation import (
     LARGEST_SHARE,
     FrictionCompensation,
-    KnownFriction,
-    known_friction,
+    FrictionLowerBound,
+    friction_lower_bound,
 )
 from wam.control.soft_walls import SoftWalls, Walls
 from wam.model.constants import load_constants
-from wam.model.friction import joint_coulomb, motor_turns
+from wam.model.friction import joint_coulomb, largest_motor_ratios
 
 CONSTANTS = load_constants()
 COUNTS = np.array(CONSTANTS.cts)
@@ -25,7 +25,7 @@ CYCLE = 2_000_000  # ns
 POSE = np.array([0, 0.9, 0, 1.6, 0, np.pi - 2.5, 0.2])
 TRUE = draw_friction(CONSTANTS, 1.0, None, np.zeros(7))
 NOTHING = np.zeros(7)
-KNOWN = KnownFriction(TRUE.coulomb, TRUE.coulomb, NOTHING, NOTHING, NOTHING)
+KNOWN = FrictionLowerBound(TRUE.coulomb, TRUE.coulomb, NOTHING, NOTHING, NOTHING)
 
 
 def reading(number, angles, q=POSE):
@@ -114,7 +114,7 @@ def test_the_known_part_lies_below_what_rubs_anywhere_and_either_way():
         load=np.full(7, 0.03),
         load_at=2.0 * TRUE.coulomb,
     )
-    known = known_friction(friction, 0.02 * TRUE.coulomb, 0.02 * TRUE.coulomb)
+    known = friction_lower_bound(friction, 0.02 * TRUE.coulomb, 0.02 * TRUE.coulomb)
     angles = np.linspace(0.0, 2.0 * np.pi, 50)[:, None] * np.ones(7)
     for sense, level in ((1.0, known.forward), (-1.0, known.backward)):
         rubs = friction.dry(angles, friction.load_at, np.full(7, sense)).min(axis=0)
@@ -126,7 +126,7 @@ def test_the_known_part_lies_below_what_rubs_anywhere_and_either_way():
 def test_a_motor_that_bears_less_gets_less_as_its_friction_does(share):
     at = np.abs(np.linalg.inv(CONSTANTS.j2mp).T @ np.array([0, 20.0, 0, 0, 0, 0, 0]))
     friction = replace(TRUE, load=np.full(7, 0.04), load_at=at)
-    known = known_friction(friction, NOTHING, NOTHING)
+    known = friction_lower_bound(friction, NOTHING, NOTHING)
     compensation = FrictionCompensation(CONSTANTS, known, 0.7)
     load_torque = np.array([0.0, share * 20.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     for number, angles in enumerate(turning(1, 0.3)):
@@ -139,7 +139,7 @@ def test_a_motor_that_bears_less_gets_less_as_its_friction_does(share):
 
 
 def test_a_friction_that_may_be_none_is_not_compensated():
-    known = known_friction(TRUE, TRUE.coulomb, NOTHING)
+    known = friction_lower_bound(TRUE, TRUE.coulomb, NOTHING)
     assert not known.forward.any()
     assert not known.backward.any()
 
@@ -156,7 +156,7 @@ def test_random_ways_never_gain_energy_at_a_fifth_too_much(seed):
     steps = random.normal(size=(3000, 7)).cumsum(axis=0)
     steps *= random.uniform(1e-4, 1e-2) / np.abs(steps).max(axis=0)
     way = np.concatenate((steps, steps[::-1]))
-    bristles = MotorBristles(TRUE, np.array(CONSTANTS.drive_inertia), 0.002)
+    bristles = BristleFriction(TRUE, np.array(CONSTANTS.drive_inertia), 0.002)
     gained, before = 0.0, np.zeros(7)
     most = 0.0
     for number, angles in enumerate(way):
@@ -278,19 +278,21 @@ def of_motors(tau):
 @pytest.mark.parametrize("way", [-1.0, 1.0])
 def test_a_bristle_bends_as_far_as_its_motor_turned(motor, way):
     angles = np.zeros((2, 7))
-    angles[1, motor] = way * 0.5 * REACH[motor] * motor_turns(CONSTANTS)[motor]
+    angles[1, motor] = way * 0.5 * REACH[motor] * largest_motor_ratios(CONSTANTS)[motor]
     tau = after(FrictionCompensation(CONSTANTS, KNOWN, 0.7), angles)[-1]
 
     wanted = np.zeros(7)
     wanted[motor] = way * 0.5 * 0.7 * TRUE.coulomb[motor]
-    counted = 2.0 * np.pi / COUNTS[motor] / (REACH * motor_turns(CONSTANTS))[motor]
+    counted = (
+        2.0 * np.pi / COUNTS[motor] / (REACH * largest_motor_ratios(CONSTANTS))[motor]
+    )
     assert of_motors(tau) == pytest.approx(wanted, abs=counted * TRUE.coulomb[motor])
 
 
 @pytest.mark.parametrize("way", [-1.0, 1.0])
 def test_a_jump_of_a_motor_bends_its_bristle_once(way):
     angles = np.zeros((2, 7))
-    angles[1, 1] = way * 3.0 * REACH[1] * motor_turns(CONSTANTS)[1]
+    angles[1, 1] = way * 3.0 * REACH[1] * largest_motor_ratios(CONSTANTS)[1]
     tau = after(FrictionCompensation(CONSTANTS, KNOWN, 0.7), angles)[-1]
 
     assert of_motors(tau)[1] == pytest.approx(way * 0.7 * TRUE.coulomb[1])
@@ -300,7 +302,7 @@ def test_a_jump_of_a_motor_bends_its_bristle_once(way):
 def test_each_sense_of_motion_has_its_own_friction(way):
     known = replace(KNOWN, forward=TRUE.coulomb, backward=0.5 * TRUE.coulomb)
     angles = np.zeros((2, 7))
-    angles[1, 3] = way * 3.0 * REACH[3] * motor_turns(CONSTANTS)[3]
+    angles[1, 3] = way * 3.0 * REACH[3] * largest_motor_ratios(CONSTANTS)[3]
     tau = after(FrictionCompensation(CONSTANTS, known, 0.7), angles)[-1]
 
     share = 0.7 if way > 0.0 else -0.35
@@ -327,7 +329,7 @@ def test_it_fades_over_the_first_20_milliradians_of_a_wall(depth, left):
 def test_twelve_turns_within_a_second_are_a_swing(turns, gap, is_over):
     """A bristle goes to its other end every `gap` cycles of 2 ms."""
     compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.7)
-    end = 3.0 * REACH[2] * motor_turns(CONSTANTS)[2]
+    end = 3.0 * REACH[2] * largest_motor_ratios(CONSTANTS)[2]
     angles = np.zeros((turns * gap + 1, 7))
     for turn in range(turns):
         angles[1 + turn * gap : 1 + (turn + 1) * gap, 2] = end * (turn % 2 == 0)
@@ -340,7 +342,7 @@ def test_twelve_turns_within_a_second_are_a_swing(turns, gap, is_over):
 def test_what_a_swinging_motor_got_fades_evenly():
     """Its twelfth turn ends the compensation; from there it rests."""
     compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.7)
-    end = 3.0 * REACH[2] * motor_turns(CONSTANTS)[2]
+    end = 3.0 * REACH[2] * largest_motor_ratios(CONSTANTS)[2]
     angles = np.zeros((600, 7))
     last = 1 + 11 * 45
     for turn in range(0, 12, 2):
@@ -365,7 +367,7 @@ def test_what_is_left_fades_evenly_for_a_tenth_of_a_second():
 
 
 def test_the_doubt_is_95_percent_and_both_add_as_squares():
-    known = known_friction(TRUE, 0.03 * TRUE.coulomb, 0.04 * TRUE.coulomb)
+    known = friction_lower_bound(TRUE, 0.03 * TRUE.coulomb, 0.04 * TRUE.coulomb)
 
     assert known.forward == pytest.approx((1.0 - 1.96 * 0.05) * TRUE.coulomb)
     assert known.backward == pytest.approx((1.0 - 1.96 * 0.05) * TRUE.coulomb)
@@ -374,7 +376,7 @@ def test_the_doubt_is_95_percent_and_both_add_as_squares():
 
 def test_a_bristle_that_is_bent_far_slides_more_and_more():
     """z grows by the step up to 0.7, and by less and less up to 1."""
-    way = 0.1 * REACH[1] * motor_turns(CONSTANTS)[1]
+    way = 0.1 * REACH[1] * largest_motor_ratios(CONSTANTS)[1]
     angles = np.zeros((13, 7))
     angles[:, 1] = way * np.arange(13)
     tau = after(FrictionCompensation(CONSTANTS, KNOWN, 0.7), angles)
@@ -403,7 +405,7 @@ def test_both_motors_of_a_differential_let_go_and_no_other():
 def test_a_bristle_that_is_bent_one_way_again_and_again_swings_not():
     compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.7)
     angles = np.zeros((400, 7))
-    back = -REACH[2] * motor_turns(CONSTANTS)[2]
+    back = -REACH[2] * largest_motor_ratios(CONSTANTS)[2]
     angles[:, 2] = np.where(np.arange(400) // 10 % 2, 0.9 * back, 0.0)
     after(compensation, angles)
 
@@ -417,7 +419,7 @@ def test_a_ripple_takes_its_share_of_what_the_load_adds():
         ripple_sin=np.full(7, 0.06),
         ripple_cos=np.full(7, 0.08),
     )
-    known = known_friction(ripple, NOTHING, NOTHING)
+    known = friction_lower_bound(ripple, NOTHING, NOTHING)
 
     assert known.load == pytest.approx(np.full(7, 0.03 * 0.9))
     assert known.forward == pytest.approx(0.9 * TRUE.coulomb)

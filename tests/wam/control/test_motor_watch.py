@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from acquisition.devices import ArmReading
-from wam.control.position_control import BREAKAWAY, MotorWatch
+from wam.control.position_control import BREAKAWAY, StallDetector
 from wam.model.constants import load_constants
 
 CONSTANTS = load_constants()
@@ -43,7 +43,7 @@ def pull(share):
 
 
 def look(counts, share=1.01, way=STEP, fresh=0x7F):
-    watch = MotorWatch(CONSTANTS)
+    watch = StallDetector(CONSTANTS)
     assert watch.stuck_motor(np.zeros(7), pull(share), reading(REST)) == 0
     return watch.stuck_motor(way, pull(share), reading(counts, fresh))
 
@@ -81,7 +81,7 @@ def test_a_move_goes_on_by_a_milliradian_or_so_before_a_motor_is_named(motor, wa
 
 
 def test_a_motor_that_turns_now_and_then_is_looked_at_from_where_it_was_last():
-    watch, moved = MotorWatch(CONSTANTS), moved_one(1)
+    watch, moved = StallDetector(CONSTANTS), moved_one(1)
     most = np.abs(J2MP)[0] @ GOES_ON / 0.3  # share of that way
     counts = list(REST)
     for number in range(5):
@@ -102,7 +102,7 @@ def test_a_motor_that_is_not_heard_is_not_said_to_stand():
 
 
 def test_a_new_move_begins_anew():
-    watch = MotorWatch(CONSTANTS)
+    watch = StallDetector(CONSTANTS)
     watch.stuck_motor(np.zeros(7), pull(2.0), reading(REST))
     watch.begin()
     assert watch.stuck_motor(STEP, pull(2.0), reading(REST)) == 0

@@ -621,7 +621,7 @@ def test_a_module_that_says_idle_is_not_believed_against_a_puck():
         cycle(rig, arm, TAU)
     driven = list(rig.motors.units)
     rig.network.disobey()
-    rig.network.say_idle()
+    rig.network.report_false_idle()
     assert arm.idle() is False
     assert arm.safety_mode() is SafetyMode.ACTIVE
     assert rig.motors.units == driven  # without torque it would fall
@@ -636,7 +636,7 @@ def test_a_module_that_says_idle_is_not_believed_while_positions_go_on():
     rig, arm = started()
     rig.network.pendant("activate")
     rig.network.disobey()
-    rig.network.say_idle()
+    rig.network.report_false_idle()
     arm.idle()
     for _ in range(200):
         cycle(rig, arm, TAU)

@@ -13,7 +13,7 @@ from wam.driver.arm import WamArm
 from wam.driver.settings import ArmSettings
 
 CYCLE_NS = 2_000_000
-EVERY = ArmSettings().unasked_every
+EVERY = ArmSettings().request_free_every
 ZERO = np.zeros(7)
 ALL = 0x7F
 GET_P = (0x404, b"\x30")
@@ -49,7 +49,7 @@ class Bench:
 
 
 def unasked(readings):
-    return [i for i, reading in enumerate(readings) if reading.is_unasked]
+    return [i for i, reading in enumerate(readings) if reading.is_without_request]
 
 
 @pytest.mark.parametrize(
@@ -112,7 +112,7 @@ def test_one_cycle_in_47_does_not_ask_and_still_sends_torques():
 def test_a_cycle_that_does_not_ask_is_no_missing_one():
     bench = Bench()
     readings = bench.run(EVERY)
-    assert readings[-1].is_unasked
+    assert readings[-1].is_without_request
     assert all(r.is_complete and r.fresh == ALL for r in readings)
     assert all(r.missing_cycles == 0 for r in readings)
     assert bench.arm.counters.missing == [0] * 7
@@ -126,7 +126,7 @@ def test_positions_go_on_at_their_velocity_in_a_cycle_that_does_not_ask():
         bench.rig.motors.position[6] += 20
         turning += bench.run(1)
     steps = [b.q[6] - a.q[6] for a, b in pairwise(turning)]
-    assert turning[EVERY - 1].is_unasked
+    assert turning[EVERY - 1].is_without_request
     # To half a count: the others are whole ones.
     assert steps[EVERY - 2] == pytest.approx(steps[EVERY - 3], rel=0.03)
     assert turning[EVERY - 1].counts[6] == turning[EVERY - 2].counts[6]
@@ -139,8 +139,8 @@ def test_a_single_late_reply_that_was_missed_is_not_for_ever():
     missed, next_one, then = bench.run(3)
     assert not missed.is_complete
     # While an answer is owed every cycle asks.
-    assert not next_one.is_unasked
-    assert then.is_unasked
+    assert not next_one.is_without_request
+    assert then.is_without_request
     assert then.late is None
 
 
@@ -198,8 +198,8 @@ def test_a_start_says_that_positions_come_too_late_and_not_that_they_are_missing
 
 def test_a_cycle_that_does_not_ask_waits_little_longer_than_an_exchange():
     """The last answer comes after 0.6 ms; replies are given up after 1.5 ms."""
-    bench = Bench(first_look_ns=100_000)
+    bench = Bench(first_read_ns=100_000)
     bench.run(EVERY - 1)
     begun_ns = bench.rig.clock.t_ns
-    assert bench.arm.read(begun_ns).is_unasked
+    assert bench.arm.read(begun_ns).is_without_request
     assert 700_000 < bench.rig.clock.t_ns - begun_ns < 1_000_000

@@ -70,9 +70,9 @@ def test_missing_replies_are_counted_for_each_puck(bench):
 # Puck 1 answers first and puck 7 last, when the others are complete already; the
 # driver may look before all have come, or after.
 @pytest.mark.parametrize("node", [1, 4, 7])
-@pytest.mark.parametrize("first_look_ns", [100_000, 700_000])
-def test_a_late_reply_never_answers_the_next_question(node, first_look_ns):
-    bench = Bench(first_look_ns=first_look_ns)
+@pytest.mark.parametrize("first_read_ns", [100_000, 700_000])
+def test_a_late_reply_never_answers_the_next_question(node, first_read_ns):
+    bench = Bench(first_read_ns=first_read_ns)
     bench.cycle()
     bench.faults.delay(position_reply_id(node), ALMOST_A_CYCLE_NS)
     late = bench.cycle()
@@ -131,7 +131,7 @@ def test_swapped_replies_disturb_no_position(bench):
     for _ in range(210):
         reading = bench.cycle()
         incomplete += not reading.is_complete
-        if not reading.is_unasked:
+        if not reading.is_without_request:
             assert bench.is_true(reading) is reading.is_complete
         assert reading.missing_cycles <= 1
     assert incomplete == 4  # puck 6 is a question late every 50 questions
@@ -185,14 +185,14 @@ def test_a_controller_that_left_the_bus_is_known_until_the_arm_answers(bench):
 
 def test_a_host_that_nobody_acknowledges_fills_its_queue(bench):
     bench.cycle()
-    bench.faults.go_unheard()
+    bench.faults.stop_acknowledging()
     seen = {bench.arm.bus_condition for _ in range(15) if not bench.cycle().is_complete}
-    assert seen == {BusCondition.UNHEARD, BusCondition.FULL}
+    assert seen == {BusCondition.UNACKNOWLEDGED, BusCondition.FULL}
 
 
 def test_no_torque_waits_in_the_queue_of_a_host_that_is_not_heard(bench):
     bench.cycle()
-    bench.faults.go_unheard()
+    bench.faults.stop_acknowledging()
     for _ in range(30):
         bench.cycle()
     heard = []

@@ -11,7 +11,12 @@ from tests.fakes.stepped import Rig
 from wam.bus.frames import encode_reply, encode_set, property_reply_id
 from wam.bus.properties import PuckMode
 from wam.driver.arm import WamArm
-from wam.driver.health import PuckHealth, complaints, health_metadata, temperature_range
+from wam.driver.health import (
+    PuckHealth,
+    health_metadata,
+    health_warnings,
+    temperature_range,
+)
 from wam.driver.pendant import NO_PENDANT
 from wam.driver.settings import ArmSettings
 from wam.driver.status_poller import StatusPoller
@@ -194,8 +199,8 @@ def test_a_puck_that_falls_silent_is_shown_with_the_age_of_what_it_said(bench):
 def test_a_puck_that_is_hot_or_reports_an_error_is_named():
     pucks = [PuckHealth(61, 30, 48, 0, 0), PuckHealth(60, 30, 48, 7, 0), PuckHealth()]
     expected = ["puck 1 at 61 °C (limit 60)", "puck 2 reports error 7"]
-    assert complaints(pucks, S) == expected
-    assert complaints(pucks, 10 * S) == []
+    assert health_warnings(pucks, S) == expected
+    assert health_warnings(pucks, 10 * S) == []
 
 
 def test_health_is_text_in_the_order_of_the_pucks():

@@ -7,7 +7,7 @@ import pytest
 from tests.fakes.stepped import Rig
 from wam.bus.frames import MOTOR_NODES, SAFETY_NODE, encode_reply, property_reply_id
 from wam.driver.arm import WamArm
-from wam.driver.survey import Heard
+from wam.driver.survey import RestTraffic
 
 MS = 1_000_000
 NODES = [*MOTOR_NODES, SAFETY_NODE]
@@ -80,7 +80,7 @@ def test_an_answer_from_before_the_question_is_none(rig):
 
 def test_a_quiet_bus_is_listened_to_for_as_long_as_wanted_and_asked_nothing(rig):
     before_ns = rig.clock.t_ns
-    assert listen(rig, 50) == Heard(frames=0, master=None, error_frames=0)
+    assert listen(rig, 50) == RestTraffic(frames=0, master=None, error_frames=0)
     assert rig.clock.t_ns - before_ns == 50 * MS
     assert rig.sent == []
 

@@ -97,7 +97,7 @@ def test_trap_02_polling_positions_is_the_heartbeat():
         arm.send(ZERO, ZERO)  # torques alone are not enough
         rig.rest(CYCLE_NS)
     assert rig.network.safety_mode is SafetyMode.IDLE
-    assert rig.network.pendant_word.heartbeat is SafetyLevel.FAULT
+    assert rig.network.pendant_state.heartbeat is SafetyLevel.FAULT
 
 
 def test_trap_03_the_host_cannot_activate_and_does_not_try():
@@ -124,7 +124,7 @@ def test_trap_04_the_module_judges_a_torque_before_the_puck_clips_it():
     assert decode_torques(frame)[0] == POWER_UP_TL2 + 1
     rig.link.send(LOWER, frame)
     rig.rest(MS)
-    assert rig.network.pendant_word.torque is SafetyLevel.FAULT
+    assert rig.network.pendant_state.torque is SafetyLevel.FAULT
     assert rig.network.safety_mode is SafetyMode.IDLE
 
 
@@ -133,7 +133,7 @@ def test_trap_04_the_driver_clips_below_what_the_module_warns_of():
     rig.network.pendant("activate")
     for sign in (1.0, -1.0):
         cycle(rig, arm, np.full(7, sign * 1000.0))
-        assert rig.network.pendant_word.torque is SafetyLevel.SAFE
+        assert rig.network.pendant_state.torque is SafetyLevel.SAFE
     assert max(HOST_TORQUE_LIMITS) < POWER_UP_TL1
 
 
@@ -146,7 +146,7 @@ def test_trap_05_one_limit_serves_motors_of_different_scale(group, slot):
     units[slot] = POWER_UP_TL2 + 1
     rig.link.send(group, encode_torques(units))
     rig.rest(MS)
-    assert rig.network.pendant_word.torque is SafetyLevel.FAULT
+    assert rig.network.pendant_state.torque is SafetyLevel.FAULT
     motor = slot if group == LOWER else 4 + slot
     limit = POWER_UP_TL2 / info.pucks[motor].ipnm
     assert limit == pytest.approx(1.93 if group == LOWER else 0.298, abs=0.005)
@@ -248,7 +248,7 @@ def test_trap_11_defined_positions_jump_and_are_announced(is_announced):
             rig.link.send(node, encode_set(48, counts))
             rig.rest(MS)
     cycle(rig, arm)
-    level = rig.network.pendant_word.velocity
+    level = rig.network.pendant_state.velocity
     assert level is (SafetyLevel.SAFE if is_announced else SafetyLevel.FAULT)
 
 

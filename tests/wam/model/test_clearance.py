@@ -10,7 +10,7 @@ from wam.model.clearance import (
     STEP,
     ArmClearance,
     ObstacleBox,
-    straight_way,
+    straight_path,
 )
 from wam.model.constants import load_constants
 
@@ -73,21 +73,21 @@ def test_a_way_through_an_obstacle_is_hit_though_both_ends_are_free(example_tool
     clearance = ArmClearance(CONSTANTS, example_tool, (post,))
     assert clearance.nearest(start).distance > CLEARANCE_MARGIN
     assert clearance.nearest(goal).distance > CLEARANCE_MARGIN
-    hit = clearance.first_hit(start, goal)
+    hit = clearance.first_collision(start, goal)
     assert hit is not None
     assert hit.second == "the post"
     assert 0.0 < hit.distance < CLEARANCE_MARGIN
-    assert clearance.first_hit(start, start) is None
+    assert clearance.first_collision(start, start) is None
 
 
 def test_a_thin_post_is_not_stepped_over(example_tool):
     """Whatever a way's length, two looks are at most 20 mrad, 20 mm at 1 m, apart."""
     start, goal = UPRIGHT.copy(), UPRIGHT.copy()
     start[0], goal[0] = -2.5, 2.5
-    assert np.abs(np.diff(straight_way(start, goal), axis=0)).max() <= STEP
+    assert np.abs(np.diff(straight_path(start, goal), axis=0)).max() <= STEP
     middle = ArmModel(CONSTANTS, example_tool).sole_pose(UPRIGHT)[0]
     clearance = ArmClearance(CONSTANTS, example_tool, (sphere_at(middle, 0.002),))
-    assert clearance.first_hit(start, goal) is not None
+    assert clearance.first_collision(start, goal) is not None
 
 
 def test_a_foot_in_its_container_may_leave_it_and_go_no_deeper(example_tool):
@@ -101,13 +101,13 @@ def test_a_foot_in_its_container_may_leave_it_and_go_no_deeper(example_tool):
     deeper = low.copy()
     deeper[1] += 0.25
     assert clearance.nearest(low).distance < 0.0
-    assert clearance.first_hit(low, UPRIGHT) is None
-    assert clearance.first_hit(deeper, low) is None  # out of it again
+    assert clearance.first_collision(low, UPRIGHT) is None
+    assert clearance.first_collision(deeper, low) is None  # out of it again
     through = low.copy()
     through[0] = 0.9
     around = low.copy()
     around[0] = -0.9
-    assert clearance.first_hit(through, around) is not None
+    assert clearance.first_collision(through, around) is not None
 
 
 def test_a_gap_is_told_in_words_and_millimetres(clearance):
@@ -190,15 +190,15 @@ def test_every_body_encloses_what_was_measured_of_the_arm(example_tool, clearanc
 
 def test_a_way_is_looked_at_from_end_to_end_in_equal_steps():
     start, goal = UPRIGHT, UPRIGHT + np.array([0.05, -0.1, 0, 0, 0, 0, 0])
-    path = straight_way(start, goal)
+    path = straight_path(start, goal)
     assert path[0] == pytest.approx(start)
     assert path[-1] == pytest.approx(goal)
     assert np.diff(path, axis=0) == pytest.approx(
         np.tile((goal - start) / (len(path) - 1), (len(path) - 1, 1))
     )
     assert len(path) in (6, 7)
-    assert len(straight_way(start, start)) == 2
-    assert len(straight_way(start, start + 0.999 * STEP)) == 2
+    assert len(straight_path(start, start)) == 2
+    assert len(straight_path(start, start + 0.999 * STEP)) == 2
 
 
 def test_the_margin_is_thirty_millimetres():
@@ -213,11 +213,11 @@ class Staged(ArmClearance):
         self.gaps = gaps
 
     def distances(self, q):
-        count = len(straight_way(np.zeros(7), np.eye(7)[0]))
+        count = len(straight_path(np.zeros(7), np.eye(7)[0]))
         return np.array([self.gaps.get(round(q[0] * (count - 1)), 0.5)])
 
 
-LAST = len(straight_way(np.zeros(7), np.eye(7)[0])) - 1
+LAST = len(straight_path(np.zeros(7), np.eye(7)[0])) - 1
 
 
 @pytest.mark.parametrize(
@@ -236,5 +236,5 @@ LAST = len(straight_way(np.zeros(7), np.eye(7)[0])) - 1
 def test_on_a_way_nothing_is_closer_than_the_margin_or_its_ends(
     example_tool, gaps, is_hit
 ):
-    hit = Staged(example_tool, gaps).first_hit(np.zeros(7), np.eye(7)[0])
+    hit = Staged(example_tool, gaps).first_collision(np.zeros(7), np.eye(7)[0])
     assert (hit is not None) is is_hit

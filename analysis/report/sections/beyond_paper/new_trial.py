@@ -27,7 +27,7 @@ def new_trial_tables(results: StudyResults) -> list[ReportTable]:
     """Return the non-empty tables on predictions of a new trial."""
     tables = [
         residual_table(results.study),
-        worth_table(results.study),
+        components_table(results.study),
         oracle_table(results),
     ]
     return [table for table in tables if table.rows]
@@ -72,7 +72,7 @@ def residual_table(study: Study) -> ReportTable:
     )
 
 
-def worth_table(study: Study) -> ReportTable:
+def components_table(study: Study) -> ReportTable:
     """Return the table of variance components and the error of a terrain's level."""
     rows = [
         [

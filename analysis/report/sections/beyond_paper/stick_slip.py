@@ -31,7 +31,7 @@ def draw_stick_slip(results: StudyResults) -> Figure | None:
     for ax, result in zip(axes[:, 0], chosen, strict=True):
         number = most_slips(result)
         smooth = result.trials[number].smooth
-        travel = way_of(smooth)
+        travel = travel_of(smooth)
         for k, slip in enumerate(result.slips[number]):
             start, stop = np.interp((slip.onset, slip.end), smooth.t, travel)
             shade_slip(ax, 1e3 * start, 1e3 * stop, is_named=k == 0)
@@ -63,7 +63,7 @@ def caption_stick_slip(results: StudyResults) -> str:
     )
 
 
-def way_of(smooth: Smoothed) -> Array:
+def travel_of(smooth: Smoothed) -> Array:
     """Return the travel of the sole since the start [m], shape (n,) (trapezoidal)."""
     steps = 0.5 * (smooth.v_t[1:] + smooth.v_t[:-1]) * np.diff(smooth.t)
     return np.concatenate([[0.0], np.cumsum(steps)])

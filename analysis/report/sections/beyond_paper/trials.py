@@ -9,7 +9,7 @@ from analysis.data.series import Array
 from analysis.data.terrain_kinds import kind_title
 from analysis.report.results import StudyResults
 from analysis.report.section import FigureSpec
-from analysis.report.sections.beyond_paper.stick_slip import way_of
+from analysis.report.sections.beyond_paper.stick_slip import travel_of
 from analysis.report.style import (
     FORCE_LABEL,
     Figure,
@@ -103,7 +103,7 @@ def force_limits(trials: Sequence[PreparedTrial]) -> tuple[float, float]:
 
 def _thinned(smooth: Smoothed) -> tuple[Array, Array]:
     step = max(1, smooth.t.size // _MOST_POINTS)
-    return way_of(smooth)[::step], smooth.F_t[::step]
+    return travel_of(smooth)[::step], smooth.F_t[::step]
 
 
 TRIALS_FIGURE = FigureSpec(

@@ -118,7 +118,7 @@ def paper_claims(evidence: PaperEvidence) -> list[PaperClaim]:
     the paper's.
     """
     terrains = evidence.study.terrains.values()
-    if len(terrains) < 2 or not all(terrain.is_papers for terrain in terrains):
+    if len(terrains) < 2 or not all(terrain.is_paper_terrain for terrain in terrains):
         return []
     return [evaluate(claim, evidence) for claim in CLAIMS]
 

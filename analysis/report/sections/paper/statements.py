@@ -13,7 +13,7 @@ def statements(results: StudyResults) -> list[ReportTable]:
     Empty for one terrain; for terrains that are not the paper's, only a note.
     """
     terrains = results.study.terrains
-    others = [name for name, result in terrains.items() if not result.is_papers]
+    others = [name for name, result in terrains.items() if not result.is_paper_terrain]
     note = (
         "Errors: mean absolute errors on held-out trials. Beyond chance: paired "
         "over the trials, p below 0.05 for all comparisons of the row together (Holm)."

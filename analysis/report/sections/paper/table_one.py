@@ -40,7 +40,7 @@ def table_one(study: Study) -> ReportTable:
                 "; ".join(flag_counts(result, TUSTIN)) or "none",
             ]
         )
-        if name in PAPER and result.is_papers:
+        if name in PAPER and result.is_paper_terrain:
             printed = [f"{getattr(PAPER[name], key):g}" for key in UNITS]
             rows.append([name, "paper, Table I", *printed, ""])
     units = [f"{SYMBOLS[key]} [{unit}]" for key, unit in UNITS.items()]

@@ -252,7 +252,7 @@ def _sliding_torques(trial: RecordedTrial) -> Array | None:
         return None
     if stored.is_simulated != trial.is_simulated or not 0.0 <= share <= 1.0:
         return None
-    return stored.fit.sliding_left(share)
+    return stored.fit.residual_friction(share)
 
 
 def _drag(trial: RecordedTrial, is_moving: np.ndarray) -> float | None:

@@ -7,7 +7,7 @@ from analysis.report.cell_texts import bounded_text, interval_text, with_error
 from analysis.report.page_model import ReportContext, Section
 from analysis.report.results import StudyResults
 from analysis.report.section import ReportSection, ReportTable
-from analysis.report.sections.summary.look_first import look_first_tables
+from analysis.report.sections.summary.outliers import outlier_tables
 from analysis.report.traction_ratio import traction_ratio
 from analysis.study.models import TITLES, compared
 from analysis.study.study import Study
@@ -132,7 +132,7 @@ def _verdict(result: TerrainResult, models: Sequence[str]) -> Iterator[tuple[str
 
 def _tables(results: StudyResults, _: ReportContext) -> list[ReportTable]:
     study = results.study
-    return [*look_first_tables(study), summary(study), parameters(study)]
+    return [*outlier_tables(study), summary(study), parameters(study)]
 
 
 SECTION = Section(

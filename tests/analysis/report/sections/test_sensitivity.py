@@ -7,9 +7,9 @@ from acquisition.errors import SettingsError
 from analysis.data.prepare import prepare_trial
 from analysis.report.sections.sensitivity import (
     VALUES,
+    comparison_table,
     parse_choice,
     plain_choice,
-    side_by_side,
 )
 from analysis.study.crossval import plan_folds
 from analysis.study.models import GP_NN, TUSTIN, FitOptions
@@ -62,8 +62,8 @@ def test_choices_change_what_they_name_and_nothing_else():
     assert parse_choice("drift=interpolated").is_interpolated
     assert not parse_choice("drift=first").is_interpolated
     assert parse_choice("lag=-12.5").lag == -0.0125
-    assert parse_choice("inertia=removed").is_massless
-    assert not parse_choice("inertia=kept").is_massless
+    assert parse_choice("inertia=removed").is_inertia_removed
+    assert not parse_choice("inertia=kept").is_inertia_removed
 
 
 @pytest.mark.parametrize("text", ["smoothing=41", "window=0.02:0.12"])
@@ -131,7 +131,7 @@ def both(make_series, moving):
 @pytest.mark.slow
 def test_both_studies_stand_side_by_side(both):
     choice, before, after = both
-    table = side_by_side(choice, before, after)
+    table = comparison_table(choice, before, after)
     row = next(row for row in table.rows if row[1] == "Tustin")
     assert row[2] == f"{before.terrains['S0'].mae(TUSTIN):.3f}"
     assert row[3] == f"{after.terrains['S0'].mae(TUSTIN):.3f}"

@@ -2,7 +2,7 @@ import struct
 
 import pytest
 
-from acquisition.ipc.frame_tape import FRAME_DTYPE, FrameTape, last_frames
+from acquisition.ipc.frame_ring import FRAME_DTYPE, FrameRing, last_frames
 from acquisition.ipc.ring_buffer import RingBuffer
 from acquisition.trial_file.views import encode_can_batch
 from tests.acquisition.ros import decode
@@ -24,7 +24,7 @@ def clock_at(t_ns):
 
 
 def tape_of(buffer, times_ns):
-    tape = FrameTape(buffer, clock_at(0))
+    tape = FrameRing(buffer, clock_at(0))
     tape.add((1, b"", t_ns) for t_ns in times_ns)
 
 
@@ -44,7 +44,7 @@ def test_the_span_can_be_chosen(buffer):
 
 def test_a_frame_is_of_its_own_time_or_of_now_in_the_order_of_arrival(buffer):
     frames = [(0x423, b"\x01\x02\x03", S - 9), (0x443, b"", 0), (1, bytes(8), 8)]
-    FrameTape(buffer, clock_at(S)).add(frames)
+    FrameRing(buffer, clock_at(S)).add(frames)
     kept = buffer.last(5)
     assert kept["can_id"].tolist() == [0x423, 0x443, 1]
     assert kept["length"].tolist() == [3, 0, 8]
@@ -63,7 +63,7 @@ def test_the_tape_does_not_grow(buffer):
 def test_a_frame_replaces_all_of_the_one_before(buffer):
     for _ in range(6):
         buffer.write(b"\xff" * FRAME_DTYPE.itemsize)
-    FrameTape(buffer, clock_at(7)).add([(0x404, b"\x30", 0)])
+    FrameRing(buffer, clock_at(7)).add([(0x404, b"\x30", 0)])
     assert buffer.last(1).tobytes() == struct.pack("<QIB3x8s", 7, 0x404, 1, b"\x30")
 
 
@@ -71,7 +71,7 @@ def frames_of(*frames):
     buffer = RingBuffer(
         memoryview(bytearray(RingBuffer.size_of(FRAME_DTYPE, 9))), FRAME_DTYPE, 9
     )
-    tape = FrameTape(buffer, clock_at(0))
+    tape = FrameRing(buffer, clock_at(0))
     tape.add((can_id, data, t_ns) for t_ns, can_id, data in frames)
     return buffer.last(9)
 

@@ -7,9 +7,9 @@ import pytest
 
 from analysis.data.prepare import PrepareOptions
 from analysis.data.series import TractionSeries
-from analysis.report.sections.summary.look_first import (
-    look_first,
-    look_first_tables,
+from analysis.report.sections.summary.outliers import (
+    outlier_tables,
+    outlier_trials,
     qn_scale,
 )
 from analysis.study.models import TUSTIN, FitOptions
@@ -37,8 +37,8 @@ def studied(trials):
 def test_nothing_stands_out_among_trials_that_are_alike():
     trials = [push(k) for k in range(10)]
     study = studied(trials)
-    assert look_first(study) == []
-    assert look_first_tables(study) == []
+    assert outlier_trials(study) == []
+    assert outlier_tables(study) == []
 
 
 @pytest.mark.parametrize(
@@ -60,11 +60,11 @@ def test_a_trial_with_something_wrong_is_the_first_and_says_what(change, words):
     trials = [push(k) for k in range(10)]
     trials[3] = change(trials[3])
     study = studied(trials)
-    odd = look_first(study)
+    odd = outlier_trials(study)
     assert (odd[0].terrain, odd[0].number, odd[0].name) == ("X", 4, "T04")
     assert odd[0].score > 1.0
     assert any(words in reason for reason in odd[0].reasons), odd[0].reasons
-    (table,) = look_first_tables(study)
+    (table,) = outlier_tables(study)
     assert table.rows[0][1] == "4"
 
 
@@ -72,7 +72,7 @@ def test_three_of_ten_trials_with_the_same_fault_do_not_hide_each_other():
     trials = [push(k) for k in range(10)]
     for k in (2, 5, 8):
         trials[k] = replace(trials[k], F_t=trials[k].F_t + 3.0)
-    assert {odd.number for odd in look_first(studied(trials))} == {3, 6, 9}
+    assert {odd.number for odd in outlier_trials(studied(trials))} == {3, 6, 9}
 
 
 def test_the_scale_is_the_standard_deviation_of_normal_values():
@@ -123,13 +123,13 @@ def stood(series):
 )
 def test_a_wrong_sensor_is_seen_at_a_foot_that_stands_on_any_ground(change, words):
     trials = [stood(push(k, mu=0.4 + 0.1 * k)) for k in range(10)]
-    assert look_first(studied(trials)) == []
+    assert outlier_trials(studied(trials)) == []
     trials[3] = change(trials[3])
-    assert look_first(studied(trials))[0].number == 4
-    assert any(words in reason for reason in look_first(studied(trials))[0].reasons)
+    assert outlier_trials(studied(trials))[0].number == 4
+    assert any(words in reason for reason in outlier_trials(studied(trials))[0].reasons)
 
 
 def test_three_trials_are_too_few_to_compare():
     trials = [push(k) for k in range(3)]
     trials[1] = replace(trials[1], F_t=trials[1].F_t + 5.0)
-    assert look_first(studied(trials)) == []
+    assert outlier_trials(studied(trials)) == []

@@ -4,12 +4,12 @@ import numpy as np
 
 from acquisition.clock import NS_PER_S
 from acquisition.control_loop.details import MotionExcess
-from acquisition.control_loop.proof import (
+from acquisition.control_loop.powered_test import (
     PARTNERS,
-    PROOF_LIMITS,
-    ProofGoal,
-    ProofKind,
-    ProofLimits,
+    POWERED_TEST_LIMITS,
+    PoweredTestGoal,
+    PoweredTestKind,
+    PoweredTestLimits,
 )
 from acquisition.devices import ArmReading, Vector
 from wam.model.constants import ArmConstants
@@ -19,15 +19,15 @@ _KEEPS = 2.0  # times the friction of the CAD arm: holds the coupled joint in a 
 _AT_THE_TOP = 0.3  # s that a lifted joint stays up
 
 
-class Proof:
+class PoweredTest:
     """One powered test, relative to the pose in which the motors get power."""
 
     def __init__(
         self,
-        goal: ProofGoal,
+        goal: PoweredTestGoal,
         constants: ArmConstants,
         reading: ArmReading,
-        limits: ProofLimits = PROOF_LIMITS,
+        limits: PoweredTestLimits = POWERED_TEST_LIMITS,
     ) -> None:
         """Begin at `reading`.
 
@@ -35,7 +35,7 @@ class Proof:
             ValueError: invalid goal: no such joint, a value that is not finite, or too
                 long without feedback.
         """
-        needs_joint = goal.kind in (ProofKind.RAMP, ProofKind.LIFT)
+        needs_joint = goal.kind in (PoweredTestKind.RAMP, PoweredTestKind.LIFT)
         if not (1 if needs_joint else 0) <= goal.joint <= _JOINTS:
             raise ValueError(f"there is no joint {goal.joint}")
         if not (np.isfinite(goal.torque) and 0.0 < goal.seconds <= 60.0):
@@ -64,14 +64,14 @@ class Proof:
         goal, i = self.goal, self.goal.joint - 1
         seconds = (reading.host_ns - self._begun_ns) * 1e-9
         share = min(seconds / goal.seconds, 1.0)
-        if goal.kind is ProofKind.GRAVITY:
+        if goal.kind is PoweredTestKind.GRAVITY:
             return share * gravity
-        if goal.kind is ProofKind.RAMP:
+        if goal.kind is PoweredTestKind.RAMP:
             travel = float(reading.q[i]) - self._q[i]
             if travel * np.sign(goal.torque) >= self._limits.reach[i]:
                 self._has_moved = True
             tau[i] = 0.0 if self._has_moved else share * goal.torque
-        elif goal.kind is ProofKind.LIFT:
+        elif goal.kind is PoweredTestKind.LIFT:
             tau[i] = self._lift(reading, i, seconds)
             if partner := PARTNERS.get(goal.joint):
                 limit = _KEEPS * float(self._constants.coulomb[partner - 1])
@@ -81,13 +81,13 @@ class Proof:
     def _lift(self, reading: ArmReading, i: int, seconds: float) -> float:
         """Return the torque that moves joint `i` up and back [N m]."""
         limits, goal = self._limits, self.goal
-        up = limits.lift_way / limits.lift_speed
+        up = limits.lift_travel / limits.lift_speed
         down = seconds - up - _AT_THE_TOP
         height = min(seconds / up, 1.0) if down <= 0.0 else 1.0 - down / up
         if height < 0.0:
             return 0.0  # back on its stop
         sense = float(np.sign(goal.torque))
-        offset = sense * height * limits.lift_way
+        offset = sense * height * limits.lift_travel
         return self._pd_torque(reading, i, offset, abs(goal.torque))
 
     def _pd_torque(

@@ -3,14 +3,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from acquisition.control_loop.proof import (
+from acquisition.control_loop.powered_test import (
     PARTNERS,
-    PROOF_LIMITS,
-    ProofGoal,
-    ProofKind,
+    POWERED_TEST_LIMITS,
+    PoweredTestGoal,
+    PoweredTestKind,
 )
 from acquisition.devices import ArmReading, PositionJump
-from wam.control.proof import Proof
+from wam.control.powered_test import PoweredTest
 from wam.model.constants import load_constants
 
 CONSTANTS = load_constants()
@@ -44,13 +44,16 @@ def excess(proof, now, energy=0.0, *, is_powered=True):
     return proof.excess(now, energy, is_powered=is_powered)
 
 
-LIMITS = PROOF_LIMITS
-REST, GRAVITY = ProofGoal(ProofKind.REST), ProofGoal(ProofKind.GRAVITY)
+LIMITS = POWERED_TEST_LIMITS
+REST, GRAVITY = (
+    PoweredTestGoal(PoweredTestKind.REST),
+    PoweredTestGoal(PoweredTestKind.GRAVITY),
+)
 
 
 def pushed(kind, joint, sense):
     """Return a goal that pushes one joint."""
-    return ProofGoal(kind, joint, 5.0 * sense, 1.0)
+    return PoweredTestGoal(kind, joint, 5.0 * sense, 1.0)
 
 
 def travel_rows():
@@ -58,8 +61,10 @@ def travel_rows():
     for sense in (-1.0, 1.0):
         yield "rest", REST, 2, sense, LIMITS.rest[1]
         yield "gravity", GRAVITY, 2, sense, LIMITS.gravity * LIMITS.rest[1]
-        for kind in (ProofKind.RAMP, ProofKind.LIFT):
-            aim = LIMITS.lift_way if kind is ProofKind.LIFT else LIMITS.reach[2]
+        for kind in (PoweredTestKind.RAMP, PoweredTestKind.LIFT):
+            aim = (
+                LIMITS.lift_travel if kind is PoweredTestKind.LIFT else LIMITS.reach[2]
+            )
             goal = pushed(kind, 3, sense)
             yield f"{kind.name} ahead", goal, 3, sense, aim + LIMITS.beyond
             yield f"{kind.name} back", goal, 3, -sense, LIMITS.reach[2]
@@ -72,7 +77,7 @@ def travel_rows():
     [pytest.param(*row, id=f"{name}-{row[2]:+.0f}") for name, *row in travel_rows()],
 )
 def test_travel_within_its_limit_passes_and_beyond_is_named(goal, joint, sense, limit):
-    proof = Proof(goal, CONSTANTS, reading())
+    proof = PoweredTest(goal, CONSTANTS, reading())
     assert excess(proof, reading(**{f"j{joint}": 0.99 * sense * limit})) is None
     found = excess(proof, reading(**{f"j{joint}": 1.01 * sense * limit}))
     assert f"joint {joint}" in found.quantity
@@ -81,7 +86,7 @@ def test_travel_within_its_limit_passes_and_beyond_is_named(goal, joint, sense, 
 
 
 def test_kinetic_energy_within_its_limit_passes_and_beyond_is_named():
-    proof = Proof(REST, CONSTANTS, reading())
+    proof = PoweredTest(REST, CONSTANTS, reading())
     assert excess(proof, reading(10), 0.99 * LIMITS.energy) is None
     found = excess(proof, reading(10), 1.01 * LIMITS.energy)
     assert (found.quantity, found.limit, found.unit) == (
@@ -93,7 +98,9 @@ def test_kinetic_energy_within_its_limit_passes_and_beyond_is_named():
 @pytest.mark.parametrize("joint", range(1, 8))
 @pytest.mark.parametrize("sense", [-1.0, 1.0])
 def test_a_ramp_grows_evenly_until_its_joint_has_moved_ahead(sense, joint):
-    proof = Proof(pushed(ProofKind.RAMP, joint, sense), CONSTANTS, reading())
+    proof = PoweredTest(
+        pushed(PoweredTestKind.RAMP, joint, sense), CONSTANTS, reading()
+    )
     reach = sense * LIMITS.reach[joint - 1]
     half = proof.torque(reading(500), WEIGHT)
     assert half == pytest.approx(2.5 * sense * np.eye(7)[joint - 1])
@@ -109,14 +116,14 @@ def test_a_ramp_grows_evenly_until_its_joint_has_moved_ahead(sense, joint):
 @pytest.mark.parametrize("sense", [-1.0, 1.0])
 def test_a_lift_goes_up_at_its_speed_waits_and_comes_back(sense):
     """A joint that is where the lift wants it is not pulled; one behind it is."""
-    proof = Proof(pushed(ProofKind.LIFT, 4, sense), CONSTANTS, reading())
-    up_s = LIMITS.lift_way / LIMITS.lift_speed
+    proof = PoweredTest(pushed(PoweredTestKind.LIFT, 4, sense), CONSTANTS, reading())
+    up_s = LIMITS.lift_travel / LIMITS.lift_speed
     pause_s = 0.3
     for seconds, height in (
         *((0.0, 0.0), (0.25 * up_s, 0.25), (up_s, 1.0), (up_s + pause_s, 1.0)),
         *((1.25 * up_s + pause_s, 0.75), (1.99 * up_s + pause_s, 0.01)),
     ):
-        travel = sense * height * LIMITS.lift_way
+        travel = sense * height * LIMITS.lift_travel
         there = reading(1000 * seconds, j4=travel)
         assert proof.torque(there, WEIGHT) == pytest.approx(np.zeros(7), abs=1e-3)
         behind = reading(1000 * seconds, j4=travel - 1e-3 * sense)
@@ -125,34 +132,40 @@ def test_a_lift_goes_up_at_its_speed_waits_and_comes_back(sense):
 
 
 def test_without_power_a_hand_may_move_the_arm_and_the_ramp_waits():
-    proof = Proof(ProofGoal(ProofKind.RAMP, 1, 8.0, 1.0), CONSTANTS, reading())
+    proof = PoweredTest(
+        PoweredTestGoal(PoweredTestKind.RAMP, 1, 8.0, 1.0), CONSTANTS, reading()
+    )
     assert excess(proof, reading(900, j4=-0.5), is_powered=False) is None
     assert excess(proof, reading(902, j4=-0.5)) is None
     assert proof.torque(reading(1400, j4=-0.5), WEIGHT)[0] == pytest.approx(4.0)
 
 
 def test_gravity_grows_to_the_whole_and_stays():
-    goal = ProofGoal(ProofKind.GRAVITY, seconds=2.0)
-    proof = Proof(goal, CONSTANTS, reading())
+    goal = PoweredTestGoal(PoweredTestKind.GRAVITY, seconds=2.0)
+    proof = PoweredTest(goal, CONSTANTS, reading())
     assert proof.torque(reading(1000), WEIGHT) == pytest.approx(WEIGHT / 2)
     assert proof.torque(reading(5000), WEIGHT) == pytest.approx(WEIGHT)
 
 
 def test_a_lift_never_exceeds_its_torque_and_ends_without():
-    proof = Proof(ProofGoal(ProofKind.LIFT, 4, -6.0), CONSTANTS, reading())
+    proof = PoweredTest(
+        PoweredTestGoal(PoweredTestKind.LIFT, 4, -6.0), CONSTANTS, reading()
+    )
     assert proof.torque(reading(1600), WEIGHT)[3] == -6.0
     for ms in (3502, 4000):
         assert not proof.torque(reading(ms, j4=-0.01), WEIGHT).any()
 
 
 def test_a_ramp_to_no_torque_pushes_nothing():
-    proof = Proof(ProofGoal(ProofKind.RAMP, 2), CONSTANTS, reading())
+    proof = PoweredTest(PoweredTestGoal(PoweredTestKind.RAMP, 2), CONSTANTS, reading())
     for way in (-0.02, 0.0, 0.02):
         assert not proof.torque(reading(500, j2=way), WEIGHT).any()
 
 
 def test_a_lift_is_damped_and_pulls_either_way_with_no_more_than_its_torque():
-    proof = Proof(ProofGoal(ProofKind.LIFT, 4, 5.0), CONSTANTS, reading())
+    proof = PoweredTest(
+        PoweredTestGoal(PoweredTestKind.LIFT, 4, 5.0), CONSTANTS, reading()
+    )
     moving = replace(reading(1700, j4=0.08), qd=0.1 * np.eye(7)[3])
     damped = proof.torque(moving, WEIGHT)[3]
     assert damped == pytest.approx(-0.1 * CONSTANTS.kd[3], abs=1e-6)
@@ -165,7 +178,9 @@ def test_a_lift_is_damped_and_pulls_either_way_with_no_more_than_its_torque():
 def test_the_partner_of_a_lifted_joint_is_kept_by_twice_its_friction(
     side, joint, other
 ):
-    proof = Proof(ProofGoal(ProofKind.LIFT, joint, 1.0), CONSTANTS, reading())
+    proof = PoweredTest(
+        PoweredTestGoal(PoweredTestKind.LIFT, joint, 1.0), CONSTANTS, reading()
+    )
     lifted = {f"j{joint}": 0.08}
     most = 2.0 * CONSTANTS.coulomb[other - 1]
     far = proof.torque(reading(1700, **lifted, **{f"j{other}": side}), WEIGHT)
@@ -175,57 +190,59 @@ def test_the_partner_of_a_lifted_joint_is_kept_by_twice_its_friction(
     assert kept[other - 1] == pytest.approx(-side * 0.5 * most)
 
 
-@pytest.mark.parametrize("kind", ProofKind)
+@pytest.mark.parametrize("kind", PoweredTestKind)
 def test_a_position_that_cannot_be_true_gets_no_torque(kind):
-    proof = Proof(ProofGoal(kind, 2, 5.0, seconds=0.3), CONSTANTS, reading())
+    proof = PoweredTest(
+        PoweredTestGoal(kind, 2, 5.0, seconds=0.3), CONSTANTS, reading()
+    )
     jumped = replace(reading(900), jump=PositionJump(motor=3, counts=900, speed=20.0))
     assert not proof.torque(jumped, WEIGHT).any()
 
 
 def test_at_rest_nothing_is_pushed():
-    proof = Proof(ProofGoal(ProofKind.REST), CONSTANTS, reading())
+    proof = PoweredTest(PoweredTestGoal(PoweredTestKind.REST), CONSTANTS, reading())
     assert not proof.torque(reading(900, j2=0.01), WEIGHT).any()
 
 
 @pytest.mark.parametrize(
     "goal",
     [
-        ProofGoal(ProofKind.REST),
-        ProofGoal(ProofKind.GRAVITY, seconds=60.0),
-        ProofGoal(ProofKind.RAMP, 1, -1.0, 0.001),
-        ProofGoal(ProofKind.LIFT, 7, 1.0),
+        PoweredTestGoal(PoweredTestKind.REST),
+        PoweredTestGoal(PoweredTestKind.GRAVITY, seconds=60.0),
+        PoweredTestGoal(PoweredTestKind.RAMP, 1, -1.0, 0.001),
+        PoweredTestGoal(PoweredTestKind.LIFT, 7, 1.0),
     ],
 )
 def test_the_widest_goals_are_proofs(goal):
-    assert Proof(goal, CONSTANTS, reading()).goal == goal
+    assert PoweredTest(goal, CONSTANTS, reading()).goal == goal
 
 
 @pytest.mark.parametrize(
     "goal",
     [
-        ProofGoal(ProofKind.RAMP, 0, 1.0),
-        ProofGoal(ProofKind.LIFT, 8, 1.0),
-        ProofGoal(ProofKind.GRAVITY, -1),
-        ProofGoal(ProofKind.REST, 8),
-        ProofGoal(ProofKind.RAMP, 1, 1.0, 60.1),
-        ProofGoal(ProofKind.RAMP, 1, 1.0, float("nan")),
-        ProofGoal(ProofKind.RAMP, 1, float("inf")),
-        ProofGoal(ProofKind.RAMP, 1, float("nan")),
-        ProofGoal(ProofKind.GRAVITY, seconds=0.0),
+        PoweredTestGoal(PoweredTestKind.RAMP, 0, 1.0),
+        PoweredTestGoal(PoweredTestKind.LIFT, 8, 1.0),
+        PoweredTestGoal(PoweredTestKind.GRAVITY, -1),
+        PoweredTestGoal(PoweredTestKind.REST, 8),
+        PoweredTestGoal(PoweredTestKind.RAMP, 1, 1.0, 60.1),
+        PoweredTestGoal(PoweredTestKind.RAMP, 1, 1.0, float("nan")),
+        PoweredTestGoal(PoweredTestKind.RAMP, 1, float("inf")),
+        PoweredTestGoal(PoweredTestKind.RAMP, 1, float("nan")),
+        PoweredTestGoal(PoweredTestKind.GRAVITY, seconds=0.0),
     ],
 )
 def test_what_is_no_proof_is_refused(goal):
     with pytest.raises(ValueError, match=r"no joint|is not a valid proof"):
-        Proof(goal, CONSTANTS, reading())
+        PoweredTest(goal, CONSTANTS, reading())
 
 
 def test_a_goal_says_what_is_given_in_four_numbers():
     """With no joint and no torque, in a second, where nothing else is said."""
     wanted = [(float(number), 0.0, 0.0, 1.0) for number in range(5)]
-    assert [ProofGoal(kind).values for kind in ProofKind] == wanted
+    assert [PoweredTestGoal(kind).values for kind in PoweredTestKind] == wanted
 
 
 def test_a_goal_survives_its_way_through_the_commands():
-    goal = ProofGoal(ProofKind.LIFT, 6, -1.5, 2.0)
-    assert ProofGoal.of((*goal.values, 0.0)) == goal
-    assert ProofGoal.of(replace(goal, joint=5).values) != goal
+    goal = PoweredTestGoal(PoweredTestKind.LIFT, 6, -1.5, 2.0)
+    assert PoweredTestGoal.of((*goal.values, 0.0)) == goal
+    assert PoweredTestGoal.of(replace(goal, joint=5).values) != goal

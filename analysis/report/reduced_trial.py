@@ -18,7 +18,7 @@ from ft_sensor.payload import Payload, TerrainFrame
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class HeldTrial:
+class ReducedTrial:
     """A recorded trial without the arrays of its file.
 
     Attributes:
@@ -52,7 +52,7 @@ class HeldTrial:
         return self.series.terrain
 
     @classmethod
-    def of(cls, trial: RecordedTrial) -> "HeldTrial":
+    def of(cls, trial: RecordedTrial) -> "ReducedTrial":
         """Reduce a trial."""
         return cls(
             path=trial.path,
@@ -69,7 +69,7 @@ class HeldTrial:
 class TrialFiles:
     """Iterable over recorded trials that reads each from disk on every pass."""
 
-    def __init__(self, trials: Sequence[HeldTrial]) -> None:
+    def __init__(self, trials: Sequence[ReducedTrial]) -> None:
         self._paths = [trial.path for trial in trials]
 
     def __iter__(self) -> Iterator[RecordedTrial]:

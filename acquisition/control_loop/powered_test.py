@@ -12,7 +12,7 @@ from enum import IntEnum
 from acquisition.clock import NS_PER_S
 
 
-class ProofKind(IntEnum):
+class PoweredTestKind(IntEnum):
     """Torques applied to the arm.
 
     REST: none. RAMP: a linearly growing torque of one joint until it moves. LIFT: a
@@ -30,7 +30,7 @@ class ProofKind(IntEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class ProofGoal:
+class PoweredTestGoal:
     """Parameters of one proof.
 
     Attributes:
@@ -41,7 +41,7 @@ class ProofGoal:
         seconds: duration of a ramp, or of SILENCE [s].
     """
 
-    kind: ProofKind
+    kind: PoweredTestKind
     joint: int = 0
     torque: float = 0.0
     seconds: float = 1.0
@@ -49,7 +49,11 @@ class ProofGoal:
     @property
     def silence_ns(self) -> int:
         """Time without position requests [ns]."""
-        return round(self.seconds * NS_PER_S) if self.kind is ProofKind.SILENCE else 0
+        return (
+            round(self.seconds * NS_PER_S)
+            if self.kind is PoweredTestKind.SILENCE
+            else 0
+        )
 
     @property
     def values(self) -> tuple[float, float, float, float]:
@@ -57,17 +61,17 @@ class ProofGoal:
         return float(self.kind), float(self.joint), self.torque, self.seconds
 
     @classmethod
-    def of(cls, values: Sequence[float]) -> "ProofGoal":
+    def of(cls, values: Sequence[float]) -> "PoweredTestGoal":
         """Return the proof with these `values`."""
         kind, joint, torque, seconds = values[:4]
-        return cls(ProofKind(int(kind)), int(joint), torque, seconds)
+        return cls(PoweredTestKind(int(kind)), int(joint), torque, seconds)
 
 
 PARTNERS = {2: 3, 3: 2, 5: 6, 6: 5}  # joints coupled by a differential
 
 
 @dataclass(frozen=True, slots=True)
-class ProofLimits:
+class PoweredTestLimits:
     """Limits of the motion in a proof.
 
     Attributes:
@@ -76,7 +80,7 @@ class ProofLimits:
         aside: travel of every other joint [rad].
         partner: travel of the joint coupled by the differential [rad]: with unequal
             friction one motor slides first and turns it.
-        lift_way: travel of a lifted joint [rad].
+        lift_travel: travel of a lifted joint [rad].
         lift_speed: speed of a lifted joint [rad/s].
         beyond: overshoot beyond the goal in the pushed direction [rad].
         gravity: travel under gravity compensation as a multiple of `rest`.
@@ -89,31 +93,31 @@ class ProofLimits:
     reach: Sequence[float] = (0.008, 0.008, 0.008, 0.008, 0.015, 0.015, 0.020)
     aside: float = 0.025
     partner: float = 0.045
-    lift_way: float = 0.080
+    lift_travel: float = 0.080
     lift_speed: float = 0.05
     beyond: float = 0.025
     gravity: float = 1.5
     energy: float = 0.07
     silence: float = 0.3
 
-    def aside_of(self, pushed: int, joint: int) -> float:
+    def other_joint_travel(self, pushed: int, joint: int) -> float:
         """Return the travel limit of joint 1-7 while another is pushed [rad]."""
         return self.partner if PARTNERS.get(pushed) == joint else self.aside
 
-    def ways(self, goal: ProofGoal) -> list[tuple[float, float]]:
+    def ways(self, goal: PoweredTestGoal) -> list[tuple[float, float]]:
         """Return the travel limits (low, high) of each joint from its start [rad]."""
-        if goal.kind in (ProofKind.REST, ProofKind.SILENCE):
+        if goal.kind in (PoweredTestKind.REST, PoweredTestKind.SILENCE):
             return [(-way, way) for way in self.rest]
-        if goal.kind is ProofKind.GRAVITY:
+        if goal.kind is PoweredTestKind.GRAVITY:
             return [(-self.gravity * way, self.gravity * way) for way in self.rest]
         i = goal.joint - 1
-        asides = [self.aside_of(goal.joint, joint) for joint in range(1, 8)]
+        asides = [self.other_joint_travel(goal.joint, joint) for joint in range(1, 8)]
         limits = [(-aside, aside) for aside in asides]
-        reach = self.lift_way if goal.kind is ProofKind.LIFT else self.reach[i]
+        reach = self.lift_travel if goal.kind is PoweredTestKind.LIFT else self.reach[i]
         # In the wrong direction only the travel that detects the motion is allowed.
         low, high = -self.reach[i], reach + self.beyond
         limits[i] = (low, high) if goal.torque > 0.0 else (-high, -low)
         return limits
 
 
-PROOF_LIMITS = ProofLimits()
+POWERED_TEST_LIMITS = PoweredTestLimits()

@@ -23,7 +23,7 @@ FRAME_DTYPE = np.dtype(
 _FRAME: Final = struct_of(FRAME_DTYPE)
 
 
-class FrameTape:
+class FrameRing:
     """Writes the frames of the bus to a ring buffer that outlives its writer."""
 
     def __init__(self, buffer: RingBuffer, clock: Clock) -> None:

@@ -103,7 +103,7 @@ MEASURES: Mapping[str, Measure] = {
 
 
 @dataclass(frozen=True, slots=True)
-class OddTrial:
+class OutlierTrial:
     """An outlier trial.
 
     Attributes:
@@ -121,14 +121,14 @@ class OddTrial:
     reasons: tuple[str, ...]
 
 
-def look_first(study: Study) -> list[OddTrial]:
+def outlier_trials(study: Study) -> list[OutlierTrial]:
     """Return the outlier trials, the largest score first; none in a sound study."""
     measured = {
         name: [_measures(result, k) for k in range(len(result.trials))]
         for name, result in study.terrains.items()
     }
     scored = _scores(measured)
-    outliers: list[OddTrial] = []
+    outliers: list[OutlierTrial] = []
     for name, result in study.terrains.items():
         for k, trial in enumerate(result.trials):
             doubts = [d.seen for d in doubts_of(trial) if d.name != _SMOOTH]
@@ -137,7 +137,7 @@ def look_first(study: Study) -> list[OddTrial]:
             reasons = (*doubts, *texts[:_MOST_REASONS])
             if reasons:
                 score = math.inf if doubts else abs(ranked[0][0])
-                outliers.append(OddTrial(name, k + 1, trial.name, score, reasons))
+                outliers.append(OutlierTrial(name, k + 1, trial.name, score, reasons))
     return sorted(outliers, key=lambda trial: -trial.score)
 
 
@@ -267,9 +267,9 @@ def _normal_score(
     return math.copysign(float(ndtri(stdtr(freedom, -abs(t)))), difference)
 
 
-def look_first_tables(study: Study) -> list[ReportTable]:
+def outlier_tables(study: Study) -> list[ReportTable]:
     """Return the table of outlier trials; none without outliers."""
-    outliers = look_first(study)
+    outliers = outlier_trials(study)
     if not outliers:
         return []
     table = ReportTable(

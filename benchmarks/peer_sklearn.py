@@ -97,7 +97,7 @@ def three_starts(part: str, X: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, .
     return (*starts, *design)[:_STARTS]
 
 
-def fit_theirs(
+def fit_sklearn(
     part: str, X: np.ndarray, y: np.ndarray, starts: Sequence[np.ndarray]
 ) -> GaussianProcessRegressor:
     """Fit scikit-learn's model from each start and return the likeliest.
