@@ -40,7 +40,7 @@ LAYOUTS: tuple[Border, ...] = (
     refused(
         "UTF-16 without a byte-order mark",
         _PLAIN.encode("utf-16-le"),
-        "line 1: a zero byte; this is no UTF-8 text",
+        "line 1: a zero byte; this is not UTF-8 text",
     ),
     refused(
         "UTF-16 that was cut within a character",

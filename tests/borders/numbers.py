@@ -197,7 +197,7 @@ NUMBERS: tuple[Border, ...] = (
     refused(
         "t in ms that nothing states",
         text(_scaled(0, 1e3)),
-        "2 s between two rows; these look like ms. Say it: --unit t=ms",
+        "2 s between two rows; these look like ms. State it: --unit t=ms",
     ),
     refused("t in us that nothing states", text(_scaled(0, 1e6)), "--unit t=us"),
     refused("t in ns that nothing states", text(_scaled(0, 1e9)), "--unit t=ns"),
@@ -280,7 +280,7 @@ NUMBERS: tuple[Border, ...] = (
     refused(
         "days of a spreadsheet",
         text(with_column(0, lambda k, _: f"{46352.5 + 0.002 * k / 86400:.10f}")),
-        "these look like days. Say it: --unit t=d",
+        "these look like days. State it: --unit t=d",
     ),
     table(
         "a foot that stands in a third of the rows, and slides evenly else",
