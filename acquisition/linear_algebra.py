@@ -53,7 +53,7 @@ def openblas_settings(cpu: Path = _CPU) -> dict[str, str]:
 
 @cache
 def keep_memory() -> bool:
-    """Let malloc keep large freed blocks for the next matrix.
+    """Make malloc keep large freed blocks for the next matrix.
 
     Returns:
         Whether mallopt succeeded; otherwise computations are slower.

@@ -145,7 +145,7 @@ class ArmBody:
         return weight - supported
 
     def keep_turn(self) -> None:
-        """Let the hand keep the present orientation of the forearm."""
+        """Make the hand keep the present orientation of the forearm."""
         hand = pin.updateFramePlacement(self._model, self._data, self._hand)
         self._target_rotation = hand.rotation.copy()
 

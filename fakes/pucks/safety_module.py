@@ -65,7 +65,7 @@ class FakeSafetyModule:
         mode: the true mode.
         is_mute: its transmit wire is cut.
         is_disobedient: it ignores a host that lowers its mode.
-        says_idle: it reports IDLE whatever its mode.
+        says_idle: it reports IDLE in every mode.
         dead_button: a pendant button without effect; None = none.
         limit_factors: by name, the ratio of the stored limit to the value a host sets.
     """

@@ -172,11 +172,11 @@ class SafetyModule:
             )
 
     def ignore_speed_faults(self, count: int) -> None:
-        """Let the module ignore `count` samples, before a jump of the positions."""
+        """Make the module ignore `count` samples, before a jump of the positions."""
         self._set("IFAULT", count)
 
     def heed_speed_faults(self) -> None:
-        """Let the module monitor the speed again.
+        """Make the module monitor the speed again.
 
         Raises:
             DeviceFaultError: the module still ignores samples.
