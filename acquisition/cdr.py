@@ -26,7 +26,7 @@ class CdrWriter:
     def string(self, text: str) -> "CdrWriter":
         """Append a string: length with its NUL, bytes, NUL.
 
-        Lone surrogates become "?": an odd note must not end a recording.
+        Lone surrogates become "?": a malformed note must not end a recording.
         """
         encoded = text.encode(errors="replace") + b"\0"
         self.scalar("I", len(encoded))

@@ -28,7 +28,7 @@ _PIECE = 1 << 20  # bytes per read
 
 
 class UnfitFileError(ValueError):
-    """A path is not a regular file, or the file is too large; the text says which."""
+    """A path is not a regular file, or the file is too large, as the message states."""
 
 
 class NotRegularError(UnfitFileError):

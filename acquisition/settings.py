@@ -16,7 +16,7 @@ Number = Annotated[float, Field(strict=True)]
 Whole = Annotated[int, Field(strict=True)]
 Near = Annotated[Number, Field(ge=-10, le=10)]  # m or rad
 Six = tuple[Number, Number, Number, Number, Number, Number]
-File = Annotated[str, Field(min_length=1, max_length=4096)]  # beside rig.toml
+File = Annotated[str, Field(min_length=1, max_length=4096)]  # next to rig.toml
 
 
 @dataclass(frozen=True, slots=True)

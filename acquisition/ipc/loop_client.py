@@ -88,7 +88,7 @@ class LoopClient:
         return self.loop.late
 
     def advance(self, seconds: float) -> None:
-        """Let `seconds` pass, at least one cycle, with heartbeats to the loop."""
+        """Wait for `seconds`, at least one cycle, with heartbeats to the loop."""
         remaining = max(1, round(seconds * NS_PER_S / PERIOD_NS))
         while remaining > 0:
             portion = min(remaining, PORTION)

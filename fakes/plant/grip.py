@@ -87,12 +87,12 @@ class StopPath:
         self._i = joint - 1
         self._sign = 1.0 if side == "high" else -1.0
         self._stop = float((ends.upper if side == "high" else ends.lower)[self._i])
-        self._wanted, self._speed, self._is_felt = np.zeros(7), 0.0, False
+        self._wanted, self._speed, self._is_at_stop = np.zeros(7), 0.0, False
 
     @property
     def is_done(self) -> bool:
-        """Whether the stop has been felt."""
-        return self._is_felt
+        """Whether the joint has met its stop."""
+        return self._is_at_stop
 
     def begin(self, q: Array) -> None:
         """Begin at `q` [rad], shape (7,)."""
@@ -102,8 +102,10 @@ class StopPath:
         """Advance by a cycle; return reference (angles, speeds), shapes (7,)."""
         i, rates = self._i, np.zeros(7)
         beyond = self._sign * (q[i] - self._stop)
-        self._is_felt = self._is_felt or bool(beyond * STOP_K >= _NOTICED_TORQUE[i])
-        if self._is_felt:
+        self._is_at_stop = self._is_at_stop or bool(
+            beyond * STOP_K >= _NOTICED_TORQUE[i]
+        )
+        if self._is_at_stop:
             return self._wanted, rates
         fastest = _FEEL if beyond > -_NEAR else _TURN
         self._speed = min(self._speed + 2.0 * _DT, fastest)  # gently: 2 rad/s^2

@@ -144,7 +144,7 @@ class ArmPlant:
         """Joint velocities [rad/s], shape (7,); the array is not changed later."""
         return self._body.qd
 
-    # --- what the pucks see -------------------------------------------------------
+    # --- interface to the pucks -------------------------------------------------------
 
     def advance(self, t_ns: int) -> None:
         """Advance the world to `t_ns` in whole substeps."""
@@ -196,7 +196,7 @@ class ArmPlant:
             self._body.drive(_NO_TORQUE)
         self._update_support()
 
-    # --- what the sensor feels ----------------------------------------------------
+    # --- interface to the sensor ----------------------------------------------------
 
     def sensor_load(self, t_ns: int) -> Wrench:
         """Return the load on the wrist sensor in its own frame [N, N m].

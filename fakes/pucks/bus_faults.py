@@ -235,10 +235,10 @@ class BusFaults:
         )
 
 
-_HALF_NS = PERIOD_NS // 2  # it speaks between two frames of the arm's own program
-_ASK = b"\x30"  # for the position
+_HALF_NS = PERIOD_NS // 2  # it sends between two frames of the arm's own program
+_POSITION_REQUEST = b"\x30"
 _FRAMES = (
-    (Group.ARM, _ASK),
+    (Group.ARM, _POSITION_REQUEST),
     (Group.LOWER_TORQUE, encode_torques([0] * 4)),
     (Group.WRIST_TORQUE, encode_torques([0] * 4)),
 )
@@ -247,27 +247,24 @@ Hear = Callable[[int, int, bytes], None]  # (time [ns], identifier, data)
 
 
 class OtherMaster:
-    """Asks for positions 500 times a second while it is on the bus, and sends torques.
-
-    Those are zero.
-    """
+    """A foreign program that requests positions and sends zero torques at 500 Hz."""
 
     def __init__(self, schedule: EventQueue, hear: Hear) -> None:
-        """Take the network's time and what the devices hear with."""
+        """Connect to the network: its clock and its `hear` callback for frames."""
         self._schedule = schedule
         self._hear = hear
         self._node = HOST
-        self._visit = 0  # number of the present one; events of earlier ones are void
+        self._visit = 0  # number of the present visit; events of earlier ones are void
 
     def join(self, node: int = HOST) -> None:
-        """Begin to send as `node`."""
+        """Start to send as `node`."""
         self._visit += 1
         self._node = node
         visit = self._visit
         self._schedule.after(_HALF_NS, lambda: self._send(visit))
 
     def leave(self) -> None:
-        """Send nothing any more."""
+        """Stop sending."""
         self._visit += 1
 
     def _send(self, visit: int) -> None:

@@ -126,5 +126,5 @@ class MotorPuck:
         self.define("MODE", PuckMode.IDLE)
 
     def lose_position(self, counts: int) -> None:
-        """Report the position within one turn again, as the magnetic encoder has it."""
+        """Restart the position within one turn, as read by the magnetic encoder."""
         self.offset = counts % (self._properties["CTS"] or 1) - counts

@@ -103,11 +103,10 @@ MODE_BROADCAST_ID = compose_id(SAFETY_NODE, Group.BUS, is_group=True)
 def is_of_host(can_id: int) -> bool:
     """Return whether only a host sends frames with this 11-bit identifier.
 
-    Devices obey a frame whatever its sender field says, and they send to feedback
-    groups only, never to each other. So a frame addressed to a device of the arm, or to
-    a group that takes requests and commands, comes from a host. The same holds for a
-    position report of a node that is no motor puck: the safety module would count it
-    as a heartbeat.
+    Devices accept a frame with any sender field, and they send to feedback groups only,
+    never to each other. So a frame addressed to a device of the arm, or to a group for
+    requests and commands, is from a host. The same holds for a position report of a
+    node that is not a motor puck: the safety module would count it as a heartbeat.
     """
     address = split_id(can_id)
     if address.sender == HOST:

@@ -167,7 +167,7 @@ def parse_log(
 ) -> Iterator[LoggedFrame]:
     """Yield the frames of a log sorted by time.
 
-    Sorting starts anew where time steps back by more than `JUMP_NS`.
+    Sorting restarts where time steps back by more than `JUMP_NS`.
 
     Args:
         lines: lines of the log, with or without newlines.

@@ -174,6 +174,6 @@ def fits_tool(calibration: GravityCalibration, tool: Tool) -> bool:
     return all(_has_same_moment(theirs, ours) for theirs, ours in pairs)
 
 
-def _has_same_moment(one: Body, other: Body) -> bool:
-    is_near = np.abs(one.com - other.com) <= _SAME
-    return abs(one.mass - other.mass) <= _SAME and bool(is_near.all())
+def _has_same_moment(body: Body, other: Body) -> bool:
+    is_near = np.abs(body.com - other.com) <= _SAME
+    return abs(body.mass - other.mass) <= _SAME and bool(is_near.all())

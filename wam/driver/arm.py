@@ -226,7 +226,7 @@ class WamArm:
         is_complete = fresh == _ALL_FRESH
         self._missing_cycles = 0 if is_complete else self._missing_cycles + 1
         if not (is_complete and self._is_commanded):
-            # Otherwise `send` asks the status question, after the torques.
+            # Otherwise `send` sends the status request, after the torques.
             traffic.ask(is_urgent=0 < self._missing_cycles <= _URGENT_CYCLES)
         self._is_commanded = False
         return ArmReading(

@@ -90,8 +90,8 @@ class CommandWatch:
         """
         if not self._sent or not self._questions or reply.value is None:
             return None
-        asked = self._questions[self._next]
-        if (node, reply.number) != asked:
+        expected = self._questions[self._next]
+        if (node, reply.number) != expected:
             return None
         mismatch = self._mismatch(node, reply)
         if mismatch is None:

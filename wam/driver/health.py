@@ -106,8 +106,10 @@ class HealthTable:
         """Store a telemetry reply of puck `node`; other properties are ignored."""
         field = self._fields[node - 1].get(reply.number)
         if field is not None:
-            old = self.pucks[node - 1]
-            self.pucks[node - 1] = replace(old, heard_ns=now_ns, **{field: reply.value})
+            previous = self.pucks[node - 1]
+            self.pucks[node - 1] = replace(
+                previous, heard_ns=now_ns, **{field: reply.value}
+            )
 
 
 def temperature_range(pucks: Sequence[PuckHealth], now_ns: int) -> str:

@@ -172,7 +172,7 @@ class SafetyModule:
             )
 
     def ignore_speed_faults(self, count: int) -> None:
-        """Let the module ignore `count` samples, before a jump of the positions."""
+        """Make the module ignore `count` samples, before a jump of the positions."""
         self._set("IFAULT", count)
 
     def monitor_speed_faults(self) -> None:

@@ -252,10 +252,12 @@ class StartUp:
                     "checked."
                 )
         health = ask_health(lambda number: self._properties.get(node, number), vers)
-        asked = ask_properties(lambda number: self._properties.get(node, number), vers)
+        answers = ask_properties(
+            lambda number: self._properties.get(node, number), vers
+        )
         required = {"VERS": vers, "ROLE": role, "CTS": cts, "IPNM": ipnm}
-        self.answers.append({**asked, **required, "VBUS": health.bus_voltage})
-        serial = asked.get("SN")
+        self.answers.append({**answers, **required, "VBUS": health.bus_voltage})
+        serial = answers.get("SN")
         return PuckInfo(node, vers, role, cts, ipnm, mech, was_asleep, health, serial)
 
     def _note_firmware(self, who: str, vers: int) -> None:

@@ -106,7 +106,7 @@ def rubbed(folder, **changes):
 
 def test_friction_that_its_command_refuses_is_refused_at_load(tmp_path):
     assert rubbed(tmp_path) is not None
-    with pytest.raises(SettingsError, match=r"motor 3 is not of this form.* 0\.25"):
+    with pytest.raises(SettingsError, match=r"does not fit motor 3: .* 0\.25"):
         rubbed(tmp_path, residual=np.array([0, 0, 0.25, 0, 0, 0, 0]))
     deviation = friction_from_toml(friction(), "f").fit.deviation
     deviation = deviation * np.array([1, 1, 1, 1, 30, 1, 1])

@@ -168,7 +168,7 @@ def test_a_friction_of_another_form_is_refused():
         replace(r, friction=r.friction * (1 + 0.5 * np.sin(r.load * 9)))
         for r in held_out
     ]
-    with pytest.raises(SettingsError, match="not of this form"):
+    with pytest.raises(SettingsError, match="model does not fit"):
         check_friction(fit_friction(CONSTANTS, rows_of(truth(), 1), other, KNOWN))
 
 
