@@ -65,7 +65,7 @@ CAUSES = {
         "experiments/calibration/test_gravity.py::"
         "test_a_hand_on_the_foot_refuses_the_calibration",
     ),
-    ("ft_sensor/calibration/fit.py", "turns the other way in the sensor"): (
+    ("ft_sensor/calibration/fit.py", "has the opposite sign in the sensor"): (
         "the fitted mass is negative at the stated mounting",
         "ft_sensor/calibration/test_fit.py::"
         "test_a_weight_of_the_other_sign_is_refused_when_the_mounting_is_stated",
@@ -74,7 +74,7 @@ CAUSES = {
         "the fitted mass is not above zero",
         "ft_sensor/calibration/test_fit.py::test_readings_of_no_weight_are_refused",
     ),
-    ("ft_sensor/calibration/fit.py", "too much alike"): (
+    ("ft_sensor/calibration/fit.py", "too similar"): (
         "the condition number of the orientations",
         "ft_sensor/calibration/test_fit.py::test_orientations_that_are_alike_are_refused",
     ),

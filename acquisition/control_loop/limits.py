@@ -48,9 +48,9 @@ class GuardLimits:
             foot of 1 kg with a wrong sign of the sensor gives 20 N.
         late_per_second: late cycles in a second that lead to hold.
         still_travel: travel of the sole in a trial while a motor does not turn [m],
-            seven. With stiction, joint 2 may move by only one motor of its
-            differential: with the friction of another arm, motors 2 to 6 rested for at
-            most 35, 17, 12, 21 and 33 mm in simulated trials; 1 and 7 may rest.
+            seven. With stiction, joint 2 may move by one motor of its differential.
+            With the friction of another arm, motors 2 to 6 rested for at most 35, 17,
+            12, 21 and 33 mm in simulated trials; 1 and 7 may rest.
         hold_after_missing: consecutive incomplete cycles that lead to hold.
         idle_after_missing: consecutive incomplete cycles that lead to idle.
         idle_after_late: consecutive cycles without a request with stale positions that

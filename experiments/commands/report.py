@@ -54,16 +54,11 @@ def run(args: argparse.Namespace) -> int:
     require_extra("report")
     if args.scheduler:
         require_extra("cluster")
-    record = _record(args)  # as the data are now, before they are read
-    if not args.json and record.is_current():
-        _tell_up_to_date(record, args)
-        return 0
     from experiments.report.workers import workers_of_report
 
     is_new = not args.scheduler and not _is_kept(Path(args.data), args.to)
     with workers_of_report(are_needed=is_new):
         _report(args)
-    record.write()
     return 0
 
 
@@ -114,6 +109,10 @@ def _report(args: argparse.Namespace) -> None:
     from experiments.settings.load import load_settings
 
     choices = analysis_choices(args)
+    record = _record(args)  # as the data are now, before they are read
+    if not args.json and record.is_current():
+        _tell_up_to_date(record, args)
+        return
     console = PageRecorder() if args.json else Console(color=not args.no_color)
     data = Path(args.data)
     sessions = choose_sessions(data, args.sessions, every=args.all)
@@ -132,6 +131,7 @@ def _report(args: argparse.Namespace) -> None:
         with_pdf=args.pdf,
     )
     page = report_sessions(sessions, data, wanted, console)
+    record.write()
     if args.json:
         names = [session.id for session in sessions]
         Console(color=False).say(_as_json(page, names, missing))

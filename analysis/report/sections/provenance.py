@@ -26,8 +26,8 @@ def choices(study: Study, *, is_foreign: bool) -> ReportTable:
         [
             "GP fit",
             f"one length per input, at most {fit.gp_points} samples chosen at random "
-            f"(seed {fit.seed}); marginal likelihood, climbed from a designed start and "
-            "from further proposed points",
+            f"(seed {fit.seed}); marginal likelihood, climbed from a designed start "
+            "and from further proposed points",
         ],
         [
             "noise of the GP",
