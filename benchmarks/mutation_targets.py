@@ -50,7 +50,7 @@ TESTS = {
         f"{_LOOP_TESTS}/test_guard.py",
         f"{_LOOP_TESTS}/test_contact.py",
     ),
-    f"{_LOOP}/powered_test.py": (f"{_CONTROL_TESTS}/test_powered_test.py",),
+    f"{_LOOP}/powered_tests.py": (f"{_CONTROL_TESTS}/test_powered_test.py",),
     "acquisition/ipc/loop_server.py": ("tests/acquisition/ipc/test_loop_server.py",),
     f"{_FILE}/salvage.py": _SALVAGED,
     f"{_FILE}/recover.py": _SALVAGED,
@@ -71,7 +71,7 @@ TESTS = {
     f"{_CONTROL}/friction_compensation.py": (
         f"{_CONTROL_TESTS}/test_friction_compensation.py",
     ),
-    f"{_CONTROL}/powered_test.py": (f"{_CONTROL_TESTS}/test_powered_test.py",),
+    f"{_CONTROL}/powered_tests.py": (f"{_CONTROL_TESTS}/test_powered_test.py",),
     f"{_CONTROL}/soft_walls.py": (f"{_CONTROL_TESTS}/test_soft_walls.py",),
     f"{_DRIVER}/transmission.py": (f"{_DRIVER_TESTS}/test_transmission.py",),
     f"{_DRIVER}/status_poller.py": (
@@ -508,12 +508,12 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         "elif t < ramp: -> elif t <= ramp:",
     ): _AT_REST,
     (
-        f"{_CONTROL}/powered_test.py",
+        f"{_CONTROL}/powered_tests.py",
         "height = min(seconds / up, 1.0) if down <= 0.0 else 1.0 - down / up -> "
         "height = min(seconds / up, 1.0) if down < 0.0 else 1.0 - down / up",
     ): _AT_REST,
     (
-        f"{_CONTROL}/powered_test.py",
+        f"{_CONTROL}/powered_tests.py",
         "limit = low if travel < low else high -> limit = low if travel <= low "
         "else high",
     ): "a joint at the end of its range was already accepted before",

@@ -18,7 +18,7 @@ from acquisition.control_loop.guard import GuardState, Observation, check
 from acquisition.control_loop.law import ControlLaw, FootObserver
 from acquisition.control_loop.limits import GuardLimits, bounded_torque
 from acquisition.control_loop.loop import Tick
-from acquisition.control_loop.powered_test import PoweredTestGoal
+from acquisition.control_loop.powered_tests import PoweredTestGoal
 from acquisition.control_loop.states import (
     REQUESTS,
     TRANSITIONS,

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from acquisition.control_loop.details import MotionExcess
-from acquisition.control_loop.powered_test import PoweredTestGoal
+from acquisition.control_loop.powered_tests import PoweredTestGoal
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import ArmReading, Vector, WrenchSample
 from acquisition.sample import Sample

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from acquisition.control_loop.faults import GuardVerdict, from_plain, to_plain
-from acquisition.control_loop.powered_test import PoweredTestGoal
+from acquisition.control_loop.powered_tests import PoweredTestGoal
 from acquisition.control_loop.states import ArmState, ControlStatus
 from acquisition.devices import BusCondition, SafetyMode
 from acquisition.ipc.latest_value import Slot

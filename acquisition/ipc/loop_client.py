@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from acquisition.clock import NS_PER_S, PERIOD_NS, Clock
-from acquisition.control_loop.powered_test import PoweredTestGoal
+from acquisition.control_loop.powered_tests import PoweredTestGoal
 from acquisition.control_loop.states import ArmState, ControlStatus
 from acquisition.ipc.commands import (
     AwaitActivation,

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.control_loop.faults import CircuitCauses, Fault, GuardVerdict
-from acquisition.control_loop.powered_test import (
+from acquisition.control_loop.powered_tests import (
     POWERED_TEST_LIMITS,
     PoweredTestGoal,
     PoweredTestKind,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from acquisition.control_loop.details import CircuitCauses
 from acquisition.control_loop.faults import GuardVerdict
-from acquisition.control_loop.powered_test import PoweredTestGoal
+from acquisition.control_loop.powered_tests import PoweredTestGoal
 from acquisition.devices import SafetyMode
 from acquisition.ipc.loop_client import LoopClient
 from acquisition.simulation import SimulationControl

@@ -6,7 +6,7 @@ import numpy as np
 
 from acquisition.control_loop.details import MotionExcess
 from acquisition.control_loop.law import ControlLaw
-from acquisition.control_loop.powered_test import PoweredTestGoal
+from acquisition.control_loop.powered_tests import PoweredTestGoal
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import ArmReading, Vector
 from wam.control.friction_compensation import FrictionCompensation
@@ -19,7 +19,7 @@ from wam.control.position_control import (
     joint_pd,
     move_reference,
 )
-from wam.control.powered_test import PoweredTest
+from wam.control.powered_tests import PoweredTest
 from wam.control.soft_walls import SoftWalls
 from wam.model.arm_model import ArmModel
 from wam.model.gravity import VirtualMass, compensation

@@ -14,7 +14,7 @@ from acquisition.control_loop.faults import (
     verdict_for,
 )
 from acquisition.control_loop.loop import Tick
-from acquisition.control_loop.powered_test import PoweredTestGoal, PoweredTestKind
+from acquisition.control_loop.powered_tests import PoweredTestGoal, PoweredTestKind
 from acquisition.control_loop.states import ArmState, ControlStatus
 from acquisition.devices import ArmReading, SafetyMode, WrenchSample
 from acquisition.errors import LinkError

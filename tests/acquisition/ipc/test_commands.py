@@ -10,7 +10,7 @@ from acquisition.control_loop.faults import (
     Fault,
     GuardVerdict,
 )
-from acquisition.control_loop.powered_test import PoweredTestGoal, PoweredTestKind
+from acquisition.control_loop.powered_tests import PoweredTestGoal, PoweredTestKind
 from acquisition.control_loop.states import ArmState, ControlStatus
 from acquisition.devices import SafetyMode
 from acquisition.ipc.commands import (

@@ -5,7 +5,7 @@ import pytest
 from acquisition.clock import PERIOD_NS
 from acquisition.control_loop.faults import Action
 from acquisition.control_loop.loop import Tick
-from acquisition.control_loop.powered_test import PoweredTestGoal, PoweredTestKind
+from acquisition.control_loop.powered_tests import PoweredTestGoal, PoweredTestKind
 from acquisition.control_loop.states import ArmState, ControlStatus
 from acquisition.devices import BusCondition
 from acquisition.ipc.commands import (

@@ -14,7 +14,7 @@ import pytest
 
 from acquisition.control_loop import contact
 from acquisition.control_loop.cycle import Cycle
-from acquisition.control_loop.powered_test import PoweredTestGoal, PoweredTestKind
+from acquisition.control_loop.powered_tests import PoweredTestGoal, PoweredTestKind
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import SafetyMode
 from acquisition.ipc.child import ProcessLostError

@@ -4,7 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from acquisition.control_loop.powered_test import PoweredTestGoal, PoweredTestKind
+from acquisition.control_loop.powered_tests import PoweredTestGoal, PoweredTestKind
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import ArmReading, PositionJump
 from wam.control.controller import FootController

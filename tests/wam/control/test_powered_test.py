@@ -3,14 +3,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from acquisition.control_loop.powered_test import (
+from acquisition.control_loop.powered_tests import (
     PARTNERS,
     POWERED_TEST_LIMITS,
     PoweredTestGoal,
     PoweredTestKind,
 )
 from acquisition.devices import ArmReading, PositionJump
-from wam.control.powered_test import PoweredTest
+from wam.control.powered_tests import PoweredTest
 from wam.model.constants import load_constants
 
 CONSTANTS = load_constants()

@@ -4,7 +4,7 @@ import numpy as np
 
 from acquisition.clock import NS_PER_S
 from acquisition.control_loop.details import MotionExcess
-from acquisition.control_loop.powered_test import (
+from acquisition.control_loop.powered_tests import (
     PARTNERS,
     POWERED_TEST_LIMITS,
     PoweredTestGoal,
