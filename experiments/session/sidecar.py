@@ -40,7 +40,7 @@ class TrialName:
 
 @dataclass(slots=True)
 class TrialOutcome:
-    """How a recording ended.
+    """End of a recording.
 
     Attributes:
         reason: "travel", "key", "time-limit", "interrupted" or a fault's name.
