@@ -28,7 +28,7 @@ from experiments.settings.load import Settings
 from experiments.settings.matrix import TerrainRow
 
 _NOTHING = "Nothing was written."
-_STOPPED = "The move was stopped; it goes on when it is asked for anew only."
+_STOPPED = "The move was stopped; it does not go on by itself."
 _HOLD = 0.2  # s, from a stop to idle
 
 

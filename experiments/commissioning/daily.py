@@ -171,7 +171,7 @@ def _hang(scene: Scene, reference: Values) -> Values:
     parts: list[tuple[Array, Array]] = []
     for is_again in (False, True):
         if is_again:
-            scene.say("The foot's weight is beside the commissioning's: once more.")
+            scene.say("The foot's weight differs from the commissioning's: once more.")
         for k, at in enumerate(HANGING, 1):
             bring(scene, POSES[at], f"pose {k} of {len(HANGING)}")
             parts.append(measure(scene))
