@@ -68,7 +68,7 @@ class DailyHistory(RecordPart):
         return self.model_copy(update={"checks": (*self.checks, check)[-_KEPT:]})
 
     def counts_at(self, now: datetime) -> bool:
-        """Return whether the last check is at most a day old, and not in the future."""
+        """Return whether the last check is at most `COUNTS_FOR` old, and not ahead."""
         return bool(self.checks) and is_fresh(self.checks[-1].ended, now, COUNTS_FOR)
 
 
